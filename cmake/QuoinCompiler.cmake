@@ -1,0 +1,25 @@
+# Compiler settings that every Quoin target shares.
+
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+set(CMAKE_CXX_EXTENSIONS OFF)
+
+find_program(QUOIN_CCACHE ccache)
+if(QUOIN_CCACHE AND PROJECT_IS_TOP_LEVEL)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${QUOIN_CCACHE}")
+endif()
+
+function(quoin_compile_options target)
+  # No contraction: the same bytes from every instruction set.
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
+    -ffp-contract=off $<$<BOOL:${QUOIN_WARNINGS_AS_ERRORS}>:-Werror>)
+  if(QUOIN_SANITIZE STREQUAL "address")
+    target_compile_options(${target} PUBLIC -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=address,undefined)
+  elseif(QUOIN_SANITIZE STREQUAL "thread")
+    target_compile_options(${target} PUBLIC -fsanitize=thread -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=thread)
+    target_compile_definitions(${target} PRIVATE QUOIN_PARALLEL_WITH_JTHREAD)
+  endif()
+endfunction()

@@ -1,0 +1,18 @@
+# What `cmake --install` puts in place, and the package that find_package(quoin) finds.
+
+include(CMakePackageConfigHelpers)
+set(quoin_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/quoin")
+
+install(TARGETS quoin EXPORT quoin_targets
+  ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+install(DIRECTORY include/quoin DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+install(EXPORT quoin_targets NAMESPACE quoin:: DESTINATION "${quoin_package_dir}")
+configure_package_config_file(cmake/quoin-config.cmake.in "${CMAKE_CURRENT_BINARY_DIR}/quoin-config.cmake"
+  INSTALL_DESTINATION "${quoin_package_dir}")
+write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/quoin-config-version.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/quoin-config.cmake" "${CMAKE_CURRENT_BINARY_DIR}/quoin-config-version.cmake"
+  DESTINATION "${quoin_package_dir}")
+install(FILES LICENSE NOTICE DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+if(QUOIN_BUILD_TOOLS)
+  install(TARGETS quoin_tool RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endif()

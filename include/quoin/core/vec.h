@@ -1,0 +1,60 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
+
+namespace quoin {
+
+/// Integer voxel or chunk coordinates.
+using IVec3 = glm::ivec3;
+/// Mesh vertices: float, relative to a grid or a chunk.
+using Vec3 = glm::vec3;
+/// World positions: double.
+using DVec3 = glm::dvec3;
+/// Rotations. Constructor order is glm's: (w, x, y, z).
+using DQuat = glm::dquat;
+
+/// A box of whole voxels (or chunks): `min` inclusive, `max` exclusive.
+///
+/// Empty when any component of `max` is not greater than that of `min`; the default box is empty.
+struct IBox {
+  IVec3 min{0};
+  IVec3 max{0};
+
+  [[nodiscard]] bool empty() const { return max.x <= min.x || max.y <= min.y || max.z <= min.z; }
+  [[nodiscard]] IVec3 size() const { return empty() ? IVec3{0} : max - min; }
+  [[nodiscard]] bool contains(IVec3 p) const {
+    return p.x >= min.x && p.y >= min.y && p.z >= min.z && p.x < max.x && p.y < max.y && p.z < max.z;
+  }
+  bool operator==(const IBox& other) const { return min == other.min && max == other.max; }
+};
+
+/// The smallest box that contains both; an empty box adds nothing.
+[[nodiscard]] inline IBox unite(const IBox& a, const IBox& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  return {glm::min(a.min, b.min), glm::max(a.max, b.max)};
+}
+
+/// What both boxes cover; empty when they do not meet.
+[[nodiscard]] inline IBox intersect(const IBox& a, const IBox& b) {
+  return {glm::max(a.min, b.min), glm::min(a.max, b.max)};
+}
+
+/// A box in double precision, both ends inclusive. The default box is empty (min > max).
+struct DBox {
+  DVec3 min{std::numeric_limits<double>::infinity()};
+  DVec3 max{-std::numeric_limits<double>::infinity()};
+
+  [[nodiscard]] bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
+  void extend(DVec3 p) {
+    min = glm::min(min, p);
+    max = glm::max(max, p);
+  }
+};
+
+}  // namespace quoin

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin {
+
+inline constexpr int kChunkShift = 6;
+/// Voxels along a chunk's edge: the width of a machine word.
+inline constexpr int kChunkEdge = 1 << kChunkShift;
+inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
+
+/// Chunk that holds a voxel; voxel -1 lies in chunk -1.
+[[nodiscard]] inline IVec3 chunk_of(IVec3 voxel) {
+  return {voxel.x >> kChunkShift, voxel.y >> kChunkShift, voxel.z >> kChunkShift};
+}
+/// Position of a voxel inside its chunk, 0..63 on each axis.
+[[nodiscard]] inline IVec3 local_of(IVec3 voxel) {
+  return {voxel.x & (kChunkEdge - 1), voxel.y & (kChunkEdge - 1), voxel.z & (kChunkEdge - 1)};
+}
+
+/// 64^3 voxels, compressed by a palette to 1, 2, 4, 8 or 16 bits each.
+///
+/// Voxels lie in rows of 64 along x, so one bit plane of a row is one word. 4x4 rows (64x4x4 voxels) are a slab, the
+/// unit of uniformity: a slab of one type holds no voxel data, a chunk of one type holds nothing but that type.
+/// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and
+/// tight bounds cost nothing to ask.
+class Chunk {
+ public:
+  explicit Chunk(VoxelType uniform = kAir);
+  Chunk(Chunk&&) noexcept = default;
+  Chunk& operator=(Chunk&&) noexcept = default;
+  Chunk(const Chunk& other);
+  Chunk& operator=(const Chunk& other);
+  ~Chunk() = default;
+
+  /// From 64^3 types, x fastest, then y, then z. The smallest storage that holds them.
+  static Chunk from_dense(std::span<const VoxelType, kChunkVoxels> types);
+
+  /// Requires: 0 <= x, y, z < 64.
+  [[nodiscard]] VoxelType get(int x, int y, int z) const {
+    if (mixed_ == nullptr) return uniform_;
+    const std::uint32_t slab = mixed_->slabs[slab_index(y, z)];
+    const std::uint32_t index =
+        (slab & kUniformSlab) != 0 ? slab & ~kUniformSlab : mixed_->read(slab, row_in_slab(y, z), x);
+    return mixed_->direct() ? static_cast<VoxelType>(index) : mixed_->palette[index];
+  }
+  [[nodiscard]] VoxelType get(IVec3 local) const { return get(local.x, local.y, local.z); }
+
+  /// Sets the voxels of one row whose bits are set in `mask`; answers which of them had another type before.
+  std::uint64_t set_row(int y, int z, std::uint64_t mask, VoxelType type);
+  /// Sets the 64 voxels of one row; answers which of them had another type before.
+  std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types);
+  void read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const;
+  /// True when the voxel had another type before.
+  bool set(int x, int y, int z, VoxelType type) { return set_row(y, z, std::uint64_t{1} << x, type) != 0; }
+  bool set(IVec3 local, VoxelType type) { return set(local.x, local.y, local.z, type); }
+  /// Makes the whole chunk one type.
+  void fill(VoxelType type);
+
+  /// Which of a row's voxels have this type.
+  [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;
+
+  /// The one type of the whole chunk, if it is stored as such.
+  [[nodiscard]] std::optional<VoxelType> uniform() const {
+    return mixed_ == nullptr ? std::optional(uniform_) : std::nullopt;
+  }
+  [[nodiscard]] int non_air_count() const;
+  /// How many voxels have this type. Cost: O(palette), or O(voxels) at 16 bits a voxel.
+  [[nodiscard]] int count(VoxelType type) const;
+  /// The types that occur, ascending. Cost: as `count`.
+  [[nodiscard]] std::vector<VoxelType> types() const;
+  /// The smallest box around the non-air voxels, in chunk coordinates; empty when all is air. Cost: O(64).
+  [[nodiscard]] IBox bounds() const;
+  /// Bytes held, this object included.
+  [[nodiscard]] std::size_t bytes() const;
+  /// Gives back what edits left behind: unused palette entries, bits, slabs that became uniform.
+  void compact();
+
+  /// The storage itself, for code that turns voxels into masks (meshing, tracing).
+  struct Mixed {
+    int bits = 1;                        ///< a voxel: 1, 2, 4, 8 or 16
+    std::vector<VoxelType> palette;      ///< type of each index; unused at 16 bits, where the index is the type
+    std::vector<std::uint32_t> counts;   ///< voxels of each index; unused at 16 bits
+    std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
+    std::vector<std::uint64_t> words;    ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
+    std::vector<std::uint32_t> free_slots;
+    std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer
+    int non_air = 0;
+
+    [[nodiscard]] bool direct() const { return bits == 16; }
+    [[nodiscard]] const std::uint64_t* row(std::uint32_t slot, int row_in_slab) const {
+      return words.data() + (static_cast<std::size_t>(slot) * 16 + static_cast<std::size_t>(row_in_slab)) *
+                                static_cast<std::size_t>(bits);
+    }
+    [[nodiscard]] std::uint64_t* row(std::uint32_t slot, int row_in_slab) {
+      return const_cast<std::uint64_t*>(std::as_const(*this).row(slot, row_in_slab));
+    }
+    [[nodiscard]] std::uint32_t read(std::uint32_t slot, int row_in_slab, int x) const {
+      const auto bit = static_cast<unsigned>(x * bits);
+      return static_cast<std::uint32_t>(row(slot, row_in_slab)[bit >> 6] >> (bit & 63U)) & ((1U << bits) - 1U);
+    }
+  };
+  static constexpr std::uint32_t kUniformSlab = 0x8000'0000U;
+  [[nodiscard]] static std::size_t slab_index(int y, int z) { return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2)); }
+  [[nodiscard]] static int row_in_slab(int y, int z) { return ((z & 3) << 2) | (y & 3); }
+  /// Null when the chunk is uniform.
+  [[nodiscard]] const Mixed* mixed() const { return mixed_.get(); }
+
+ private:
+  void make_mixed();
+  std::uint32_t index_for(VoxelType type);
+  void widen(int bits);
+  std::uint32_t slot_for_writing(std::size_t slab);
+  void count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid);
+
+  VoxelType uniform_;
+  std::unique_ptr<Mixed> mixed_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// Names a kind of voxel; an index into a VoxelRegistry. 0 is air in every registry.
+using VoxelType = std::uint16_t;
+inline constexpr VoxelType kAir = 0;
+/// Types besides air that a registry can hold.
+inline constexpr std::size_t kMaxVoxelTypes = 65'535;
+
+/// How a voxel takes part in visibility, occlusion and light.
+enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
+
+/// 8 bits a channel, encoded as sRGB; alpha is linear coverage.
+struct Rgba8 {
+  std::uint8_t r = 0;
+  std::uint8_t g = 0;
+  std::uint8_t b = 0;
+  std::uint8_t a = 255;
+  bool operator==(const Rgba8&) const = default;
+};
+
+/// What there is to know of one kind of voxel.
+struct VoxelProperties {
+  std::string name;
+  Rgba8 colour;                                ///< sRGB; alpha below 255 only matters for transparent types
+  Visibility visibility = Visibility::Opaque;
+  bool collides = true;                        ///< stops a moving body
+  float roughness = 1.0F;                      ///< glTF's perceptual roughness, 0 to 1
+  float metalness = 0.0F;                      ///< 0 to 1
+  float emission = 0.0F;                       ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
+  float ior = 1.5F;                            ///< index of refraction, of use to transparent types
+  /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
+  std::map<std::string, std::string> attributes;
+
+  bool operator==(const VoxelProperties&) const = default;
+};
+
+/// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.
+///
+/// Cost: `visibility` is one array look-up.
+class VoxelRegistry {
+ public:
+  /// Holds air only.
+  VoxelRegistry();
+
+  /// Adds a type and returns its id: ids count up from 1.
+  ///
+  /// Errors: LimitExceeded beyond kMaxVoxelTypes; InvalidArgument when `visibility` is Air.
+  [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);
+
+  /// The id of a type that equals `properties` in everything, or a new one. Errors: as `add`. Cost: O(log types).
+  [[nodiscard]] Result<VoxelType> find_or_add(const VoxelProperties& properties);
+
+  /// Replaces the properties of `type`. Meshes and pictures made before know nothing of it.
+  ///
+  /// Requires: type is not air and is registered; visibility is not Air.
+  void replace(VoxelType type, VoxelProperties properties);
+
+  /// Requires: `type < size()`.
+  [[nodiscard]] const VoxelProperties& operator[](VoxelType type) const { return properties_[type]; }
+
+  /// Number of ids in use, air included; every id below it is valid.
+  [[nodiscard]] std::size_t size() const { return properties_.size(); }
+
+  /// An unregistered id counts as opaque, so that a wrong id shows instead of vanishing.
+  [[nodiscard]] Visibility visibility(VoxelType type) const {
+    return type < visibility_.size() ? visibility_[type] : Visibility::Opaque;
+  }
+  [[nodiscard]] bool is_opaque(VoxelType type) const { return visibility(type) == Visibility::Opaque; }
+  [[nodiscard]] bool is_transparent(VoxelType type) const { return visibility(type) == Visibility::Transparent; }
+  /// Whether any registered type is transparent.
+  [[nodiscard]] bool has_transparent() const { return transparent_count_ > 0; }
+
+ private:
+  std::vector<VoxelProperties> properties_;
+  std::vector<Visibility> visibility_;
+  std::multimap<std::uint64_t, VoxelType> by_hash_;
+  std::size_t transparent_count_ = 0;
+};
+
+}  // namespace quoin

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// The whole of a regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not there).
+[[nodiscard]] Result<std::vector<std::byte>> read_file(const std::filesystem::path& path);
+
+/// A file that appears whole or not at all: bytes go to a temporary file beside `path`, `commit` syncs and renames it.
+/// Destroyed without a commit, it leaves nothing behind and the old file as it was.
+class AtomicFile {
+ public:
+  /// Errors: CannotWrite.
+  [[nodiscard]] static Result<AtomicFile> create(const std::filesystem::path& path);
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&& other) noexcept;
+  ~AtomicFile();
+
+  /// Errors: CannotWrite (a full disk). Afterwards `commit` fails too.
+  [[nodiscard]] Status write(std::span<const std::byte> bytes);
+  [[nodiscard]] Status commit();
+
+ private:
+  AtomicFile() = default;
+  void discard() noexcept;
+
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  int descriptor_ = -1;
+  bool failed_ = false;
+};
+
+/// Writes all of `bytes` to `path` by way of an AtomicFile.
+[[nodiscard]] Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
+
+}  // namespace quoin

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/grid/grid.h>
+#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/quad.h>
+#include <quoin/mesh/visible_faces.h>
+
+namespace quoin {
+
+struct QuadOptions {
+  bool merge = true;       ///< false: one quad a visible unit face
+  bool occlusion = true;   ///< false: all levels 0, and faces merge whatever stands before them
+  IBox region = kWholeChunk;
+};
+
+/// What a mesher did.
+struct QuadStats {
+  std::int64_t faces = 0;  ///< visible unit faces covered
+};
+
+/// Turns chunks into quads; holds the scratch memory that this takes (about 1 MiB), so keep one a thread.
+class BlockyMesher {
+ public:
+  BlockyMesher();
+  BlockyMesher(BlockyMesher&&) noexcept;
+  BlockyMesher& operator=(BlockyMesher&&) noexcept;
+  ~BlockyMesher();
+
+  /// Replaces `out` by the quads of the centre chunk's visible faces.
+  ///
+  /// Space:    voxels, origin at the chunk's minimum corner.
+  /// Border:   reads one voxel past each side; the chunk that owns the voxel emits the face.
+  /// Lossless: every visible unit face of the region is covered by exactly one quad, of its type, whose levels
+  ///           interpolate to that face's own; faces merge only where type and all four levels agree and along
+  ///           directions in which the levels do not change.
+  /// Order:    direction, layer, row, column; the same bytes on every machine.
+  /// Cost:     O(rows of 64 voxels + visible faces); no allocation once `out` has grown.
+  QuadStats mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);
+
+ private:
+  struct Scratch;
+  std::unique_ptr<Scratch> scratch_;
+};
+
+}  // namespace quoin

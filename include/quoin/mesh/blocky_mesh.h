@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin {
+
+/// What a triangle is drawn with; each class becomes a primitive of its own.
+enum class SurfaceClass : std::uint8_t { Opaque, Transparent, Emissive, EmissiveTransparent };
+inline constexpr std::size_t kSurfaceClasses = 4;
+
+/// The class of a type: by its visibility and whether it emits.
+[[nodiscard]] SurfaceClass surface_class(const VoxelProperties& properties);
+
+/// Triangles of one surface class. The vertex arrays have one entry a vertex; no vertex is shared between faces.
+struct BlockyTriangles {
+  std::vector<Vec3> positions;           ///< grid coordinates, voxels
+  std::vector<Direction> directions;     ///< the face's normal
+  std::vector<std::uint8_t> levels;      ///< occlusion, 0 to 3
+  std::vector<VoxelType> types;
+  std::vector<std::uint32_t> indices;    ///< three a triangle, counter-clockwise from outside
+};
+
+struct BlockyMesh {
+  std::array<BlockyTriangles, kSurfaceClasses> surfaces;
+  std::int64_t faces_total = 0;    ///< 6 x non-air voxels
+  std::int64_t faces_visible = 0;
+  std::int64_t quads = 0;
+
+  [[nodiscard]] std::int64_t triangle_count() const;
+  [[nodiscard]] std::int64_t vertex_count() const;
+};
+
+struct BlockyMeshOptions {
+  bool merge = true;
+  bool occlusion = true;
+  bool watertight = false;  ///< subdivide outlines so that no vertex lies inside another triangle's edge
+};
+
+/// Meshes a whole grid, chunk by chunk.
+///
+/// Space:   grid coordinates (voxel (i,j,k) spans i..i+1 and so on). Coordinates beyond 2^24 lose precision; use
+///          BlockyMesher chunk by chunk for those.
+/// Order:   chunks as in Grid::chunks; the same bytes at any thread count.
+/// Errors:  Cancelled; LimitExceeded when a surface class needs more than 2^32 - 2 vertices.
+[[nodiscard]] Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types,
+                                                   const BlockyMeshOptions& options, Threads threads = {},
+                                                   const Progress& progress = {});
+
+}  // namespace quoin

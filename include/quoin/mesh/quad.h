@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/occlusion.h>
+
+namespace quoin {
+
+/// One merged face, packed into a word.
+///
+/// bits 0-5 x, 6-11 y, 12-17 z of the lowest voxel it covers (chunk coordinates); 18-23 and 24-29 size along the
+/// direction's u and v, less one; 30-37 the four levels, corner 0 lowest; 38 diagonal flipped; 39-41 direction;
+/// 42-57 type; the rest 0.
+struct Quad {
+  std::uint64_t bits = 0;
+
+  static constexpr int kSizeUShift = 18;
+  static constexpr int kSizeVShift = 24;
+  static constexpr int kLevelsShift = 30;
+  static constexpr int kFlipShift = 38;
+  static constexpr int kDirectionShift = 39;
+  static constexpr int kTypeShift = 42;
+
+  /// The lowest voxel covered, 0..63 on each axis.
+  [[nodiscard]] IVec3 voxel() const { return {field(0, 63), field(6, 63), field(12, 63)}; }
+  /// Voxels along the direction's first and second axis, 1..64.
+  [[nodiscard]] int size_u() const { return field(kSizeUShift, 63) + 1; }
+  [[nodiscard]] int size_v() const { return field(kSizeVShift, 63) + 1; }
+  [[nodiscard]] Direction direction() const { return static_cast<Direction>(field(kDirectionShift, 7)); }
+  [[nodiscard]] VoxelType type() const { return static_cast<VoxelType>(field(kTypeShift, 0xFFFF)); }
+  [[nodiscard]] bool flipped() const { return field(kFlipShift, 1) != 0; }
+  [[nodiscard]] FaceLevels levels() const {
+    return {level(0), level(1), level(2), level(3)};
+  }
+  [[nodiscard]] std::uint8_t level(int corner) const {
+    return static_cast<std::uint8_t>(field(kLevelsShift + 2 * corner, 3));
+  }
+  /// Position of a corner (0..3, as in FaceLevels) in chunk coordinates, 0..64.
+  [[nodiscard]] IVec3 corner(int index) const {
+    const FaceFrame& frame = frame_of(direction());
+    IVec3 p = voxel();
+    if (frame.sign > 0) p[frame.axis] += 1;
+    if (index == 1 || index == 2) p[frame.u] += size_u();
+    if (index >= 2) p[frame.v] += size_v();
+    return p;
+  }
+
+  bool operator==(const Quad&) const = default;
+
+ private:
+  [[nodiscard]] int field(int shift, int mask) const { return static_cast<int>(bits >> shift) & mask; }
+};
+
+/// Quads of one chunk, in the order direction, layer, row, column. Reuse one between calls: it only grows.
+using QuadBuffer = std::vector<Quad>;
+
+}  // namespace quoin
