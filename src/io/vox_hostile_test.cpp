@@ -21,7 +21,9 @@ Error error_of(const std::vector<std::byte>& bytes) {
   return loaded ? Error{} : loaded.error();
 }
 
-std::string text_of(const std::vector<std::byte>& bytes) { return to_string(error_of(bytes)); }
+std::string text_of(const std::vector<std::byte>& bytes) {
+  return to_string(error_of(bytes));
+}
 
 std::vector<std::byte> bytes_of(std::string_view text) {
   const auto bytes = std::as_bytes(std::span(text.data(), text.size()));
@@ -123,8 +125,7 @@ TEST(VoxHostile, OtherFormatsAreNamed) {
 TEST(VoxHostile, SizesBeyondTheFormatAreErrors) {
   EXPECT_EQ(text_of(FileBuilder().size(0xFFFF'FFFF, 40, 40).voxels({}).file()),
             "byte 20: chunk SIZE claims 4294967295 x 40 x 40 voxels");
-  EXPECT_EQ(text_of(FileBuilder().size(1, 257, 1).voxels({}).file()),
-            "byte 20: chunk SIZE claims 1 x 257 x 1 voxels");
+  EXPECT_EQ(text_of(FileBuilder().size(1, 257, 1).voxels({}).file()), "byte 20: chunk SIZE claims 1 x 257 x 1 voxels");
 }
 
 TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
@@ -142,7 +143,8 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
   EXPECT_EQ(text_of(with_words("nGRP", {0, 0, kMost})), "byte 64: chunk nGRP ends before its content does");
   EXPECT_EQ(text_of(with_words("nGRP", {0, kMost})), "byte 64: chunk nGRP ends before its content does");
   EXPECT_EQ(text_of(with_words("nGRP", {0, 1, kMost, 0, 0})), "byte 64: chunk nGRP ends before its content does");
-  EXPECT_EQ(text_of(with_words("nTRN", {0, 0, 1, kMost, 0, kMost})), "byte 64: chunk nTRN ends before its content does");
+  EXPECT_EQ(text_of(with_words("nTRN", {0, 0, 1, kMost, 0, kMost})),
+            "byte 64: chunk nTRN ends before its content does");
   EXPECT_EQ(text_of(with_words("nSHP", {0, 0, kMost})), "byte 64: chunk nSHP ends before its content does");
   EXPECT_EQ(text_of(with_words("MATL", {0, kMost})), "byte 64: chunk MATL ends before its content does");
   EXPECT_EQ(text_of(with_words("MATT", {0, 0, 0, kMost})), "byte 64: chunk MATT ends before its content does");
@@ -187,8 +189,9 @@ TEST(VoxHostile, GraphsThatAreNoGraphsAreErrors) {
             "byte 104: node 1 shows model 4, but there are 1");
   EXPECT_EQ(text_of(one_voxel().transform(0, 1, {{}}).shape(1, 0).shape(1, 0).file()),
             "byte 136: node 1 is there twice");
-  EXPECT_EQ(text_of(one_voxel().transform(0, 1, {{}}).shape(1, std::vector<std::pair<std::uint32_t, Entries>>{}).file()),
-            "byte 104: chunk nSHP has no model");
+  EXPECT_EQ(
+      text_of(one_voxel().transform(0, 1, {{}}).shape(1, std::vector<std::pair<std::uint32_t, Entries>>{}).file()),
+      "byte 104: chunk nSHP has no model");
 }
 
 TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {

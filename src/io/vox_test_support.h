@@ -188,8 +188,8 @@ inline std::string difference_after_round_trip(const Scene& scene) {
   return difference(scene, again->scene);
 }
 
-/// Reads bytes that may be anything. What can be read must survive writing and reading again, unless it lies beyond what
-/// a file can say; errors must be one line. Returns what is wrong, or nothing.
+/// Reads bytes that may be anything. What can be read must survive writing and reading again, unless it lies beyond
+/// what a file can say; errors must be one line. Returns what is wrong, or nothing.
 inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOptions& options = {}) {
   const Result<LoadedScene> loaded = read_vox(bytes, options);
   if (!loaded) {
