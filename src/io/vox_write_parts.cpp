@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "io/visit_voxels.h"
 #include "io/vox_models.h"
 #include "io/vox_palette.h"
 
@@ -78,7 +79,7 @@ std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std:
   std::map<Cell, Piece> pieces;
   Cell last_cell{};
   Piece* last = nullptr;
-  grid.grid.for_each([&](IVec3 voxel, VoxelType type) {
+  visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
     const Cell cell = cell_of(voxel, box.min);
     if (last == nullptr || cell != last_cell) {
       last_cell = cell;
