@@ -12,6 +12,7 @@ typedef std::uint64_t Words __attribute__((vector_size(32)));
 typedef std::uint64_t UnalignedWords __attribute__((vector_size(32), aligned(8)));
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
+#define QUOIN_STAGE inline __attribute__((noinline))
 
 QUOIN_INLINE Words load(const std::uint64_t* p) {
   return *reinterpret_cast<const UnalignedWords*>(p);
@@ -431,7 +432,7 @@ struct Pass {
 
 // Visible faces of a batch of planes, and the list of groups of four rows that have any.
 template <bool kTransparent>
-QUOIN_INLINE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
+QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
   int groups = 0;
   for (int i = 0; i < plane_count; ++i) {
     const int plane = first_plane + i;
@@ -441,13 +442,12 @@ QUOIN_INLINE int find_faces(const Pass& pass, int first_plane, int plane_count, 
     for (int row = pass.rows.begin; row < pass.rows.end; row += 4) {
       const Words mask = load(pass.row_masks + row);
       const Words faces = (kTransparent ? load(given + row) : load(here + row) & ~load(front + row)) & mask;
-      const int at = i * 64 + row;
+      const int at = i * kRowStride + row;
       store(b.faces + at, faces);
-      store(b.mergeable + at, Words{});
       b.groups[groups] = static_cast<std::uint16_t>(at);
       groups += static_cast<int>(any(faces));
     }
-    b.mergeable[i * 64 + pass.rows.end] = 0;
+    b.faces[i * kRowStride + pass.rows.end] = 0;
   }
   return groups;
 }
@@ -469,7 +469,7 @@ QUOIN_INLINE Words differ(const Levels& a, const Levels& b) {
 
 // Splits the faces of each listed group into runs of equal type and constant levels.
 template <bool kMerge, bool kOcclusion, bool kRowEnds>
-QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
+QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
     const Words faces = load(b.faces + at);
@@ -478,7 +478,7 @@ QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch
       store(b.ends + at, faces);
       continue;
     }
-    const int here = word_index(first_plane + (at >> 6), at & 63);
+    const int here = word_index(first_plane, 0) + at;
     Words joined = faces;
     if constexpr (kOcclusion) {
       const int front = here + pass.side * kRowStride;
@@ -511,77 +511,63 @@ QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch
 }
 
 // Which runs go on in the next row: those with the same extent, type and levels constant along the rows.
-QUOIN_INLINE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
+QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    const int here = word_index(first_plane + (at >> 6), at & 63);
+    const int here = word_index(first_plane, 0) + at;
     const Words starts = load(b.starts + at);
     const Words ends = load(b.ends + at);
-    const Words agree = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(pass.view->same_row.words + here) &
-                        ~(starts ^ load(b.starts + at + 1)) & ~(ends ^ load(b.ends + at + 1));
+    const Words agree = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(b.faces + at + 1) &
+                        load(pass.view->same_row.words + here) & ~(starts ^ load(b.starts + at + 1)) &
+                        ~(ends ^ load(b.ends + at + 1));
     // The sum carries from a run's first cell to its last only if all cells between agree.
-    store(b.grows + at, ((agree & ~ends) + starts) & ends & agree);
+    store(b.closes + at, ends & ~(((agree & ~ends) + starts) & agree));
   }
 }
 
-struct RunList {
+// Where a quad of one direction holds what.
+template <int kDirection>
+struct Layout {
+  static constexpr FaceFrame kFrame = kFaceFrames[kDirection];
+  static constexpr int kAxis = kFrame.axis;
+  static constexpr int kRowAxis = kAxis == 1 ? 2 : 1;
+  static constexpr int kBitAxis = kAxis == 0 ? 2 : 0;
+  static constexpr bool kUAlongBits = kFrame.u == kBitAxis;
+  static constexpr int kWidthShift = kUAlongBits ? Quad::kSizeUShift : Quad::kSizeVShift;
+  static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
+};
+
+struct RowList {
   std::size_t runs;
   std::int64_t faces;
 };
 
-// Lists every run of the listed groups: row of the batch << 16 | last cell << 8 | first cell. Most rows hold at most
-// two, which are written without asking how many there are.
-QUOIN_INLINE RunList list_runs(int groups, Batch& b) {
-  std::uint32_t* out = b.runs;
+// The rows of the listed groups that have runs, side by side.
+template <int kDirection>
+QUOIN_STAGE RowList list_rows(int first_plane, int groups, Batch& b) {
+  constexpr int kAxis = Layout<kDirection>::kAxis;
+  const std::uint64_t* places = level_tables().places[kAxis];
+  const std::uint64_t base =
+      (std::uint64_t{kDirection} << Quad::kDirectionShift) + (static_cast<std::uint64_t>(first_plane) << (6 * kAxis));
+  Row* out = b.rows;
+  std::int64_t runs = 0;
   std::int64_t faces = 0;
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    for (int row = at; row < at + 4; ++row) {
-      std::uint64_t starts = b.starts[row];
-      std::uint64_t ends = b.ends[row];
-      const auto count = __builtin_popcountll(ends);
-      faces += __builtin_popcountll(b.faces[row]);
-      const std::uint32_t base = static_cast<std::uint32_t>(row) << 16;
-      int written = 0;
-      do {
-        for (int k = 0; k < 2; ++k) {
-          out[written + k] = base | lowest_bit(ends) << 8 | lowest_bit(starts);
-          starts &= starts - 1;
-          ends &= ends - 1;
-        }
-        written += 2;
-      } while (__builtin_expect(written < count, 0));
-      out += count;
+    for (int k = 0; k < 4; ++k) {
+      const std::uint64_t ends = b.ends[at + k];
+      out->ends = ends;
+      out->starts = b.starts[at + k];
+      out->at = static_cast<std::uint64_t>(at + k);
+      out->place = places[at + k] + base;
+      out += ends != 0;
+      runs += __builtin_popcountll(ends);
+      faces += __builtin_popcountll(b.faces[at + k]);
     }
   }
-  return {static_cast<std::size_t>(out - b.runs), faces};
+  out->ends = out->starts = out->at = 0;
+  return {static_cast<std::size_t>(runs), faces};
 }
-
-// How a quad learns its type.
-struct OneType {
-  std::uint64_t bits;
-  QUOIN_INLINE std::uint64_t at(unsigned, unsigned, unsigned) const { return bits; }
-};
-
-struct PaletteTypes {
-  const std::uint64_t* const* rows;
-  const VoxelType* palette;
-  unsigned log_bits;
-  unsigned mask;
-  QUOIN_INLINE std::uint64_t at(unsigned x, unsigned y, unsigned z) const {
-    const unsigned bit = x << log_bits;
-    const std::uint64_t word = rows[z * 64 + y][bit >> 6];
-    return static_cast<std::uint64_t>(palette[static_cast<std::uint32_t>(word >> (bit & 63U)) & mask])
-           << Quad::kTypeShift;
-  }
-};
-
-struct DirectTypes {
-  const std::uint64_t* const* rows;
-  QUOIN_INLINE std::uint64_t at(unsigned x, unsigned y, unsigned z) const {
-    return (rows[z * 64 + y][x >> 2] >> (x << 4 & 63U) & 0xFFFFU) << Quad::kTypeShift;
-  }
-};
 
 // The bits of the 9 voxels in front of a face, as the level tables index them.
 QUOIN_INLINE std::uint64_t bits_in_front(const std::uint64_t* front, const std::uint64_t* before,
@@ -598,64 +584,51 @@ QUOIN_INLINE std::uint64_t bits_in_front(const std::uint64_t* front, const std::
   return bits;
 }
 
-// Where a quad of one direction holds what.
-template <int kDirection>
-struct Layout {
-  static constexpr FaceFrame kFrame = kFaceFrames[kDirection];
-  static constexpr int kAxis = kFrame.axis;
-  static constexpr int kRowAxis = kAxis == 1 ? 2 : 1;
-  static constexpr int kBitAxis = kAxis == 0 ? 2 : 0;
-  static constexpr bool kUAlongBits = kFrame.u == kBitAxis;
-  static constexpr int kWidthShift = kUAlongBits ? Quad::kSizeUShift : Quad::kSizeVShift;
-  static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
-  // Coordinates in planes, rows and bits -> x, y, z.
-  template <class Types>
-  static QUOIN_INLINE std::uint64_t type(const Types& types, unsigned plane, unsigned row, unsigned cell) {
-    return kAxis == 0   ? types.at(plane, row, cell)
-           : kAxis == 1 ? types.at(cell, plane, row)
-                        : types.at(cell, row, plane);
-  }
-};
-
-// Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row.
-template <int kDirection, bool kOcclusion, class Types>
-QUOIN_INLINE std::uint64_t* emit(const Pass& pass, int first_plane, std::size_t runs, const Types& types, Scratch& s,
-                                 std::uint64_t* out) {
+// Turns the runs of a batch into quads without a type. A run that ends here becomes one; one that grows only counts a
+// row. One flat loop over all runs: when a row is done, the next is taken up without a branch.
+template <int kDirection, bool kOcclusion>
+QUOIN_STAGE std::uint64_t* emit(const Pass& pass, int first_plane, std::size_t runs, Batch& b, std::uint64_t* out) {
   using L = Layout<kDirection>;
-  const Batch& b = s.batch;
-  const std::uint16_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
+  const std::uint64_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
   const int front = word_index(first_plane + L::kFrame.sign, 0);
   const std::uint64_t* opaque = pass.view->opaque.words + front;
   const std::uint64_t* before = pass.view->before.words + front;
   const std::uint64_t* after = pass.view->after.words + front;
   const bool row_ends = pass.row_ends;
+  // A row more starts lower and is higher.
+  constexpr std::uint64_t kPerHeight = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
+  const Row* row = b.rows;
+  std::uint64_t starts = row->starts;
+  std::uint64_t ends = row->ends;
   for (std::size_t i = 0; i < runs; ++i) {
-    const std::uint32_t run = b.runs[i];
-    const unsigned first = run & 63U;
-    const unsigned last = run >> 8 & 63U;
-    const unsigned at = run >> 16;
-    const std::uint64_t grows = b.grows[at] >> last & 1;
-    const std::uint64_t height = s.heights[last];  // rows before this one
-    s.heights[last] = static_cast<std::uint32_t>(height + 1) & (0U - static_cast<std::uint32_t>(grows));
-    const unsigned plane_in_batch = at >> 6;
-    const unsigned plane = static_cast<unsigned>(first_plane) + plane_in_batch;
-    const unsigned row = at & 63U;
-    std::uint64_t quad = std::uint64_t{kDirection} << Quad::kDirectionShift | std::uint64_t{plane} << (6 * L::kAxis) |
-                         (row - height) << (6 * L::kRowAxis) | std::uint64_t{first} << (6 * L::kBitAxis) |
-                         std::uint64_t{last - first} << L::kWidthShift | height << L::kHeightShift;
+    const std::uint64_t at = row->at;
+    const std::uint64_t first = lowest_bit(starts);
+    const std::uint64_t last = lowest_bit(ends);
+    const std::uint64_t closes = b.closes[at] >> last & 1;
+    const std::uint64_t height = b.heights[last];  // rows before this one
+    b.heights[last] = (height + 1) & (closes - 1);
+    std::uint64_t quad = row->place + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
+    quad += height * kPerHeight;
     if constexpr (kOcclusion) {
-      const std::size_t word = plane_in_batch * kRowStride + row;
-      const std::uint64_t around = bits_in_front(opaque + word, before + word, after + word, last, row_ends);
-      quad |= std::uint64_t{levels[around]} << Quad::kLevelsShift;
+      const std::uint64_t around =
+          bits_in_front(opaque + at, before + at, after + at, static_cast<unsigned>(last), row_ends);
+      quad |= levels[around];
     }
-    *out = quad | L::type(types, plane, row, last);
-    out += 1 - grows;
+    *out = quad;
+    out += closes;
+    starts &= starts - 1;
+    ends &= ends - 1;
+    // When a row is done both words are 0: the next row's are taken up without a branch.
+    const auto done = static_cast<std::uint64_t>(ends == 0);
+    starts |= row[1].starts & (std::uint64_t{0} - done);
+    ends |= row[1].ends & (std::uint64_t{0} - done);
+    row += done;
   }
   return out;
 }
 
-template <int kDirection, bool kOcclusion, class Types>
-std::int64_t run_pass(const Job& job, const Pass& pass, const Types& types, Scratch& s, QuadBuffer& quads) {
+template <int kDirection, bool kOcclusion>
+std::int64_t run_pass(const Job& job, const Pass& pass, Scratch& s, QuadBuffer& quads) {
   Batch& b = s.batch;
   std::int64_t faces = 0;
   for (int first = pass.planes.begin; first < pass.planes.end; first += kBatchPlanes) {
@@ -671,12 +644,29 @@ std::int64_t run_pass(const Job& job, const Pass& pass, const Types& types, Scra
       find_runs<true, kOcclusion, false>(pass, first, groups, b);
     }
     find_growth(pass, first, groups, b);
-    const RunList list = list_runs(groups, b);
+    const RowList list = list_rows<kDirection>(first, groups, b);
     faces += list.faces;
     std::uint64_t* begin = grow_quads(quads, s.quads, list.runs + 1);
-    s.quads += static_cast<std::size_t>(emit<kDirection, kOcclusion>(pass, first, list.runs, types, s, begin) - begin);
+    s.quads += static_cast<std::size_t>(emit<kDirection, kOcclusion>(pass, first, list.runs, b, begin) - begin);
   }
   return faces;
+}
+
+// Gives quads their types: bits 6 to 17 of a quad are the number of its voxel's row.
+template <int kLogBits>
+void add_palette_types(const std::uint64_t* const* rows, const std::uint64_t* palette, std::uint64_t* quads,
+                       std::size_t count) {
+  constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t quad = quads[i];
+    const std::uint64_t bit = (quad & 63) << kLogBits;
+    const std::uint64_t index = rows[quad >> 6 & 0xFFF][bit >> 6] >> (bit & 63) & kMask;
+    quads[i] = quad | (kLogBits == 4 ? index << Quad::kTypeShift : palette[index]);
+  }
+}
+
+void add_one_type(VoxelType type, std::uint64_t* quads, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) quads[i] |= std::uint64_t{type} << Quad::kTypeShift;
 }
 
 // How the axes of a direction map to planes, rows and bits.
@@ -717,22 +707,20 @@ void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& 
   }
 }
 
-template <int kDirection, class Types>
-std::int64_t run_direction(const Job& job, bool row_ends, const Types& types, Scratch& s, QuadBuffer& out) {
+template <int kDirection>
+std::int64_t run_direction(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
   const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
-  return job.occlusion ? run_pass<kDirection, true>(job, pass, types, s, out)
-                       : run_pass<kDirection, false>(job, pass, types, s, out);
+  return job.occlusion ? run_pass<kDirection, true>(job, pass, s, out) : run_pass<kDirection, false>(job, pass, s, out);
 }
 
-template <class Types>
-QuadStats run_directions(const Job& job, bool row_ends, const Types& types, Scratch& s, QuadBuffer& out) {
+QuadStats run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
   QuadStats stats;
-  stats.faces += run_direction<0>(job, row_ends, types, s, out);
-  stats.faces += run_direction<1>(job, row_ends, types, s, out);
-  stats.faces += run_direction<2>(job, row_ends, types, s, out);
-  stats.faces += run_direction<3>(job, row_ends, types, s, out);
-  stats.faces += run_direction<4>(job, row_ends, types, s, out);
-  stats.faces += run_direction<5>(job, row_ends, types, s, out);
+  stats.faces += run_direction<0>(job, row_ends, s, out);
+  stats.faces += run_direction<1>(job, row_ends, s, out);
+  stats.faces += run_direction<2>(job, row_ends, s, out);
+  stats.faces += run_direction<3>(job, row_ends, s, out);
+  stats.faces += run_direction<4>(job, row_ends, s, out);
+  stats.faces += run_direction<5>(job, row_ends, s, out);
   return stats;
 }
 
@@ -750,6 +738,38 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
     ++found;
   }
   return found == 1;
+}
+
+void add_types(const Chunk& centre, Scratch& s, QuadBuffer& out) {
+  if (s.quads == 0) return;
+  std::uint64_t* quads = grow_quads(out, 0, s.quads);
+  VoxelType type = kAir;
+  if (has_one_type(centre, type)) {
+    add_one_type(type, quads, s.quads);
+    return;
+  }
+  const Chunk::Mixed& voxels = *centre.mixed();
+  std::uint64_t palette[256];  // in a quad's place
+  for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+    palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+  }
+  switch (voxels.bits) {
+    case 1:
+      add_palette_types<0>(s.rows, palette, quads, s.quads);
+      break;
+    case 2:
+      add_palette_types<1>(s.rows, palette, quads, s.quads);
+      break;
+    case 4:
+      add_palette_types<2>(s.rows, palette, quads, s.quads);
+      break;
+    case 8:
+      add_palette_types<3>(s.rows, palette, quads, s.quads);
+      break;
+    default:
+      add_palette_types<4>(s.rows, nullptr, quads, s.quads);
+      break;
+  }
 }
 
 // Nothing merges across the chunk's last row or plane.
@@ -779,17 +799,9 @@ QuadStats mesh_chunk(const Job& job, Scratch& s, QuadBuffer& out) {
   copy_border(row_ends, s);
   if (row_ends) copy_row_ends(s);
   if (job.has_transparent) fill_faces(job, range, row_ends, s);
-  const Chunk& centre = *job.chunks->centre();
-  VoxelType type = kAir;
-  if (has_one_type(centre, type)) {
-    return run_directions(job, row_ends, OneType{std::uint64_t{type} << Quad::kTypeShift}, s, out);
-  }
-  const Chunk::Mixed& voxels = *centre.mixed();
-  if (voxels.direct()) return run_directions(job, row_ends, DirectTypes{s.rows}, s, out);
-  const auto bits = static_cast<unsigned>(voxels.bits);
-  const auto log_bits = static_cast<unsigned>(__builtin_ctz(bits));
-  return run_directions(job, row_ends, PaletteTypes{s.rows, voxels.palette.data(), log_bits, (1U << bits) - 1U}, s,
-                        out);
+  const QuadStats stats = run_directions(job, row_ends, s, out);
+  add_types(*job.chunks->centre(), s, out);
+  return stats;
 }
 
 #undef QUOIN_INLINE
