@@ -12,7 +12,7 @@ typedef std::uint64_t Words __attribute__((vector_size(32)));
 typedef std::uint64_t UnalignedWords __attribute__((vector_size(32), aligned(8)));
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
-#define QUOIN_STAGE inline __attribute__((noinline))
+#define QUOIN_STAGE inline __attribute__((noinline))  // stands apart in a profile
 
 QUOIN_INLINE Words load(const std::uint64_t* p) {
   return *reinterpret_cast<const UnalignedWords*>(p);
@@ -30,12 +30,12 @@ QUOIN_INLINE bool any(Words v) {
 #endif
 }
 
-// Position of the lowest bit; 64 of an empty word.
-QUOIN_INLINE std::uint32_t lowest_bit(std::uint64_t w) {
+// Position of the lowest bit. Requires: there is one.
+QUOIN_INLINE std::uint64_t lowest_bit(std::uint64_t w) {
 #if QUOIN_KERNEL_AVX2
-  return static_cast<std::uint32_t>(_tzcnt_u64(w));
+  return _tzcnt_u64(w);
 #else
-  return w == 0 ? 64U : static_cast<std::uint32_t>(__builtin_ctzll(w));
+  return static_cast<std::uint64_t>(__builtin_ctzll(w));
 #endif
 }
 
@@ -181,32 +181,51 @@ void classify_planes(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
+// Where neighbours are of one type; and opacity, where air is the only index that is not opaque.
 template <int kBits>
-void compare_planes(const SlabRange& range, Scratch& s) {
+void compare_planes(const SlabRange& range, int air, Scratch& s) {
+  Words air_bits[kBits];
+  for (int k = 0; k < kBits; ++k) air_bits[k] = Words{} - static_cast<std::uint64_t>(air >> k & 1);
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
+      const int at = word_index(z, y);
+      Words opaque{};
       Words along_x{};
       Words along_y{};
       Words along_z{};
       for (int k = 0; k < kBits; ++k) {
-        const std::uint64_t* p = s.planes[k].words + word_index(z, y);
+        const std::uint64_t* p = s.planes[k].words + at;
         const Words here = load(p);
+        opaque |= here ^ air_bits[k];
         along_x |= here ^ (here >> 1);
         along_y |= here ^ load(p + 1);
         along_z |= here ^ load(p + kRowStride);
       }
-      store(s.z.same_bit.words + word_index(z, y), ~along_x);
-      store(s.z.same_row.words + word_index(z, y), ~along_y);
-      store(s.same_z.words + word_index(z, y), ~along_z);
+      if (air >= 0) store(s.z.opaque.words + at, opaque);
+      store(s.z.same_bit.words + at, ~along_x);
+      store(s.z.same_row.words + at, ~along_y);
+      store(s.same_z.words + at, ~along_z);
     }
   }
+}
+
+// The only palette index that is not opaque, if that is air; -1 otherwise.
+int sole_air_index(const Scratch& s, int indices) {
+  int air = -1;
+  for (int i = 0; i < indices; ++i) {
+    if (s.index_class[i] == 1) continue;
+    if (air >= 0 || s.index_class[i] == 2) return -1;
+    air = i;
+  }
+  return air;
 }
 
 template <int kBits>
 void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
   split_planes<kBits>(voxels, range, s);
-  classify_planes<kBits>(job, range, s);
-  compare_planes<kBits>(range, s);
+  const int air = sole_air_index(s, 1 << kBits);
+  if (air < 0) classify_planes<kBits>(job, range, s);
+  compare_planes<kBits>(range, air, s);
 }
 
 // As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
@@ -542,93 +561,152 @@ struct RowList {
   std::int64_t faces;
 };
 
+// How quads learn their types: all have one, or each looks into its voxel's packed row.
+inline constexpr int kOneType = -1;
+
+struct TypeSource {
+  std::uint64_t one;                 // in a quad's place; 0 when there are several
+  const std::uint64_t* const* rows;  // [z * 64 + y]
+  const std::uint64_t* palette;      // types in a quad's place, by index
+};
+
 // The rows of the listed groups that have runs, side by side.
 template <int kDirection>
-QUOIN_STAGE RowList list_rows(int first_plane, int groups, Batch& b) {
-  constexpr int kAxis = Layout<kDirection>::kAxis;
-  const std::uint64_t* places = level_tables().places[kAxis];
-  const std::uint64_t base =
-      (std::uint64_t{kDirection} << Quad::kDirectionShift) + (static_cast<std::uint64_t>(first_plane) << (6 * kAxis));
+QUOIN_STAGE RowList list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Batch& b) {
+  using L = Layout<kDirection>;
+  const std::uint64_t* places = level_tables().places[L::kAxis];
+  const std::uint64_t base = (std::uint64_t{kDirection} << Quad::kDirectionShift) + types.one +
+                             (static_cast<std::uint64_t>(first_plane) << (6 * L::kAxis));
+  const std::uint64_t* front = pass.view->opaque.words + word_index(first_plane + L::kFrame.sign, 0);
   Row* out = b.rows;
   std::int64_t runs = 0;
   std::int64_t faces = 0;
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    for (int k = 0; k < 4; ++k) {
-      const std::uint64_t ends = b.ends[at + k];
+    for (int row = at; row < at + 4; ++row) {
+      const std::uint64_t ends = b.ends[row];
       out->ends = ends;
-      out->starts = b.starts[at + k];
-      out->at = static_cast<std::uint64_t>(at + k);
-      out->place = places[at + k] + base;
+      out->starts = b.starts[row];
+      out->closes = b.closes[row];
+      out->place = places[row] + base;
+      out->front = front + row;
       out += ends != 0;
       runs += __builtin_popcountll(ends);
-      faces += __builtin_popcountll(b.faces[at + k]);
+      faces += __builtin_popcountll(b.faces[row]);
     }
   }
-  out->ends = out->starts = out->at = 0;
+  out->ends = out->starts = 0;
   return {static_cast<std::size_t>(runs), faces};
 }
 
-// The bits of the 9 voxels in front of a face, as the level tables index them.
-QUOIN_INLINE std::uint64_t bits_in_front(const std::uint64_t* front, const std::uint64_t* before,
-                                         const std::uint64_t* after, unsigned cell, bool row_ends) {
-  if (__builtin_expect(cell - 1U < 62U, 1)) {
-    const unsigned shift = cell - 1U;
-    return (front[-1] >> shift & 7) + (front[0] >> shift & 7) * 8 + (front[1] >> shift & 7) * 64;
-  }
+// The bits of the 9 voxels in front of the first or last cell of a row, as the level tables index them.
+__attribute__((noinline)) std::uint64_t bits_in_front_at_end(const Pass& pass, const std::uint64_t* front,
+                                                             bool is_first) {
+  const std::int64_t word = front - pass.view->opaque.words;
   std::uint64_t bits = 0;
   for (int row = 1; row >= -1; --row) {
-    const std::uint64_t outside = !row_ends ? 0 : cell == 0 ? before[row] & 1 : after[row] >> 63;
-    bits = bits << 3 | (cell == 0 ? (front[row] << 1 | outside) & 7 : front[row] >> 62 | outside << 2);
+    const std::uint64_t before = pass.row_ends ? pass.view->before.words[word + row] & 1 : 0;
+    const std::uint64_t after = pass.row_ends ? pass.view->after.words[word + row] >> 63 : 0;
+    bits = bits << 3 | (is_first ? (front[row] << 1 | before) & 7 : front[row] >> 62 | after << 2);
   }
   return bits;
 }
 
-// Turns the runs of a batch into quads without a type. A run that ends here becomes one; one that grows only counts a
-// row. One flat loop over all runs: when a row is done, the next is taken up without a branch.
-template <int kDirection, bool kOcclusion>
-QUOIN_STAGE std::uint64_t* emit(const Pass& pass, int first_plane, std::size_t runs, Batch& b, std::uint64_t* out) {
+QUOIN_INLINE std::uint64_t bits_in_front(const Pass& pass, const std::uint64_t* front, std::uint64_t cell) {
+  const std::uint64_t shift = cell - 1;
+  if (__builtin_expect(shift >= 62, 0)) return bits_in_front_at_end(pass, front, cell == 0);
+  return (front[-1] >> shift & 7) + (front[0] >> shift & 7) * 8 + (front[1] >> shift & 7) * 64;
+}
+
+// Removes the lowest bits of both words; when none are left, takes up the next row, without a branch.
+QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row*& row) {
+  const Row* next = row + 1;
+  starts &= starts - 1;
+#if QUOIN_KERNEL_AVX2
+  // Compilers make this a branch, which mispredicts in every other row.
+  asm("blsr %[ends], %[ends]\n\t"
+      "cmovz %[next_starts], %[starts]\n\t"
+      "cmovz %[next_ends], %[ends]\n\t"
+      "cmovz %[next], %[row]"
+      : [starts] "+r"(starts), [ends] "+r"(ends), [row] "+r"(row)
+      : [next_starts] "m"(next->starts), [next_ends] "m"(next->ends), [next] "r"(next)
+      : "cc");
+#else
+  ends &= ends - 1;
+  const auto done = static_cast<std::uint64_t>(ends == 0);
+  starts |= next->starts & (std::uint64_t{0} - done);
+  ends |= next->ends & (std::uint64_t{0} - done);
+  row += done;
+#endif
+}
+
+// The type of a cell of a row, in a quad's place. `place` holds the row's plane and number.
+template <int kDirection, int kLogBits>
+QUOIN_INLINE std::uint64_t type_of(const TypeSource& types, std::uint64_t place, std::uint64_t cell) {
+  using L = Layout<kDirection>;
+  if constexpr (kLogBits == kOneType) {
+    return 0;
+  } else {
+    // Bits 6 to 17 of a quad number its voxel's row; in the x view the cell is the z in that number.
+    const std::uint64_t row = (place >> 6 & 0xFFF) + (L::kAxis == 0 ? cell << 6 : 0);
+    const std::uint64_t x = L::kAxis == 0 ? place & 63 : cell;
+    const std::uint64_t bit = x << kLogBits;
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;
+    const std::uint64_t index = types.rows[row][bit >> 6] >> (bit & 63) & kMask;
+    return kLogBits == 4 ? index << Quad::kTypeShift : types.palette[index];
+  }
+}
+
+// Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row. One flat
+// loop over all runs.
+template <int kDirection, bool kOcclusion, int kLogBits>
+QUOIN_STAGE std::uint64_t* emit(const Pass& pass, const TypeSource& types, std::size_t runs, Batch& b,
+                                std::uint64_t* out) {
   using L = Layout<kDirection>;
   const std::uint64_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
-  const int front = word_index(first_plane + L::kFrame.sign, 0);
-  const std::uint64_t* opaque = pass.view->opaque.words + front;
-  const std::uint64_t* before = pass.view->before.words + front;
-  const std::uint64_t* after = pass.view->after.words + front;
-  const bool row_ends = pass.row_ends;
   // A row more starts lower and is higher.
-  constexpr std::uint64_t kPerHeight = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
+  constexpr std::uint64_t kPerRow = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
   const Row* row = b.rows;
   std::uint64_t starts = row->starts;
   std::uint64_t ends = row->ends;
+  const TypeSource source = types;
   for (std::size_t i = 0; i < runs; ++i) {
-    const std::uint64_t at = row->at;
     const std::uint64_t first = lowest_bit(starts);
     const std::uint64_t last = lowest_bit(ends);
-    const std::uint64_t closes = b.closes[at] >> last & 1;
-    const std::uint64_t height = b.heights[last];  // rows before this one
-    b.heights[last] = (height + 1) & (closes - 1);
-    std::uint64_t quad = row->place + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
-    quad += height * kPerHeight;
-    if constexpr (kOcclusion) {
-      const std::uint64_t around =
-          bits_in_front(opaque + at, before + at, after + at, static_cast<unsigned>(last), row_ends);
-      quad |= levels[around];
-    }
-    *out = quad;
+    const std::uint64_t closes = row->closes >> last & 1;
+    const std::uint64_t rows_before = b.rows_before[last];
+    b.rows_before[last] = (rows_before + kPerRow) & (closes - 1);
+    std::uint64_t quad = row->place + rows_before + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
+    if constexpr (kOcclusion) quad |= levels[bits_in_front(pass, row->front, last)];
+    *out = quad | type_of<kDirection, kLogBits>(source, row->place, last);
     out += closes;
-    starts &= starts - 1;
-    ends &= ends - 1;
-    // When a row is done both words are 0: the next row's are taken up without a branch.
-    const auto done = static_cast<std::uint64_t>(ends == 0);
-    starts |= row[1].starts & (std::uint64_t{0} - done);
-    ends |= row[1].ends & (std::uint64_t{0} - done);
-    row += done;
+    next_run(starts, ends, row);
   }
   return out;
 }
 
 template <int kDirection, bool kOcclusion>
-std::int64_t run_pass(const Job& job, const Pass& pass, Scratch& s, QuadBuffer& quads) {
+std::uint64_t* emit(const Pass& pass, const TypeSource& types, int log_bits, std::size_t runs, Batch& b,
+                    std::uint64_t* out) {
+  switch (log_bits) {
+    case kOneType:
+      return emit<kDirection, kOcclusion, kOneType>(pass, types, runs, b, out);
+    case 0:
+      return emit<kDirection, kOcclusion, 0>(pass, types, runs, b, out);
+    case 1:
+      return emit<kDirection, kOcclusion, 1>(pass, types, runs, b, out);
+    case 2:
+      return emit<kDirection, kOcclusion, 2>(pass, types, runs, b, out);
+    case 3:
+      return emit<kDirection, kOcclusion, 3>(pass, types, runs, b, out);
+    default:
+      return emit<kDirection, kOcclusion, 4>(pass, types, runs, b, out);
+  }
+}
+
+template <int kDirection, bool kOcclusion>
+std::int64_t run_pass(const Job& job, const Pass& pass, const TypeSource& types, int log_bits, Scratch& s,
+                      QuadBuffer& quads) {
   Batch& b = s.batch;
   std::int64_t faces = 0;
   for (int first = pass.planes.begin; first < pass.planes.end; first += kBatchPlanes) {
@@ -644,29 +722,13 @@ std::int64_t run_pass(const Job& job, const Pass& pass, Scratch& s, QuadBuffer& 
       find_runs<true, kOcclusion, false>(pass, first, groups, b);
     }
     find_growth(pass, first, groups, b);
-    const RowList list = list_rows<kDirection>(first, groups, b);
+    const RowList list = list_rows<kDirection>(pass, first, groups, types, b);
     faces += list.faces;
     std::uint64_t* begin = grow_quads(quads, s.quads, list.runs + 1);
-    s.quads += static_cast<std::size_t>(emit<kDirection, kOcclusion>(pass, first, list.runs, b, begin) - begin);
+    const std::uint64_t* end = emit<kDirection, kOcclusion>(pass, types, log_bits, list.runs, b, begin);
+    s.quads += static_cast<std::size_t>(end - begin);
   }
   return faces;
-}
-
-// Gives quads their types: bits 6 to 17 of a quad are the number of its voxel's row.
-template <int kLogBits>
-void add_palette_types(const std::uint64_t* const* rows, const std::uint64_t* palette, std::uint64_t* quads,
-                       std::size_t count) {
-  constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t quad = quads[i];
-    const std::uint64_t bit = (quad & 63) << kLogBits;
-    const std::uint64_t index = rows[quad >> 6 & 0xFFF][bit >> 6] >> (bit & 63) & kMask;
-    quads[i] = quad | (kLogBits == 4 ? index << Quad::kTypeShift : palette[index]);
-  }
-}
-
-void add_one_type(VoxelType type, std::uint64_t* quads, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) quads[i] |= std::uint64_t{type} << Quad::kTypeShift;
 }
 
 // How the axes of a direction map to planes, rows and bits.
@@ -707,23 +769,6 @@ void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& 
   }
 }
 
-template <int kDirection>
-std::int64_t run_direction(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
-  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
-  return job.occlusion ? run_pass<kDirection, true>(job, pass, s, out) : run_pass<kDirection, false>(job, pass, s, out);
-}
-
-QuadStats run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
-  QuadStats stats;
-  stats.faces += run_direction<0>(job, row_ends, s, out);
-  stats.faces += run_direction<1>(job, row_ends, s, out);
-  stats.faces += run_direction<2>(job, row_ends, s, out);
-  stats.faces += run_direction<3>(job, row_ends, s, out);
-  stats.faces += run_direction<4>(job, row_ends, s, out);
-  stats.faces += run_direction<5>(job, row_ends, s, out);
-  return stats;
-}
-
 // The type of all of a chunk's voxels besides air, when there is just one.
 bool has_one_type(const Chunk& chunk, VoxelType& type) {
   const Chunk::Mixed* voxels = chunk.mixed();
@@ -740,36 +785,37 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
   return found == 1;
 }
 
-void add_types(const Chunk& centre, Scratch& s, QuadBuffer& out) {
-  if (s.quads == 0) return;
-  std::uint64_t* quads = grow_quads(out, 0, s.quads);
+template <int kDirection>
+std::int64_t run_direction(const Job& job, bool row_ends, const TypeSource& types, int log_bits, Scratch& s,
+                           QuadBuffer& out) {
+  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
+  return job.occlusion ? run_pass<kDirection, true>(job, pass, types, log_bits, s, out)
+                       : run_pass<kDirection, false>(job, pass, types, log_bits, s, out);
+}
+
+QuadStats run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
+  std::uint64_t palette[256];
+  TypeSource types{0, s.rows, palette};
+  int log_bits = kOneType;
+  const Chunk& centre = *job.chunks->centre();
   VoxelType type = kAir;
   if (has_one_type(centre, type)) {
-    add_one_type(type, quads, s.quads);
-    return;
+    types.one = std::uint64_t{type} << Quad::kTypeShift;
+  } else {
+    const Chunk::Mixed& voxels = *centre.mixed();
+    log_bits = __builtin_ctz(static_cast<unsigned>(voxels.bits));
+    for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+      palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+    }
   }
-  const Chunk::Mixed& voxels = *centre.mixed();
-  std::uint64_t palette[256];  // in a quad's place
-  for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
-    palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
-  }
-  switch (voxels.bits) {
-    case 1:
-      add_palette_types<0>(s.rows, palette, quads, s.quads);
-      break;
-    case 2:
-      add_palette_types<1>(s.rows, palette, quads, s.quads);
-      break;
-    case 4:
-      add_palette_types<2>(s.rows, palette, quads, s.quads);
-      break;
-    case 8:
-      add_palette_types<3>(s.rows, palette, quads, s.quads);
-      break;
-    default:
-      add_palette_types<4>(s.rows, nullptr, quads, s.quads);
-      break;
-  }
+  QuadStats stats;
+  stats.faces += run_direction<0>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<1>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<2>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<3>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<4>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<5>(job, row_ends, types, log_bits, s, out);
+  return stats;
 }
 
 // Nothing merges across the chunk's last row or plane.
@@ -799,12 +845,11 @@ QuadStats mesh_chunk(const Job& job, Scratch& s, QuadBuffer& out) {
   copy_border(row_ends, s);
   if (row_ends) copy_row_ends(s);
   if (job.has_transparent) fill_faces(job, range, row_ends, s);
-  const QuadStats stats = run_directions(job, row_ends, s, out);
-  add_types(*job.chunks->centre(), s, out);
-  return stats;
+  return run_directions(job, row_ends, s, out);
 }
 
 #undef QUOIN_INLINE
+#undef QUOIN_STAGE
 
 }  // namespace
 }  // namespace quoin::blocky::QUOIN_KERNEL

@@ -40,11 +40,12 @@ struct View {
 inline constexpr int kBatchPlanes = 8;
 inline constexpr int kBatchWords = kBatchPlanes * kRowStride;
 
-struct Row {
+struct alignas(64) Row {
   std::uint64_t ends;
   std::uint64_t starts;
-  std::uint64_t at;     // number of the row
-  std::uint64_t place;  // a quad's bits for its direction, plane and row
+  std::uint64_t closes;
+  std::uint64_t place;         // a quad's bits for its direction, plane and row
+  const std::uint64_t* front;  // the row before the faces
 };
 
 struct alignas(64) Batch {
@@ -53,7 +54,8 @@ struct alignas(64) Batch {
   std::uint64_t starts[kBatchWords + 8];     // first cell of each run
   std::uint64_t ends[kBatchWords + 8];       // last cell of each run
   std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
-  std::uint64_t heights[64];                 // rows so far of the run that ends in a column; 0 between batches
+  // Of the run that ends in a column: its rows so far, as a quad's bits; 0 between batches.
+  std::uint64_t rows_before[64];
   std::uint16_t groups[kBatchWords / 4 + 8];
   Row rows[kBatchPlanes * 64 + 8];
 };
