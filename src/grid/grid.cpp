@@ -51,6 +51,8 @@ class Reach {
   }
 };
 
+constexpr std::uint32_t kCentreOnly = std::uint32_t{1} << 13;
+
 constexpr int kMinChunk = std::numeric_limits<int>::min() >> kChunkShift;
 constexpr int kMaxChunk = std::numeric_limits<int>::max() >> kChunkShift;
 
@@ -81,9 +83,10 @@ struct Grid::Impl {
     Chunk chunk;
     std::uint64_t version = 0;
     std::uint64_t neighbourhood_version = 0;
+    bool is_dirty = false;  ///< its coordinates stand in `dirty`
   };
   tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
-  std::set<IVec3, decltype(&by_zyx)> dirty{&by_zyx};
+  std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it twice
   std::uint64_t version = 0;
 
   Entry* find(IVec3 chunk) const {
@@ -96,6 +99,14 @@ struct Grid::Impl {
     return *entry;
   }
 
+  // Books that the mesh of a chunk may have changed.
+  void touch(IVec3 chunk, Entry& entry) {
+    entry.neighbourhood_version = version;
+    if (entry.is_dirty) return;
+    entry.is_dirty = true;
+    dirty.push_back(chunk);
+  }
+
   // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
   void finish_edit(IVec3 chunk, Entry& entry, const Reach& reach) {
     if (reach.voxels == 0) {
@@ -103,6 +114,11 @@ struct Grid::Impl {
       return;
     }
     entry.version = version;
+    if (reach.mask == kCentreOnly) {
+      touch(chunk, entry);
+      if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+      return;
+    }
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
@@ -110,8 +126,7 @@ struct Grid::Impl {
           const IVec3 at = chunk + IVec3{dx, dy, dz};
           Entry* neighbour = find(at);
           if (neighbour == nullptr) continue;
-          neighbour->neighbourhood_version = version;
-          dirty.insert(at);
+          touch(at, *neighbour);
         }
       }
     }
@@ -293,7 +308,7 @@ void Grid::put_chunk(IVec3 at, Chunk voxels) {
 void Grid::clear() {
   if (impl_->entries.empty()) return;
   ++impl_->version;
-  for (const auto& [at, entry] : impl_->entries) impl_->dirty.insert(at);
+  for (auto it = impl_->entries.begin(); it != impl_->entries.end(); ++it) impl_->touch(it.key(), *it.value());
   impl_->entries.clear();
 }
 
@@ -341,8 +356,13 @@ std::uint64_t Grid::version() const {
 }
 
 std::vector<IVec3> Grid::take_dirty() {
-  std::vector<IVec3> taken(impl_->dirty.begin(), impl_->dirty.end());
+  std::vector<IVec3> taken = std::move(impl_->dirty);
   impl_->dirty.clear();
+  for (const IVec3 at : taken) {
+    if (Impl::Entry* entry = impl_->find(at)) entry->is_dirty = false;
+  }
+  std::sort(taken.begin(), taken.end(), by_zyx);
+  taken.erase(std::unique(taken.begin(), taken.end()), taken.end());
   return taken;
 }
 
