@@ -1,0 +1,29 @@
+#pragma once
+
+#include <quoin/grid/grid.h>
+#include <quoin/scene/scene.h>
+
+namespace demo {
+
+/// The palette of the demo world.
+struct Palette {
+  quoin::VoxelType grass, meadow, soil, rock, sand, path, wall, wall_dark, trim, roof, roof_dark, wood, plank, leaf,
+      leaf_light, water, glass, lamp, flag, sail;
+};
+
+/// Registers the palette's types.
+[[nodiscard]] quoin::Result<Palette> add_palette(quoin::VoxelRegistry& types);
+
+/// Ground height at a column of the island, 0 to about 30; below kSeaLevel lies under water.
+[[nodiscard]] int ground_height(int x, int z);
+inline constexpr int kIslandEdge = 192;
+inline constexpr int kSeaLevel = 9;
+
+/// The island with its castle, in [0, kIslandEdge) along x and z.
+[[nodiscard]] quoin::Grid make_island(const Palette& palette);
+/// A tree, its trunk's foot in the middle of the bottom layer.
+[[nodiscard]] quoin::Grid make_tree(const Palette& palette, int height);
+/// A ship, its bow towards -z.
+[[nodiscard]] quoin::Grid make_ship(const Palette& palette);
+
+}  // namespace demo
