@@ -41,10 +41,14 @@ std::uint8_t scaled_in_linear_light(std::uint8_t srgb, double factor) {
 
 const char* material_name(SurfaceClass surface) {
   switch (surface) {
-    case SurfaceClass::Opaque: return "voxels opaque";
-    case SurfaceClass::Transparent: return "voxels transparent";
-    case SurfaceClass::Emissive: return "voxels emissive";
-    case SurfaceClass::EmissiveTransparent: return "voxels emissive transparent";
+    case SurfaceClass::Opaque:
+      return "voxels opaque";
+    case SurfaceClass::Transparent:
+      return "voxels transparent";
+    case SurfaceClass::Emissive:
+      return "voxels emissive";
+    case SurfaceClass::EmissiveTransparent:
+      return "voxels emissive transparent";
   }
   return "voxels";
 }
@@ -80,7 +84,8 @@ void MaterialPalette::find_bands(const Usage& used) {
   band_of_type_.assign(types_.size(), 0);
   for (std::size_t type = 0; type < types_.size() && !bands_.empty(); ++type) {
     const float emission = clamped_emission(types_[static_cast<VoxelType>(type)].emission);
-    const auto weaker = std::partition_point(bands_.begin(), bands_.end(), [&](float band) { return band >= emission; });
+    const auto weaker =
+        std::partition_point(bands_.begin(), bands_.end(), [&](float band) { return band >= emission; });
     if (weaker != bands_.begin()) band_of_type_[type] = static_cast<std::uint16_t>(weaker - bands_.begin() - 1);
   }
 }
@@ -126,8 +131,7 @@ std::array<float, 2> MaterialPalette::texel_centre(VoxelType type) const {
 }
 
 PngImage MaterialPalette::blank(std::uint32_t channels) const {
-  return {kPaletteWidth, rows_, channels,
-          std::vector<std::uint8_t>(std::size_t{kPaletteWidth} * rows_ * channels)};
+  return {kPaletteWidth, rows_, channels, std::vector<std::uint8_t>(std::size_t{kPaletteWidth} * rows_ * channels)};
 }
 
 PngImage MaterialPalette::base_colour() const {
@@ -158,7 +162,8 @@ PngImage MaterialPalette::emissive() const {
   for (std::size_t type = 1; type < types_.size() && !bands_.empty(); ++type) {
     const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
     const float emission = clamped_emission(properties.emission);
-    const double factor = std::min(1.0, static_cast<double>(emission) / static_cast<double>(bands_[band_of_type_[type]]));
+    const double factor =
+        std::min(1.0, static_cast<double>(emission) / static_cast<double>(bands_[band_of_type_[type]]));
     std::uint8_t* texel = image.pixels.data() + type * 3;
     texel[0] = scaled_in_linear_light(properties.colour.r, factor);
     texel[1] = scaled_in_linear_light(properties.colour.g, factor);

@@ -35,8 +35,8 @@ struct SurfaceMaterial {
 /// The voxel types of a scene's meshes as mesh formats say it: textures with one texel a type, and the few materials
 /// that use them.
 ///
-/// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within a
-/// band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
+/// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
+/// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
 /// strength, or with strengths more than twice apart, has its colours unscaled.
 class MaterialPalette {
  public:
@@ -70,7 +70,7 @@ class MaterialPalette {
 
   const VoxelRegistry& types_;
   std::uint32_t rows_ = 1;
-  std::vector<float> bands_;               ///< strongest of each, descending
+  std::vector<float> bands_;  ///< strongest of each, descending
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_band_;

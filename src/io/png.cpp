@@ -19,7 +19,9 @@ void flush_nothing(png_structp) {}
 
 void stay_silent(png_structp, png_const_charp) {}
 
-[[noreturn]] void jump_back(png_structp png, png_const_charp) { png_longjmp(png, 1); }
+[[noreturn]] void jump_back(png_structp png, png_const_charp) {
+  png_longjmp(png, 1);
+}
 
 /// Everything that libpng may jump out of; nothing here needs a destructor.
 bool write_image(png_structp png, png_infop info, const PngImage& image, std::vector<std::byte>& out) {

@@ -15,7 +15,8 @@ constexpr std::size_t kSmallGridChunks = 4;
 /// Adds up the progress of many grids, each weighted by its chunks, for one listener.
 class SharedProgress {
  public:
-  SharedProgress(const Progress& listener, std::size_t total) : listener_(listener), total_(std::max<std::size_t>(total, 1)) {}
+  SharedProgress(const Progress& listener, std::size_t total)
+      : listener_(listener), total_(std::max<std::size_t>(total, 1)) {}
 
   /// Says that `chunks` more are done; false when the listener wants to stop.
   bool advance(double chunks) {
