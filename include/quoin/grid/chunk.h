@@ -3,9 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -60,11 +62,14 @@ class Chunk {
   /// Sets the 64 voxels of one row; answers which of them had another type before.
   std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types);
   void read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const;
-  /// True when the voxel had another type before.
-  bool set(int x, int y, int z, VoxelType type) { return set_row(y, z, std::uint64_t{1} << x, type) != 0; }
+  /// True when the voxel had another type before. Requires: 0 <= x, y, z < 64.
+  bool set(int x, int y, int z, VoxelType type);
   bool set(IVec3 local, VoxelType type) { return set(local.x, local.y, local.z, type); }
   /// Makes the whole chunk one type.
   void fill(VoxelType type);
+  /// Sets the voxels of a box (clipped to the chunk); calls `on_change` for every row in which some had another type.
+  void fill_box(const IBox& box, VoxelType type,
+                const std::function<void(int y, int z, std::uint64_t changed)>& on_change);
 
   /// Which of a row's voxels have this type.
   [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;
@@ -87,11 +92,11 @@ class Chunk {
 
   /// The storage itself, for code that turns voxels into masks (meshing, tracing).
   struct Mixed {
-    int bits = 1;                        ///< a voxel: 1, 2, 4, 8 or 16
-    std::vector<VoxelType> palette;      ///< type of each index; unused at 16 bits, where the index is the type
-    std::vector<std::uint32_t> counts;   ///< voxels of each index; unused at 16 bits
+    int bits = 1;                            ///< a voxel: 1, 2, 4, 8 or 16
+    std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
+    std::vector<std::uint32_t> counts;       ///< voxels of each index; unused at 16 bits
     std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
-    std::vector<std::uint64_t> words;    ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
+    std::vector<std::uint64_t> words;        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
     std::vector<std::uint32_t> free_slots;
     std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer
     int non_air = 0;
@@ -110,7 +115,9 @@ class Chunk {
     }
   };
   static constexpr std::uint32_t kUniformSlab = 0x8000'0000U;
-  [[nodiscard]] static std::size_t slab_index(int y, int z) { return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2)); }
+  [[nodiscard]] static std::size_t slab_index(int y, int z) {
+    return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));
+  }
   [[nodiscard]] static int row_in_slab(int y, int z) { return ((z & 3) << 2) | (y & 3); }
   /// Null when the chunk is uniform.
   [[nodiscard]] const Mixed* mixed() const { return mixed_.get(); }
@@ -121,6 +128,9 @@ class Chunk {
   void widen(int bits);
   std::uint32_t slot_for_writing(std::size_t slab);
   void count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid);
+  void make_slab_uniform(std::size_t slab, VoxelType type);
+  void pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels> types,
+                 const std::vector<std::uint32_t>& index_of);
 
   VoxelType uniform_;
   std::unique_ptr<Mixed> mixed_;

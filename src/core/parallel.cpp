@@ -1,0 +1,61 @@
+#include <quoin/core/parallel.h>
+
+#include <algorithm>
+#include <thread>
+
+#ifdef QUOIN_PARALLEL_WITH_JTHREAD
+// Thread-sanitizer builds: oneTBB is not instrumented and gives false reports.
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <vector>
+#else
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+#endif
+
+namespace quoin {
+
+unsigned resolve(Threads threads) {
+  return threads.count != 0 ? threads.count : std::max(1U, std::thread::hardware_concurrency());
+}
+
+#ifdef QUOIN_PARALLEL_WITH_JTHREAD
+
+void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex failure_lock;
+  const auto work = [&] {
+    try {
+      for (std::size_t i = next++; i < count; i = next++) body(i);
+    } catch (...) {
+      const std::lock_guard lock(failure_lock);
+      failure = std::current_exception();
+      next = count;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    const std::size_t helpers = std::min<std::size_t>(resolve(threads), count);
+    for (std::size_t i = 1; i < helpers; ++i) workers.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+#else
+
+void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
+  const unsigned workers = resolve(threads);
+  if (workers == 1 || count <= 1) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+    return;
+  }
+  oneapi::tbb::task_arena arena(static_cast<int>(workers));
+  arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, body); });
+}
+
+#endif
+
+}  // namespace quoin

@@ -1,0 +1,147 @@
+#include <quoin/grid/chunk.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+std::size_t dense_index(int x, int y, int z) {
+  return static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge + x);
+}
+
+void expect_holds(const Chunk& chunk, const std::vector<VoxelType>& dense) {
+  int non_air = 0;
+  IBox box;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      for (int x = 0; x < kChunkEdge; ++x) {
+        const VoxelType expected = dense[dense_index(x, y, z)];
+        ASSERT_EQ(chunk.get(x, y, z), expected) << x << ' ' << y << ' ' << z;
+        if (expected == kAir) continue;
+        ++non_air;
+        box = unite(box, {{x, y, z}, {x + 1, y + 1, z + 1}});
+      }
+    }
+  }
+  EXPECT_EQ(chunk.non_air_count(), non_air);
+  EXPECT_EQ(chunk.bounds(), box);
+  std::set<VoxelType> types(dense.begin(), dense.end());
+  const std::vector<VoxelType> found = chunk.types();
+  EXPECT_TRUE(std::equal(types.begin(), types.end(), found.begin(), found.end()));
+  int checked = 0;
+  for (const VoxelType type : types) {
+    if (++checked > 300) break;
+    EXPECT_EQ(chunk.count(type), std::count(dense.begin(), dense.end(), type));
+  }
+}
+
+TEST(Chunk, OfOneTypeHoldsNoVoxelData) {
+  EXPECT_EQ(Chunk(7).bytes(), sizeof(Chunk));
+  EXPECT_EQ(Chunk(7).non_air_count(), 64 * 64 * 64);
+  EXPECT_EQ(Chunk().bounds(), IBox{});
+}
+
+TEST(Chunk, SetAnswersWhetherTheVoxelChanged) {
+  Chunk chunk;
+  EXPECT_TRUE(chunk.set(1, 2, 3, 5));
+  EXPECT_FALSE(chunk.set(1, 2, 3, 5));
+  EXPECT_TRUE(chunk.set(1, 2, 3, kAir));
+  EXPECT_FALSE(chunk.set(1, 2, 3, kAir));
+}
+
+TEST(Chunk, FilledVoxelByVoxelBecomesUniform) {
+  Chunk chunk;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      for (int x = 0; x < kChunkEdge; ++x) chunk.set(x, y, z, 9);
+    }
+  }
+  EXPECT_EQ(chunk.uniform(), 9);
+}
+
+// Each width is reached by having that many types; the chunk must hold what a plain array holds.
+class ChunkOfTypes : public testing::TestWithParam<int> {};
+
+TEST_P(ChunkOfTypes, HoldsWhatAPlainArrayHolds) {
+  std::mt19937 random(static_cast<unsigned>(GetParam()));
+  std::vector<VoxelType> dense(kChunkVoxels, kAir);
+  Chunk chunk;
+  const auto pick = [&] { return static_cast<VoxelType>(random() % static_cast<unsigned>(GetParam())); };
+  for (int i = 0; i < 40'000; ++i) {
+    const int x = static_cast<int>(random() % 64);
+    const int y = static_cast<int>(random() % 64);
+    const int z = static_cast<int>(random() % 64);
+    const VoxelType type = pick();
+    ASSERT_EQ(chunk.set(x, y, z, type), dense[dense_index(x, y, z)] != type);
+    dense[dense_index(x, y, z)] = type;
+  }
+  for (int i = 0; i < 3'000; ++i) {
+    const int y = static_cast<int>(random() % 64);
+    const int z = static_cast<int>(random() % 64);
+    const std::uint64_t mask = (std::uint64_t{random()} << 32 | random()) & (std::uint64_t{random()} << 32 | random());
+    const VoxelType type = pick();
+    std::uint64_t changed = 0;
+    for (int x = 0; x < kChunkEdge; ++x) {
+      VoxelType& voxel = dense[dense_index(x, y, z)];
+      if ((mask >> x & 1U) == 0 || voxel == type) continue;
+      voxel = type;
+      changed |= std::uint64_t{1} << x;
+    }
+    ASSERT_EQ(chunk.set_row(y, z, mask, type), changed);
+  }
+  expect_holds(chunk, dense);
+  Chunk packed = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
+  expect_holds(packed, dense);
+  chunk.compact();
+  expect_holds(chunk, dense);
+  const Chunk copy = chunk;
+  expect_holds(copy, dense);
+}
+
+INSTANTIATE_TEST_SUITE_P(Widths, ChunkOfTypes, testing::Values(2, 3, 4, 5, 16, 17, 200, 256, 257, 65'535));
+
+TEST(Chunk, ReusesPaletteEntriesThatFellOutOfUse) {
+  Chunk chunk;
+  for (int i = 1; i < 60'000; ++i) chunk.set(5, 5, 5, static_cast<VoxelType>(i));
+  EXPECT_LE(chunk.mixed()->bits, 2);
+}
+
+TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {
+  Chunk chunk;
+  int rows = 0;
+  chunk.fill_box({{0, 0, 0}, {64, 32, 64}}, 3, [&](int, int, std::uint64_t changed) {
+    EXPECT_EQ(changed, ~std::uint64_t{0});
+    ++rows;
+  });
+  EXPECT_EQ(rows, 32 * 64);
+  chunk.fill_box({{10, 40, 10}, {20, 41, 11}}, 4, [](int, int, std::uint64_t) {});
+  EXPECT_EQ(chunk.count(3), 64 * 32 * 64);
+  EXPECT_EQ(chunk.count(4), 10);
+  chunk.compact();
+  EXPECT_LT(chunk.bytes(), 8'192U);
+}
+
+TEST(Chunk, RandomEditsDoNotGrowWithoutBound) {
+  std::mt19937 random(1);
+  Chunk chunk;
+  std::size_t largest = 0;
+  for (int round = 0; round < 40; ++round) {
+    for (int i = 0; i < 200; ++i) {
+      const int y = static_cast<int>(random() % 16) * 4;
+      const int z = static_cast<int>(random() % 16) * 4;
+      chunk.fill_box({{0, y, z}, {64, y + 4, z + 4}}, static_cast<VoxelType>(random() % 3),
+                     [](int, int, std::uint64_t) {});
+      chunk.set(static_cast<int>(random() % 64), y, z, static_cast<VoxelType>(random() % 3));
+    }
+    largest = std::max(largest, chunk.bytes());
+  }
+  EXPECT_LT(largest, 200'000U);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,401 @@
+#include <quoin/grid/grid.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include <tsl/robin_map.h>
+
+namespace quoin {
+namespace {
+
+struct ChunkHash {
+  std::size_t operator()(IVec3 c) const {
+    const auto mix = [](std::uint64_t h, std::int32_t v) {
+      return (h ^ static_cast<std::uint32_t>(v)) * 0x9E37'79B9'7F4A'7C15U;
+    };
+    const std::uint64_t h = mix(mix(mix(0, c.x), c.y), c.z);
+    return static_cast<std::size_t>(h ^ (h >> 32));
+  }
+};
+
+bool by_zyx(IVec3 a, IVec3 b) {
+  if (a.z != b.z) return a.z < b.z;
+  return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets.
+class Reach {
+ public:
+  void add(int y, int z, std::uint64_t changed) {
+    voxels += std::popcount(changed);
+    const unsigned x_sides = 0b010U | static_cast<unsigned>(changed & 1) | static_cast<unsigned>(changed >> 63) << 2;
+    const unsigned y_sides = sides(y);
+    const unsigned z_sides = sides(z);
+    for (unsigned dz = 0; dz < 3; ++dz) {
+      for (unsigned dy = 0; dy < 3; ++dy) {
+        if (((z_sides >> dz) & (y_sides >> dy) & 1U) != 0) mask |= x_sides << (dz * 9 + dy * 3);
+      }
+    }
+  }
+
+  std::int64_t voxels = 0;
+  std::uint32_t mask = 0;  ///< bit Neighbourhood::index(dx, dy, dz)
+
+ private:
+  static unsigned sides(int local) {
+    return 0b010U | static_cast<unsigned>(local == 0) | static_cast<unsigned>(local == kChunkEdge - 1) << 2;
+  }
+};
+
+constexpr int kMinChunk = std::numeric_limits<int>::min() >> kChunkShift;
+constexpr int kMaxChunk = std::numeric_limits<int>::max() >> kChunkShift;
+
+// The outermost chunks stay air, so that every neighbour's coordinates are representable.
+bool is_inside_world(IVec3 chunk) {
+  const auto fits = [](int c) { return c > kMinChunk && c < kMaxChunk; };
+  return fits(chunk.x) && fits(chunk.y) && fits(chunk.z);
+}
+
+// [min, max) in int64, so that corners at the ends of the int32 range do not overflow.
+struct LongBox {
+  std::array<std::int64_t, 3> min{};
+  std::array<std::int64_t, 3> max{};
+};
+
+LongBox clipped(LongBox box) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.min[axis] = std::max<std::int64_t>(box.min[axis], std::int64_t{kMinChunk + 1} * kChunkEdge);
+    box.max[axis] = std::min<std::int64_t>(box.max[axis], std::int64_t{kMaxChunk} * kChunkEdge);
+  }
+  return box;
+}
+
+}  // namespace
+
+struct Grid::Impl {
+  struct Entry {
+    Chunk chunk;
+    std::uint64_t version = 0;
+    std::uint64_t neighbourhood_version = 0;
+  };
+  tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
+  std::set<IVec3, decltype(&by_zyx)> dirty{&by_zyx};
+  std::uint64_t version = 0;
+
+  Entry* find(IVec3 chunk) const {
+    const auto it = entries.find(chunk);
+    return it == entries.end() ? nullptr : it->second.get();
+  }
+  Entry& find_or_create(IVec3 chunk) {
+    auto& entry = entries[chunk];
+    if (entry == nullptr) entry = std::make_unique<Entry>();
+    return *entry;
+  }
+
+  // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
+  void finish_edit(IVec3 chunk, Entry& entry, const Reach& reach) {
+    if (reach.voxels == 0) {
+      if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+      return;
+    }
+    entry.version = version;
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          if ((reach.mask >> Neighbourhood::index(dx, dy, dz) & 1U) == 0) continue;
+          const IVec3 at = chunk + IVec3{dx, dy, dz};
+          Entry* neighbour = find(at);
+          if (neighbour == nullptr) continue;
+          neighbour->neighbourhood_version = version;
+          dirty.insert(at);
+        }
+      }
+    }
+    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+  }
+
+  // Calls `change(chunk, entry, part of the box in chunk coordinates, reach)` for every chunk of a box. Chunks that are
+  // not there are created where `create`, left out otherwise.
+  template <class Change>
+  std::int64_t edit_box(const LongBox& wanted, bool create, Change&& change);
+};
+
+template <class Change>
+std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& change) {
+  const LongBox box = clipped(wanted);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (box.max[axis] <= box.min[axis]) return 0;
+  }
+  const auto chunk_at = [](std::int64_t voxel) { return static_cast<int>(voxel >> kChunkShift); };
+  const IVec3 first{chunk_at(box.min[0]), chunk_at(box.min[1]), chunk_at(box.min[2])};
+  const IVec3 last{chunk_at(box.max[0] - 1), chunk_at(box.max[1] - 1), chunk_at(box.max[2] - 1)};
+  ++version;
+  std::int64_t changed = 0;
+  const auto edit_chunk = [&](IVec3 chunk, Entry& entry) {
+    IBox part;
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t origin = std::int64_t{chunk[axis]} * kChunkEdge;
+      part.min[axis] = static_cast<int>(std::max<std::int64_t>(box.min[static_cast<std::size_t>(axis)] - origin, 0));
+      part.max[axis] =
+          static_cast<int>(std::min<std::int64_t>(box.max[static_cast<std::size_t>(axis)] - origin, kChunkEdge));
+    }
+    Reach reach;
+    change(chunk, entry.chunk, part, reach);
+    changed += reach.voxels;
+    finish_edit(chunk, entry, reach);
+  };
+  if (create) {
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) edit_chunk({x, y, z}, find_or_create({x, y, z}));
+      }
+    }
+  } else {
+    std::vector<IVec3> present;
+    const IBox chunks{first, last + 1};
+    for (const auto& [at, entry] : entries) {
+      if (chunks.contains(at)) present.push_back(at);
+    }
+    std::sort(present.begin(), present.end(), by_zyx);
+    for (const IVec3 at : present) edit_chunk(at, *find(at));
+  }
+  if (changed == 0) --version;
+  return changed;
+}
+
+Grid::Grid() : impl_(std::make_unique<Impl>()) {}
+Grid::Grid(Grid&&) noexcept = default;
+Grid& Grid::operator=(Grid&&) noexcept = default;
+Grid::~Grid() = default;
+
+Grid Grid::clone() const {
+  Grid copy;
+  copy.impl_->version = impl_->version;
+  copy.impl_->dirty = impl_->dirty;
+  for (const auto& [at, entry] : impl_->entries) {
+    copy.impl_->entries.emplace(at, std::make_unique<Impl::Entry>(*entry));
+  }
+  return copy;
+}
+
+VoxelType Grid::get(IVec3 voxel) const {
+  const Impl::Entry* entry = impl_->find(chunk_of(voxel));
+  return entry == nullptr ? kAir : entry->chunk.get(local_of(voxel));
+}
+
+bool Grid::set(IVec3 voxel, VoxelType type) {
+  const IVec3 at = chunk_of(voxel);
+  const IVec3 local = local_of(voxel);
+  Impl::Entry* entry = impl_->find(at);
+  if (entry == nullptr) {
+    if (type == kAir || !is_inside_world(at)) return false;
+    entry = &impl_->find_or_create(at);
+  }
+  if (!entry->chunk.set(local, type)) return false;
+  ++impl_->version;
+  Reach reach;
+  reach.add(local.y, local.z, std::uint64_t{1} << local.x);
+  impl_->finish_edit(at, *entry, reach);
+  return true;
+}
+
+std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[static_cast<std::size_t>(axis)] = std::min(first[axis], last[axis]);
+    box.max[static_cast<std::size_t>(axis)] = std::int64_t{std::max(first[axis], last[axis])} + 1;
+  }
+  return impl_->edit_box(box, type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, Reach& reach) {
+    chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { reach.add(y, z, changed); });
+  });
+}
+
+std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
+  constexpr double kLimit = 2'147'483'648.0;
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(radius >= 0.0) || !std::isfinite(centre[axis])) return 0;
+    const double low = std::clamp(centre[axis] - radius - 1.0, -kLimit, kLimit);
+    const double high = std::clamp(centre[axis] + radius + 1.0, -kLimit, kLimit);
+    box.min[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(low));
+    box.max[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::ceil(high));
+  }
+  return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
+    const DVec3 local_centre = centre - DVec3(at) * double{kChunkEdge} - 0.5;
+    for (int z = part.min.z; z < part.max.z; ++z) {
+      for (int y = part.min.y; y < part.max.y; ++y) {
+        const double dy = y - local_centre.y;
+        const double dz = z - local_centre.z;
+        std::uint64_t mask = 0;
+        for (int x = part.min.x; x < part.max.x; ++x) {
+          const double dx = x - local_centre.x;
+          mask |= std::uint64_t{dx * dx + dy * dy + dz * dz <= radius * radius} << x;
+        }
+        const std::uint64_t changed = chunk.set_row(y, z, mask, type);
+        if (changed != 0) reach.add(y, z, changed);
+      }
+    }
+  });
+}
+
+std::int64_t Grid::edit(const IBox& wanted, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick) {
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[static_cast<std::size_t>(axis)] = wanted.min[axis];
+    box.max[static_cast<std::size_t>(axis)] = wanted.max[axis];
+  }
+  return impl_->edit_box(box, true, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
+    std::array<VoxelType, kChunkEdge> row{};
+    for (int z = part.min.z; z < part.max.z; ++z) {
+      for (int y = part.min.y; y < part.max.y; ++y) {
+        chunk.read_row(y, z, row);
+        for (int x = part.min.x; x < part.max.x; ++x) {
+          VoxelType& type = row[static_cast<std::size_t>(x)];
+          type = pick(at * kChunkEdge + IVec3{x, y, z}, type);
+        }
+        const std::uint64_t changed = chunk.write_row(y, z, row);
+        if (changed != 0) reach.add(y, z, changed);
+      }
+    }
+  });
+}
+
+void Grid::put_chunk(IVec3 at, Chunk voxels) {
+  if (!is_inside_world(at)) return;
+  Impl::Entry* present = impl_->find(at);
+  if (present == nullptr && voxels.non_air_count() == 0) return;
+  Impl::Entry& entry = present != nullptr ? *present : impl_->find_or_create(at);
+  Reach reach;
+  std::array<VoxelType, kChunkEdge> old_row{};
+  std::array<VoxelType, kChunkEdge> new_row{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      if (present == nullptr) {
+        reach.add(y, z, ~voxels.row_mask(y, z, kAir));
+        continue;
+      }
+      entry.chunk.read_row(y, z, old_row);
+      voxels.read_row(y, z, new_row);
+      std::uint64_t changed = 0;
+      for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{old_row[x] != new_row[x]} << x;
+      if (changed != 0) reach.add(y, z, changed);
+    }
+  }
+  entry.chunk = std::move(voxels);
+  if (reach.voxels != 0) ++impl_->version;
+  impl_->finish_edit(at, entry, reach);
+}
+
+void Grid::clear() {
+  if (impl_->entries.empty()) return;
+  ++impl_->version;
+  for (const auto& [at, entry] : impl_->entries) impl_->dirty.insert(at);
+  impl_->entries.clear();
+}
+
+const Chunk* Grid::find_chunk(IVec3 chunk) const {
+  const Impl::Entry* entry = impl_->find(chunk);
+  return entry == nullptr ? nullptr : &entry->chunk;
+}
+
+std::vector<IVec3> Grid::chunks() const {
+  std::vector<IVec3> all;
+  all.reserve(impl_->entries.size());
+  for (const auto& [at, entry] : impl_->entries) all.push_back(at);
+  std::sort(all.begin(), all.end(), by_zyx);
+  return all;
+}
+
+std::size_t Grid::chunk_count() const {
+  return impl_->entries.size();
+}
+
+Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
+  Neighbourhood result;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        result.chunks[Neighbourhood::index(dx, dy, dz)] = find_chunk(chunk + IVec3{dx, dy, dz});
+      }
+    }
+  }
+  return result;
+}
+
+std::uint64_t Grid::version(IVec3 chunk) const {
+  const Impl::Entry* entry = impl_->find(chunk);
+  return entry == nullptr ? 0 : entry->version;
+}
+
+std::uint64_t Grid::neighbourhood_version(IVec3 chunk) const {
+  const Impl::Entry* entry = impl_->find(chunk);
+  return entry == nullptr ? 0 : entry->neighbourhood_version;
+}
+
+std::uint64_t Grid::version() const {
+  return impl_->version;
+}
+
+std::vector<IVec3> Grid::take_dirty() {
+  std::vector<IVec3> taken(impl_->dirty.begin(), impl_->dirty.end());
+  impl_->dirty.clear();
+  return taken;
+}
+
+IBox Grid::bounds() const {
+  IBox box;
+  for (const auto& [at, entry] : impl_->entries) {
+    const IBox inside = entry->chunk.bounds();
+    box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
+  }
+  return box;
+}
+
+std::int64_t Grid::voxel_count() const {
+  std::int64_t total = 0;
+  for (const auto& [at, entry] : impl_->entries) total += entry->chunk.non_air_count();
+  return total;
+}
+
+std::vector<VoxelType> Grid::types() const {
+  std::set<VoxelType> all;
+  for (const auto& [at, entry] : impl_->entries) {
+    for (const VoxelType type : entry->chunk.types()) {
+      if (type != kAir) all.insert(type);
+    }
+  }
+  return {all.begin(), all.end()};
+}
+
+void Grid::for_each(const std::function<void(IVec3 voxel, VoxelType type)>& visit) const {
+  std::array<VoxelType, kChunkEdge> row{};
+  for (const IVec3 at : chunks()) {
+    const Chunk& chunk = *find_chunk(at);
+    const IBox box = chunk.bounds();
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        chunk.read_row(y, z, row);
+        for (int x = box.min.x; x < box.max.x; ++x) {
+          const VoxelType type = row[static_cast<std::size_t>(x)];
+          if (type != kAir) visit(at * kChunkEdge + IVec3{x, y, z}, type);
+        }
+      }
+    }
+  }
+}
+
+std::size_t Grid::bytes() const {
+  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bucket_count() * sizeof(void*) * 4;
+  for (const auto& [at, entry] : impl_->entries) total += sizeof(Impl::Entry) - sizeof(Chunk) + entry->chunk.bytes();
+  return total;
+}
+
+void Grid::compact() {
+  for (auto it = impl_->entries.begin(); it != impl_->entries.end(); ++it) it.value()->chunk.compact();
+}
+
+}  // namespace quoin
