@@ -1,7 +1,9 @@
 #include "io/gltf_document.h"
 
-#include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "io/placement.h"
 
 namespace quoin {
 
@@ -111,13 +113,6 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
   document["images"] = std::move(images);
 }
 
-bool is_finite(const Instance& instance) {
-  const DVec3& p = instance.position;
-  const DQuat& q = instance.rotation;
-  const double sum = p.x + p.y + p.z + q.w + q.x + q.y + q.z + instance.voxel_size;
-  return std::isfinite(sum) && instance.voxel_size > 0.0 && glm::length(q) > 0.0;
-}
-
 Json node_json(const Instance& instance, const SceneGrid& grid, const GltfLayout& layout) {
   Json node = Json::object();
   const std::string& name = instance.name.empty() ? grid.name : instance.name;
@@ -135,16 +130,12 @@ Json node_json(const Instance& instance, const SceneGrid& grid, const GltfLayout
   return node;
 }
 
-Result<Json> nodes_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout& layout) {
+Json nodes_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout& layout) {
   Json nodes = Json::array();
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, meshes.hidden)) continue;
-    if (!is_finite(instance)) {
-      return fail(ErrorCode::InvalidArgument,
-                  "instance \"" + instance.name + "\" has a transform that is not finite or not positive");
-    }
-    nodes.push_back(node_json(instance, scene.grids()[instance.grid], layout));
+    if (is_drawn(scene, instance, meshes.hidden))
+      nodes.push_back(node_json(instance, scene.grids()[instance.grid], layout));
   }
   return nodes;
 }
@@ -175,14 +166,14 @@ void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& doc
 
 Result<std::string> gltf_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout& layout,
                               std::string_view buffer_uri) {
-  auto nodes = nodes_json(scene, meshes, layout);
-  if (!nodes) return tl::unexpected<Error>(nodes.error());
+  if (auto sound = check_placements(scene, meshes.hidden); !sound) return tl::unexpected<Error>(sound.error());
+  Json nodes = nodes_json(scene, meshes, layout);
   Json document;
   document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
   if (layout.palette.has_emission()) document["extensionsUsed"] = {kEmissiveStrength};
   document["scene"] = 0;
-  document["scenes"] = scene_json(*nodes);
-  if (!nodes->empty()) document["nodes"] = std::move(*nodes);
+  document["scenes"] = scene_json(nodes);
+  if (!nodes.empty()) document["nodes"] = std::move(nodes);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -35,7 +35,7 @@ void SurfaceParts::add_surface(const BlockyTriangles& surface, SurfaceClass surf
     return;
   }
   for (auto& [material, triangles] : by_material) {
-    triangles = &owned_.emplace_back();
+    triangles = owned_.emplace_back(std::make_unique<BlockyTriangles>()).get();
     parts_.push_back({triangles, material});
   }
   // A triangle lies in one face, so its three vertices have one type and move together.

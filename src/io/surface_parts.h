@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,7 +30,7 @@ class SurfaceParts {
   void add_surface(const BlockyTriangles& surface, SurfaceClass surface_class, const MaterialPalette& palette);
 
   std::vector<SurfacePart> parts_;
-  std::deque<BlockyTriangles> owned_;
+  std::vector<std::unique_ptr<BlockyTriangles>> owned_;
 };
 
 /// Grey of a vertex's occlusion level, linear: 255, 191, 128, 64.
