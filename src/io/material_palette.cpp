@@ -107,7 +107,7 @@ void MaterialPalette::make_materials(const Usage& used) {
       if (!bands[band]) continue;
       SurfaceMaterial material{material_name(surface), surface, 0.0F};
       if (emits(surface) && !bands_.empty()) material.emission = bands_[band];
-      if (count > 1) material.name += " " + std::to_string(++number);
+      if (count > 1) material.name.append(1, ' ').append(std::to_string(++number));
       by_class_and_band_[{surface, band}] = materials_.size();
       materials_.push_back(std::move(material));
     }
