@@ -1,0 +1,203 @@
+#include <quoin/io/file.h>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace quoin {
+
+namespace {
+
+// Far above any file Quoin can make sense of; keeps a sparse file of terabytes from exhausting the memory.
+constexpr std::uint64_t kMaxFileBytes = std::uint64_t{8} << 30;
+
+constexpr mode_t kPermissionBits = 07777;
+
+std::string reason(int error_number) {
+  return std::generic_category().message(error_number);
+}
+
+tl::unexpected<Error> cannot_read(std::string message, const std::filesystem::path& path) {
+  return fail(ErrorCode::CannotRead, std::move(message), path.string());
+}
+
+tl::unexpected<Error> cannot_write(std::string message, const std::filesystem::path& path) {
+  return fail(ErrorCode::CannotWrite, std::move(message), path.string());
+}
+
+/// Closes a descriptor at the end of its scope.
+struct DescriptorGuard {
+  int descriptor;
+  explicit DescriptorGuard(int value) : descriptor(value) {}
+  DescriptorGuard(const DescriptorGuard&) = delete;
+  DescriptorGuard& operator=(const DescriptorGuard&) = delete;
+  ~DescriptorGuard() { ::close(descriptor); }
+};
+
+/// The file at the end of a chain of symbolic links, which need not exist.
+std::filesystem::path behind_links(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int i = 0; i < kMostLinks; ++i) {
+    if (!std::filesystem::is_symlink(path, error) || error) break;
+    const std::filesystem::path target = std::filesystem::read_symlink(path, error);
+    if (error) break;
+    path = target.is_absolute() ? target : path.parent_path() / target;
+  }
+  return path;
+}
+
+/// A name beside `path` that no other writer of this or another process uses.
+std::filesystem::path temporary_name(const std::filesystem::path& path, unsigned attempt) {
+  static std::atomic<unsigned> counter{0};
+  const std::string name =
+      ".quoin-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + "-" + std::to_string(attempt) + ".tmp";
+  return path.parent_path() / name;
+}
+
+/// Why `path` cannot be replaced by a file, or 0 when it can. `mode` becomes the permissions of the file that is there.
+Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t>& mode) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) {
+    if (errno == ENOENT) return {};
+    return cannot_write(reason(errno), path);
+  }
+  if (S_ISDIR(info.st_mode)) return cannot_write("it is a folder", path);
+  if (!S_ISREG(info.st_mode)) return cannot_write("it is not a regular file", path);
+  if (::access(path.c_str(), W_OK) != 0) return cannot_write(reason(errno), path);
+  mode = info.st_mode & kPermissionBits;
+  return {};
+}
+
+/// Makes a rename last: without it a power cut may bring the old folder entry back. Not all file systems can.
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
+  // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return cannot_read(reason(errno), path);
+  const DescriptorGuard guard(descriptor);
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0) return cannot_read(reason(errno), path);
+  if (S_ISDIR(info.st_mode)) return cannot_read("it is a folder", path);
+  if (!S_ISREG(info.st_mode)) return cannot_read("it is not a regular file", path);
+  if (static_cast<std::uint64_t>(info.st_size) > kMaxFileBytes) {
+    return fail(ErrorCode::LimitExceeded, "the file has " + std::to_string(info.st_size) + " bytes", path.string());
+  }
+  std::vector<std::byte> bytes(static_cast<std::size_t>(info.st_size));
+  std::size_t filled = 0;
+  while (filled < bytes.size()) {
+    const ssize_t count = ::read(descriptor, bytes.data() + filled, bytes.size() - filled);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return cannot_read(reason(errno), path);
+    if (count == 0) break;
+    filled += static_cast<std::size_t>(count);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
+  AtomicFile file;
+  file.path_ = behind_links(path);
+  std::optional<mode_t> mode;
+  if (Status status = check_replaceable(file.path_, mode); !status) {
+    status.error().path = path.string();
+    return tl::unexpected(status.error());
+  }
+  constexpr unsigned kAttempts = 100;
+  for (unsigned attempt = 0; attempt < kAttempts && file.descriptor_ < 0; ++attempt) {
+    file.temporary_ = temporary_name(file.path_, attempt);
+    file.descriptor_ = ::open(file.temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file.descriptor_ < 0 && errno != EEXIST) break;
+  }
+  if (file.descriptor_ < 0) return cannot_write(reason(errno), path);
+  // Some file systems have no permissions; the file is then as good as it can be.
+  if (mode.has_value()) static_cast<void>(::fchmod(file.descriptor_, *mode));
+  return file;
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      temporary_(std::move(other.temporary_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      failed_(other.failed_) {}
+
+AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
+  if (this == &other) return *this;
+  discard();
+  path_ = std::move(other.path_);
+  temporary_ = std::move(other.temporary_);
+  descriptor_ = std::exchange(other.descriptor_, -1);
+  failed_ = other.failed_;
+  return *this;
+}
+
+AtomicFile::~AtomicFile() {
+  discard();
+}
+
+void AtomicFile::discard() noexcept {
+  if (descriptor_ < 0) return;
+  ::close(std::exchange(descriptor_, -1));
+  ::unlink(temporary_.c_str());
+}
+
+Status AtomicFile::write(std::span<const std::byte> bytes) {
+  if (descriptor_ < 0 || failed_) return cannot_write("an earlier write failed", path_);
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) {
+      failed_ = true;
+      return cannot_write(reason(errno), path_);
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return {};
+}
+
+Status AtomicFile::commit() {
+  if (descriptor_ < 0 || failed_) {
+    discard();
+    return cannot_write("an earlier write failed", path_);
+  }
+  const int synced = ::fsync(descriptor_);
+  const int sync_error = errno;
+  const int closed = ::close(std::exchange(descriptor_, -1));
+  const int close_error = errno;
+  // EINVAL: this kind of file cannot be synced (some network and virtual file systems).
+  const bool sync_failed = synced != 0 && sync_error != EINVAL;
+  int error = sync_failed ? sync_error : closed != 0 ? close_error : 0;
+  if (error == 0 && ::rename(temporary_.c_str(), path_.c_str()) != 0) error = errno;
+  if (error != 0) {
+    ::unlink(temporary_.c_str());
+    return cannot_write(reason(error), path_);
+  }
+  sync_folder(path_.parent_path());
+  return {};
+}
+
+Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  Result<AtomicFile> file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (Status status = file->write(bytes); !status) return status;
+  return file->commit();
+}
+
+}  // namespace quoin

@@ -1,0 +1,63 @@
+#include <quoin/scene/scene.h>
+
+#include <cmath>
+
+#include <glm/mat3x3.hpp>
+
+namespace quoin {
+
+namespace {
+
+/// The rotation's matrix, exact for quarter turns, whose quaternions hold the irrational square root of one half.
+glm::dmat3 exact_matrix(const DQuat& rotation) {
+  constexpr double kRounding = 1e-12;
+  glm::dmat3 matrix = glm::mat3_cast(rotation);
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      const double nearest = std::round(matrix[column][row]);
+      if (std::abs(matrix[column][row] - nearest) < kRounding) matrix[column][row] = nearest;
+    }
+  }
+  return matrix;
+}
+
+}  // namespace
+
+bool Scene::remove_grid(GridHandle handle) {
+  if (!grids_.remove(handle)) return false;
+  for (const InstanceHandle instance : instances_.handles()) {
+    if (instances_[instance].grid == handle) instances_.remove(instance);
+  }
+  return true;
+}
+
+std::int64_t Scene::voxel_count() const {
+  std::int64_t count = 0;
+  for (const GridHandle handle : grids_.handles()) count += grids_[handle].grid.voxel_count();
+  return count;
+}
+
+DBox Scene::bounds(bool hidden_too) const {
+  DBox box;
+  for (const InstanceHandle handle : instances_.handles()) {
+    const Instance& instance = instances_[handle];
+    const SceneGrid* grid = grids_.find(instance.grid);
+    if (grid == nullptr || (!instance.visible && !hidden_too)) continue;
+    const IBox tight = grid->grid.bounds();
+    if (tight.empty()) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
+                        (corner & 4) != 0 ? tight.max.z : tight.min.z};
+      box.extend(world_from_grid(instance, *grid, point));
+    }
+  }
+  return box;
+}
+
+DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid) {
+  DVec3 offset = (point_in_grid - grid.pivot) * instance.voxel_size;
+  if (instance.mirrored) offset.x = -offset.x;
+  return instance.position + exact_matrix(instance.rotation) * offset;
+}
+
+}  // namespace quoin
