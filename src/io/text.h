@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace quoin {
+
+/// The integer that all of `text` spells, in base ten; nothing when it is not one or does not fit.
+[[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text);
+
+/// The finite number that all of `text` spells, whatever the locale; nothing when it is not one.
+[[nodiscard]] std::optional<float> parse_float(std::string_view text);
+
+/// The shortest text from which `parse_float` gives the same number.
+[[nodiscard]] std::string to_text(float value);
+
+/// `text` as valid UTF-8 on one line: bytes that are not UTF-8 become U+FFFD, control characters become blanks.
+[[nodiscard]] std::string printable(std::string_view text);
+
+}  // namespace quoin

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "io/byte_reader.h"
+#include "io/text.h"
+#include "io/vox_chunks.h"
+
+namespace quoin::vox {
+
+/// The content of one chunk, with the errors that name it.
+class ChunkReader : public ByteReader {
+ public:
+  ChunkReader(std::span<const std::byte> file, std::string_view id, std::size_t offset, std::size_t begin,
+              std::size_t end)
+      : ByteReader(file, begin, end), id_(id), offset_(offset) {}
+
+  [[nodiscard]] std::string_view id() const { return id_; }
+  /// Where the chunk's header starts.
+  [[nodiscard]] std::size_t offset() const { return offset_; }
+
+  [[nodiscard]] std::string_view string() { return text(u32()); }
+  [[nodiscard]] Dict dict();
+
+  /// BadFormat at the chunk: "chunk nTRN <what>".
+  [[nodiscard]] tl::unexpected<Error> error(const std::string& what) const {
+    return bad_at(offset_, "chunk " + printable(id_) + " " + what);
+  }
+  [[nodiscard]] tl::unexpected<Error> too_short() const { return error("ends before its content does"); }
+
+ private:
+  std::string_view id_;
+  std::size_t offset_;
+};
+
+}  // namespace quoin::vox

@@ -1,0 +1,114 @@
+#include "io/vox_models.h"
+
+#include <algorithm>
+
+namespace quoin::vox {
+
+namespace {
+
+// Below this many voxels in a chunk single edits of the grid are cheaper than making a chunk of its own, and below the
+// second one single edits of a chunk are cheaper than going over all its 64^3 places.
+constexpr std::size_t kFewVoxels = 128;
+constexpr std::size_t kSomeVoxels = 8'192;
+
+constexpr unsigned kTypeShift = 3 * kChunkShift;
+constexpr std::uint32_t kPlaceMask = (1U << kTypeShift) - 1U;
+// A model spans at most four chunks on each axis.
+constexpr unsigned kChunksShift = 2;
+static_assert((kChunkEdge << kChunksShift) == kMaxModelEdge);
+
+std::size_t chunk_number(IVec3 chunk) {
+  return static_cast<std::size_t>((chunk.z << (2 * kChunksShift)) | (chunk.y << kChunksShift) | chunk.x);
+}
+
+std::uint32_t place_in_chunk(IVec3 local) {
+  return static_cast<std::uint32_t>((local.z << (2 * kChunkShift)) | (local.y << kChunkShift) | local.x);
+}
+
+IVec3 local_from_place(std::uint32_t place) {
+  const auto p = static_cast<int>(place);
+  return {p & (kChunkEdge - 1), (p >> kChunkShift) & (kChunkEdge - 1), p >> (2 * kChunkShift)};
+}
+
+/// Calls `visit(grid voxel, colour index)` for every voxel inside the model.
+template <class Visit>
+void for_each_voxel(const Model& model, Visit visit) {
+  for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
+    const int x = std::to_integer<int>(model.voxels[i]);
+    const int y = std::to_integer<int>(model.voxels[i + 1]);
+    const int z = std::to_integer<int>(model.voxels[i + 2]);
+    if (x >= model.size.x || y >= model.size.y || z >= model.size.z) continue;
+    visit(IVec3{x, z, model.size.y - 1 - y}, std::to_integer<std::uint8_t>(model.voxels[i + 3]));
+  }
+}
+
+}  // namespace
+
+IBox canvas_of(IVec3 model_size) {
+  return {IVec3{0}, {model_size.x, model_size.z, model_size.y}};
+}
+
+DVec3 pivot_of(IVec3 model_size) {
+  // The pivot is a corner between voxels, not a voxel: along the axis that is turned round it is counted from the end.
+  return {model_size.x / 2, model_size.z / 2, model_size.y - model_size.y / 2};
+}
+
+void ModelBuilder::sort_into_chunks(const Model& model) {
+  std::array<std::size_t, 65> counts{};
+  std::int64_t inside = 0;
+  for_each_voxel(model, [&](IVec3 voxel, std::uint8_t colour_index) {
+    ++inside;
+    if (colour_index == 0) {
+      ++losses_.colourless;
+    } else {
+      ++counts[chunk_number(chunk_of(voxel))];
+    }
+  });
+  losses_.outside += static_cast<std::int64_t>(model.voxels.size() / 4) - inside;
+  chunk_begins_[0] = 0;
+  for (std::size_t i = 0; i < 64; ++i) chunk_begins_[i + 1] = chunk_begins_[i] + counts[i];
+  sorted_.resize(chunk_begins_[64]);
+  std::array<std::size_t, 65> next = chunk_begins_;
+  for_each_voxel(model, [&](IVec3 voxel, std::uint8_t colour_index) {
+    if (colour_index == 0) return;
+    const std::uint32_t type = type_of_[colour_index];
+    sorted_[next[chunk_number(chunk_of(voxel))]++] = place_in_chunk(local_of(voxel)) | type << kTypeShift;
+  });
+}
+
+void ModelBuilder::fill_chunk(IVec3 chunk, std::size_t first, std::size_t count, Grid& grid) {
+  const std::span voxels = std::span(sorted_).subspan(first, count);
+  const auto type_of_voxel = [](std::uint32_t voxel) { return static_cast<VoxelType>(voxel >> kTypeShift); };
+  if (count < kFewVoxels) {
+    for (const std::uint32_t voxel : voxels) {
+      grid.set(chunk * kChunkEdge + local_from_place(voxel & kPlaceMask), type_of_voxel(voxel));
+    }
+    return;
+  }
+  if (count < kSomeVoxels) {
+    Chunk filled;
+    for (const std::uint32_t voxel : voxels) filled.set(local_from_place(voxel & kPlaceMask), type_of_voxel(voxel));
+    grid.put_chunk(chunk, std::move(filled));
+    return;
+  }
+  dense_.assign(kChunkVoxels, kAir);
+  for (const std::uint32_t voxel : voxels) dense_[voxel & kPlaceMask] = type_of_voxel(voxel);
+  grid.put_chunk(chunk, Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_)));
+}
+
+SceneGrid ModelBuilder::build(const Model& model) {
+  SceneGrid out;
+  out.canvas = canvas_of(model.size);
+  out.pivot = pivot_of(model.size);
+  sort_into_chunks(model);
+  for (std::size_t i = 0; i < 64; ++i) {
+    const std::size_t count = chunk_begins_[i + 1] - chunk_begins_[i];
+    if (count == 0) continue;
+    const auto number = static_cast<int>(i);
+    const IVec3 chunk{number & 3, (number >> kChunksShift) & 3, number >> (2 * kChunksShift)};
+    fill_chunk(chunk, chunk_begins_[i], count, out.grid);
+  }
+  return out;
+}
+
+}  // namespace quoin::vox

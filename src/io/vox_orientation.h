@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include <quoin/core/vec.h>
+
+namespace quoin::vox {
+
+/// A translation that sums of many 32-bit ones cannot overflow.
+using Offset = std::array<std::int64_t, 3>;
+
+/// One of the 48 turns and reflections that take the axes to the axes, as a matrix whose row `i` holds `sign[i]` in
+/// column `axis[i]` and zeros elsewhere.
+struct Orientation {
+  std::array<std::uint8_t, 3> axis{0, 1, 2};
+  std::array<std::int8_t, 3> sign{1, 1, 1};
+
+  bool operator==(const Orientation&) const = default;
+};
+
+/// The matrix product: first `b`, then `a`.
+[[nodiscard]] Orientation operator*(const Orientation& a, const Orientation& b);
+[[nodiscard]] Offset operator*(const Orientation& a, const Offset& offset);
+/// Its determinant is -1.
+[[nodiscard]] bool is_reflection(const Orientation& orientation);
+
+/// From and to the `_r` byte: bits 0-1 and 2-3 the columns of the first and second row's entry, bits 4-6 the rows'
+/// signs. Nothing when the two rows name the same column, or none.
+[[nodiscard]] std::optional<Orientation> orientation_from_byte(std::uint8_t byte);
+[[nodiscard]] std::uint8_t byte_from_orientation(const Orientation& orientation);
+
+/// An orientation as an Instance holds it: mirror x, then rotate.
+struct InstanceTurn {
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};
+  bool mirrored = false;
+};
+
+/// From MagicaVoxel's axes (z up) to Quoin's (y up): the same motion seen from axes (x, z, -y).
+[[nodiscard]] InstanceTurn turn_from_orientation(const Orientation& in_vox);
+/// The inverse; nothing when the rotation is not by quarter turns.
+[[nodiscard]] std::optional<Orientation> orientation_from_turn(const InstanceTurn& turn);
+
+/// (x, y, z) of MagicaVoxel as Quoin's (x, z, -y), and back.
+[[nodiscard]] Offset quoin_from_vox(const Offset& offset);
+[[nodiscard]] Offset vox_from_quoin(const Offset& offset);
+
+}  // namespace quoin::vox
