@@ -179,7 +179,7 @@ int run_convert(const ConvertOptions& options) {
     print_error(outcome.error());
     return kFailed;
   }
-  if (options.common.json) return print(outcome_json(*outcome));
+  if (options.common.json) return print_json(outcome_json(*outcome));
   print_warnings(outcome->warnings);
   return print(outcome_text(options, *format, *outcome));
 }

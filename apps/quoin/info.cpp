@@ -143,7 +143,7 @@ int run_info(const CommonOptions& options) {
     print_error(loaded.error());
     return kFailed;
   }
-  if (options.json) return print(info_json(*loaded, options.load.hidden));
+  if (options.json) return print_json(info_json(*loaded, options.load.hidden));
   print_warnings(loaded->warnings);
   return print(info_text(options, *loaded));
 }

@@ -70,7 +70,7 @@ int print(std::string_view text) {
   return kFailed;
 }
 
-int print(const Json& object) {
+int print_json(const Json& object) {
   return print(object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

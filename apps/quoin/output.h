@@ -29,6 +29,6 @@ void print_warnings(const std::vector<std::string>& warnings);
 /// Prints text, or one JSON object and a line end, on standard output; answers the exit status: kFailed when that
 /// cannot be written.
 [[nodiscard]] int print(std::string_view text);
-[[nodiscard]] int print(const Json& object);
+[[nodiscard]] int print_json(const Json& object);
 
 }  // namespace quoin::tool
