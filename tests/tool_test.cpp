@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Run {
+struct ToolRun {
   int status = -1;
   std::string out;
   std::string err;
@@ -58,10 +58,10 @@ class Tool : public ::testing::Test {
   }
 
   /// Runs the tool in the test's folder.
-  Run run(const std::string& arguments) {
+  ToolRun run(const std::string& arguments) {
     const std::string command =
         "cd '" + folder_.file("").string() + "' && '" QUOIN_TOOL "' " + arguments + " > stdout.txt 2> stderr.txt";
-    Run result;
+    ToolRun result;
     const int status = std::system(command.c_str());
     result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     result.out = text_of(folder_.file("stdout.txt"));
@@ -74,17 +74,17 @@ class Tool : public ::testing::Test {
   TestFolder folder_{std::string("tool_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-void expect_one_error_line(const Run& run) {
+void expect_one_error_line(const ToolRun& run) {
   EXPECT_TRUE(run.err.starts_with("quoin: ")) << run.err;
   EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
   EXPECT_EQ(run.out, "");
 }
 
 TEST_F(Tool, info_says_what_is_in_a_file) {
-  const Run text = run("info tiny.vox");
+  const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Voxels: 4 of 2 types"), std::string::npos) << text.out;
-  const Run json = run("info tiny.vox --json");
+  const ToolRun json = run("info tiny.vox --json");
   ASSERT_EQ(json.status, 0) << json.err;
   const Json object = Json::parse(json.out);
   EXPECT_EQ(object["format"], "vox");
@@ -105,11 +105,11 @@ TEST_F(Tool, info_says_what_is_in_a_file) {
 }
 
 TEST_F(Tool, convert_writes_every_format_and_counts) {
-  const Run text = run("convert tiny.vox tiny.glb");
+  const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Faces: 18 visible of 24 total"), std::string::npos) << text.out;
   for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "out.vox"}) {
-    const Run json = run("convert tiny.vox " + name + " --json --threads 2");
+    const ToolRun json = run("convert tiny.vox " + name + " --json --threads 2");
     ASSERT_EQ(json.status, 0) << json.err;
     const Json object = Json::parse(json.out);
     EXPECT_EQ(object["voxels"], 4);
@@ -130,7 +130,7 @@ TEST_F(Tool, convert_writes_every_format_and_counts) {
 
 TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
   const auto quads = [&](const std::string& flags) {
-    const Run result = run("convert tiny.vox out.glb --json " + flags);
+    const ToolRun result = run("convert tiny.vox out.glb --json " + flags);
     return Json::parse(result.out)["quads"].get<int>();
   };
   EXPECT_EQ(quads("--mesher culled"), 18);
@@ -140,7 +140,7 @@ TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
 
 TEST_F(Tool, a_file_may_be_converted_onto_itself) {
   ASSERT_EQ(run("convert tiny.vox tiny.vox").status, 0);
-  const Run json = run("info tiny.vox --json");
+  const ToolRun json = run("info tiny.vox --json");
   ASSERT_EQ(json.status, 0) << json.err;
   EXPECT_EQ(Json::parse(json.out)["voxels"], 4);
 }
@@ -151,7 +151,7 @@ TEST_F(Tool, failures_are_one_line_status_1_and_no_file) {
   std::ofstream(folder_.file("empty.vox"));
   for (const std::string name : {"broken.vox", "pointer.vox", "empty.vox", "missing.vox", "."}) {
     for (const std::string flag : {"", " --json"}) {
-      const Run result = run("convert " + name + " out.glb" + flag);
+      const ToolRun result = run("convert " + name + " out.glb" + flag);
       EXPECT_EQ(result.status, 1) << name;
       expect_one_error_line(result);
       EXPECT_NE(result.err.find(name + ": "), std::string::npos) << result.err;
@@ -160,7 +160,7 @@ TEST_F(Tool, failures_are_one_line_status_1_and_no_file) {
     }
   }
   for (const std::string out : {"none/out.glb", "none/out.obj", "none/out.gltf", "none/out.vox"}) {
-    const Run result = run("convert tiny.vox " + out);
+    const ToolRun result = run("convert tiny.vox " + out);
     EXPECT_EQ(result.status, 1) << out;
     expect_one_error_line(result);
   }
@@ -171,25 +171,25 @@ TEST_F(Tool, wrong_usage_is_status_2) {
        {"", "frobnicate", "render tiny.vox", "info", "info tiny.vox --frame -1", "convert tiny.vox",
         "convert tiny.vox out.xyz", "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
         "convert tiny.vox out.vox --no-ao", "info tiny.vox --threads 0", "info tiny.vox --unknown"}) {
-    const Run result = run(arguments);
+    const ToolRun result = run(arguments);
     EXPECT_EQ(result.status, 2) << arguments;
     expect_one_error_line(result);
   }
 }
 
 TEST_F(Tool, the_smooth_mesher_is_announced_as_missing) {
-  const Run result = run("convert tiny.vox out.glb --mesher smooth --iso 0.5");
+  const ToolRun result = run("convert tiny.vox out.glb --mesher smooth --iso 0.5");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);
   EXPECT_FALSE(exists("out.glb"));
 }
 
 TEST_F(Tool, help_has_an_example_for_every_command) {
-  const Run all = run("--help");
+  const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   for (const std::string command : {"info", "convert"}) {
     EXPECT_NE(all.out.find(command), std::string::npos);
-    const Run help = run(command + " --help");
+    const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_NE(help.out.find("Example: quoin " + command), std::string::npos) << help.out;
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <array>
 #include <cstring>
 #include <filesystem>
@@ -75,7 +77,8 @@ inline ParsedGlb parse_glb(const std::vector<std::byte>& file) {
 /// A folder of its own for one test, removed with the object.
 class TestFolder {
  public:
-  explicit TestFolder(const std::string& name) : path_(std::filesystem::temp_directory_path() / ("quoin_" + name)) {
+  explicit TestFolder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / ("quoin_" + name + "_" + std::to_string(getpid()))) {
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }
