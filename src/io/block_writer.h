@@ -38,6 +38,8 @@ class BlockWriter {
   /// Fills up to a multiple of four bytes since the start.
   void align(char filler);
 
+  /// Whether what follows is swallowed; long loops ask, to end early.
+  [[nodiscard]] bool failed() const { return !status_.has_value(); }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
   /// Errors: the file's first; Cancelled.
   [[nodiscard]] Status finish();

@@ -115,7 +115,7 @@ class ObjText {
   }
 
   void write_vertices(const Instance& instance, const SceneGrid& grid, const BlockyTriangles& triangles) {
-    for (std::size_t i = 0; i < triangles.positions.size(); ++i) {
+    for (std::size_t i = 0; i < triangles.positions.size() && !out_.failed(); ++i) {
       line("v", world_from_grid(instance, grid, DVec3(triangles.positions[i])));
       if (meshes_.occlusion) {
         const double grey = occlusion_brightness(triangles.levels[i]);
@@ -127,7 +127,7 @@ class ObjText {
 
   void write_faces(const BlockyTriangles& triangles, bool mirrored) {
     const std::size_t second = mirrored ? 2 : 1;
-    for (std::size_t i = 0; i + 2 < triangles.indices.size(); i += 3) {
+    for (std::size_t i = 0; i + 2 < triangles.indices.size() && !out_.failed(); i += 3) {
       out_.put('f');
       write_corner(triangles, triangles.indices[i]);
       write_corner(triangles, triangles.indices[i + second]);

@@ -1,5 +1,6 @@
 // Runs in the browser: shows models and answers questions about pixels.
 import * as THREE from 'three';
+import { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 import { parseGlb } from './glb.mjs';
@@ -23,8 +24,11 @@ let parsed = [];
 let camera;
 
 function addLights() {
-  lights.add(new THREE.HemisphereLight(0xddeeff, 0x998877, 1.6));
-  const sun = new THREE.DirectionalLight(0xfff2dd, 2.2);
+  // Metals are black without something to reflect.
+  scene.environment = new THREE.PMREMGenerator(renderer).fromScene(new RoomEnvironment()).texture;
+  scene.environmentIntensity = 0.35;
+  lights.add(new THREE.HemisphereLight(0xddeeff, 0x998877, 1.2));
+  const sun = new THREE.DirectionalLight(0xfff2dd, 2.0);
   sun.position.set(3, 5, 4);
   lights.add(sun);
 }
