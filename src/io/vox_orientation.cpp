@@ -73,6 +73,7 @@ InstanceTurn turn_from_orientation(const Orientation& in_vox) {
 
 std::optional<Orientation> orientation_from_turn(const InstanceTurn& turn) {
   constexpr double kRounding = 1e-6;
+  if (!(std::abs(glm::length(turn.rotation) - 1.0) <= kRounding)) return std::nullopt;
   const glm::dmat3 matrix = glm::mat3_cast(turn.rotation);
   Orientation rotation;
   unsigned columns = 0;

@@ -65,18 +65,18 @@ void add_instances(const vox::Placements& placements, const std::vector<GridHand
   }
 }
 
-void warn(std::int64_t count, const std::string& of_what, std::vector<std::string>& warnings) {
-  if (count > 0) warnings.push_back(std::to_string(count) + " " + of_what);
+void warn(const std::string& of_what, std::int64_t count, std::vector<std::string>& warnings) {
+  if (count > 0) warnings.push_back(of_what + ": " + std::to_string(count));
 }
 
 void add_warnings(const vox::Placements& placements, const vox::ModelLosses& losses, bool hidden_too,
                   std::vector<std::string>& warnings) {
   warnings.insert(warnings.end(), placements.warnings.begin(), placements.warnings.end());
-  warn(losses.outside, "voxels lie outside their model's size; skipped", warnings);
-  warn(losses.colourless, "voxels have colour 0, which is air; skipped", warnings);
-  warn(std::ranges::count(placements.is_model_used, false), "models are placed nowhere", warnings);
+  warn("voxels outside their model's size skipped", losses.outside, warnings);
+  warn("voxels of colour 0, which is air, skipped", losses.colourless, warnings);
+  warn("models placed nowhere", std::ranges::count(placements.is_model_used, false), warnings);
   if (hidden_too) return;
-  warn(std::ranges::count_if(placements.all, &vox::Placement::hidden), "hidden instances skipped", warnings);
+  warn("hidden instances skipped", std::ranges::count_if(placements.all, &vox::Placement::hidden), warnings);
 }
 
 }  // namespace
@@ -98,7 +98,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes.size(), loaded.scene);
   if (!grids) return tl::unexpected(grids.error());
   add_instances(*placements, *grids, options, loaded.scene);
-  warn(document->stray_materials, "materials belong to no colour; skipped", loaded.warnings);
+  warn("materials of no colour skipped", document->stray_materials, loaded.warnings);
   add_warnings(*placements, builder.losses(), options.hidden, loaded.warnings);
   return loaded;
 }

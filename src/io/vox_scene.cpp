@@ -235,7 +235,7 @@ Result<Placements> GraphWalk::run() {
   is_seen_.assign(document_.nodes.size(), false);
   if (Status status = walk(find_root()); !status) return tl::unexpected(status.error());
   const auto apart = std::ranges::count(is_seen_, false);
-  if (apart > 0) out_.warnings.push_back(std::to_string(apart) + " nodes hang on no other and are not shown");
+  if (apart > 0) out_.warnings.push_back("nodes apart from the scene graph skipped: " + std::to_string(apart));
   return std::move(out_);
 }
 

@@ -1,0 +1,104 @@
+#include "io/vox_write_parts.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "io/vox_models.h"
+#include "io/vox_palette.h"
+
+namespace quoin::vox {
+
+namespace {
+
+using Cell = std::array<std::int64_t, 3>;
+
+/// Which piece of a box a voxel lies in, counted z, y, x so that pieces sort that way.
+Cell cell_of(IVec3 voxel, IVec3 box_min) {
+  Cell cell{};
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[static_cast<std::size_t>(2 - axis)] = (std::int64_t{voxel[axis]} - box_min[axis]) / kMaxModelEdge;
+  }
+  return cell;
+}
+
+Piece piece_at(const Cell& cell, const IBox& box) {
+  Piece piece;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t begin = box.min[axis] + cell[static_cast<std::size_t>(2 - axis)] * kMaxModelEdge;
+    piece.min[axis] = static_cast<int>(begin);
+    piece.size[axis] = static_cast<int>(std::min<std::int64_t>(kMaxModelEdge, box.max[axis] - begin));
+  }
+  return piece;
+}
+
+std::vector<VoxelType> occurring_types(const Scene& scene) {
+  std::vector<bool> occurs(kMaxVoxelTypes + 1);
+  for (const GridHandle handle : scene.grids().handles()) {
+    for (const VoxelType type : scene.grids()[handle].grid.types()) occurs[type] = true;
+  }
+  std::vector<VoxelType> types;
+  for (std::size_t type = 1; type < occurs.size(); ++type) {
+    if (occurs[type]) types.push_back(static_cast<VoxelType>(type));
+  }
+  return types;
+}
+
+}  // namespace
+
+Result<TypeTable> make_type_table(const Scene& scene) {
+  std::vector<VoxelType> types = occurring_types(scene);
+  const bool keeps_ids = types.empty() || types.back() < kColours;
+  if (keeps_ids) {
+    types.clear();
+    for (std::size_t type = 1; type < kColours; ++type) types.push_back(static_cast<VoxelType>(type));
+  }
+  if (types.size() >= kColours) {
+    return fail(ErrorCode::LimitExceeded,
+                "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
+  }
+  TypeTable table;
+  table.index_of_type.resize(kMaxVoxelTypes + 1);
+  const std::array<Rgba8, kColours> fallback = default_palette();
+  for (std::size_t index = 1; index < kColours; ++index) {
+    VoxelProperties& properties = table.by_index[index];
+    properties.name = default_type_name(static_cast<int>(index));
+    properties.colour = fallback[index];
+    if (index > types.size()) continue;
+    const VoxelType type = types[index - 1];
+    table.index_of_type[type] = static_cast<std::uint8_t>(index);
+    if (type < scene.types.size()) properties = scene.types[type];
+  }
+  return table;
+}
+
+std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std::uint8_t>& index_of_type) {
+  IBox box = grid.declared_box();
+  if (box.empty()) box = {box.min, box.min + 1};
+  std::map<Cell, Piece> pieces;
+  Cell last_cell{};
+  Piece* last = nullptr;
+  grid.grid.for_each([&](IVec3 voxel, VoxelType type) {
+    const Cell cell = cell_of(voxel, box.min);
+    if (last == nullptr || cell != last_cell) {
+      last_cell = cell;
+      last = &pieces.try_emplace(cell, piece_at(cell, box)).first->second;
+    }
+    const IVec3 local = voxel - last->min;
+    const int y = last->size.z - 1 - local.z;
+    last->voxels.insert(last->voxels.end(),
+                        {static_cast<std::byte>(local.x), static_cast<std::byte>(y), static_cast<std::byte>(local.y),
+                         static_cast<std::byte>(index_of_type[type])});
+  });
+  if (pieces.empty()) pieces.emplace(Cell{}, piece_at(Cell{}, box));
+  std::vector<Piece> sorted;
+  sorted.reserve(pieces.size());
+  for (auto& [cell, piece] : pieces) sorted.push_back(std::move(piece));
+  return sorted;
+}
+
+DVec3 pivot_of(const Piece& piece) {
+  return DVec3(piece.min) + pivot_of(IVec3{piece.size.x, piece.size.z, piece.size.y});
+}
+
+}  // namespace quoin::vox

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/scene/scene.h>
+
+#include "io/vox_chunks.h"
+
+/// What a scene becomes in a .vox file before it is bytes.
+namespace quoin::vox {
+
+/// Which colour index stands for which type.
+struct TypeTable {
+  std::vector<std::uint8_t> index_of_type;         ///< by type; 0 for types that do not occur
+  std::array<VoxelProperties, kColours> by_index;  ///< entry 0 is unused
+};
+
+/// Types keep their ids as colour indices when all types that occur are below 256; else those that occur are numbered
+/// in ascending order. Colour indices without a type get the default palette's colour.
+///
+/// Errors: LimitExceeded when more than 255 types occur.
+[[nodiscard]] Result<TypeTable> make_type_table(const Scene& scene);
+
+/// A model to write, cut from a grid.
+struct Piece {
+  IVec3 min{0};                   ///< the grid's voxel that is lowest on each axis
+  IVec3 size{1};                  ///< along Quoin's axes, at most 256 each
+  std::vector<std::byte> voxels;  ///< as in XYZI: MagicaVoxel's axes
+};
+
+/// Cuts a grid's declared box into pieces of at most 256 voxels a side, sorted by z, then y, then x; pieces without
+/// voxels are left out unless they are all there is.
+[[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std::uint8_t>& index_of_type);
+
+/// The point of the grid that MagicaVoxel's pivot of that piece's model is.
+[[nodiscard]] DVec3 pivot_of(const Piece& piece);
+
+}  // namespace quoin::vox
