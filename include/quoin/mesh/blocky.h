@@ -16,8 +16,8 @@
 namespace quoin {
 
 struct QuadOptions {
-  bool merge = true;       ///< false: one quad a visible unit face
-  bool occlusion = true;   ///< false: all levels 0, and faces merge whatever stands before them
+  bool merge = true;      ///< false: one quad a visible unit face
+  bool occlusion = true;  ///< false: all levels 0, and faces merge whatever stands before them
   IBox region = kWholeChunk;
 };
 
@@ -26,10 +26,16 @@ struct QuadStats {
   std::int64_t faces = 0;  ///< visible unit faces covered
 };
 
-/// Turns chunks into quads; holds the scratch memory that this takes (about 1 MiB), so keep one a thread.
+/// Which processor instructions to use. Every choice gives the same bytes.
+enum class InstructionSet : std::uint8_t {
+  Best,   ///< the widest that this machine has
+  Plain,  ///< none beyond the build's baseline
+};
+
+/// Turns chunks into quads; holds the scratch memory that this takes (about 1.5 MiB), so keep one a thread.
 class BlockyMesher {
  public:
-  BlockyMesher();
+  explicit BlockyMesher(InstructionSet instructions = InstructionSet::Best);
   BlockyMesher(BlockyMesher&&) noexcept;
   BlockyMesher& operator=(BlockyMesher&&) noexcept;
   ~BlockyMesher();
@@ -44,6 +50,11 @@ class BlockyMesher {
   /// Order:    direction, layer, row, column; the same bytes on every machine.
   /// Cost:     O(rows of 64 voxels + visible faces); no allocation once `out` has grown.
   QuadStats mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);
+
+  /// Finds the visible faces of the centre chunk's voxels in `region` (chunk coordinates); reads one voxel past it.
+  ///
+  /// Cost: O(rows of 64 voxels); `out` is reused.
+  void find_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region, FaceRows& out);
 
  private:
   struct Scratch;

@@ -22,7 +22,7 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
   return types.is_transparent(b) && a != b;
 }
 
-/// Visible faces of a chunk as bit masks.
+/// Visible faces of a chunk as bit masks; BlockyMesher::find_faces makes them.
 struct FaceRows {
   /// [direction][z * 64 + y]: bit x is set when that voxel's face shows.
   std::array<std::vector<std::uint64_t>, 6> rows;
@@ -30,14 +30,10 @@ struct FaceRows {
   [[nodiscard]] std::int64_t count() const;
 };
 
-/// Finds the visible faces of the voxels in `region` (chunk coordinates); reads one voxel past it.
-///
-/// Cost: O(rows); `out` is reused.
-void visible_face_rows(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region, FaceRows& out);
-
 /// One byte a voxel of `region`, x fastest, then y, then z; bit d is set when the face towards direction d shows.
 ///
-/// Bits: +X 0, -X 1, +Y 2, -Y 3, +Z 4, -Z 5. `out` is resized to the region's volume.
+/// Bits: +X 0, -X 1, +Y 2, -Y 3, +Z 4, -Z 5. The region is clipped to the chunk and `out` resized to its volume.
+/// Convenient, but makes a BlockyMesher for one use: in a loop keep one and call its `find_faces`.
 void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region,
                    std::vector<std::uint8_t>& out);
 

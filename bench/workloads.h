@@ -1,0 +1,138 @@
+#pragma once
+
+// The fixed worlds that benchmarks and their check values speak of. All mathematics in double.
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin::workloads {
+
+/// Height of the terrain at a column.
+inline double height(double x, double z) {
+  return std::floor(31.0 + 12.0 * std::sin(0.11 * x + 0.3) * std::cos(0.07 * z) +
+                    6.0 * std::sin(0.31 * x) * std::sin(0.23 * z));
+}
+
+inline VoxelType terrain_type(double y, double h) {
+  if (y > h) return kAir;
+  if (y == h) return 1;
+  return y >= h - 3 ? 2 : 3;
+}
+
+enum class Blocky { W1, W2, W3a, W3b, W3c, W4, Empty, Full };
+
+/// The part that is meshed: padded coordinates 1 to 62, one row of border all round.
+inline constexpr IBox kInterior = {IVec3{1}, IVec3{63}};
+
+namespace detail {
+
+/// The two bits of the noise worlds are drawn in this order: y, then x, then z.
+inline std::vector<VoxelType> noise(bool typed) {
+  std::vector<VoxelType> dense(kChunkVoxels, kAir);
+  std::uint64_t s = 42;
+  for (std::size_t y = 0; y < 64; ++y) {
+    for (std::size_t x = 0; x < 64; ++x) {
+      for (std::size_t z = 0; z < 64; ++z) {
+        s ^= s << 13;
+        s ^= s >> 7;
+        s ^= s << 17;
+        if ((s >> 32 & 1U) == 0) continue;
+        dense[(z * 64 + y) * 64 + x] = typed ? static_cast<VoxelType>(1 + (s >> 40) % 3) : VoxelType{1};
+      }
+    }
+  }
+  return dense;
+}
+
+inline std::vector<VoxelType> terrain(bool caves, int column_x, int column_z) {
+  std::vector<VoxelType> dense(kChunkVoxels, kAir);
+  for (int z = 0; z < 64; ++z) {
+    for (int x = 0; x < 64; ++x) {
+      const double wx = x - 1 + 62 * column_x;
+      const double wz = z - 1 + 62 * column_z;
+      const double h = height(wx, wz);
+      const double cave = std::sin(0.2 * wx) * std::sin(0.19 * wz);
+      for (int y = 0; y < 64; ++y) {
+        if (caves && !(cave * std::sin(0.21 * (y - 1)) > -0.35)) continue;
+        dense[static_cast<std::size_t>((z * 64 + y) * 64 + x)] = terrain_type(y - 1, h);
+      }
+    }
+  }
+  return dense;
+}
+
+template <class Pick>
+std::vector<VoxelType> filled(Pick&& pick) {
+  std::vector<VoxelType> dense(kChunkVoxels, kAir);
+  for (int i = 0; i < 64 * 64 * 64; ++i) dense[static_cast<std::size_t>(i)] = pick(i & 63, i >> 6 & 63, i >> 12);
+  return dense;
+}
+
+}  // namespace detail
+
+/// A padded 64^3 chunk; terrain is taken 62 voxels further along x and z for each column.
+inline Chunk blocky_chunk(Blocky which, int column_x = 0, int column_z = 0) {
+  const auto make = [&]() -> std::vector<VoxelType> {
+    switch (which) {
+      case Blocky::W1:
+        return detail::terrain(false, column_x, column_z);
+      case Blocky::W2:
+        return detail::terrain(true, column_x, column_z);
+      case Blocky::W3a:
+        return detail::filled([](int x, int y, int z) { return static_cast<VoxelType>((x + y + z) & 1); });
+      case Blocky::W3b:
+        return detail::noise(false);
+      case Blocky::W3c:
+        return detail::noise(true);
+      case Blocky::W4:
+        return detail::filled([](int x, int y, int z) {
+          const int dx = x - 32;
+          const int dy = y - 32;
+          const int dz = z - 32;
+          return dx * dx + dy * dy + dz * dz <= 784 ? VoxelType{1} : kAir;
+        });
+      case Blocky::Full:
+        return std::vector<VoxelType>(kChunkVoxels, 1);
+      default:
+        return std::vector<VoxelType>(kChunkVoxels, kAir);
+    }
+  };
+  const std::vector<VoxelType> dense = make();
+  return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
+}
+
+/// The visible unit faces that the specification states.
+inline std::int64_t expected_faces(Blocky which) {
+  switch (which) {
+    case Blocky::W1:
+      return 9'949;
+    case Blocky::W2:
+      return 19'627;
+    case Blocky::W3a:
+      return 714'984;
+    case Blocky::W3b:
+    case Blocky::W3c:
+      return 357'362;
+    case Blocky::W4:
+      return 14'718;
+    default:
+      return 0;
+  }
+}
+
+/// A registry of three opaque types, 1 to 3.
+inline VoxelRegistry three_types() {
+  VoxelRegistry types;
+  for (const Rgba8 colour : {Rgba8{77, 179, 51}, Rgba8{128, 77, 26}, Rgba8{128, 128, 128}}) {
+    VoxelProperties properties;
+    properties.colour = colour;
+    if (!types.add(properties)) break;
+  }
+  return types;
+}
+
+}  // namespace quoin::workloads

@@ -1,0 +1,39 @@
+// The mesher's kernel for x86-64 processors with AVX2 and BMI2; called only where both were found.
+
+#include "grid/packed_row.h"
+#include "mesh/blocky_scratch.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include <immintrin.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,popcnt,lzcnt"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,bmi,bmi2,popcnt,lzcnt")
+#endif
+
+#define QUOIN_KERNEL avx2
+#define QUOIN_KERNEL_AVX2 1
+#include "mesh/blocky_kernel.inl"
+
+namespace quoin::blocky {
+
+QuadStats mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  return avx2::mesh_chunk(job, scratch, out);
+}
+
+void find_faces_avx2(const Job& job, Scratch& scratch) {
+  avx2::find_all_faces(job, scratch);
+}
+
+}  // namespace quoin::blocky
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+#endif

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+
+#include <quoin/core/direction.h>
+#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/quad.h>
+
+namespace quoin::blocky {
+
+// A layer is a bit per voxel of a chunk and of the rows around it: planes and rows run from -1 to 64, a word holds the
+// 64 voxels of a row. Row 0 of every plane is aligned to four words, and rows up to 67 may be read.
+inline constexpr int kRowStride = 72;
+inline constexpr int kFirstRow = 4;
+inline constexpr int kLayerWords = 66 * kRowStride;
+
+constexpr int word_index(int plane, int row) {
+  return (plane + 1) * kRowStride + row + kFirstRow;
+}
+
+struct alignas(64) Layer {
+  std::uint64_t words[kLayerWords];
+};
+
+// The chunk seen along one axis: faces point along `plane`, runs lie along `bit`, runs of equal extent merge along
+// `row`.
+struct View {
+  Layer opaque;    // all 66 x 66 rows
+  Layer same_bit;  // same type as the next voxel of the row
+  Layer same_row;  // same type as the voxel of the next row
+  Layer before;    // bit 0: the voxel before the row's first is opaque
+  Layer after;     // bit 63: the voxel after the row's last is opaque
+  Layer faces[2];  // visible faces towards the next and the previous plane; only used with transparent types
+};
+
+// Everything that the passes over one direction need of a batch of planes.
+inline constexpr int kBatchPlanes = 8;
+inline constexpr int kBatchRows = kBatchPlanes * 64;
+
+struct alignas(64) Batch {
+  std::uint64_t faces[kBatchRows + 8];
+  std::uint64_t mergeable[kBatchRows + 8];  // faces whose levels are constant along the rows
+  std::uint64_t starts[kBatchRows + 8];     // first cell of each run
+  std::uint64_t ends[kBatchRows + 8];       // last cell of each run
+  std::uint64_t grows[kBatchRows + 8];      // at a run's last cell: the same run follows in the next row
+  std::uint16_t groups[kBatchRows / 4 + 8];
+  std::uint32_t runs[kBatchRows * 64 + 8];  // only what is used is touched
+};
+
+struct Scratch {
+  View z;           // planes z, rows y, bits x
+  View y;           // planes y, rows z, bits x
+  View x;           // planes x, rows y, bits z
+  Layer solid;      // planes z, rows y: not air
+  Layer same_z;     // planes z, rows y: same type as the voxel at z + 1
+  Layer planes[4];  // planes z, rows y: the bits of the palette index
+  Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; not used by meshing opaque types
+  Batch batch;
+  std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region
+  std::uint64_t patterns[256][16];     // a row of each uniform slab
+  const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
+  std::uint8_t index_class[256];       // by palette index: 0 air, 1 opaque, 2 transparent
+  std::uint32_t heights[64];           // rows so far of the run that ends in a column; 0 between calls
+  std::size_t quads;                   // written so far
+};
+
+// What a kernel works on.
+struct Job {
+  const Neighbourhood* chunks;
+  const VoxelRegistry* types;
+  IBox region;  // not empty, inside the chunk, no larger than the voxels' bounds
+  bool merge;
+  bool occlusion;
+  bool has_transparent;  // some voxel of the centre chunk is
+};
+
+// The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`
+// and in the z view's `faces`, for the rows of the region.
+QuadStats mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
+void find_faces_plain(const Job& job, Scratch& scratch);
+#ifdef QUOIN_X86_KERNELS
+QuadStats mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
+void find_faces_avx2(const Job& job, Scratch& scratch);
+#endif
+
+// 9 front neighbours' bits -> levels (bits 0-7) and diagonal (bit 8), for faces whose u lies along the bits, and along
+// the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
+struct LevelTables {
+  std::uint16_t u_along_bits[512];
+  std::uint16_t u_along_rows[512];
+};
+const LevelTables& level_tables();
+
+// Makes room for `more` quads behind the first `used`; answers where they go.
+std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
+
+// Visible faces where some types are transparent: the z view's faces and `sides`, from the z view's other layers.
+void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& scratch);
+
+// Rows of opacity around the chunk, from its 26 neighbours, into the z view. Answers whether any voxel before or after
+// a row is opaque; only then are `before` and `after` written.
+bool gather_border(const Job& job, Scratch& scratch);
+
+}  // namespace quoin::blocky

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/mesh/quad.h>
+
+namespace quoin {
+
+struct OutlinePoint {
+  IVec3 position;  ///< chunk coordinates, 0..64
+  std::uint8_t level;
+};
+
+/// Finds, for the quads of one chunk, the vertices that must lie on their outlines so that no vertex lies inside
+/// another quad's edge.
+///
+/// Inside the chunk those are the corners of its other quads. An edge in one of the chunk's border planes is shared
+/// with a chunk that may be meshed apart, so it is divided at every voxel: a rule that both sides can follow.
+class OutlineFinder {
+ public:
+  /// Takes note of the corners of all quads of a chunk.
+  void prepare(const QuadBuffer& quads);
+
+  /// The outline of one of them, counter-clockwise from outside, starting at corner 0; corners are never left out.
+  void outline(const Quad& quad, std::vector<OutlinePoint>& out) const;
+
+ private:
+  [[nodiscard]] bool is_vertex(IVec3 p) const;
+
+  std::vector<std::uint64_t> corners_;  // a bit for each of 65^3 lattice points
+};
+
+/// Appends triangles that cover a quad's outline, using all of its points and none of zero area.
+///
+/// Order of `outline`: as OutlineFinder gives it. An outline of four points is split along the quad's diagonal.
+void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped, std::uint32_t base,
+                         std::vector<std::uint32_t>& indices);
+
+}  // namespace quoin
