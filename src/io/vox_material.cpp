@@ -102,6 +102,10 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   set("metalness", out.metalness);
   set("emission", out.emission);
   set("ior", out.ior);
+  out.roughness = std::clamp(out.roughness, 0.0F, 1.0F);
+  out.metalness = std::clamp(out.metalness, 0.0F, 1.0F);
+  out.emission = std::max(out.emission, 0.0F);
+  out.ior = std::clamp(out.ior, 1.0F, kMostRefraction);
 }
 
 void encode_emission(float emission, Attributes& out) {

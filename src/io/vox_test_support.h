@@ -188,4 +188,22 @@ inline std::string difference_after_round_trip(const Scene& scene) {
   return difference(scene, again->scene);
 }
 
+/// Reads bytes that may be anything. What can be read must survive writing and reading again, unless it lies beyond
+/// what a file can say; errors must be one line. Returns what is wrong, or nothing.
+inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOptions& options = {}) {
+  const Result<LoadedScene> loaded = read_vox(bytes, options);
+  if (!loaded) {
+    const std::string text = to_string(loaded.error());
+    return text.empty() || text.find('\n') != std::string::npos ? "the error is not one line: " + text : "";
+  }
+  std::vector<std::string> warnings;
+  const Result<std::vector<std::byte>> written = write_vox(loaded->scene, warnings);
+  if (!written) {
+    return written.error().code == ErrorCode::LimitExceeded ? "" : "cannot write: " + to_string(written.error());
+  }
+  const Result<LoadedScene> again = read_vox(*written, {.hidden = false, .frame = 0});
+  if (!again) return "cannot read what was written: " + to_string(again.error());
+  return difference(loaded->scene, again->scene);
+}
+
 }  // namespace quoin::vox_test

@@ -1,0 +1,112 @@
+#include <quoin/io/file.h>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+class FileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "quoin-file-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string content(const fs::path& path) const {
+    const auto bytes = read_file(path);
+    EXPECT_TRUE(bytes);
+    return bytes ? std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()) : "";
+  }
+  [[nodiscard]] std::size_t entries() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(FileTest, WritesWhatItReads) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(path, bytes_of("hello")));
+  EXPECT_EQ(content(path), "hello");
+  ASSERT_TRUE(write_file(path, bytes_of("")));
+  EXPECT_EQ(content(path), "");
+  EXPECT_EQ(entries(), 1U);
+}
+
+TEST_F(FileTest, WithoutCommitTheOldFileStays) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(path, bytes_of("old")));
+  {
+    auto file = AtomicFile::create(path);
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->write(bytes_of("new")));
+    EXPECT_EQ(content(path), "old");
+  }
+  EXPECT_EQ(content(path), "old");
+  EXPECT_EQ(entries(), 1U);
+}
+
+TEST_F(FileTest, KeepsPermissionsAndSymbolicLinks) {
+  const fs::path target = folder_ / "target";
+  const fs::path link = folder_ / "link";
+  ASSERT_TRUE(write_file(target, bytes_of("old")));
+  fs::permissions(target, fs::perms::owner_all | fs::perms::others_read);
+  fs::create_symlink("target", link);
+  ASSERT_TRUE(write_file(link, bytes_of("new")));
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(content(target), "new");
+  EXPECT_EQ(fs::status(target).permissions(), fs::perms::owner_all | fs::perms::others_read);
+}
+
+TEST_F(FileTest, RefusesFoldersDevicesAndPathsThatAreNotThere) {
+  for (const fs::path& path : {folder_, fs::path("/dev/null"), folder_ / "no" / "such", fs::path("")}) {
+    const Status written = write_file(path, bytes_of("x"));
+    ASSERT_FALSE(written) << path;
+    EXPECT_EQ(written.error().code, ErrorCode::CannotWrite);
+    EXPECT_EQ(written.error().path, path.string());
+    const auto read = read_file(path);
+    ASSERT_FALSE(read) << path;
+    EXPECT_EQ(read.error().code, ErrorCode::CannotRead);
+  }
+  EXPECT_EQ(entries(), 0U);
+}
+
+TEST_F(FileTest, DoesNotWaitForAFifo) {
+  const fs::path fifo = folder_ / "fifo";
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_FALSE(read_file(fifo));
+  EXPECT_FALSE(write_file(fifo, bytes_of("x")));
+}
+
+TEST_F(FileTest, AMoveCarriesTheFileAlong) {
+  const fs::path path = folder_ / "a";
+  auto first = AtomicFile::create(path);
+  ASSERT_TRUE(first);
+  AtomicFile second = std::move(*first);
+  ASSERT_TRUE(second.write(bytes_of("moved")));
+  ASSERT_TRUE(second.commit());
+  EXPECT_FALSE(second.commit());
+  EXPECT_EQ(content(path), "moved");
+  EXPECT_EQ(entries(), 1U);
+}
+
+}  // namespace
+}  // namespace quoin
