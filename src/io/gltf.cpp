@@ -1,7 +1,6 @@
 #include <quoin/io/gltf.h>
 
 #include <array>
-#include <limits>
 
 #include <quoin/io/file.h>
 
@@ -18,8 +17,6 @@ constexpr std::uint32_t kMagic = 0x46546C67;  // "glTF"
 constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
-constexpr std::uint64_t kHeaderBytes = 12;
-constexpr std::uint64_t kChunkHeaderBytes = 8;
 
 void write_chunk_header(std::uint64_t bytes, std::uint32_t kind, BlockWriter& out) {
   out.put(std::array<std::uint32_t, 2>{static_cast<std::uint32_t>(bytes), kind});
@@ -28,17 +25,6 @@ void write_chunk_header(std::uint64_t bytes, std::uint32_t kind, BlockWriter& ou
 tl::unexpected<Error> with_path(Error error, const std::filesystem::path& path) {
   if (error.path.empty()) error.path = path.string();
   return tl::unexpected<Error>(std::move(error));
-}
-
-/// The size of the whole file. Errors: LimitExceeded when it does not fit the header's 32 bits.
-Result<std::uint64_t> glb_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes) {
-  std::uint64_t total = kHeaderBytes + kChunkHeaderBytes + json_bytes;
-  if (buffer_bytes > 0) total += kChunkHeaderBytes + buffer_bytes;
-  if (total > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::LimitExceeded,
-                "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
-  }
-  return total;
 }
 
 Status write_glb_parts(std::string& json, const GltfLayout& layout, const std::filesystem::path& path,
@@ -86,7 +72,7 @@ Result<std::uint64_t> write_glb(const Scene& scene, const SceneMeshes& meshes, c
   auto json = gltf_json(scene, meshes, *layout, "");
   if (!json) return with_path(json.error(), path);
   json->append((4 - json->size() % 4) % 4, ' ');
-  const auto total = glb_bytes(json->size(), layout->buffer_bytes);
+  const auto total = glb_file_bytes(json->size(), layout->buffer_bytes);
   if (!total) return with_path(total.error(), path);
   if (auto done = write_glb_parts(*json, *layout, path, progress, *total); !done) return with_path(done.error(), path);
   return *total;

@@ -1,5 +1,6 @@
 #include "io/gltf_layout.h"
 
+#include <limits>
 #include <set>
 
 namespace quoin {
@@ -94,6 +95,18 @@ Result<GltfLayout> lay_out_gltf(const Scene& scene, const SceneMeshes& meshes) {
     if (auto added = add_images(layout); !added) return tl::unexpected<Error>(added.error());
   }
   return layout;
+}
+
+Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes) {
+  constexpr std::uint64_t kHeaderBytes = 12;
+  constexpr std::uint64_t kChunkHeaderBytes = 8;
+  std::uint64_t total = kHeaderBytes + kChunkHeaderBytes + json_bytes;
+  if (buffer_bytes > 0) total += kChunkHeaderBytes + buffer_bytes;
+  if (total > std::numeric_limits<std::uint32_t>::max()) {
+    return fail(ErrorCode::LimitExceeded,
+                "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
+  }
+  return total;
 }
 
 }  // namespace quoin

@@ -73,4 +73,7 @@ struct GltfLayout {
 /// Requires: `scene` and `meshes` outlive the layout. Errors: LimitExceeded from the PNG encoder.
 [[nodiscard]] Result<GltfLayout> lay_out_gltf(const Scene& scene, const SceneMeshes& meshes);
 
+/// The size of a GLB with chunks of these sizes. Errors: LimitExceeded when it does not fit the header's 32 bits.
+[[nodiscard]] Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes);
+
 }  // namespace quoin

@@ -7,63 +7,14 @@
 #include <set>
 #include <string>
 
-#include "io/glb_for_tests.h"
+#include "io/gltf_fixture.h"
+#include "io/gltf_layout.h"
 
 namespace quoin {
 
 namespace {
 
 using Json = nlohmann::json;
-
-VoxelType add_type(Scene& scene, const std::string& name, Rgba8 colour) {
-  VoxelProperties properties;
-  properties.name = name;
-  properties.colour = colour;
-  return *scene.types.add(properties);
-}
-
-/// An L with an arm to +x and a red tip, so that no reflection or turn looks the same.
-GridHandle add_asymmetric_grid(Scene& scene, const std::string& name) {
-  const VoxelType grey = add_type(scene, "grey", {120, 120, 120, 255});
-  const VoxelType red = add_type(scene, "red", {200, 10, 20, 255});
-  SceneGrid grid;
-  grid.name = name;
-  grid.grid.fill_box({0, 0, 0}, {0, 4, 0}, grey);
-  grid.grid.fill_box({1, 0, 0}, {3, 0, 0}, grey);
-  grid.grid.set({3, 1, 0}, red);
-  grid.grid.set({0, 1, 1}, grey);
-  grid.pivot = {2.0, 2.5, 0.5};
-  return scene.add_grid(std::move(grid));
-}
-
-InstanceHandle place(Scene& scene, GridHandle grid, DVec3 position, const std::string& name = "") {
-  Instance instance;
-  instance.name = name;
-  instance.grid = grid;
-  instance.position = position;
-  return scene.add_instance(instance);
-}
-
-class Gltf : public ::testing::Test {
- protected:
-  ParsedGlb write(const BlockyMeshOptions& options = {}) {
-    const auto meshes = mesh_scene(scene_, options);
-    EXPECT_TRUE(meshes.has_value());
-    return write(*meshes);
-  }
-
-  ParsedGlb write(const SceneMeshes& meshes) {
-    const auto path = folder_.file("out.glb");
-    const auto bytes = write_glb(scene_, meshes, path);
-    EXPECT_TRUE(bytes.has_value()) << to_string(bytes.error());
-    const auto file = read_file(path);
-    EXPECT_TRUE(file && file->size() == *bytes);
-    return file ? parse_glb(*file) : ParsedGlb{};
-  }
-
-  Scene scene_;
-  TestFolder folder_{std::string("gltf_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
-};
 
 DVec3 vector_from(const Json& node, const char* key, DVec3 otherwise) {
   return node.contains(key) ? DVec3(node[key][0], node[key][1], node[key][2]) : otherwise;
@@ -215,63 +166,6 @@ TEST_F(Gltf, arrays_are_aligned_bounded_and_inside_the_buffer) {
   EXPECT_EQ(accessor["max"], Json({2.0, 2.5, 1.5}));
 }
 
-TEST_F(Gltf, occlusion_is_linear_grey_with_full_alpha_and_can_be_left_out) {
-  place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
-  const auto meshes = mesh_scene(scene_, {});
-  const ParsedGlb glb = write(*meshes);
-  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
-  const std::size_t accessor = primitive["attributes"]["COLOR_0"];
-  EXPECT_EQ(glb.document["accessors"][accessor]["componentType"], 5121);
-  EXPECT_EQ(glb.document["accessors"][accessor]["type"], "VEC4");
-  EXPECT_EQ(glb.document["accessors"][accessor]["normalized"], true);
-  const auto colours = glb.array<std::array<std::uint8_t, 4>>(accessor);
-  const auto& levels = meshes->grids[0].mesh.surfaces[0].levels;
-  ASSERT_EQ(colours.size(), levels.size());
-  constexpr std::array<std::uint8_t, 4> grey_of_level = {255, 191, 128, 64};
-  std::set<std::uint8_t> seen;
-  for (std::size_t i = 0; i < colours.size(); ++i) {
-    const std::uint8_t grey = grey_of_level[levels[i]];
-    EXPECT_EQ(colours[i], (std::array<std::uint8_t, 4>{grey, grey, grey, 255}));
-    seen.insert(grey);
-  }
-  EXPECT_GT(seen.size(), 1U) << "the model has inner corners";
-  const ParsedGlb plain = write(BlockyMeshOptions{.merge = true, .occlusion = false, .watertight = false});
-  EXPECT_FALSE(plain.document["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"));
-}
-
-TEST_F(Gltf, every_type_has_its_texel) {
-  SceneGrid grid;
-  grid.name = "ramp";
-  for (int i = 0; i < 600; ++i) {
-    VoxelProperties properties;
-    properties.colour = {static_cast<std::uint8_t>(i % 256), static_cast<std::uint8_t>(i / 256), 77, 255};
-    properties.roughness = static_cast<float>(i) / 600.0F;
-    properties.metalness = 1.0F - properties.roughness;
-    grid.grid.set({2 * i, 0, 0}, *scene_.types.add(properties));
-  }
-  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
-  const auto meshes = mesh_scene(scene_, {});
-  const ParsedGlb glb = write(*meshes);
-  const PngImage palette = glb.image(0);
-  const PngImage surface = glb.image(1);
-  EXPECT_EQ(palette.width, 256U);
-  EXPECT_EQ(palette.height, 4U) << "601 types need 3 rows, and textures keep to powers of two";
-  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
-  const auto& types = meshes->grids[0].mesh.surfaces[0].types;
-  for (std::size_t vertex = 0; vertex < types.size(); vertex += 5) {
-    const VoxelProperties& properties = scene_.types[types[vertex]];
-    EXPECT_EQ(glb.texel(palette, primitive, vertex),
-              (std::array<int, 4>{properties.colour.r, properties.colour.g, 77, 255}));
-    const auto rough = glb.texel(surface, primitive, vertex);
-    EXPECT_NEAR(rough[1], properties.roughness * 255.0F, 0.51F);
-    EXPECT_NEAR(rough[2], properties.metalness * 255.0F, 0.51F);
-  }
-  const Json& sampler = glb.document["samplers"][0];
-  EXPECT_EQ(sampler, Json({{"magFilter", 9728}, {"minFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33071}}));
-  EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["metallicFactor"], 1.0);
-  EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 1.0);
-}
-
 /// A mesh of `vertices` vertices, made of as many triangles as hold them all; one kind of voxel.
 SceneMeshes mesh_of_size(Scene& scene, std::size_t vertices) {
   SceneMeshes meshes;
@@ -308,85 +202,6 @@ TEST_F(Gltf, indices_take_16_bits_where_they_fit) {
   EXPECT_EQ(component(65'538), 5125);
 }
 
-TEST_F(Gltf, transparent_types_blend_with_alpha_in_the_palette) {
-  VoxelProperties glass;
-  glass.colour = {10, 200, 220, 90};
-  glass.visibility = Visibility::Transparent;
-  VoxelProperties stone;
-  stone.colour = {90, 90, 90, 40};
-  SceneGrid grid;
-  grid.grid.set({0, 0, 0}, *scene_.types.add(glass));
-  grid.grid.set({2, 0, 0}, *scene_.types.add(stone));
-  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
-  const ParsedGlb glb = write();
-  const Json& primitives = glb.document["meshes"][0]["primitives"];
-  ASSERT_EQ(primitives.size(), 2U);
-  const Json& opaque = glb.document["materials"][primitives[0]["material"].get<std::size_t>()];
-  const Json& blended = glb.document["materials"][primitives[1]["material"].get<std::size_t>()];
-  EXPECT_FALSE(opaque.contains("alphaMode"));
-  EXPECT_EQ(blended["alphaMode"], "BLEND");
-  EXPECT_NE(opaque["name"], blended["name"]);
-  const PngImage palette = glb.image(0);
-  EXPECT_EQ(glb.texel(palette, primitives[0], 0), (std::array<int, 4>{90, 90, 90, 255}))
-      << "opaque whatever alpha says";
-  EXPECT_EQ(glb.texel(palette, primitives[1], 0), (std::array<int, 4>{10, 200, 220, 90}));
-}
-
-double linear(int srgb) {
-  const double value = srgb / 255.0;
-  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-}
-
-TEST_F(Gltf, emission_comes_out_right_in_linear_light_whatever_the_strengths) {
-  const std::vector<float> strengths = {8.0F, 6.5F, 4.0F, 3.9F, 0.5F, 0.02F, 1000.0F};
-  SceneGrid grid;
-  std::vector<VoxelType> types;
-  for (std::size_t i = 0; i < strengths.size(); ++i) {
-    VoxelProperties lamp;
-    lamp.colour = {250, 180, static_cast<std::uint8_t>(40 + i), 255};
-    lamp.emission = strengths[i];
-    types.push_back(*scene_.types.add(lamp));
-    grid.grid.set({static_cast<int>(2 * i), 0, 0}, types.back());
-  }
-  grid.grid.set({0, 2, 0}, add_type(scene_, "stone", {90, 90, 90, 255}));
-  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
-  const ParsedGlb glb = write();
-  EXPECT_EQ(glb.document["extensionsUsed"], Json({"KHR_materials_emissive_strength"}));
-  std::set<std::string> names;
-  for (const Json& material : glb.document["materials"]) names.insert(material["name"]);
-  EXPECT_EQ(names.size(), glb.document["materials"].size());
-  std::size_t found = 0;
-  for (const Json& primitive : glb.document["meshes"][0]["primitives"]) {
-    const Json& material = glb.document["materials"][primitive["material"].get<std::size_t>()];
-    if (!material.contains("emissiveTexture")) continue;
-    EXPECT_EQ(material["emissiveTexture"]["index"], 2);
-    const double factor = material["emissiveFactor"][0].get<double>() *
-                          material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"].get<double>();
-    const auto count = glb.vectors(primitive, "POSITION").size();
-    for (std::size_t vertex = 0; vertex < count; vertex += 24) {
-      const auto base = glb.texel(glb.image(0), primitive, vertex);
-      const auto texel = glb.texel(glb.image(2), primitive, vertex);
-      const double expected = strengths[static_cast<std::size_t>(base[2] - 40)];
-      EXPECT_EQ(base[0], 250) << "the base colour is kept";
-      EXPECT_NEAR(factor * linear(texel[0]) / linear(base[0]), expected, expected * 0.01);
-      ++found;
-    }
-  }
-  EXPECT_EQ(found, strengths.size());
-}
-
-TEST_F(Gltf, one_strength_keeps_the_palette_colour_in_the_emissive_texture) {
-  VoxelProperties lamp;
-  lamp.colour = {201, 102, 3, 255};
-  lamp.emission = 0.35F;
-  SceneGrid grid;
-  grid.grid.set({0, 0, 0}, *scene_.types.add(lamp));
-  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
-  const ParsedGlb glb = write();
-  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
-  EXPECT_EQ(glb.texel(glb.image(2), primitive, 0), (std::array<int, 4>{201, 102, 3, 255}));
-}
-
 TEST_F(Gltf, an_empty_scene_and_an_empty_grid_are_valid_files) {
   const ParsedGlb nothing = write();
   EXPECT_EQ(nothing.document["scenes"], Json::parse("[{}]"));
@@ -420,6 +235,15 @@ TEST_F(Gltf, names_that_are_no_utf8_are_repaired) {
   grid.grid.set({0, 0, 0}, add_type(scene_, "stone", {90, 90, 90, 255}));
   place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
   EXPECT_EQ(write().document["meshes"][0]["name"], "caf\xEF\xBF\xBD");
+}
+
+TEST_F(Gltf, more_than_4_gib_is_refused) {
+  constexpr std::uint64_t limit = std::numeric_limits<std::uint32_t>::max();
+  EXPECT_EQ(glb_file_bytes(100, 0).value_or(0), 120U);
+  EXPECT_EQ(glb_file_bytes(100, limit - 128).value_or(0), limit);
+  const auto refused = glb_file_bytes(100, limit - 127);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
 TEST_F(Gltf, the_same_bytes_at_any_thread_count) {

@@ -125,9 +125,10 @@ bool MaterialPalette::has_emission() const {
 }
 
 std::array<float, 2> MaterialPalette::texel_centre(VoxelType type) const {
-  const auto column = static_cast<float>(type % kPaletteWidth);
-  const auto row = static_cast<float>(type / kPaletteWidth);
-  return {(column + 0.5F) / static_cast<float>(kPaletteWidth), (row + 0.5F) / static_cast<float>(rows_)};
+  const std::uint32_t column = type % kPaletteWidth;
+  const std::uint32_t row = type / kPaletteWidth;
+  return {(static_cast<float>(column) + 0.5F) / static_cast<float>(kPaletteWidth),
+          (static_cast<float>(row) + 0.5F) / static_cast<float>(rows_)};
 }
 
 PngImage MaterialPalette::blank(std::uint32_t channels) const {
