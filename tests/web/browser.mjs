@@ -22,11 +22,11 @@ async function requirements() {
   process.exit(77);
 }
 
-function serve(models) {
+function serve(models, truth) {
   const server = createServer(async (request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
     const model = /^\/model\/(\d+)\.glb$/.exec(path);
-    const file = model ? models[Number(model[1])] : join(here, path);
+    const file = model ? models[Number(model[1])] : path === '/truth.vox' && truth ? truth : join(here, path);
     try {
       const body = await readFile(file);
       response.writeHead(200, { 'Content-Type': types[extname(file)] ?? 'application/octet-stream' });
@@ -38,10 +38,11 @@ function serve(models) {
   return new Promise((resolve) => server.listen(0, '127.0.0.1', () => resolve(server)));
 }
 
-/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes everything. */
-export async function withViewer(models, size, use) {
+/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes everything; `truth` is a .vox
+ *  file that the page may ask for. */
+export async function withViewer(models, size, use, truth) {
   const { chromium, launcher } = await requirements();
-  const server = await serve(models);
+  const server = await serve(models, truth);
   const browser = await launcher.launch({
     executablePath: chromium,
     headless: true,

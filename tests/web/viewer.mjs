@@ -4,6 +4,7 @@ import { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 import { parseGlb } from './glb.mjs';
+import { readVox, truthAt } from './vox_truth.mjs';
 
 const background = [30, 34, 42];
 const directions = {
@@ -22,6 +23,7 @@ const lights = new THREE.Group();
 scene.add(lights);
 let parsed = [];
 let camera;
+let truth = null;
 
 function addLights() {
   // Metals are black without something to reflect.
@@ -52,6 +54,12 @@ async function load(urls) {
     models.add(gltf.scene);
   }
   scene.updateMatrixWorld(true);
+}
+
+/** From now on pixels are compared with the voxels of this file; false when it has more than one plain model. */
+async function compareWith(url) {
+  truth = readVox(await (await fetch(url)).arrayBuffer());
+  return truth !== null;
 }
 
 /** The palette times the vertex colours and nothing else; blended surfaces are left out. */
@@ -111,7 +119,7 @@ function hitAt(raycaster, x, y) {
     ? corners.reduce((sum, index, corner) => sum + weights.getComponent(corner) * primitive.colours[index * 4] / 255, 0)
     : 1;
   const normal = new THREE.Vector3().fromArray(primitive.normals, corners[0] * 3).transformDirection(hit.object.matrixWorld);
-  return { texel: primitive.texelOf(corners[0]), brightness, normal, inward: normal.dot(raycaster.ray.direction) };
+  return { texel: primitive.texelOf(corners[0]), brightness, point: hit.point, normal, inward: normal.dot(raycaster.ray.direction) };
 }
 
 /** Compares up to `count` pixels with palette times occlusion; pixels near an edge of colours are passed over. */
@@ -133,14 +141,15 @@ function checkPixels(count, seed) {
       Math.abs(other.brightness - hit.brightness) < 0.08;
     if (!around.every(alike)) continue;
     const at = ((height - 1 - y) * width + x) * 4;
-    const expected = hit.texel.slice(0, 3).map((byte) => encoded(linear(byte) * hit.brightness));
+    const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3), brightness: hit.brightness };
+    const expected = told ? told.colour.map((byte) => encoded(linear(byte) * told.brightness)) : ['air', 'air', 'air'];
     const actual = [...pixels.slice(at, at + 3)];
     ++result.checked;
     if (hit.inward > 0) ++result.inside_out;
     if (hit.brightness < 0.95) ++result.darkened;
-    if (expected.some((value, channel) => Math.abs(value - actual[channel]) > 4)) result.wrong.push({ x, y, expected, actual });
+    if (expected.some((value, channel) => !(Math.abs(value - actual[channel]) <= 4))) result.wrong.push({ x, y, expected, actual });
   }
   return result;
 }
 
-window.viewer = { load, unlit, look, checkPixels };
+window.viewer = { load, compareWith, unlit, look, checkPixels };
