@@ -1,7 +1,7 @@
 // A picture of GLB files in three.js, side by side, for a person to look at:
 // node shot.mjs -o OUT.png [--view iso|front|back|left|right|top|x,y,z] [--size 1280x720] [--zoom 1] [--unlit] FILE.glb...
 //
-// A view is the direction from the model towards the camera. Exit status: 0 done, 77 when the browser is not installed.
+// A view is the direction from the model towards the camera (--view=-1,0.5,1 when it begins with a minus). Exit status: 0 done, 77 when the browser is not installed.
 import { parseArgs } from 'node:util';
 
 import { withViewer } from './browser.mjs';

@@ -29,8 +29,8 @@ function addLights() {
   // Metals are black without something to reflect.
   scene.environment = new THREE.PMREMGenerator(renderer).fromScene(new RoomEnvironment()).texture;
   scene.environmentIntensity = 0.35;
-  lights.add(new THREE.HemisphereLight(0xddeeff, 0x998877, 1.2));
-  const sun = new THREE.DirectionalLight(0xfff2dd, 2.0);
+  lights.add(new THREE.HemisphereLight(0xddeeff, 0x998877, 0.9));
+  const sun = new THREE.DirectionalLight(0xfff2dd, 1.5);
   sun.position.set(3, 5, 4);
   lights.add(sun);
 }
@@ -138,7 +138,7 @@ function checkPixels(count, seed) {
     if (!hit) continue;
     const around = [[-1, -1], [2, -1], [-1, 2], [2, 2]].map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
     const alike = (other) => other && String(other.texel) === String(hit.texel) && other.normal.dot(hit.normal) > 0.99 &&
-      Math.abs(other.brightness - hit.brightness) < 0.08;
+      Math.abs(other.brightness - hit.brightness) < 0.03;
     if (!around.every(alike)) continue;
     const at = ((height - 1 - y) * width + x) * 4;
     const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3), brightness: hit.brightness };
