@@ -22,10 +22,17 @@ LevelTables make_level_tables() {
     const std::uint8_t l11 = vertex_occlusion(bit(5), bit(7), bit(8));
     const auto pack = [](const FaceLevels& levels) {
       const int packed = levels[0] | levels[1] << 2 | levels[2] << 4 | levels[3] << 6;
-      return static_cast<std::uint16_t>(packed | static_cast<int>(flips_diagonal(levels)) << 8);
+      return static_cast<std::uint64_t>(packed) << Quad::kLevelsShift | std::uint64_t{flips_diagonal(levels)}
+                                                                            << Quad::kFlipShift;
     };
     tables.u_along_bits[around] = pack({l00, l10, l11, l01});
     tables.u_along_rows[around] = pack({l00, l01, l11, l10});
+  }
+  constexpr int kRowAxis[3] = {1, 2, 1};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::uint64_t at = 0; at < kBatchWords; ++at) {
+      tables.places[axis][at] = at / kRowStride << (6 * axis) | (at % kRowStride & 63) << (6 * kRowAxis[axis]);
+    }
   }
   return tables;
 }

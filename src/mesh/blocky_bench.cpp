@@ -78,6 +78,24 @@ void register_all() {
   }
 }
 
+void visible_faces(benchmark::State& state) {
+  std::vector<Chunk> chunks;
+  for (int i = 0; i < 64; ++i) chunks.push_back(workloads::blocky_chunk(Blocky::W1, i % 8, i / 8));
+  const VoxelRegistry types = workloads::three_types();
+  BlockyMesher mesher;
+  FaceRows faces;
+  mesher.find_faces(lone(chunks[0]), types, workloads::kInterior, faces);
+  check(Blocky::W1, faces.count());
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.find_faces(lone(chunks[next]), types, workloads::kInterior, faces);
+    benchmark::DoNotOptimize(faces.rows[0].data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["faces"] = static_cast<double>(workloads::expected_faces(Blocky::W1));
+}
+BENCHMARK(visible_faces)->Name("visible_faces/w1/cold64")->Unit(benchmark::kMicrosecond);
+
 const bool kRegistered = (register_all(), true);
 
 }  // namespace

@@ -12,6 +12,7 @@ typedef std::uint64_t Words __attribute__((vector_size(32)));
 typedef std::uint64_t UnalignedWords __attribute__((vector_size(32), aligned(8)));
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
+#define QUOIN_STAGE inline __attribute__((noinline))  // stands apart in a profile
 
 QUOIN_INLINE Words load(const std::uint64_t* p) {
   return *reinterpret_cast<const UnalignedWords*>(p);
@@ -29,12 +30,12 @@ QUOIN_INLINE bool any(Words v) {
 #endif
 }
 
-// Position of the lowest bit; 64 of an empty word.
-QUOIN_INLINE std::uint32_t lowest_bit(std::uint64_t w) {
+// Position of the lowest bit. Requires: there is one.
+QUOIN_INLINE std::uint64_t lowest_bit(std::uint64_t w) {
 #if QUOIN_KERNEL_AVX2
-  return static_cast<std::uint32_t>(_tzcnt_u64(w));
+  return _tzcnt_u64(w);
 #else
-  return w == 0 ? 64U : static_cast<std::uint32_t>(__builtin_ctzll(w));
+  return static_cast<std::uint64_t>(__builtin_ctzll(w));
 #endif
 }
 
@@ -180,32 +181,51 @@ void classify_planes(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
+// Where neighbours are of one type; and opacity, where air is the only index that is not opaque.
 template <int kBits>
-void compare_planes(const SlabRange& range, Scratch& s) {
+void compare_planes(const SlabRange& range, int air, Scratch& s) {
+  Words air_bits[kBits];
+  for (int k = 0; k < kBits; ++k) air_bits[k] = Words{} - static_cast<std::uint64_t>(air >> k & 1);
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
+      const int at = word_index(z, y);
+      Words opaque{};
       Words along_x{};
       Words along_y{};
       Words along_z{};
       for (int k = 0; k < kBits; ++k) {
-        const std::uint64_t* p = s.planes[k].words + word_index(z, y);
+        const std::uint64_t* p = s.planes[k].words + at;
         const Words here = load(p);
+        opaque |= here ^ air_bits[k];
         along_x |= here ^ (here >> 1);
         along_y |= here ^ load(p + 1);
         along_z |= here ^ load(p + kRowStride);
       }
-      store(s.z.same_bit.words + word_index(z, y), ~along_x);
-      store(s.z.same_row.words + word_index(z, y), ~along_y);
-      store(s.same_z.words + word_index(z, y), ~along_z);
+      if (air >= 0) store(s.z.opaque.words + at, opaque);
+      store(s.z.same_bit.words + at, ~along_x);
+      store(s.z.same_row.words + at, ~along_y);
+      store(s.same_z.words + at, ~along_z);
     }
   }
+}
+
+// The only palette index that is not opaque, if that is air; -1 otherwise.
+int sole_air_index(const Scratch& s, int indices) {
+  int air = -1;
+  for (int i = 0; i < indices; ++i) {
+    if (s.index_class[i] == 1) continue;
+    if (air >= 0 || s.index_class[i] == 2) return -1;
+    air = i;
+  }
+  return air;
 }
 
 template <int kBits>
 void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
   split_planes<kBits>(voxels, range, s);
-  classify_planes<kBits>(job, range, s);
-  compare_planes<kBits>(range, s);
+  const int air = sole_air_index(s, 1 << kBits);
+  if (air < 0) classify_planes<kBits>(job, range, s);
+  compare_planes<kBits>(range, air, s);
 }
 
 // As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
@@ -431,7 +451,7 @@ struct Pass {
 
 // Visible faces of a batch of planes, and the list of groups of four rows that have any.
 template <bool kTransparent>
-QUOIN_INLINE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
+QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
   int groups = 0;
   for (int i = 0; i < plane_count; ++i) {
     const int plane = first_plane + i;
@@ -441,13 +461,12 @@ QUOIN_INLINE int find_faces(const Pass& pass, int first_plane, int plane_count, 
     for (int row = pass.rows.begin; row < pass.rows.end; row += 4) {
       const Words mask = load(pass.row_masks + row);
       const Words faces = (kTransparent ? load(given + row) : load(here + row) & ~load(front + row)) & mask;
-      const int at = i * 64 + row;
+      const int at = i * kRowStride + row;
       store(b.faces + at, faces);
-      store(b.mergeable + at, Words{});
       b.groups[groups] = static_cast<std::uint16_t>(at);
       groups += static_cast<int>(any(faces));
     }
-    b.mergeable[i * 64 + pass.rows.end] = 0;
+    b.faces[i * kRowStride + pass.rows.end] = 0;
   }
   return groups;
 }
@@ -469,7 +488,7 @@ QUOIN_INLINE Words differ(const Levels& a, const Levels& b) {
 
 // Splits the faces of each listed group into runs of equal type and constant levels.
 template <bool kMerge, bool kOcclusion, bool kRowEnds>
-QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
+QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
     const Words faces = load(b.faces + at);
@@ -478,7 +497,7 @@ QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch
       store(b.ends + at, faces);
       continue;
     }
-    const int here = word_index(first_plane + (at >> 6), at & 63);
+    const int here = word_index(first_plane, 0) + at;
     Words joined = faces;
     if constexpr (kOcclusion) {
       const int front = here + pass.side * kRowStride;
@@ -511,91 +530,18 @@ QUOIN_INLINE void find_runs(const Pass& pass, int first_plane, int groups, Batch
 }
 
 // Which runs go on in the next row: those with the same extent, type and levels constant along the rows.
-QUOIN_INLINE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
+QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    const int here = word_index(first_plane + (at >> 6), at & 63);
+    const int here = word_index(first_plane, 0) + at;
     const Words starts = load(b.starts + at);
     const Words ends = load(b.ends + at);
-    const Words agree = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(pass.view->same_row.words + here) &
-                        ~(starts ^ load(b.starts + at + 1)) & ~(ends ^ load(b.ends + at + 1));
+    const Words agree = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(b.faces + at + 1) &
+                        load(pass.view->same_row.words + here) & ~(starts ^ load(b.starts + at + 1)) &
+                        ~(ends ^ load(b.ends + at + 1));
     // The sum carries from a run's first cell to its last only if all cells between agree.
-    store(b.grows + at, ((agree & ~ends) + starts) & ends & agree);
+    store(b.closes + at, ends & ~(((agree & ~ends) + starts) & agree));
   }
-}
-
-struct RunList {
-  std::size_t runs;
-  std::int64_t faces;
-};
-
-// Lists every run of the listed groups: row of the batch << 16 | last cell << 8 | first cell. Most rows hold at most
-// two, which are written without asking how many there are.
-QUOIN_INLINE RunList list_runs(int groups, Batch& b) {
-  std::uint32_t* out = b.runs;
-  std::int64_t faces = 0;
-  for (int i = 0; i < groups; ++i) {
-    const int at = b.groups[i];
-    for (int row = at; row < at + 4; ++row) {
-      std::uint64_t starts = b.starts[row];
-      std::uint64_t ends = b.ends[row];
-      const auto count = __builtin_popcountll(ends);
-      faces += __builtin_popcountll(b.faces[row]);
-      const std::uint32_t base = static_cast<std::uint32_t>(row) << 16;
-      int written = 0;
-      do {
-        for (int k = 0; k < 2; ++k) {
-          out[written + k] = base | lowest_bit(ends) << 8 | lowest_bit(starts);
-          starts &= starts - 1;
-          ends &= ends - 1;
-        }
-        written += 2;
-      } while (__builtin_expect(written < count, 0));
-      out += count;
-    }
-  }
-  return {static_cast<std::size_t>(out - b.runs), faces};
-}
-
-// How a quad learns its type.
-struct OneType {
-  std::uint64_t bits;
-  QUOIN_INLINE std::uint64_t at(unsigned, unsigned, unsigned) const { return bits; }
-};
-
-struct PaletteTypes {
-  const std::uint64_t* const* rows;
-  const VoxelType* palette;
-  unsigned log_bits;
-  unsigned mask;
-  QUOIN_INLINE std::uint64_t at(unsigned x, unsigned y, unsigned z) const {
-    const unsigned bit = x << log_bits;
-    const std::uint64_t word = rows[z * 64 + y][bit >> 6];
-    return static_cast<std::uint64_t>(palette[static_cast<std::uint32_t>(word >> (bit & 63U)) & mask])
-           << Quad::kTypeShift;
-  }
-};
-
-struct DirectTypes {
-  const std::uint64_t* const* rows;
-  QUOIN_INLINE std::uint64_t at(unsigned x, unsigned y, unsigned z) const {
-    return (rows[z * 64 + y][x >> 2] >> (x << 4 & 63U) & 0xFFFFU) << Quad::kTypeShift;
-  }
-};
-
-// The bits of the 9 voxels in front of a face, as the level tables index them.
-QUOIN_INLINE std::uint64_t bits_in_front(const std::uint64_t* front, const std::uint64_t* before,
-                                         const std::uint64_t* after, unsigned cell, bool row_ends) {
-  if (__builtin_expect(cell - 1U < 62U, 1)) {
-    const unsigned shift = cell - 1U;
-    return (front[-1] >> shift & 7) + (front[0] >> shift & 7) * 8 + (front[1] >> shift & 7) * 64;
-  }
-  std::uint64_t bits = 0;
-  for (int row = 1; row >= -1; --row) {
-    const std::uint64_t outside = !row_ends ? 0 : cell == 0 ? before[row] & 1 : after[row] >> 63;
-    bits = bits << 3 | (cell == 0 ? (front[row] << 1 | outside) & 7 : front[row] >> 62 | outside << 2);
-  }
-  return bits;
 }
 
 // Where a quad of one direction holds what.
@@ -608,54 +554,159 @@ struct Layout {
   static constexpr bool kUAlongBits = kFrame.u == kBitAxis;
   static constexpr int kWidthShift = kUAlongBits ? Quad::kSizeUShift : Quad::kSizeVShift;
   static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
-  // Coordinates in planes, rows and bits -> x, y, z.
-  template <class Types>
-  static QUOIN_INLINE std::uint64_t type(const Types& types, unsigned plane, unsigned row, unsigned cell) {
-    return kAxis == 0   ? types.at(plane, row, cell)
-           : kAxis == 1 ? types.at(cell, plane, row)
-                        : types.at(cell, row, plane);
-  }
 };
 
-// Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row.
-template <int kDirection, bool kOcclusion, class Types>
-QUOIN_INLINE std::uint64_t* emit(const Pass& pass, int first_plane, std::size_t runs, const Types& types, Scratch& s,
-                                 std::uint64_t* out) {
+struct RowList {
+  std::size_t runs;
+  std::int64_t faces;
+};
+
+// How quads learn their types: all have one, or each looks into its voxel's packed row.
+inline constexpr int kOneType = -1;
+
+struct TypeSource {
+  std::uint64_t one;                 // in a quad's place; 0 when there are several
+  const std::uint64_t* const* rows;  // [z * 64 + y]
+  const std::uint64_t* palette;      // types in a quad's place, by index
+};
+
+// The rows of the listed groups that have runs, side by side.
+template <int kDirection>
+QUOIN_STAGE RowList list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Batch& b) {
   using L = Layout<kDirection>;
-  const Batch& b = s.batch;
-  const std::uint16_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
-  const int front = word_index(first_plane + L::kFrame.sign, 0);
-  const std::uint64_t* opaque = pass.view->opaque.words + front;
-  const std::uint64_t* before = pass.view->before.words + front;
-  const std::uint64_t* after = pass.view->after.words + front;
-  const bool row_ends = pass.row_ends;
-  for (std::size_t i = 0; i < runs; ++i) {
-    const std::uint32_t run = b.runs[i];
-    const unsigned first = run & 63U;
-    const unsigned last = run >> 8 & 63U;
-    const unsigned at = run >> 16;
-    const std::uint64_t grows = b.grows[at] >> last & 1;
-    const std::uint64_t height = s.heights[last];  // rows before this one
-    s.heights[last] = static_cast<std::uint32_t>(height + 1) & (0U - static_cast<std::uint32_t>(grows));
-    const unsigned plane_in_batch = at >> 6;
-    const unsigned plane = static_cast<unsigned>(first_plane) + plane_in_batch;
-    const unsigned row = at & 63U;
-    std::uint64_t quad = std::uint64_t{kDirection} << Quad::kDirectionShift | std::uint64_t{plane} << (6 * L::kAxis) |
-                         (row - height) << (6 * L::kRowAxis) | std::uint64_t{first} << (6 * L::kBitAxis) |
-                         std::uint64_t{last - first} << L::kWidthShift | height << L::kHeightShift;
-    if constexpr (kOcclusion) {
-      const std::size_t word = plane_in_batch * kRowStride + row;
-      const std::uint64_t around = bits_in_front(opaque + word, before + word, after + word, last, row_ends);
-      quad |= std::uint64_t{levels[around]} << Quad::kLevelsShift;
+  const std::uint64_t* places = level_tables().places[L::kAxis];
+  const std::uint64_t base = (std::uint64_t{kDirection} << Quad::kDirectionShift) + types.one +
+                             (static_cast<std::uint64_t>(first_plane) << (6 * L::kAxis));
+  const std::uint64_t* front = pass.view->opaque.words + word_index(first_plane + L::kFrame.sign, 0);
+  Row* out = b.rows;
+  std::int64_t runs = 0;
+  std::int64_t faces = 0;
+  for (int i = 0; i < groups; ++i) {
+    const int at = b.groups[i];
+    for (int row = at; row < at + 4; ++row) {
+      const std::uint64_t ends = b.ends[row];
+      out->ends = ends;
+      out->starts = b.starts[row];
+      out->closes = b.closes[row];
+      out->place = places[row] + base;
+      out->front = front + row;
+      out += ends != 0;
+      runs += __builtin_popcountll(ends);
+      faces += __builtin_popcountll(b.faces[row]);
     }
-    *out = quad | L::type(types, plane, row, last);
-    out += 1 - grows;
+  }
+  out->ends = out->starts = 0;
+  return {static_cast<std::size_t>(runs), faces};
+}
+
+// The bits of the 9 voxels in front of the first or last cell of a row, as the level tables index them.
+__attribute__((noinline)) std::uint64_t bits_in_front_at_end(const Pass& pass, const std::uint64_t* front,
+                                                             bool is_first) {
+  const std::int64_t word = front - pass.view->opaque.words;
+  std::uint64_t bits = 0;
+  for (int row = 1; row >= -1; --row) {
+    const std::uint64_t before = pass.row_ends ? pass.view->before.words[word + row] & 1 : 0;
+    const std::uint64_t after = pass.row_ends ? pass.view->after.words[word + row] >> 63 : 0;
+    bits = bits << 3 | (is_first ? (front[row] << 1 | before) & 7 : front[row] >> 62 | after << 2);
+  }
+  return bits;
+}
+
+QUOIN_INLINE std::uint64_t bits_in_front(const Pass& pass, const std::uint64_t* front, std::uint64_t cell) {
+  const std::uint64_t shift = cell - 1;
+  if (__builtin_expect(shift >= 62, 0)) return bits_in_front_at_end(pass, front, cell == 0);
+  return (front[-1] >> shift & 7) + (front[0] >> shift & 7) * 8 + (front[1] >> shift & 7) * 64;
+}
+
+// Removes the lowest bits of both words; when none are left, takes up the next row, without a branch.
+QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row*& row) {
+  const Row* next = row + 1;
+  starts &= starts - 1;
+#if QUOIN_KERNEL_AVX2
+  // Compilers make this a branch, which mispredicts in every other row.
+  asm("blsr %[ends], %[ends]\n\t"
+      "cmovz %[next_starts], %[starts]\n\t"
+      "cmovz %[next_ends], %[ends]\n\t"
+      "cmovz %[next], %[row]"
+      : [starts] "+r"(starts), [ends] "+r"(ends), [row] "+r"(row)
+      : [next_starts] "m"(next->starts), [next_ends] "m"(next->ends), [next] "r"(next)
+      : "cc");
+#else
+  ends &= ends - 1;
+  const auto done = static_cast<std::uint64_t>(ends == 0);
+  starts |= next->starts & (std::uint64_t{0} - done);
+  ends |= next->ends & (std::uint64_t{0} - done);
+  row += done;
+#endif
+}
+
+// The type of a cell of a row, in a quad's place. `place` holds the row's plane and number.
+template <int kDirection, int kLogBits>
+QUOIN_INLINE std::uint64_t type_of(const TypeSource& types, std::uint64_t place, std::uint64_t cell) {
+  using L = Layout<kDirection>;
+  if constexpr (kLogBits == kOneType) {
+    return 0;
+  } else {
+    // Bits 6 to 17 of a quad number its voxel's row; in the x view the cell is the z in that number.
+    const std::uint64_t row = (place >> 6 & 0xFFF) + (L::kAxis == 0 ? cell << 6 : 0);
+    const std::uint64_t x = L::kAxis == 0 ? place & 63 : cell;
+    const std::uint64_t bit = x << kLogBits;
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;
+    const std::uint64_t index = types.rows[row][bit >> 6] >> (bit & 63) & kMask;
+    return kLogBits == 4 ? index << Quad::kTypeShift : types.palette[index];
+  }
+}
+
+// Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row. One flat
+// loop over all runs.
+template <int kDirection, bool kOcclusion, int kLogBits>
+QUOIN_STAGE std::uint64_t* emit(const Pass& pass, const TypeSource& types, std::size_t runs, Batch& b,
+                                std::uint64_t* out) {
+  using L = Layout<kDirection>;
+  const std::uint64_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
+  // A row more starts lower and is higher.
+  constexpr std::uint64_t kPerRow = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
+  const Row* row = b.rows;
+  std::uint64_t starts = row->starts;
+  std::uint64_t ends = row->ends;
+  const TypeSource source = types;
+  for (std::size_t i = 0; i < runs; ++i) {
+    const std::uint64_t first = lowest_bit(starts);
+    const std::uint64_t last = lowest_bit(ends);
+    const std::uint64_t closes = row->closes >> last & 1;
+    const std::uint64_t rows_before = b.rows_before[last];
+    b.rows_before[last] = (rows_before + kPerRow) & (closes - 1);
+    std::uint64_t quad = row->place + rows_before + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
+    if constexpr (kOcclusion) quad |= levels[bits_in_front(pass, row->front, last)];
+    *out = quad | type_of<kDirection, kLogBits>(source, row->place, last);
+    out += closes;
+    next_run(starts, ends, row);
   }
   return out;
 }
 
-template <int kDirection, bool kOcclusion, class Types>
-std::int64_t run_pass(const Job& job, const Pass& pass, const Types& types, Scratch& s, QuadBuffer& quads) {
+template <int kDirection, bool kOcclusion>
+std::uint64_t* emit(const Pass& pass, const TypeSource& types, int log_bits, std::size_t runs, Batch& b,
+                    std::uint64_t* out) {
+  switch (log_bits) {
+    case kOneType:
+      return emit<kDirection, kOcclusion, kOneType>(pass, types, runs, b, out);
+    case 0:
+      return emit<kDirection, kOcclusion, 0>(pass, types, runs, b, out);
+    case 1:
+      return emit<kDirection, kOcclusion, 1>(pass, types, runs, b, out);
+    case 2:
+      return emit<kDirection, kOcclusion, 2>(pass, types, runs, b, out);
+    case 3:
+      return emit<kDirection, kOcclusion, 3>(pass, types, runs, b, out);
+    default:
+      return emit<kDirection, kOcclusion, 4>(pass, types, runs, b, out);
+  }
+}
+
+template <int kDirection, bool kOcclusion>
+std::int64_t run_pass(const Job& job, const Pass& pass, const TypeSource& types, int log_bits, Scratch& s,
+                      QuadBuffer& quads) {
   Batch& b = s.batch;
   std::int64_t faces = 0;
   for (int first = pass.planes.begin; first < pass.planes.end; first += kBatchPlanes) {
@@ -671,10 +722,11 @@ std::int64_t run_pass(const Job& job, const Pass& pass, const Types& types, Scra
       find_runs<true, kOcclusion, false>(pass, first, groups, b);
     }
     find_growth(pass, first, groups, b);
-    const RunList list = list_runs(groups, b);
+    const RowList list = list_rows<kDirection>(pass, first, groups, types, b);
     faces += list.faces;
     std::uint64_t* begin = grow_quads(quads, s.quads, list.runs + 1);
-    s.quads += static_cast<std::size_t>(emit<kDirection, kOcclusion>(pass, first, list.runs, types, s, begin) - begin);
+    const std::uint64_t* end = emit<kDirection, kOcclusion>(pass, types, log_bits, list.runs, b, begin);
+    s.quads += static_cast<std::size_t>(end - begin);
   }
   return faces;
 }
@@ -717,25 +769,6 @@ void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& 
   }
 }
 
-template <int kDirection, class Types>
-std::int64_t run_direction(const Job& job, bool row_ends, const Types& types, Scratch& s, QuadBuffer& out) {
-  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
-  return job.occlusion ? run_pass<kDirection, true>(job, pass, types, s, out)
-                       : run_pass<kDirection, false>(job, pass, types, s, out);
-}
-
-template <class Types>
-QuadStats run_directions(const Job& job, bool row_ends, const Types& types, Scratch& s, QuadBuffer& out) {
-  QuadStats stats;
-  stats.faces += run_direction<0>(job, row_ends, types, s, out);
-  stats.faces += run_direction<1>(job, row_ends, types, s, out);
-  stats.faces += run_direction<2>(job, row_ends, types, s, out);
-  stats.faces += run_direction<3>(job, row_ends, types, s, out);
-  stats.faces += run_direction<4>(job, row_ends, types, s, out);
-  stats.faces += run_direction<5>(job, row_ends, types, s, out);
-  return stats;
-}
-
 // The type of all of a chunk's voxels besides air, when there is just one.
 bool has_one_type(const Chunk& chunk, VoxelType& type) {
   const Chunk::Mixed* voxels = chunk.mixed();
@@ -750,6 +783,39 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
     ++found;
   }
   return found == 1;
+}
+
+template <int kDirection>
+std::int64_t run_direction(const Job& job, bool row_ends, const TypeSource& types, int log_bits, Scratch& s,
+                           QuadBuffer& out) {
+  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
+  return job.occlusion ? run_pass<kDirection, true>(job, pass, types, log_bits, s, out)
+                       : run_pass<kDirection, false>(job, pass, types, log_bits, s, out);
+}
+
+QuadStats run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
+  std::uint64_t palette[256];
+  TypeSource types{0, s.rows, palette};
+  int log_bits = kOneType;
+  const Chunk& centre = *job.chunks->centre();
+  VoxelType type = kAir;
+  if (has_one_type(centre, type)) {
+    types.one = std::uint64_t{type} << Quad::kTypeShift;
+  } else {
+    const Chunk::Mixed& voxels = *centre.mixed();
+    log_bits = __builtin_ctz(static_cast<unsigned>(voxels.bits));
+    for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+      palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+    }
+  }
+  QuadStats stats;
+  stats.faces += run_direction<0>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<1>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<2>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<3>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<4>(job, row_ends, types, log_bits, s, out);
+  stats.faces += run_direction<5>(job, row_ends, types, log_bits, s, out);
+  return stats;
 }
 
 // Nothing merges across the chunk's last row or plane.
@@ -779,20 +845,11 @@ QuadStats mesh_chunk(const Job& job, Scratch& s, QuadBuffer& out) {
   copy_border(row_ends, s);
   if (row_ends) copy_row_ends(s);
   if (job.has_transparent) fill_faces(job, range, row_ends, s);
-  const Chunk& centre = *job.chunks->centre();
-  VoxelType type = kAir;
-  if (has_one_type(centre, type)) {
-    return run_directions(job, row_ends, OneType{std::uint64_t{type} << Quad::kTypeShift}, s, out);
-  }
-  const Chunk::Mixed& voxels = *centre.mixed();
-  if (voxels.direct()) return run_directions(job, row_ends, DirectTypes{s.rows}, s, out);
-  const auto bits = static_cast<unsigned>(voxels.bits);
-  const auto log_bits = static_cast<unsigned>(__builtin_ctz(bits));
-  return run_directions(job, row_ends, PaletteTypes{s.rows, voxels.palette.data(), log_bits, (1U << bits) - 1U}, s,
-                        out);
+  return run_directions(job, row_ends, s, out);
 }
 
 #undef QUOIN_INLINE
+#undef QUOIN_STAGE
 
 }  // namespace
 }  // namespace quoin::blocky::QUOIN_KERNEL

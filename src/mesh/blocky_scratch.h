@@ -35,18 +35,29 @@ struct View {
   Layer faces[2];  // visible faces towards the next and the previous plane; only used with transparent types
 };
 
-// Everything that the passes over one direction need of a batch of planes.
+// Everything that the passes over one direction need of a batch of planes. Rows are numbered as in a layer: a plane is
+// kRowStride further than the one before.
 inline constexpr int kBatchPlanes = 8;
-inline constexpr int kBatchRows = kBatchPlanes * 64;
+inline constexpr int kBatchWords = kBatchPlanes * kRowStride;
+
+struct alignas(64) Row {
+  std::uint64_t ends;
+  std::uint64_t starts;
+  std::uint64_t closes;
+  std::uint64_t place;         // a quad's bits for its direction, plane and row
+  const std::uint64_t* front;  // the row before the faces
+};
 
 struct alignas(64) Batch {
-  std::uint64_t faces[kBatchRows + 8];
-  std::uint64_t mergeable[kBatchRows + 8];  // faces whose levels are constant along the rows
-  std::uint64_t starts[kBatchRows + 8];     // first cell of each run
-  std::uint64_t ends[kBatchRows + 8];       // last cell of each run
-  std::uint64_t grows[kBatchRows + 8];      // at a run's last cell: the same run follows in the next row
-  std::uint16_t groups[kBatchRows / 4 + 8];
-  std::uint32_t runs[kBatchRows * 64 + 8];  // only what is used is touched
+  std::uint64_t faces[kBatchWords + 8];
+  std::uint64_t mergeable[kBatchWords + 8];  // faces whose levels are constant along the rows
+  std::uint64_t starts[kBatchWords + 8];     // first cell of each run
+  std::uint64_t ends[kBatchWords + 8];       // last cell of each run
+  std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
+  // Of the run that ends in a column: its rows so far, as a quad's bits; 0 between batches.
+  std::uint64_t rows_before[64];
+  std::uint16_t groups[kBatchWords / 4 + 8];
+  Row rows[kBatchPlanes * 64 + 8];
 };
 
 struct Scratch {
@@ -62,7 +73,6 @@ struct Scratch {
   std::uint64_t patterns[256][16];     // a row of each uniform slab
   const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
   std::uint8_t index_class[256];       // by palette index: 0 air, 1 opaque, 2 transparent
-  std::uint32_t heights[64];           // rows so far of the run that ends in a column; 0 between calls
   std::size_t quads;                   // written so far
 };
 
@@ -85,11 +95,12 @@ QuadStats mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_avx2(const Job& job, Scratch& scratch);
 #endif
 
-// 9 front neighbours' bits -> levels (bits 0-7) and diagonal (bit 8), for faces whose u lies along the bits, and along
+// 9 front neighbours' bits -> a quad's bits for levels and diagonal, for faces whose u lies along the bits, and along
 // the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
 struct LevelTables {
-  std::uint16_t u_along_bits[512];
-  std::uint16_t u_along_rows[512];
+  std::uint64_t u_along_bits[512];
+  std::uint64_t u_along_rows[512];
+  std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
 };
 const LevelTables& level_tables();
 

@@ -1,0 +1,92 @@
+// grid/*: memory of the 256x128x256 terrain and the cost of getting and setting its voxels.
+
+#include <quoin/grid/grid.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include <benchmark/benchmark.h>
+
+#include "bench/workloads.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kWidth = 256;
+constexpr int kHeight = 128;
+constexpr std::int64_t kSolid = 2'062'206;
+
+const Grid& world() {
+  static const Grid grid = [] {
+    Grid g;
+    g.edit({IVec3{0}, IVec3{kWidth, kHeight, kWidth}},
+           [](IVec3 v, VoxelType) { return static_cast<VoxelType>(v.y <= workloads::height(v.x, v.z)); });
+    g.compact();
+    if (g.voxel_count() != kSolid) {
+      std::fprintf(stderr, "grid benchmark: %lld voxels, expected %lld\n", static_cast<long long>(g.voxel_count()),
+                   static_cast<long long>(kSolid));
+      std::exit(1);
+    }
+    return g;
+  }();
+  return grid;
+}
+
+void memory(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(world().bytes());
+  state.counters["bytes"] = static_cast<double>(world().bytes());
+  state.counters["voxels"] = static_cast<double>(kSolid);
+}
+BENCHMARK(memory)->Name("grid/world");
+
+void get_sequential(benchmark::State& state) {
+  GridReader reader(world());
+  for (auto _ : state) {
+    std::int64_t sum = 0;
+    for (int z = 0; z < kWidth; ++z) {
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) sum += reader.get({x, y, z});
+      }
+    }
+    if (sum != kSolid) std::exit(1);
+  }
+  state.counters["seconds_per_get"] = benchmark::Counter(
+      double{kWidth} * kHeight * kWidth, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(get_sequential)->Name("grid/get_sequential")->Unit(benchmark::kMillisecond);
+
+// Each position depends on the voxel read before.
+void get_dependent(benchmark::State& state) {
+  constexpr int kGets = 1'000'000;
+  const Grid& grid = world();
+  for (auto _ : state) {
+    std::uint32_t s = 12'345;
+    for (int i = 0; i < kGets; ++i) {
+      const IVec3 at{static_cast<int>(s >> 8 & 255U), static_cast<int>(s >> 16 & 127U), static_cast<int>(s >> 24)};
+      s = s * 1'664'525U + 1'013'904'223U + grid.get(at);
+    }
+    benchmark::DoNotOptimize(s);
+  }
+  state.counters["seconds_per_get"] =
+      benchmark::Counter(double{kGets}, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(get_dependent)->Name("grid/get_dependent")->Unit(benchmark::kMillisecond);
+
+void set_sequential(benchmark::State& state) {
+  constexpr int kEdge = 128;
+  for (auto _ : state) {
+    Grid grid;
+    for (int z = 0; z < kEdge; ++z) {
+      for (int y = 0; y < kEdge; ++y) {
+        for (int x = 0; x < kEdge; ++x) grid.set({x, y, z}, static_cast<VoxelType>(1 + (x & y & 1)));
+      }
+    }
+    if (grid.voxel_count() != kEdge * kEdge * kEdge) std::exit(1);
+  }
+  state.counters["seconds_per_set"] = benchmark::Counter(
+      double{kEdge} * kEdge * kEdge, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(set_sequential)->Name("grid/set_sequential")->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace quoin
