@@ -155,6 +155,7 @@ VoxelProperties decode_material(const std::string& default_name, Rgba8 colour, c
   VoxelProperties out;
   out.name = default_name;
   out.colour = {colour.r, colour.g, colour.b, 255};
+  if (attributes.empty()) return out;
   decode_published(attributes, out);
   decode_own(attributes, out);
   out.attributes = attributes;

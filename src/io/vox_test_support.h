@@ -14,6 +14,7 @@
 
 #include <quoin/io/vox.h>
 
+#include "io/visit_voxels.h"
 #include "io/vox_chunk_writer.h"
 
 /// What the tests and the fuzz target of .vox share.
@@ -121,7 +122,7 @@ using VoxelList = std::vector<std::tuple<int, int, int, VoxelType>>;
 
 inline VoxelList voxels_of(const Grid& grid) {
   VoxelList list;
-  grid.for_each([&](IVec3 v, VoxelType type) { list.emplace_back(v.x, v.y, v.z, type); });
+  visit_voxels(grid, [&](IVec3 v, VoxelType type) { list.emplace_back(v.x, v.y, v.z, type); });
   return list;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <string>
 
+#include "io/visit_voxels.h"
 #include "io/vox_models.h"
 #include "io/vox_palette.h"
 
@@ -32,15 +33,15 @@ Piece piece_at(const Cell& cell, const IBox& box) {
   return piece;
 }
 
+/// Ascending.
 std::vector<VoxelType> occurring_types(const Scene& scene) {
-  std::vector<bool> occurs(kMaxVoxelTypes + 1);
-  for (const GridHandle handle : scene.grids().handles()) {
-    for (const VoxelType type : scene.grids()[handle].grid.types()) occurs[type] = true;
-  }
   std::vector<VoxelType> types;
-  for (std::size_t type = 1; type < occurs.size(); ++type) {
-    if (occurs[type]) types.push_back(static_cast<VoxelType>(type));
+  for (const GridHandle handle : scene.grids().handles()) {
+    const std::vector<VoxelType> of_grid = scene.grids()[handle].grid.types();
+    types.insert(types.end(), of_grid.begin(), of_grid.end());
   }
+  std::ranges::sort(types);
+  types.erase(std::unique(types.begin(), types.end()), types.end());
   return types;
 }
 
@@ -58,7 +59,7 @@ Result<TypeTable> make_type_table(const Scene& scene) {
                 "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
   }
   TypeTable table;
-  table.index_of_type.resize(kMaxVoxelTypes + 1);
+  table.index_of_type.resize(std::size_t{types.back()} + 1);
   const std::array<Rgba8, kColours> fallback = default_palette();
   for (std::size_t index = 1; index < kColours; ++index) {
     VoxelProperties& properties = table.by_index[index];
@@ -78,7 +79,7 @@ std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std:
   std::map<Cell, Piece> pieces;
   Cell last_cell{};
   Piece* last = nullptr;
-  grid.grid.for_each([&](IVec3 voxel, VoxelType type) {
+  visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
     const Cell cell = cell_of(voxel, box.min);
     if (last == nullptr || cell != last_cell) {
       last_cell = cell;

@@ -283,6 +283,16 @@ TEST(VoxWrite, EmptyGridsAndEmptyScenesAreWritten) {
   EXPECT_EQ(difference_after_round_trip(again), "");
 }
 
+TEST(VoxWrite, VoxelsAreVisitedInTheOrderOfTheGrid) {
+  const Scene scene = random_scene(3);
+  for (const GridHandle handle : scene.grids().handles()) {
+    vox_test::VoxelList expected;
+    const Grid& grid = scene.grids()[handle].grid;
+    grid.for_each([&](IVec3 v, VoxelType type) { expected.emplace_back(v.x, v.y, v.z, type); });
+    EXPECT_EQ(vox_test::voxels_of(grid), expected);
+  }
+}
+
 TEST(VoxWrite, TheSameSceneGivesTheSameBytes) {
   std::vector<std::string> warnings;
   EXPECT_EQ(*write_vox(random_scene(7), warnings), *write_vox(random_scene(7), warnings));
