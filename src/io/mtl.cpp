@@ -25,11 +25,13 @@ std::string mtl_name(const SurfaceMaterial& material) {
 std::string mtl_text(const MaterialPalette& palette, const std::string& texture, const std::string& emissive_texture) {
   std::string text = "# Quoin " QUOIN_VERSION "\n";
   for (const SurfaceMaterial& material : palette.materials()) {
-    text += "\nnewmtl " + mtl_name(material) + "\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd " + texture + "\n";
-    if (material.is_transparent()) text += "map_d -imfchan m " + texture + "\n";
+    text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+    text.append("map_Kd ").append(texture).append("\n");
+    if (material.is_transparent()) text.append("map_d -imfchan m ").append(texture).append("\n");
     if (material.is_emissive()) {
       const std::string strength = shortest(material.emission);
-      text += "Ke " + strength + " " + strength + " " + strength + "\nmap_Ke " + emissive_texture + "\n";
+      text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
+      text.append("\nmap_Ke ").append(emissive_texture).append("\n");
     }
   }
   return text;
