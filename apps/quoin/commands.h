@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include <quoin/core/parallel.h>
+#include <quoin/io/vox.h>
+
+namespace quoin::tool {
+
+/// The tool's exit statuses.
+inline constexpr int kDone = 0;
+inline constexpr int kFailed = 1;
+inline constexpr int kWrongUsage = 2;
+
+/// What every command takes.
+struct CommonOptions {
+  std::filesystem::path input;
+  LoadOptions load;
+  Threads threads;
+  bool json = false;
+};
+
+/// Adds IN, --json, --threads, --hidden and --frame to a command.
+void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// Each adds one command; once it has been parsed, `status` becomes what the command ends with.
+void add_info_command(CLI::App& app, int& status);
+void add_convert_command(CLI::App& app, int& status);
+
+}  // namespace quoin::tool

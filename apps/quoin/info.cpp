@@ -1,0 +1,161 @@
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <set>
+
+#include <quoin/io/formats.h>
+#include <quoin/scene/scene.h>
+
+#include "commands.h"
+#include "output.h"
+
+namespace quoin::tool {
+
+namespace {
+
+struct GridReport {
+  const SceneGrid* grid = nullptr;
+  std::vector<const Instance*> instances;
+};
+
+std::vector<GridReport> report_grids(const Scene& scene) {
+  std::map<GridHandle, GridReport> reports;
+  for (const GridHandle handle : scene.grids().handles()) reports[handle].grid = &scene.grids()[handle];
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (const auto found = reports.find(instance.grid); found != reports.end()) {
+      found->second.instances.push_back(&instance);
+    }
+  }
+  std::vector<GridReport> list;
+  for (auto& [handle, report] : reports) list.push_back(std::move(report));
+  return list;
+}
+
+std::size_t distinct_types(const Scene& scene) {
+  std::set<VoxelType> used;
+  for (const GridHandle handle : scene.grids().handles()) {
+    for (const VoxelType type : scene.grids()[handle].grid.types()) used.insert(type);
+  }
+  used.erase(kAir);
+  return used.size();
+}
+
+template <class V>
+Json triple(const V& v) {
+  return {v.x, v.y, v.z};
+}
+
+Json triple(const DVec3& v) {
+  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
+}
+
+/// Nothing has no box; zeros keep the keys' types.
+Json box(const DBox& bounds) {
+  const DBox shown = bounds.empty() ? DBox{DVec3(0.0), DVec3(0.0)} : bounds;
+  return {{"min", triple(shown.min)}, {"max", triple(shown.max)}};
+}
+
+DVec3 signed_scale(const Instance& instance) {
+  DVec3 scale(instance.voxel_size);
+  if (instance.mirrored) scale.x = -scale.x;
+  return scale;
+}
+
+Json instance_json(const Instance& instance) {
+  const DQuat& q = instance.rotation;
+  return {{"name", instance.name},
+          {"position", triple(instance.position)},
+          {"rotation", {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0}},
+          {"scale", triple(signed_scale(instance))},
+          {"visible", instance.visible}};
+}
+
+Json grid_json(const GridReport& report) {
+  const IBox bounds = report.grid->grid.bounds();
+  Json entry = {{"name", report.grid->name},
+                {"voxels", report.grid->grid.voxel_count()},
+                {"size", triple(report.grid->declared_box().size())},
+                {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+                {"instances", Json::array()}};
+  for (const Instance* instance : report.instances) entry["instances"].push_back(instance_json(*instance));
+  return entry;
+}
+
+Json info_json(const LoadedScene& loaded, bool hidden) {
+  Json object = {{"format", loaded.format},
+                 {"voxels", loaded.scene.voxel_count()},
+                 {"types", distinct_types(loaded.scene)},
+                 {"bounds", box(loaded.scene.bounds(hidden))},
+                 {"grids", Json::array()},
+                 {"warnings", loaded.warnings}};
+  for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report));
+  return object;
+}
+
+std::string three(const DVec3& v, const char* between) {
+  return number_for_people(v.x) + between + number_for_people(v.y) + between + number_for_people(v.z);
+}
+
+std::string quoted(const std::string& name) {
+  return name.empty() ? "(no name)" : "\"" + name + "\"";
+}
+
+std::string count_of(std::int64_t count, const std::string& singular) {
+  return with_thousands(count) + " " + singular + (count == 1 ? "" : "s");
+}
+
+std::string instance_text(const Instance& instance) {
+  std::string line = "    at " + three(instance.position, ", ");
+  const DQuat& q = instance.rotation;
+  if (q != DQuat(1, 0, 0, 0)) line += "  turned (" + three({q.x, q.y, q.z}, ", ") + "; " + number_for_people(q.w) + ")";
+  if (instance.voxel_size != 1.0) line += "  scale " + number_for_people(instance.voxel_size);
+  if (instance.mirrored) line += "  mirrored";
+  if (!instance.visible) line += "  hidden";
+  if (!instance.name.empty()) line += "  " + quoted(instance.name);
+  return line + "\n";
+}
+
+std::string grid_text(const GridReport& report) {
+  std::string text = "  " + quoted(report.grid->name) + "  " + three(DVec3(report.grid->declared_box().size()), " x ") +
+                     ", " + count_of(report.grid->grid.voxel_count(), "voxel") + "\n";
+  if (report.instances.empty()) text += "    not placed\n";
+  for (const Instance* instance : report.instances) text += instance_text(*instance);
+  return text;
+}
+
+std::string info_text(const CommonOptions& options, const LoadedScene& loaded) {
+  const Scene& scene = loaded.scene;
+  std::string text = options.input.filename().string() + ": " + loaded.format + ", " +
+                     count_of(static_cast<std::int64_t>(scene.grids().size()), "grid") + ", " +
+                     count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
+  text += "Voxels: " + with_thousands(scene.voxel_count()) + " of " +
+          count_of(static_cast<std::int64_t>(distinct_types(scene)), "type") + "\n";
+  const DBox bounds = scene.bounds(options.load.hidden);
+  if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
+  for (const GridReport& report : report_grids(scene)) text += grid_text(report);
+  return text;
+}
+
+int run_info(const CommonOptions& options) {
+  const auto loaded = load_scene(options.input, options.load);
+  if (!loaded) {
+    print_error(loaded.error());
+    return kFailed;
+  }
+  if (options.json) return print_json(info_json(*loaded, options.load.hidden));
+  print_warnings(loaded->warnings);
+  return print(info_text(options, *loaded));
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& app, int& status) {
+  CLI::App* command = app.add_subcommand("info", "Say what is in a file: grids, sizes, voxels, types, transforms");
+  const auto options = std::make_shared<CommonOptions>();
+  add_common_options(*command, *options);
+  command->footer("Reads " + readable_endings() + ".\nExample: quoin info castle.vox");
+  command->callback([options, &status] { status = run_info(*options); });
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,77 @@
+#include "output.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "commands.h"
+
+namespace quoin::tool {
+
+namespace {
+
+std::string on_one_line(std::string_view text) {
+  std::string line(text);
+  for (char& c : line) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7F') c = '?';
+  }
+  return line;
+}
+
+}  // namespace
+
+std::string with_thousands(std::int64_t number) {
+  std::string digits = std::to_string(number);
+  const std::size_t first = number < 0 ? 1 : 0;
+  for (std::size_t at = digits.size(); at > first + 3;) {
+    at -= 3;
+    digits.insert(at, ",");
+  }
+  return digits;
+}
+
+std::string number_for_people(double value) {
+  std::array<char, 400> text{};
+  std::snprintf(text.data(), text.size(), "%.4f", value);
+  std::string digits = text.data();
+  digits.erase(digits.find_last_not_of('0') + 1);
+  if (digits.back() == '.') digits.pop_back();
+  return digits == "-0" ? "0" : digits;
+}
+
+std::string bytes_for_people(std::uint64_t bytes) {
+  constexpr std::array units = {"kB", "MB", "GB", "TB"};
+  if (bytes < 1000) return std::to_string(bytes) + " B";
+  auto size = static_cast<double>(bytes) / 1000.0;
+  std::size_t unit = 0;
+  for (; size >= 999.5 && unit + 1 < units.size(); ++unit) size /= 1000.0;
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), size < 9.95 ? "%.1f %s" : "%.0f %s", size, units[unit]);
+  return text.data();
+}
+
+void print_error(std::string_view message) {
+  const std::string line = "quoin: " + on_one_line(message) + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+void print_error(const Error& error) {
+  print_error(to_string(error));
+}
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) print_error("warning: " + warning);
+}
+
+int print(std::string_view text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
+  if (written && std::fflush(stdout) == 0) return kDone;
+  print_error("standard output cannot be written");
+  return kFailed;
+}
+
+int print_json(const Json& object) {
+  return print(object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin::tool {
+
+using Json = nlohmann::ordered_json;
+
+/// "1,234,567".
+[[nodiscard]] std::string with_thousands(std::int64_t number);
+
+/// "1.5 MB"; decimal units, up to three digits.
+[[nodiscard]] std::string bytes_for_people(std::uint64_t bytes);
+
+/// At most four digits after the point, none when they are zeros.
+[[nodiscard]] std::string number_for_people(double value);
+
+/// Prints "quoin: MESSAGE" on standard error, as one line whatever the message holds.
+void print_error(std::string_view message);
+void print_error(const Error& error);
+void print_warnings(const std::vector<std::string>& warnings);
+
+/// Prints text, or one JSON object and a line end, on standard output; answers the exit status: kFailed when that
+/// cannot be written.
+[[nodiscard]] int print(std::string_view text);
+[[nodiscard]] int print_json(const Json& object);
+
+}  // namespace quoin::tool

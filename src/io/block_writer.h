@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/io/file.h>
+
+namespace quoin {
+
+/// Gathers small values into blocks of a mebibyte on their way to a file. After an error it swallows what follows;
+/// `finish` tells.
+class BlockWriter {
+ public:
+  /// `expected_bytes` is what progress is measured against; 0 when unknown.
+  BlockWriter(AtomicFile& file, const Progress& progress, std::uint64_t expected_bytes)
+      : file_(file), progress_(progress), expected_bytes_(expected_bytes) {
+    block_.resize(kBlockBytes);
+  }
+
+  /// The value's bytes as they lie in memory.
+  template <class T>
+  void put(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kBlockBytes);
+    if (used_ + sizeof(T) > kBlockBytes) flush();
+    std::memcpy(block_.data() + used_, &value, sizeof(T));
+    used_ += sizeof(T);
+  }
+
+  void put(std::span<const std::byte> bytes);
+  void put_text(std::string_view text) { put(std::as_bytes(std::span(text))); }
+  /// Fills up to a multiple of four bytes since the start.
+  void align(char filler);
+
+  /// Whether what follows is swallowed; long loops ask, to end early.
+  [[nodiscard]] bool failed() const { return !status_.has_value(); }
+  [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
+  /// Errors: the file's first; Cancelled.
+  [[nodiscard]] Status finish();
+
+ private:
+  static constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+
+  void flush();
+
+  AtomicFile& file_;
+  const Progress& progress_;
+  std::uint64_t expected_bytes_;
+  std::vector<std::byte> block_;
+  std::size_t used_ = 0;
+  std::uint64_t written_ = 0;
+  Status status_;
+};
+
+}  // namespace quoin

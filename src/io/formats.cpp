@@ -1,0 +1,99 @@
+#include <quoin/io/formats.h>
+
+#include <algorithm>
+#include <array>
+
+#include <quoin/io/file.h>
+
+namespace quoin {
+
+namespace {
+
+constexpr std::array kFormats = {
+    FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false},
+    FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true},
+    FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true},
+    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and .png", false, true, true},
+};
+
+bool begins_with(std::span<const std::byte> bytes, std::string_view text) {
+  return bytes.size() >= text.size() && std::equal(text.begin(), text.end(), bytes.begin(),
+                                                   [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
+}
+
+std::string lower_case_ending(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  for (char& c : ending) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return ending;
+}
+
+std::string endings(bool FormatInfo::*ability) {
+  std::vector<std::string_view> sorted;
+  for (const FormatInfo& info : kFormats) {
+    if (info.*ability) sorted.push_back(info.ending);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  std::string list;
+  for (const std::string_view ending : sorted) {
+    if (!list.empty()) list += ", ";
+    list += ending;
+  }
+  return list;
+}
+
+/// Why a file of no known format is refused.
+Error unrecognised(std::span<const std::byte> bytes) {
+  if (bytes.empty()) return {ErrorCode::BadFormat, "the file is empty", {}, {}};
+  if (begins_with(bytes, "version https://git-lfs.github.com/spec/")) {
+    return {ErrorCode::BadFormat, "a Git LFS pointer, not the file itself (git lfs pull fetches it)", {}, 0};
+  }
+  return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_endings() + ")", {}, {}};
+}
+
+Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                               const LoadOptions& options) {
+  if (recognise(bytes) == FileFormat::Vox) return read_vox(bytes, options);
+  const Error error = unrecognised(bytes);
+  // The reader knows more of what else goes by this name.
+  const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_ending(path) == ".vox";
+  if (named_vox) return read_vox(bytes, options);
+  return tl::unexpected<Error>(error);
+}
+
+}  // namespace
+
+std::span<const FormatInfo> file_formats() {
+  return kFormats;
+}
+
+std::string readable_endings() {
+  return endings(&FormatInfo::readable);
+}
+
+std::string writable_endings() {
+  return endings(&FormatInfo::writable);
+}
+
+std::optional<FileFormat> recognise(std::span<const std::byte> bytes) {
+  if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
+  return std::nullopt;
+}
+
+Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
+  const std::string ending = lower_case_ending(path);
+  for (const FormatInfo& info : kFormats) {
+    if (info.writable && info.ending == ending) return info;
+  }
+  return fail(ErrorCode::Unsupported, "the name must end in one of " + writable_endings(), path.string());
+}
+
+Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options) {
+  auto bytes = read_file(path);
+  auto loaded = bytes ? read_bytes(path, *bytes, options) : Result<LoadedScene>(tl::unexpected<Error>(bytes.error()));
+  if (!loaded && loaded.error().path.empty()) loaded.error().path = path.string();
+  return loaded;
+}
+
+}  // namespace quoin

@@ -1,0 +1,59 @@
+#include <quoin/io/formats.h>
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "io/glb_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+Error error_of(const TestFolder& folder, const std::string& name, const std::string& content) {
+  EXPECT_TRUE(write_file(folder.file(name), bytes_of(content)));
+  const auto loaded = load_scene(folder.file(name));
+  EXPECT_FALSE(loaded) << name;
+  return loaded ? Error{} : loaded.error();
+}
+
+TEST(Formats, content_decides_what_a_file_is) {
+  EXPECT_EQ(recognise(bytes_of("VOX \x96")), FileFormat::Vox);
+  EXPECT_EQ(recognise(bytes_of("VOX")), std::nullopt);
+  EXPECT_EQ(recognise(bytes_of("glTF")), std::nullopt) << "written, not read";
+  EXPECT_EQ(recognise({}), std::nullopt);
+}
+
+TEST(Formats, names_decide_what_is_written) {
+  EXPECT_EQ(format_for_writing("a/b.GLB")->format, FileFormat::Glb);
+  EXPECT_EQ(format_for_writing("b.gltf")->format, FileFormat::Gltf);
+  EXPECT_EQ(format_for_writing("b.obj")->format, FileFormat::Obj);
+  EXPECT_EQ(format_for_writing("b.c.vox")->format, FileFormat::Vox);
+  for (const char* name : {"b", "b.", "glb", ".glb", "b.glb.bak", "b.glbx"}) {
+    const auto format = format_for_writing(name);
+    ASSERT_FALSE(format) << name;
+    EXPECT_EQ(format.error().code, ErrorCode::Unsupported);
+    EXPECT_NE(format.error().message.find(".glb, .gltf, .obj, .vox"), std::string::npos) << format.error().message;
+  }
+}
+
+TEST(Formats, files_of_no_known_format_are_refused_with_the_reason) {
+  const TestFolder folder("formats");
+  EXPECT_EQ(error_of(folder, "a.txt", "hello").code, ErrorCode::BadFormat);
+  EXPECT_NE(error_of(folder, "a.vox", "").message.find("empty"), std::string::npos);
+  const Error pointer = error_of(folder, "b.vox", "version https://git-lfs.github.com/spec/v1\noid sha256:0\n");
+  EXPECT_NE(pointer.message.find("Git LFS pointer"), std::string::npos) << pointer.message;
+  EXPECT_EQ(pointer.path, folder.file("b.vox").string());
+  const auto missing = load_scene(folder.file("missing.vox"));
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::CannotRead);
+  EXPECT_EQ(missing.error().path, folder.file("missing.vox").string());
+}
+
+}  // namespace
+
+}  // namespace quoin

@@ -1,0 +1,176 @@
+#include "io/material_palette.h"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace quoin {
+
+namespace {
+
+bool emits(SurfaceClass surface) {
+  return surface == SurfaceClass::Emissive || surface == SurfaceClass::EmissiveTransparent;
+}
+
+/// What the file can say: finite and not negative.
+float clamped_emission(float emission) {
+  return emission > 0.0F ? std::min(emission, std::numeric_limits<float>::max()) : 0.0F;
+}
+
+std::uint8_t byte_from_unit(double value) {
+  if (!(value > 0.0)) return 0;
+  return static_cast<std::uint8_t>(std::lround(std::min(value, 1.0) * 255.0));
+}
+
+/// The sRGB transfer functions of IEC 61966-2-1.
+double linear_from_srgb(std::uint8_t value) {
+  const double encoded = value / 255.0;
+  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+std::uint8_t srgb_from_linear(double linear) {
+  return byte_from_unit(linear <= 0.0031308 ? linear * 12.92 : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055);
+}
+
+std::uint8_t scaled_in_linear_light(std::uint8_t srgb, double factor) {
+  return factor == 1.0 ? srgb : srgb_from_linear(linear_from_srgb(srgb) * factor);
+}
+
+const char* material_name(SurfaceClass surface) {
+  switch (surface) {
+    case SurfaceClass::Opaque:
+      return "voxels opaque";
+    case SurfaceClass::Transparent:
+      return "voxels transparent";
+    case SurfaceClass::Emissive:
+      return "voxels emissive";
+    case SurfaceClass::EmissiveTransparent:
+      return "voxels emissive transparent";
+  }
+  return "voxels";
+}
+
+}  // namespace
+
+MaterialPalette::MaterialPalette(const VoxelRegistry& types, const SceneMeshes& meshes) : types_(types) {
+  const auto rows = static_cast<std::uint32_t>((types.size() + kPaletteWidth - 1) / kPaletteWidth);
+  rows_ = std::bit_ceil(std::max(rows, 1U));
+  Usage used;
+  for (std::size_t surface = 0; surface < kSurfaceClasses; ++surface) {
+    used[surface].resize(types.size());
+    for (const GridMesh& grid : meshes.grids) {
+      for (const VoxelType type : grid.mesh.surfaces[surface].types) used[surface][type] = true;
+    }
+  }
+  find_bands(used);
+  make_materials(used);
+}
+
+void MaterialPalette::find_bands(const Usage& used) {
+  std::vector<float> strengths;
+  const auto& opaque = used[static_cast<std::size_t>(SurfaceClass::Emissive)];
+  const auto& transparent = used[static_cast<std::size_t>(SurfaceClass::EmissiveTransparent)];
+  for (std::size_t type = 0; type < types_.size(); ++type) {
+    const float emission = clamped_emission(types_[static_cast<VoxelType>(type)].emission);
+    if ((opaque[type] || transparent[type]) && emission > 0.0F) strengths.push_back(emission);
+  }
+  std::sort(strengths.begin(), strengths.end(), std::greater<>());
+  for (const float strength : strengths) {
+    if (bands_.empty() || strength < bands_.back() / 2.0F) bands_.push_back(strength);
+  }
+  band_of_type_.assign(types_.size(), 0);
+  for (std::size_t type = 0; type < types_.size() && !bands_.empty(); ++type) {
+    const float emission = clamped_emission(types_[static_cast<VoxelType>(type)].emission);
+    const auto weaker =
+        std::partition_point(bands_.begin(), bands_.end(), [&](float band) { return band >= emission; });
+    if (weaker != bands_.begin()) band_of_type_[type] = static_cast<std::uint16_t>(weaker - bands_.begin() - 1);
+  }
+}
+
+std::size_t MaterialPalette::band_of(SurfaceClass surface, VoxelType type) const {
+  return emits(surface) ? band_of_type_[type] : 0;
+}
+
+void MaterialPalette::make_materials(const Usage& used) {
+  for (std::size_t index = 0; index < kSurfaceClasses; ++index) {
+    const auto surface = static_cast<SurfaceClass>(index);
+    std::vector<bool> bands(std::max<std::size_t>(bands_.size(), 1));
+    for (std::size_t type = 0; type < types_.size(); ++type) {
+      if (used[index][type]) bands[band_of(surface, static_cast<VoxelType>(type))] = true;
+    }
+    const auto count = std::count(bands.begin(), bands.end(), true);
+    int number = 0;
+    for (std::size_t band = 0; band < bands.size(); ++band) {
+      if (!bands[band]) continue;
+      SurfaceMaterial material{material_name(surface), surface, 0.0F};
+      if (emits(surface) && !bands_.empty()) material.emission = bands_[band];
+      if (count > 1) material.name.append(1, ' ').append(std::to_string(++number));
+      by_class_and_band_[{surface, band}] = materials_.size();
+      materials_.push_back(std::move(material));
+    }
+  }
+}
+
+std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) const {
+  const auto found = by_class_and_band_.find({surface, band_of(surface, type)});
+  assert(found != by_class_and_band_.end());
+  return found->second;
+}
+
+bool MaterialPalette::has_emission() const {
+  return std::any_of(materials_.begin(), materials_.end(), [](const SurfaceMaterial& m) { return m.is_emissive(); });
+}
+
+std::array<float, 2> MaterialPalette::texel_centre(VoxelType type) const {
+  const std::uint32_t column = type % kPaletteWidth;
+  const std::uint32_t row = type / kPaletteWidth;
+  return {(static_cast<float>(column) + 0.5F) / static_cast<float>(kPaletteWidth),
+          (static_cast<float>(row) + 0.5F) / static_cast<float>(rows_)};
+}
+
+PngImage MaterialPalette::blank(std::uint32_t channels) const {
+  return {kPaletteWidth, rows_, channels, std::vector<std::uint8_t>(std::size_t{kPaletteWidth} * rows_ * channels)};
+}
+
+PngImage MaterialPalette::base_colour() const {
+  PngImage image = blank(4);
+  for (std::size_t type = 1; type < types_.size(); ++type) {
+    const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
+    std::uint8_t* texel = image.pixels.data() + type * 4;
+    texel[0] = properties.colour.r;
+    texel[1] = properties.colour.g;
+    texel[2] = properties.colour.b;
+    texel[3] = properties.visibility == Visibility::Transparent ? properties.colour.a : 255;
+  }
+  return image;
+}
+
+PngImage MaterialPalette::metallic_roughness() const {
+  PngImage image = blank(3);
+  for (std::size_t type = 1; type < types_.size(); ++type) {
+    const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
+    image.pixels[type * 3 + 1] = byte_from_unit(properties.roughness);
+    image.pixels[type * 3 + 2] = byte_from_unit(properties.metalness);
+  }
+  return image;
+}
+
+PngImage MaterialPalette::emissive() const {
+  PngImage image = blank(3);
+  for (std::size_t type = 1; type < types_.size() && !bands_.empty(); ++type) {
+    const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
+    const float emission = clamped_emission(properties.emission);
+    const double factor =
+        std::min(1.0, static_cast<double>(emission) / static_cast<double>(bands_[band_of_type_[type]]));
+    std::uint8_t* texel = image.pixels.data() + type * 3;
+    texel[0] = scaled_in_linear_light(properties.colour.r, factor);
+    texel[1] = scaled_in_linear_light(properties.colour.g, factor);
+    texel[2] = scaled_in_linear_light(properties.colour.b, factor);
+  }
+  return image;
+}
+
+}  // namespace quoin

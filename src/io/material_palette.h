@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/io/scene_meshes.h>
+#include <quoin/mesh/blocky_mesh.h>
+
+#include "io/png.h"
+
+namespace quoin {
+
+inline constexpr std::uint32_t kPaletteWidth = 256;
+
+/// One material of an exported file.
+struct SurfaceMaterial {
+  std::string name;  ///< unique in the file
+  SurfaceClass surface = SurfaceClass::Opaque;
+  float emission = 0.0F;  ///< what a full texel of the emissive palette stands for; 0 when nothing is emitted
+
+  [[nodiscard]] bool is_transparent() const {
+    return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
+  }
+  [[nodiscard]] bool is_emissive() const {
+    return surface == SurfaceClass::Emissive || surface == SurfaceClass::EmissiveTransparent;
+  }
+};
+
+/// The voxel types of a scene's meshes as mesh formats say it: textures with one texel a type, and the few materials
+/// that use them.
+///
+/// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
+/// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
+/// strength, or with strengths more than twice apart, has its colours unscaled.
+class MaterialPalette {
+ public:
+  /// Only types that the meshes use get materials; all registered types get texels.
+  MaterialPalette(const VoxelRegistry& types, const SceneMeshes& meshes);
+
+  [[nodiscard]] const std::vector<SurfaceMaterial>& materials() const { return materials_; }
+  /// Requires: the meshes have a triangle of this class and type.
+  [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
+  [[nodiscard]] bool has_emission() const;
+
+  /// Rows of every texture, a power of two.
+  [[nodiscard]] std::uint32_t rows() const { return rows_; }
+  /// The centre of a type's texel, from the top left; exact in float.
+  [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const;
+
+  /// sRGB colour and linear alpha (255 for opaque types).
+  [[nodiscard]] PngImage base_colour() const;
+  /// Roughness in green, metalness in blue, both linear.
+  [[nodiscard]] PngImage metallic_roughness() const;
+  /// sRGB; black where nothing is emitted.
+  [[nodiscard]] PngImage emissive() const;
+
+ private:
+  using Usage = std::array<std::vector<bool>, kSurfaceClasses>;
+
+  void find_bands(const Usage& used);
+  void make_materials(const Usage& used);
+  [[nodiscard]] std::size_t band_of(SurfaceClass surface, VoxelType type) const;
+  [[nodiscard]] PngImage blank(std::uint32_t channels) const;
+
+  const VoxelRegistry& types_;
+  std::uint32_t rows_ = 1;
+  std::vector<float> bands_;  ///< strongest of each, descending
+  std::vector<std::uint16_t> band_of_type_;
+  std::vector<SurfaceMaterial> materials_;
+  std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_band_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,74 @@
+#include "io/png.h"
+
+#include <png.h>
+
+#include <cassert>
+#include <csetjmp>
+
+namespace quoin {
+
+namespace {
+
+void append_bytes(png_structp png, png_bytep data, std::size_t size) {
+  auto& out = *static_cast<std::vector<std::byte>*>(png_get_io_ptr(png));
+  const auto* bytes = reinterpret_cast<const std::byte*>(data);
+  out.insert(out.end(), bytes, bytes + size);
+}
+
+void flush_nothing(png_structp) {}
+
+void stay_silent(png_structp, png_const_charp) {}
+
+[[noreturn]] void jump_back(png_structp png, png_const_charp) {
+  png_longjmp(png, 1);
+}
+
+/// Everything that libpng may jump out of; nothing here needs a destructor.
+bool write_image(png_structp png, png_infop info, const PngImage& image, std::vector<std::byte>& out) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_write_fn(png, &out, append_bytes, flush_nothing);
+  png_set_compression_level(png, 9);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
+  png_set_IHDR(png, info, image.width, image.height, 8, image.channels == 4 ? PNG_COLOR_TYPE_RGBA : PNG_COLOR_TYPE_RGB,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  for (std::uint32_t y = 0; y < image.height; ++y) {
+    png_write_row(png, image.pixels.data() + std::size_t{y} * image.width * image.channels);
+  }
+  png_write_end(png, info);
+  return true;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> encode_png(const PngImage& image) {
+  assert(image.pixels.size() == std::size_t{image.width} * image.height * image.channels);
+  std::vector<std::byte> out;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, jump_back, stay_silent);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  const bool written = info != nullptr && write_image(png, info, image, out);
+  png_destroy_write_struct(&png, &info);
+  if (!written) return fail(ErrorCode::LimitExceeded, "the picture cannot be encoded as PNG");
+  return out;
+}
+
+Result<PngImage> decode_png(std::span<const std::byte> file) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&header, file.data(), file.size()) == 0) {
+    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+  }
+  if (std::uint64_t{header.width} * header.height > (std::uint64_t{1} << 28)) {
+    png_image_free(&header);
+    return fail(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
+  }
+  header.format = PNG_FORMAT_RGBA;
+  PngImage image{header.width, header.height, 4, {}};
+  image.pixels.resize(PNG_IMAGE_SIZE(header));
+  if (png_image_finish_read(&header, nullptr, image.pixels.data(), 0, nullptr) == 0) {
+    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+  }
+  return image;
+}
+
+}  // namespace quoin

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// 8-bit pixels as PNG holds them: rows from the top, channels interleaved.
+struct PngImage {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t channels = 3;  ///< 3 RGB, 4 RGBA
+  std::vector<std::uint8_t> pixels;
+};
+
+/// A PNG file without colour-space chunks, so that readers take the numbers as they are; the same bytes on every run.
+///
+/// Requires: both sizes positive and as many bytes in `pixels` as they say.
+/// Errors: LimitExceeded when libpng refuses (sizes beyond a million, memory).
+[[nodiscard]] Result<std::vector<std::byte>> encode_png(const PngImage& image);
+
+/// Decodes to RGBA whatever the file holds.
+///
+/// Errors: BadFormat; LimitExceeded beyond 2^28 pixels.
+[[nodiscard]] Result<PngImage> decode_png(std::span<const std::byte> file);
+
+}  // namespace quoin

@@ -1,0 +1,44 @@
+// Reads what the checks need from a GLB, by the specification and without any client's loader (browser only).
+
+async function decodePng(bytes) {
+  const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }),
+                                         { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+  context.drawImage(bitmap, 0, 0);
+  return context.getImageData(0, 0, bitmap.width, bitmap.height);
+}
+
+const arrayTypes = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
+
+/** {meshes: [{primitives: [{positions, normals, colours, indices, texelOf(vertex)}]}]} */
+export async function parseGlb(buffer) {
+  const header = new DataView(buffer);
+  const jsonBytes = header.getUint32(12, true);
+  const json = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 20, jsonBytes)));
+  const start = 20 + jsonBytes + 8;
+  const view = (index) => json.bufferViews[index];
+  const accessor = (index) => {
+    if (index === undefined) return undefined;
+    const { bufferView, componentType, count, type } = json.accessors[index];
+    return new arrayTypes[componentType](buffer, start + view(bufferView).byteOffset, count * widths[type]);
+  };
+  const images = [];
+  for (const { bufferView } of json.images ?? []) {
+    const { byteOffset, byteLength } = view(bufferView);
+    images.push(await decodePng(new Uint8Array(buffer, start + byteOffset, byteLength)));
+  }
+  const read = ({ attributes, indices, material }) => {
+    const texture = json.materials[material].pbrMetallicRoughness.baseColorTexture.index;
+    const image = images[json.textures[texture].source];
+    const coordinates = accessor(attributes.TEXCOORD_0);
+    const texelOf = (vertex) => {
+      const x = Math.floor(coordinates[vertex * 2] * image.width);
+      const y = Math.floor(coordinates[vertex * 2 + 1] * image.height);
+      return [...image.data.slice((y * image.width + x) * 4, (y * image.width + x) * 4 + 4)];
+    };
+    return { positions: accessor(attributes.POSITION), normals: accessor(attributes.NORMAL),
+             colours: accessor(attributes.COLOR_0), indices: accessor(indices), texelOf };
+  };
+  return { meshes: (json.meshes ?? []).map(({ primitives }) => ({ primitives: primitives.map(read) })) };
+}

@@ -1,0 +1,41 @@
+// Loads GLB files in three.js in a headless Chromium, unlit, and checks that sampled pixels are the palette's colour
+// times the occlusion: node pixels.mjs [--vox FOLDER] FILE.glb...
+//
+// With --vox, a GLB whose .vox of the same name lies in FOLDER and is a single plain model is compared with colours and
+// occlusion computed anew from those voxels, instead of with what the GLB says itself.
+// Exit status: 0 all right, 1 not, 77 when the browser or the packages are not installed.
+import { existsSync } from 'node:fs';
+import { basename, join } from 'node:path';
+import { parseArgs } from 'node:util';
+
+import { withViewer } from './browser.mjs';
+
+const views = ['front', 'back', 'left', 'right', 'top', 'bottom', 'iso', 'iso2', 'iso3', 'iso4'];
+const pixelsPerView = 60;
+
+const { values: options, positionals: files } = parseArgs({ allowPositionals: true, options: { vox: { type: 'string' } } });
+
+let failed = false;
+for (const file of files) {
+  const vox = options.vox && join(options.vox, `${basename(file, '.glb')}.vox`);
+  const served = vox && existsSync(vox) ? [file, vox] : [file];
+  const totals = await withViewer([file], [800, 800], (page) => page.evaluate(async ([list, count, truth]) => {
+    window.viewer.unlit();
+    const from_voxels = truth && (await window.viewer.compareWith(truth));
+    const sums = { from_voxels, checked: 0, inside_out: 0, darkened: 0, wrong: [] };
+    list.forEach((view, index) => {
+      window.viewer.look(view);
+      const result = window.viewer.checkPixels(count, 12345 + index);
+      for (const key of ['checked', 'inside_out', 'darkened']) sums[key] += result[key];
+      sums.wrong.push(...result.wrong.map((pixel) => ({ view, ...pixel })));
+    });
+    return sums;
+  }, [views, pixelsPerView, served[1] && '/truth.vox']), served[1]);
+  const good = totals.checked > 0 && totals.wrong.length === 0 && totals.inside_out === 0;
+  failed ||= !good;
+  console.log(`${good ? 'ok' : 'FAILED'} ${file}: ${totals.checked} pixels (${totals.darkened} occluded), ` +
+              `${totals.wrong.length} wrong, ${totals.inside_out} inside out${totals.from_voxels ? ', against the voxels' : ''}`);
+  totals.wrong.slice(0, 5).forEach((pixel) => console.log(`  ${JSON.stringify(pixel)}`));
+}
+if (files.length === 0) console.error('pixels.mjs: which files?');
+process.exit(failed || files.length === 0 ? 1 : 0);

@@ -1,0 +1,155 @@
+// Runs in the browser: shows models and answers questions about pixels.
+import * as THREE from 'three';
+import { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+
+import { parseGlb } from './glb.mjs';
+import { readVox, truthAt } from './vox_truth.mjs';
+
+const background = [30, 34, 42];
+const directions = {
+  front: [0, 0, 1], back: [0, 0, -1], left: [-1, 0, 0], right: [1, 0, 0], top: [0, 1, 0], bottom: [0, -1, 0],
+  iso: [1, 0.8, 1], iso2: [-1, 0.8, 1], iso3: [-1, -0.6, -1], iso4: [1, 0.7, -1],
+};
+
+const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+renderer.setSize(window.innerWidth, window.innerHeight);
+document.body.append(renderer.domElement);
+const scene = new THREE.Scene();
+scene.background = new THREE.Color(`rgb(${background.join(',')})`);
+const models = new THREE.Group();
+scene.add(models);
+const lights = new THREE.Group();
+scene.add(lights);
+let parsed = [];
+let camera;
+let truth = null;
+
+function addLights() {
+  // Metals are black without something to reflect.
+  scene.environment = new THREE.PMREMGenerator(renderer).fromScene(new RoomEnvironment()).texture;
+  scene.environmentIntensity = 0.35;
+  lights.add(new THREE.HemisphereLight(0xddeeff, 0x998877, 0.9));
+  const sun = new THREE.DirectionalLight(0xfff2dd, 1.5);
+  sun.position.set(3, 5, 4);
+  lights.add(sun);
+}
+
+/** Models stand in a row along x, a quarter of their width apart. */
+async function load(urls) {
+  addLights();
+  let x = 0;
+  for (const url of urls) {
+    const bytes = await (await fetch(url)).arrayBuffer();
+    const gltf = await new GLTFLoader().parseAsync(bytes.slice(0), '/');
+    const own = parsed.push(await parseGlb(bytes)) - 1;
+    gltf.scene.traverse((object) => {
+      if (object.isMesh) object.userData.source = { model: own, ...gltf.parser.associations.get(object) };
+    });
+    const box = new THREE.Box3().setFromObject(gltf.scene);
+    if (urls.length > 1 && !box.isEmpty()) {
+      gltf.scene.position.set(x - box.min.x, -box.min.y, -(box.min.z + box.max.z) / 2);
+      x += (box.max.x - box.min.x) * 1.25 + 1;
+    }
+    models.add(gltf.scene);
+  }
+  scene.updateMatrixWorld(true);
+}
+
+/** From now on pixels are compared with the voxels of this file; false when it has more than one plain model. */
+async function compareWith(url) {
+  truth = readVox(await (await fetch(url)).arrayBuffer());
+  return truth !== null;
+}
+
+/** The palette times the vertex colours and nothing else; blended surfaces are left out. */
+function unlit() {
+  lights.visible = false;
+  models.traverse((object) => {
+    if (!object.isMesh) return;
+    object.visible = !object.material.transparent;
+    object.material = new THREE.MeshBasicMaterial({
+      map: object.material.map, vertexColors: object.geometry.hasAttribute('color'), side: object.material.side,
+    });
+  });
+}
+
+function look(view, zoom = 1) {
+  const direction = new THREE.Vector3(...(directions[view] ?? view)).normalize();
+  const box = new THREE.Box3().setFromObject(models);
+  const centre = box.getCenter(new THREE.Vector3());
+  const radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 1e-3);
+  const aspect = window.innerWidth / window.innerHeight;
+  camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 0, 4 * radius);
+  camera.position.copy(centre).addScaledVector(direction, 2 * radius);
+  camera.up.set(0, Math.abs(direction.y) > 0.99 ? 0 : 1, Math.abs(direction.y) > 0.99 ? -Math.sign(direction.y) : 0);
+  camera.lookAt(centre);
+  camera.updateMatrixWorld(true);
+  let [halfWidth, halfHeight] = [1e-3, 1e-3];
+  for (let corner = 0; corner < 8; ++corner) {
+    const point = new THREE.Vector3(corner & 1 ? box.max.x : box.min.x, corner & 2 ? box.max.y : box.min.y,
+                                    corner & 4 ? box.max.z : box.min.z).applyMatrix4(camera.matrixWorldInverse);
+    halfWidth = Math.max(halfWidth, Math.abs(point.x));
+    halfHeight = Math.max(halfHeight, Math.abs(point.y));
+  }
+  const half = Math.max(halfHeight, halfWidth / aspect) * 1.05 / zoom;
+  [camera.left, camera.right, camera.top, camera.bottom] = [-half * aspect, half * aspect, half, -half];
+  camera.updateProjectionMatrix();
+  renderer.render(scene, camera);
+}
+
+const linear = (byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
+const encoded = (value) => Math.round(255 * (value <= 0.0031308 ? value * 12.92 : 1.055 * value ** (1 / 2.4) - 0.055));
+
+/** What the file says about the point that a ray through a pixel meets: its texel and the brightness there. */
+function hitAt(raycaster, x, y) {
+  const ndc = new THREE.Vector2((x / window.innerWidth) * 2 - 1, 1 - (y / window.innerHeight) * 2);
+  raycaster.setFromCamera(ndc, camera);
+  const visible = [];
+  models.traverse((object) => object.isMesh && object.visible && visible.push(object));
+  const [hit] = raycaster.intersectObjects(visible, false);
+  if (!hit) return null;
+  const source = hit.object.userData.source;
+  const primitive = parsed[source.model].meshes[source.meshes].primitives[source.primitives ?? 0];
+  const corners = [0, 1, 2].map((corner) => primitive.indices[hit.faceIndex * 3 + corner]);
+  const local = hit.object.worldToLocal(hit.point.clone());
+  const points = corners.map((index) => new THREE.Vector3().fromArray(primitive.positions, index * 3));
+  const weights = THREE.Triangle.getBarycoord(local, ...points, new THREE.Vector3());
+  const brightness = primitive.colours
+    ? corners.reduce((sum, index, corner) => sum + weights.getComponent(corner) * primitive.colours[index * 4] / 255, 0)
+    : 1;
+  const normal = new THREE.Vector3().fromArray(primitive.normals, corners[0] * 3).transformDirection(hit.object.matrixWorld);
+  return { texel: primitive.texelOf(corners[0]), brightness, point: hit.point, normal, inward: normal.dot(raycaster.ray.direction) };
+}
+
+/** Compares up to `count` pixels with palette times occlusion; pixels near an edge of colours are passed over. */
+function checkPixels(count, seed) {
+  const gl = renderer.getContext();
+  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+  const pixels = new Uint8Array(width * height * 4);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  const raycaster = new THREE.Raycaster();
+  const result = { checked: 0, inside_out: 0, darkened: 0, wrong: [] };
+  let state = seed;
+  const random = (limit) => ((state = (state * 1664525 + 1013904223) >>> 0) / 2 ** 32) * limit;
+  for (let attempt = 0; attempt < count * 4 && result.checked < count; ++attempt) {
+    const [x, y] = [Math.floor(random(width)), Math.floor(random(height))];
+    const hit = hitAt(raycaster, x + 0.5, y + 0.5);
+    if (!hit) continue;
+    const around = [[-1, -1], [2, -1], [-1, 2], [2, 2]].map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
+    const alike = (other) => other && String(other.texel) === String(hit.texel) && other.normal.dot(hit.normal) > 0.99 &&
+      Math.abs(other.brightness - hit.brightness) < 0.03;
+    if (!around.every(alike)) continue;
+    const at = ((height - 1 - y) * width + x) * 4;
+    const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3), brightness: hit.brightness };
+    const expected = told ? told.colour.map((byte) => encoded(linear(byte) * told.brightness)) : ['air', 'air', 'air'];
+    const actual = [...pixels.slice(at, at + 3)];
+    ++result.checked;
+    if (hit.inward > 0) ++result.inside_out;
+    if (hit.brightness < 0.95) ++result.darkened;
+    if (expected.some((value, channel) => !(Math.abs(value - actual[channel]) <= 4))) result.wrong.push({ x, y, expected, actual });
+  }
+  return result;
+}
+
+window.viewer = { load, compareWith, unlit, look, checkPixels };
