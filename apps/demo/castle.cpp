@@ -154,7 +154,7 @@ quoin::Result<Palette> add_palette(quoin::VoxelRegistry& types) {
       properties.visibility = quoin::Visibility::Transparent;
       properties.roughness = 0.1F;
     }
-    if (entry.slot == &Palette::lamp) properties.emission = 3.0F;
+    if (entry.slot == &Palette::lamp) properties.emission = 1.0F;
     const auto type = types.add(properties);
     if (!type) return tl::unexpected<quoin::Error>(type.error());
     p.*entry.slot = *type;

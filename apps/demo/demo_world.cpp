@@ -60,8 +60,8 @@ quoin::Result<quoin::Scene> make_scene() {
                                 {x - kHalf, ground + 1, z - kHalf}, turn));
   }
   const auto ship = add_grid(scene, "ship", demo::make_ship(*palette), {0, 0, 17});
-  scene.add_instance(instance("Swift", ship, {62, demo::kSeaLevel - 2, 84}, 1));
-  scene.add_instance(instance("Heron", ship, {-88, demo::kSeaLevel - 2, 52}, 0));
+  scene.add_instance(instance("Swift", ship, {46, demo::kSeaLevel - 2, 71}, 1));
+  scene.add_instance(instance("Heron", ship, {-73, demo::kSeaLevel - 2, 36}, 0));
   return scene;
 }
 

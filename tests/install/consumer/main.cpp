@@ -1,0 +1,26 @@
+// A program outside Quoin's tree: fills a box, meshes it, writes a GLB.
+
+#include <cstdio>
+
+#include <quoin/quoin.h>
+
+int main() {
+  quoin::Scene scene;
+  quoin::VoxelProperties stone;
+  stone.name = "stone";
+  stone.colour = {130, 130, 135, 255};
+  const auto type = scene.types.add(stone);
+  if (!type) return 1;
+  quoin::SceneGrid box;
+  box.grid.fill_box({0, 0, 0}, {9, 9, 9}, *type);
+  const quoin::GridHandle handle = scene.add_grid(std::move(box));
+  quoin::Instance placed;
+  placed.grid = handle;
+  scene.add_instance(placed);
+
+  const auto mesh = quoin::build_blocky_mesh(scene.grids()[handle].grid, scene.types, {});
+  if (!mesh || mesh->quads != 6) return 1;
+  std::printf("%lld faces in %lld quads\n", static_cast<long long>(mesh->faces_visible),
+              static_cast<long long>(mesh->quads));
+  return 0;
+}
