@@ -28,6 +28,7 @@ std::vector<GridReport> report_grids(const Scene& scene) {
     }
   }
   std::vector<GridReport> list;
+  list.reserve(reports.size());
   for (auto& [handle, report] : reports) list.push_back(std::move(report));
   return list;
 }

@@ -1,0 +1,59 @@
+// Converts every .vox file below a folder with the tool and checks the results: node check_tool.mjs TOOL FOLDER [--pixels N]
+//
+// Every GLB must pass the validator without a message, and N of them (default 4, spread over the list) the pixel check
+// against their voxels. Files that the tool refuses are listed, and count only when it did not refuse them properly (status 1, one
+// line, no file). Exit status: 0 all right, 1 not, 77 when something is not installed.
+import { spawnSync } from 'node:child_process';
+import { existsSync, mkdtempSync, readdirSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { basename, dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { parseArgs } from 'node:util';
+
+const here = fileURLToPath(new URL('.', import.meta.url));
+const { values, positionals } = parseArgs({ allowPositionals: true, options: { pixels: { type: 'string', default: '4' } } });
+const [tool, folder] = positionals;
+if (!existsSync(tool ?? '') || !existsSync(folder ?? '')) {
+  console.log('skipped: no such tool or folder');
+  process.exit(77);
+}
+
+const work = mkdtempSync(join(tmpdir(), 'quoin-web-'));
+const script = (name, ...rest) => spawnSync(process.execPath, [join(here, name), ...rest], { stdio: 'inherit' }).status;
+
+function convertAll(sources) {
+  const [written, faults] = [[], []];
+  for (const source of sources) {
+    const glb = join(work, `${basename(source, '.vox')}.glb`);
+    const run = spawnSync(tool, ['convert', source, glb, '--json'], { encoding: 'utf8' });
+    if (run.status === 0 && JSON.parse(run.stdout).bytes > 0) {
+      written.push([source, glb]);
+    } else if (run.status === 1 && run.stderr.trim().split('\n').length === 1 && !existsSync(glb)) {
+      console.log(`refused: ${run.stderr.trim()}`);
+    } else {
+      faults.push(source);
+      console.log(`FAILED ${source}: status ${run.status} ${run.stderr}`);
+    }
+  }
+  return [written, faults];
+}
+
+/** 77 (skipped) when nothing failed but something was not installed. */
+function check() {
+  const sources = readdirSync(folder, { recursive: true }).filter((name) => name.endsWith('.vox')).sort();
+  const [written, faults] = convertAll(sources.map((name) => join(folder, name)));
+  const statuses = [faults.length === 0 && written.length > 0 ? 0 : 1];
+  statuses.push(script('validate.mjs', '--strict', ...written.map(([, glb]) => glb)));
+  const step = Math.max(1, Math.floor(written.length / Math.max(1, Number(values.pixels))));
+  for (let i = 0; i < written.length && i < step * Number(values.pixels); i += step) {
+    statuses.push(script('pixels.mjs', '--vox', dirname(written[i][0]), written[i][1]));
+  }
+  const bad = statuses.filter((status) => status !== 0);
+  return bad.some((status) => status !== 77) ? 1 : bad.length > 0 ? 77 : 0;
+}
+
+try {
+  process.exitCode = check();
+} finally {
+  rmSync(work, { recursive: true });
+}
