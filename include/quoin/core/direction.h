@@ -24,11 +24,13 @@ struct FaceFrame {
   std::uint8_t v;     ///< axis of the second edge
 };
 
-inline constexpr std::array<FaceFrame, 6> kFaceFrames = {
-    FaceFrame{0, +1, 1, 2}, FaceFrame{0, -1, 2, 1}, FaceFrame{1, +1, 2, 0},
-    FaceFrame{1, -1, 0, 2}, FaceFrame{2, +1, 0, 1}, FaceFrame{2, -1, 1, 0}};
+inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2}, FaceFrame{0, -1, 2, 1},
+                                                         FaceFrame{1, +1, 2, 0}, FaceFrame{1, -1, 0, 2},
+                                                         FaceFrame{2, +1, 0, 1}, FaceFrame{2, -1, 1, 0}};
 
-[[nodiscard]] constexpr const FaceFrame& frame_of(Direction d) { return kFaceFrames[static_cast<std::size_t>(d)]; }
+[[nodiscard]] constexpr const FaceFrame& frame_of(Direction d) {
+  return kFaceFrames[static_cast<std::size_t>(d)];
+}
 
 /// Unit vector of a direction.
 [[nodiscard]] inline IVec3 normal_of(Direction d) {

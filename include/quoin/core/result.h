@@ -22,9 +22,9 @@ enum class ErrorCode : std::uint8_t {
 /// What went wrong with data from outside: one line for a person, with the place where there is one.
 struct Error {
   ErrorCode code = ErrorCode::BadFormat;
-  std::string message;                        ///< One line, no full stop, no path.
-  std::string path;                           ///< The file, or empty.
-  std::optional<std::uint64_t> byte_offset;   ///< Where in the file, counted from 0.
+  std::string message;                       ///< One line, no full stop, no path.
+  std::string path;                          ///< The file, or empty.
+  std::optional<std::uint64_t> byte_offset;  ///< Where in the file, counted from 0.
 };
 
 /// "castle.vox: byte 1204: chunk SIZE claims 4294967295 x 40 x 40 voxels"; parts that are absent are left out.

@@ -17,8 +17,8 @@ namespace quoin {
 /// Space:    voxel (i, j, k) fills the unit cube from (i, j, k) to (i + 1, j + 1, k + 1). Any int32 coordinates, except
 ///           the outermost chunk on each side, which stays air.
 /// Edits:    an edit raises the version of every chunk in which a voxel changed, and the neighbourhood version of
-///           every existing chunk whose mesh it can change: those that hold one of the 26 neighbours of a changed voxel.
-///           Setting a voxel to what it is changes nothing. A chunk that is all air is dropped.
+///           every existing chunk whose mesh it can change: those that hold one of the 26 neighbours of a changed
+///           voxel. Setting a voxel to what it is changes nothing. A chunk that is all air is dropped.
 /// Threads:  any number may read at once; an edit needs the grid to itself.
 class Grid {
  public:
@@ -55,7 +55,8 @@ class Grid {
 
   /// Raised by every edit that changed a voxel of this chunk; 0 for a chunk that is not there.
   [[nodiscard]] std::uint64_t version(IVec3 chunk) const;
-  /// Raised by every edit within one voxel of this chunk: what a mesh of it depends on. 0 for a chunk that is not there.
+  /// Raised by every edit within one voxel of this chunk: what a mesh of it depends on. 0 for a chunk that is not
+  /// there.
   [[nodiscard]] std::uint64_t neighbourhood_version(IVec3 chunk) const;
   /// Raised by every edit that changed anything.
   [[nodiscard]] std::uint64_t version() const;

@@ -30,13 +30,13 @@ struct Rgba8 {
 /// What there is to know of one kind of voxel.
 struct VoxelProperties {
   std::string name;
-  Rgba8 colour;                                ///< sRGB; alpha below 255 only matters for transparent types
+  Rgba8 colour;  ///< sRGB; alpha below 255 only matters for transparent types
   Visibility visibility = Visibility::Opaque;
-  bool collides = true;                        ///< stops a moving body
-  float roughness = 1.0F;                      ///< glTF's perceptual roughness, 0 to 1
-  float metalness = 0.0F;                      ///< 0 to 1
-  float emission = 0.0F;                       ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
-  float ior = 1.5F;                            ///< index of refraction, of use to transparent types
+  bool collides = true;    ///< stops a moving body
+  float roughness = 1.0F;  ///< glTF's perceptual roughness, 0 to 1
+  float metalness = 0.0F;  ///< 0 to 1
+  float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
+  float ior = 1.5F;        ///< index of refraction, of use to transparent types
   /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
   std::map<std::string, std::string> attributes;
 

@@ -22,7 +22,9 @@ using FaceLevels = std::array<std::uint8_t, 4>;
 }
 
 /// Brightness of a level: 1, 0.75, 0.5, 0.25.
-[[nodiscard]] constexpr float occlusion_brightness(std::uint8_t level) { return 1.0F - 0.25F * static_cast<float>(level); }
+[[nodiscard]] constexpr float occlusion_brightness(std::uint8_t level) {
+  return 1.0F - 0.25F * static_cast<float>(level);
+}
 
 /// The four levels of a face of `voxel` (coordinates in the centre chunk). Occluders are opaque voxels: glass and water
 /// do not darken.

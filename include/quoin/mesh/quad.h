@@ -33,9 +33,7 @@ struct Quad {
   [[nodiscard]] Direction direction() const { return static_cast<Direction>(field(kDirectionShift, 7)); }
   [[nodiscard]] VoxelType type() const { return static_cast<VoxelType>(field(kTypeShift, 0xFFFF)); }
   [[nodiscard]] bool flipped() const { return field(kFlipShift, 1) != 0; }
-  [[nodiscard]] FaceLevels levels() const {
-    return {level(0), level(1), level(2), level(3)};
-  }
+  [[nodiscard]] FaceLevels levels() const { return {level(0), level(1), level(2), level(3)}; }
   [[nodiscard]] std::uint8_t level(int corner) const {
     return static_cast<std::uint8_t>(field(kLevelsShift + 2 * corner, 3));
   }

@@ -16,8 +16,8 @@ struct SceneGrid {
   Grid grid;
   /// The point of the grid, in voxels, that an instance's position places and about which it turns.
   DVec3 pivot{0.0};
-  /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may lie
-  /// outside after edits; `declared_box` says how large the grid counts as.
+  /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may
+  /// lie outside after edits; `declared_box` says how large the grid counts as.
   IBox canvas;
 
   /// The canvas and the tight bounds together.
@@ -30,11 +30,11 @@ using GridHandle = Handle<SceneGrid>;
 struct Instance {
   std::string name;
   GridHandle grid;
-  DVec3 position{0.0};                  ///< of the grid's pivot, in world units
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};   ///< unit; world from grid
-  double voxel_size = 1.0;              ///< world units a voxel; positive
-  bool mirrored = false;                ///< the grid's x is negated (about the pivot) before the rotation
-  bool visible = true;                  ///< false for hidden layers and nodes; such instances are kept, not drawn
+  DVec3 position{0.0};                 ///< of the grid's pivot, in world units
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; world from grid
+  double voxel_size = 1.0;             ///< world units a voxel; positive
+  bool mirrored = false;               ///< the grid's x is negated (about the pivot) before the rotation
+  bool visible = true;                 ///< false for hidden layers and nodes; such instances are kept, not drawn
 };
 
 using InstanceHandle = Handle<Instance>;
