@@ -27,12 +27,29 @@ struct LoadOptions {
 
 /// MagicaVoxel's format, versions 150 and 200.
 ///
-/// Source: the published format description of MagicaVoxel and its extension.
-/// Axes:   (x, y, z) becomes (x, z, -y): Quoin's +Y is MagicaVoxel's +Z.
-/// Errors: BadFormat with the byte offset; memory stays within a small multiple of the input's size.
+/// Source:  the published format description of MagicaVoxel and its extension (github.com/ephtracy/voxel-model).
+/// Axes:    (x, y, z) becomes (x, z, -y): Quoin's +Y is MagicaVoxel's +Z.
+/// Grids:   one a model, in the file's order, with the model's box, from the origin, as canvas. Models that are placed
+///          nowhere stay grids without an instance; a warning counts them.
+/// Types:   1 to 255 are the palette as the artist sees it (IMAP applied); the raw material keys are kept in
+///          VoxelProperties::attributes. The palette's alpha means nothing to MagicaVoxel and is not read.
+/// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
+///          last key or the end of the animation's range.
+/// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
+/// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
+///          InvalidArgument for a frame that is not there; LimitExceeded when a scene graph or scattered voxels would
+///          take far more memory than the file has bytes. Memory stays within a multiple of the input's size.
 [[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {});
 
-/// Errors: Unsupported when a transform is not one of the 48 axis-aligned ones or a voxel size is not 1.
+/// The scene as a .vox file of version 150; the same scene gives the same bytes.
+///
+/// Reading it again gives the same scene when every canvas is a box of at most 256 voxels a side from the origin, as
+/// `read_vox` makes them. Otherwise voxels still stand where they stood, but grids are moved to the origin, and those
+/// beyond 256 become several, under a group.
+/// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1.
+/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, with a warning.
+/// Errors:   Unsupported when a transform is not one of the 48 axis-aligned ones or a voxel size is not 1;
+///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace quoin
