@@ -138,6 +138,12 @@ TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
   EXPECT_LT(quads("--no-ao"), 18);
 }
 
+TEST_F(Tool, more_threads_than_processors_are_no_news) {
+  const ToolRun result = run("convert tiny.vox out.glb --threads 1000");
+  EXPECT_EQ(result.status, 0);
+  EXPECT_EQ(result.err, "");
+}
+
 TEST_F(Tool, a_file_may_be_converted_onto_itself) {
   ASSERT_EQ(run("convert tiny.vox tiny.vox").status, 0);
   const ToolRun json = run("info tiny.vox --json");

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <vector>
 #else
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 #endif
@@ -47,7 +48,9 @@ void parallel_for(std::size_t count, Threads threads, const std::function<void(s
 #else
 
 void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
-  const unsigned workers = resolve(threads);
+  // Asked for more workers than there are processors, oneTBB starts no more but complains on standard error.
+  const auto processors = static_cast<unsigned>(std::max(1, oneapi::tbb::info::default_concurrency()));
+  const unsigned workers = std::min(resolve(threads), processors);
   if (workers == 1 || count <= 1) {
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
