@@ -446,7 +446,7 @@ struct Pass {
   Range planes;
   Range rows;
   int side;       // +1 or -1: where the faces look
-  bool row_ends;  // some voxel before or after a row is opaque
+  bool row_ends;  // some voxel before or after a row may be opaque
 };
 
 // Visible faces of a batch of planes, and the list of groups of four rows that have any.
@@ -495,6 +495,7 @@ QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch&
     if constexpr (!kMerge) {
       store(b.starts + at, faces);
       store(b.ends + at, faces);
+      store(b.mergeable + at, Words{});
       continue;
     }
     const int here = word_index(first_plane, 0) + at;
@@ -628,7 +629,7 @@ QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row
       "cmovz %[next_starts], %[starts]\n\t"
       "cmovz %[next_ends], %[ends]\n\t"
       "cmovz %[next], %[row]"
-      : [starts] "+r"(starts), [ends] "+r"(ends), [row] "+r"(row)
+      : [starts] "+&r"(starts), [ends] "+&r"(ends), [row] "+r"(row)
       : [next_starts] "m"(next->starts), [next_ends] "m"(next->ends), [next] "r"(next)
       : "cc");
 #else
