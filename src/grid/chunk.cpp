@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::uint64_t kAllVoxels = ~std::uint64_t{0};
 constexpr int kSlabRows = 16;
-constexpr int kSlabVoxels = kSlabRows * kChunkEdge;
 
 int bits_for(std::size_t types) {
   if (types <= 2) return 1;

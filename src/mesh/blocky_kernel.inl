@@ -8,8 +8,8 @@
 namespace quoin::blocky::QUOIN_KERNEL {
 namespace {
 
-typedef std::uint64_t Words __attribute__((vector_size(32)));
-typedef std::uint64_t UnalignedWords __attribute__((vector_size(32), aligned(8)));
+using Words __attribute__((vector_size(32))) = std::uint64_t;
+using UnalignedWords __attribute__((vector_size(32), aligned(8))) = std::uint64_t;
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
 #define QUOIN_STAGE inline __attribute__((noinline))  // stands apart in a profile
@@ -39,8 +39,7 @@ QUOIN_INLINE std::uint64_t lowest_bit(std::uint64_t w) {
 #endif
 }
 
-// ---- Packed voxels to bit layers
-// -------------------------------------------------------------------------------------
+// From packed voxels to layers of bits.
 
 QUOIN_INLINE std::uint64_t even_bits(std::uint64_t w) {
 #if QUOIN_KERNEL_AVX2
@@ -322,8 +321,7 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
-// ---- Layouts
-// ---------------------------------------------------------------------------------------------------------
+// The layers in the layouts of the other views.
 
 // Rows [z][y] to rows [y][z]; words are moved whole.
 void swap_planes_and_rows(const Layer& from, Layer& to, Range z_range, Range y_range) {
@@ -437,8 +435,7 @@ void copy_row_ends(Scratch& s) {
   }
 }
 
-// ---- One direction
-// ---------------------------------------------------------------------------------------------------
+// The passes over one direction.
 
 struct Pass {
   const View* view;
