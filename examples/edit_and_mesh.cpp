@@ -21,9 +21,9 @@ int main() {
   quoin::BlockyMesher mesher;
   quoin::QuadBuffer quads;
   for (const quoin::IVec3 chunk : grid.take_dirty()) {
-    const auto stats = mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
+    mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
     std::printf("chunk %d %d %d: %lld faces in %zu quads\n", chunk.x, chunk.y, chunk.z,
-                static_cast<long long>(stats.faces), quads.size());
+                static_cast<long long>(quoin::face_count(quads)), quads.size());
   }
   return quads.empty() ? 1 : 0;
 }

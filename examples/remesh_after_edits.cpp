@@ -44,15 +44,15 @@ int main() {
   if (!type) return 1;
 
   quoin::Grid world;
-  world.fill_box({-128, -64, -128}, {127, 0, 127}, *type);
+  world.fill_box({-128, -64, -128}, {127, 20, 127}, *type);
   MeshCache meshes;
   const int all = meshes.update(world, types);
 
-  world.set({10, 0, 10}, quoin::kAir);  // in the middle of a chunk's top
+  world.set({10, 20, 10}, quoin::kAir);  // in the middle of a chunk's top
   const int one = meshes.update(world, types);
 
-  world.fill_sphere({0.0, 0.0, 0.0}, 9.0, quoin::kAir);  // a crater where four columns of chunks meet
+  world.fill_sphere({0.0, 20.0, 0.0}, 9.0, quoin::kAir);  // a crater where four columns of chunks meet
   const int crater = meshes.update(world, types);
   std::printf("meshed %d chunks at first, %d after a voxel, %d after a crater\n", all, one, crater);
-  return all == 32 && one == 1 && crater == 8 ? 0 : 1;
+  return all == 32 && one == 1 && crater == 4 ? 0 : 1;
 }

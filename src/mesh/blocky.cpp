@@ -86,11 +86,6 @@ class OpaqueVoxels {
 
 }  // namespace
 
-const LevelTables& level_tables() {
-  static const LevelTables tables = make_level_tables();
-  return tables;
-}
-
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
   if (out.size() < used + more) out.resize(std::max(used + more, out.capacity()));
   static_assert(sizeof(Quad) == sizeof(std::uint64_t));
@@ -248,7 +243,7 @@ bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
 }
 
 struct Kernel {
-  QuadStats (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
+  void (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
   void (*find_faces)(const blocky::Job&, blocky::Scratch&);
 };
 
@@ -269,27 +264,31 @@ struct BlockyMesher::Scratch : blocky::Scratch {
 };
 
 BlockyMesher::BlockyMesher(InstructionSet instructions) : scratch_(new Scratch()) {
+  scratch_->levels = blocky::make_level_tables();
   scratch_->kernel = pick_kernel(instructions);
 }
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
 BlockyMesher& BlockyMesher::operator=(BlockyMesher&&) noexcept = default;
 BlockyMesher::~BlockyMesher() = default;
 
-QuadStats BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
-                             QuadBuffer& out) {
-  QuadStats stats;
+void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
+                        QuadBuffer& out) {
   scratch_->quads = 0;
   const Chunk* centre = chunks.centre();
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
       const bool transparent = holds_transparent(*centre, types);
-      stats = scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent}, *scratch_,
-                                    out);
+      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent}, *scratch_, out);
     }
   }
   out.resize(scratch_->quads);
-  return stats;
+}
+
+std::int64_t face_count(const QuadBuffer& quads) {
+  std::int64_t faces = 0;
+  for (const Quad& quad : quads) faces += std::int64_t{quad.size_u()} * quad.size_v();
+  return faces;
 }
 
 void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& wanted,

@@ -20,8 +20,8 @@
 
 namespace quoin::blocky {
 
-QuadStats mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out) {
-  return avx2::mesh_chunk(job, scratch, out);
+void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  avx2::mesh_chunk(job, scratch, out);
 }
 
 void find_faces_avx2(const Job& job, Scratch& scratch) {

@@ -127,9 +127,14 @@ void find_rows(const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
         const std::uint64_t pattern = packed_row::repeat(voxels.bits, entry & ~Chunk::kUniformSlab);
         for (int i = 0; i < voxels.bits; ++i) s.patterns[slab][i] = pattern;
       }
-      const std::uint64_t* first = is_uniform ? s.patterns[slab] : voxels.row(entry, 0);
-      const int step = is_uniform ? 0 : voxels.bits;
-      for (int i = 0; i < 16; ++i) s.rows[(z + (i >> 2)) * 64 + y + (i & 3)] = first + i * step;
+      const auto first = reinterpret_cast<std::uint64_t>(is_uniform ? s.patterns[slab] : voxels.row(entry, 0));
+      const std::uint64_t step = is_uniform ? 0 : static_cast<std::uint64_t>(voxels.bits) * 8;
+      Words four = Words{0, step, 2 * step, 3 * step} + first;
+      for (int i = 0; i < 4; ++i) {
+        static_assert(sizeof(s.rows[0]) == sizeof(std::uint64_t));
+        __builtin_memcpy(s.rows + (z + i) * 64 + y, &four, sizeof(four));
+        four += 4 * step;
+      }
     }
   }
 }
@@ -323,20 +328,27 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
 
 // The layers in the layouts of the other views.
 
+// Word j of vector i becomes word i of vector j.
+QUOIN_INLINE void transpose_words(const Words (&in)[4], Words (&out)[4]) {
+  const Words a = __builtin_shufflevector(in[0], in[1], 0, 4, 2, 6);
+  const Words b = __builtin_shufflevector(in[0], in[1], 1, 5, 3, 7);
+  const Words c = __builtin_shufflevector(in[2], in[3], 0, 4, 2, 6);
+  const Words d = __builtin_shufflevector(in[2], in[3], 1, 5, 3, 7);
+  out[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  out[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  out[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  out[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
 // Rows [z][y] to rows [y][z]; words are moved whole.
 void swap_planes_and_rows(const Layer& from, Layer& to, Range z_range, Range y_range) {
   for (int z = z_range.begin; z < z_range.end; z += 4) {
     for (int y = y_range.begin; y < y_range.end; y += 4) {
       Words in[4];
       for (int i = 0; i < 4; ++i) in[i] = load(from.words + word_index(z + i, y));
-      const Words a = __builtin_shufflevector(in[0], in[1], 0, 4, 2, 6);
-      const Words b = __builtin_shufflevector(in[0], in[1], 1, 5, 3, 7);
-      const Words c = __builtin_shufflevector(in[2], in[3], 0, 4, 2, 6);
-      const Words d = __builtin_shufflevector(in[2], in[3], 1, 5, 3, 7);
-      store(to.words + word_index(y, z), __builtin_shufflevector(a, c, 0, 1, 4, 5));
-      store(to.words + word_index(y + 1, z), __builtin_shufflevector(b, d, 0, 1, 4, 5));
-      store(to.words + word_index(y + 2, z), __builtin_shufflevector(a, c, 2, 3, 6, 7));
-      store(to.words + word_index(y + 3, z), __builtin_shufflevector(b, d, 2, 3, 6, 7));
+      Words out[4];
+      transpose_words(in, out);
+      for (int i = 0; i < 4; ++i) store(to.words + word_index(y + i, z), out[i]);
     }
   }
 }
@@ -554,47 +566,41 @@ struct Layout {
   static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
 };
 
-struct RowList {
-  std::size_t runs;
-  std::int64_t faces;
-};
-
 // How quads learn their types: all have one, or each looks into its voxel's packed row.
 inline constexpr int kOneType = -1;
 
 struct TypeSource {
-  std::uint64_t one;                 // in a quad's place; 0 when there are several
-  const std::uint64_t* const* rows;  // [z * 64 + y]
-  const std::uint64_t* palette;      // types in a quad's place, by index
+  std::uint64_t one;  // in a quad's place; 0 when there are several
+  int log_bits;       // of the packed rows, or kOneType
 };
 
-// The rows of the listed groups that have runs, side by side.
+// Puts the rows of the listed groups that have runs side by side; answers how many runs those are.
 template <int kDirection>
-QUOIN_STAGE RowList list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Batch& b) {
+QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Scratch& s) {
   using L = Layout<kDirection>;
-  const std::uint64_t* places = level_tables().places[L::kAxis];
+  Batch& b = s.batch;
+  const std::uint64_t* places = s.levels.places[L::kAxis];
   const std::uint64_t base = (std::uint64_t{kDirection} << Quad::kDirectionShift) + types.one +
                              (static_cast<std::uint64_t>(first_plane) << (6 * L::kAxis));
   const std::uint64_t* front = pass.view->opaque.words + word_index(first_plane + L::kFrame.sign, 0);
   Row* out = b.rows;
   std::int64_t runs = 0;
-  std::int64_t faces = 0;
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
-    for (int row = at; row < at + 4; ++row) {
-      const std::uint64_t ends = b.ends[row];
-      out->ends = ends;
-      out->starts = b.starts[row];
-      out->closes = b.closes[row];
-      out->place = places[row] + base;
-      out->front = front + row;
+    const Words columns[4] = {load(b.ends + at), load(b.starts + at), load(b.closes + at), load(places + at) + base};
+    Words rows[4];
+    transpose_words(columns, rows);
+    // All four are written; a row without runs is written over by the next.
+    for (int k = 0; k < 4; ++k) {
+      const std::uint64_t ends = b.ends[at + k];
+      store(&out->ends, rows[k]);
+      out->front = front + at + k;
       out += ends != 0;
       runs += __builtin_popcountll(ends);
-      faces += __builtin_popcountll(b.faces[row]);
     }
   }
   out->ends = out->starts = 0;
-  return {static_cast<std::size_t>(runs), faces};
+  return static_cast<std::size_t>(runs);
 }
 
 // The bits of the 9 voxels in front of the first or last cell of a row, as the level tables index them.
@@ -640,7 +646,7 @@ QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row
 
 // The type of a cell of a row, in a quad's place. `place` holds the row's plane and number.
 template <int kDirection, int kLogBits>
-QUOIN_INLINE std::uint64_t type_of(const TypeSource& types, std::uint64_t place, std::uint64_t cell) {
+QUOIN_INLINE std::uint64_t type_of(const Scratch& s, std::uint64_t place, std::uint64_t cell) {
   using L = Layout<kDirection>;
   if constexpr (kLogBits == kOneType) {
     return 0;
@@ -650,33 +656,33 @@ QUOIN_INLINE std::uint64_t type_of(const TypeSource& types, std::uint64_t place,
     const std::uint64_t x = L::kAxis == 0 ? place & 63 : cell;
     const std::uint64_t bit = x << kLogBits;
     constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;
-    const std::uint64_t index = types.rows[row][bit >> 6] >> (bit & 63) & kMask;
-    return kLogBits == 4 ? index << Quad::kTypeShift : types.palette[index];
+    const std::uint64_t index = s.rows[row][bit >> 6] >> static_cast<unsigned>(bit & 63) & kMask;
+    return kLogBits == 4 ? index << Quad::kTypeShift : s.palette[index];
   }
 }
 
 // Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row. One flat
 // loop over all runs.
 template <int kDirection, bool kOcclusion, int kLogBits>
-QUOIN_STAGE std::uint64_t* emit(const Pass& pass, const TypeSource& types, std::size_t runs, Batch& b,
-                                std::uint64_t* out) {
+QUOIN_STAGE std::uint64_t* emit(const Pass& pass, std::size_t runs, Scratch& s, std::uint64_t* out) {
   using L = Layout<kDirection>;
-  const std::uint64_t* levels = L::kUAlongBits ? level_tables().u_along_bits : level_tables().u_along_rows;
   // A row more starts lower and is higher.
   constexpr std::uint64_t kPerRow = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
-  const Row* row = b.rows;
+  const Row* row = s.batch.rows;
   std::uint64_t starts = row->starts;
   std::uint64_t ends = row->ends;
-  const TypeSource source = types;
-  for (std::size_t i = 0; i < runs; ++i) {
+  for (; runs != 0; --runs) {
     const std::uint64_t first = lowest_bit(starts);
     const std::uint64_t last = lowest_bit(ends);
     const std::uint64_t closes = row->closes >> last & 1;
-    const std::uint64_t rows_before = b.rows_before[last];
-    b.rows_before[last] = (rows_before + kPerRow) & (closes - 1);
+    const std::uint64_t rows_before = s.batch.rows_before[last];
+    s.batch.rows_before[last] = (rows_before + kPerRow) & (closes - 1);
     std::uint64_t quad = row->place + rows_before + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
-    if constexpr (kOcclusion) quad |= levels[bits_in_front(pass, row->front, last)];
-    *out = quad | type_of<kDirection, kLogBits>(source, row->place, last);
+    if constexpr (kOcclusion) {
+      const std::uint64_t around = bits_in_front(pass, row->front, last);
+      quad |= L::kUAlongBits ? s.levels.u_along_bits[around] : s.levels.u_along_rows[around];
+    }
+    *out = quad | type_of<kDirection, kLogBits>(s, row->place, last);
     out += closes;
     next_run(starts, ends, row);
   }
@@ -684,29 +690,26 @@ QUOIN_STAGE std::uint64_t* emit(const Pass& pass, const TypeSource& types, std::
 }
 
 template <int kDirection, bool kOcclusion>
-std::uint64_t* emit(const Pass& pass, const TypeSource& types, int log_bits, std::size_t runs, Batch& b,
-                    std::uint64_t* out) {
+std::uint64_t* emit(const Pass& pass, int log_bits, std::size_t runs, Scratch& s, std::uint64_t* out) {
   switch (log_bits) {
     case kOneType:
-      return emit<kDirection, kOcclusion, kOneType>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, kOneType>(pass, runs, s, out);
     case 0:
-      return emit<kDirection, kOcclusion, 0>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, 0>(pass, runs, s, out);
     case 1:
-      return emit<kDirection, kOcclusion, 1>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, 1>(pass, runs, s, out);
     case 2:
-      return emit<kDirection, kOcclusion, 2>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, 2>(pass, runs, s, out);
     case 3:
-      return emit<kDirection, kOcclusion, 3>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, 3>(pass, runs, s, out);
     default:
-      return emit<kDirection, kOcclusion, 4>(pass, types, runs, b, out);
+      return emit<kDirection, kOcclusion, 4>(pass, runs, s, out);
   }
 }
 
 template <int kDirection, bool kOcclusion>
-std::int64_t run_pass(const Job& job, const Pass& pass, const TypeSource& types, int log_bits, Scratch& s,
-                      QuadBuffer& quads) {
+void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch& s, QuadBuffer& quads) {
   Batch& b = s.batch;
-  std::int64_t faces = 0;
   for (int first = pass.planes.begin; first < pass.planes.end; first += kBatchPlanes) {
     const int count = pass.planes.end - first < kBatchPlanes ? pass.planes.end - first : kBatchPlanes;
     const int groups =
@@ -720,13 +723,11 @@ std::int64_t run_pass(const Job& job, const Pass& pass, const TypeSource& types,
       find_runs<true, kOcclusion, false>(pass, first, groups, b);
     }
     find_growth(pass, first, groups, b);
-    const RowList list = list_rows<kDirection>(pass, first, groups, types, b);
-    faces += list.faces;
-    std::uint64_t* begin = grow_quads(quads, s.quads, list.runs + 1);
-    const std::uint64_t* end = emit<kDirection, kOcclusion>(pass, types, log_bits, list.runs, b, begin);
+    const std::size_t runs = list_rows<kDirection>(pass, first, groups, types, s);
+    std::uint64_t* begin = grow_quads(quads, s.quads, runs + 1);
+    const std::uint64_t* end = emit<kDirection, kOcclusion>(pass, types.log_bits, runs, s, begin);
     s.quads += static_cast<std::size_t>(end - begin);
   }
-  return faces;
 }
 
 // How the axes of a direction map to planes, rows and bits.
@@ -784,36 +785,57 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
 }
 
 template <int kDirection>
-std::int64_t run_direction(const Job& job, bool row_ends, const TypeSource& types, int log_bits, Scratch& s,
-                           QuadBuffer& out) {
+void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
   const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
-  return job.occlusion ? run_pass<kDirection, true>(job, pass, types, log_bits, s, out)
-                       : run_pass<kDirection, false>(job, pass, types, log_bits, s, out);
+  if (job.occlusion) {
+    run_pass<kDirection, true>(job, pass, types, s, out);
+  } else {
+    run_pass<kDirection, false>(job, pass, types, s, out);
+  }
 }
 
-QuadStats run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
-  std::uint64_t palette[256];
-  TypeSource types{0, s.rows, palette};
-  int log_bits = kOneType;
+void run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
+  TypeSource types{0, kOneType};
   const Chunk& centre = *job.chunks->centre();
   VoxelType type = kAir;
   if (has_one_type(centre, type)) {
     types.one = std::uint64_t{type} << Quad::kTypeShift;
   } else {
     const Chunk::Mixed& voxels = *centre.mixed();
-    log_bits = __builtin_ctz(static_cast<unsigned>(voxels.bits));
+    types.log_bits = __builtin_ctz(static_cast<unsigned>(voxels.bits));
     for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
-      palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+      s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
     }
   }
-  QuadStats stats;
-  stats.faces += run_direction<0>(job, row_ends, types, log_bits, s, out);
-  stats.faces += run_direction<1>(job, row_ends, types, log_bits, s, out);
-  stats.faces += run_direction<2>(job, row_ends, types, log_bits, s, out);
-  stats.faces += run_direction<3>(job, row_ends, types, log_bits, s, out);
-  stats.faces += run_direction<4>(job, row_ends, types, log_bits, s, out);
-  stats.faces += run_direction<5>(job, row_ends, types, log_bits, s, out);
-  return stats;
+  run_direction<0>(job, row_ends, types, s, out);
+  run_direction<1>(job, row_ends, types, s, out);
+  run_direction<2>(job, row_ends, types, s, out);
+  run_direction<3>(job, row_ends, types, s, out);
+  run_direction<4>(job, row_ends, types, s, out);
+  run_direction<5>(job, row_ends, types, s, out);
+}
+
+// The region without its solid floor: layers in which every voxel, of the region and around it, is opaque, like the
+// layers below and above, show no face. A common case, the ground under a terrain's surface.
+IBox above_solid_floor(const Job& job, bool row_ends, const Scratch& s) {
+  const IBox& region = job.region;
+  const std::uint64_t first = region.min.x > 0 ? region.min.x - 1U : 0U;
+  const std::uint64_t last = region.max.x < 64 ? static_cast<unsigned>(region.max.x) : 63U;
+  const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last));
+  const auto is_solid = [&](int y) {
+    for (int z = region.min.z - 1; z <= region.max.z; ++z) {
+      const int at = word_index(z, y);
+      const bool before = region.min.x > 0 || (row_ends && (s.z.before.words[at] & 1) != 0);
+      const bool after = region.max.x < 64 || (row_ends && s.z.after.words[at] >> 63 != 0);
+      if ((s.z.opaque.words[at] & cells) != cells || !before || !after) return false;
+    }
+    return true;
+  };
+  int y = region.min.y - 1;
+  while (y < region.max.y && is_solid(y)) ++y;
+  IBox rest = region;
+  if (y - 1 > rest.min.y) rest.min.y = y - 1;
+  return rest;
 }
 
 // Nothing merges across the chunk's last row or plane.
@@ -828,22 +850,27 @@ void find_all_faces(const Job& job, Scratch& s) {
   find_faces_of_all_types(job, gather_border(job, s), s);
 }
 
-QuadStats mesh_chunk(const Job& job, Scratch& s, QuadBuffer& out) {
+void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
+  const SlabRange read = slabs_around(whole.region);
+  fill_layers(whole, read, s);
+  end_at_border(read, s);
+  const bool row_ends = gather_border(whole, s);
+  Job job = whole;
+  job.region = above_solid_floor(whole, row_ends, s);
+  if (job.region.empty()) return;
   const SlabRange range = slabs_around(job.region);
   fill_row_masks(job.region, s);
-  fill_layers(job, range, s);
-  end_at_border(range, s);
-  const bool row_ends = gather_border(job, s);
   swap_planes_and_rows(s.z.opaque, s.y.opaque, range.z, range.y);
   swap_planes_and_rows(s.z.same_bit, s.y.same_bit, range.z, range.y);
   swap_planes_and_rows(s.same_z, s.y.same_row, range.z, range.y);
-  turn_bits(s.z.opaque, s.x.opaque, {-4, 68});
+  const Range bordered = {range.y.begin - (range.y.begin == 0 ? 4 : 0), range.y.end + (range.y.end == 64 ? 4 : 0)};
+  turn_bits(s.z.opaque, s.x.opaque, bordered);
   turn_bits(s.same_z, s.x.same_bit, range.y);
   turn_bits(s.z.same_row, s.x.same_row, range.y);
   copy_border(row_ends, s);
   if (row_ends) copy_row_ends(s);
   if (job.has_transparent) fill_faces(job, range, row_ends, s);
-  return run_directions(job, row_ends, s, out);
+  run_directions(job, row_ends, s, out);
 }
 
 #undef QUOIN_INLINE

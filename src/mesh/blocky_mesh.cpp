@@ -13,12 +13,6 @@
 namespace quoin {
 namespace {
 
-// Quads of one chunk and the vertices that the watertight mode adds to their outlines.
-struct ChunkMesh {
-  QuadBuffer quads;
-  QuadStats stats;
-};
-
 void append_quad(const Quad& quad, IVec3 origin, BlockyTriangles& out) {
   const auto base = static_cast<std::uint32_t>(out.positions.size());
   for (int corner = 0; corner < 4; ++corner) {
@@ -86,7 +80,7 @@ std::int64_t BlockyMesh::vertex_count() const {
 Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
                                      Threads threads, const Progress& progress) {
   const std::vector<IVec3> chunks = grid.chunks();
-  std::vector<ChunkMesh> parts(chunks.size());
+  std::vector<QuadBuffer> parts(chunks.size());
   // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
   Reporter reporter(progress, chunks.size());
@@ -96,7 +90,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
     quad_options.merge = options.merge;
     quad_options.occlusion = options.occlusion;
     for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
-      parts[i].stats = mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i].quads);
+      mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
       reporter.step();
     }
   });
@@ -109,11 +103,11 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
   OutlineFinder finder;
   std::vector<OutlinePoint> outline;
   for (std::size_t i = 0; i < chunks.size(); ++i) {
-    ChunkMesh& part = parts[i];
-    mesh.faces_visible += part.stats.faces;
-    mesh.quads += static_cast<std::int64_t>(part.quads.size());
-    if (options.watertight) finder.prepare(part.quads);
-    for (const Quad& quad : part.quads) {
+    QuadBuffer& quads = parts[i];
+    mesh.faces_visible += face_count(quads);
+    mesh.quads += static_cast<std::int64_t>(quads.size());
+    if (options.watertight) finder.prepare(quads);
+    for (const Quad& quad : quads) {
       const SurfaceClass which = quad.type() < classes.size() ? classes[quad.type()] : SurfaceClass::Opaque;
       BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(which)];
       if (out.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
@@ -126,7 +120,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
         append_quad(quad, chunks[i] * kChunkEdge, out);
       }
     }
-    part.quads = {};
+    quads = {};
   }
   return mesh;
 }

@@ -9,8 +9,8 @@
 
 namespace quoin::blocky {
 
-QuadStats mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out) {
-  return plain::mesh_chunk(job, scratch, out);
+void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  plain::mesh_chunk(job, scratch, out);
 }
 
 void find_faces_plain(const Job& job, Scratch& scratch) {

@@ -60,6 +60,14 @@ struct alignas(64) Batch {
   Row rows[kBatchPlanes * 64 + 8];
 };
 
+// 9 front neighbours' bits -> a quad's bits for levels and diagonal, for faces whose u lies along the bits, and along
+// the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
+struct LevelTables {
+  std::uint64_t u_along_bits[512];
+  std::uint64_t u_along_rows[512];
+  std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
+};
+
 struct Scratch {
   View z;           // planes z, rows y, bits x
   View y;           // planes y, rows z, bits x
@@ -69,6 +77,8 @@ struct Scratch {
   Layer planes[4];  // planes z, rows y: the bits of the palette index
   Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; not used by meshing opaque types
   Batch batch;
+  LevelTables levels;
+  std::uint64_t palette[256];          // types in a quad's place, by palette index
   std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region
   std::uint64_t patterns[256][16];     // a row of each uniform slab
   const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
@@ -88,21 +98,12 @@ struct Job {
 
 // The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`
 // and in the z view's `faces`, for the rows of the region.
-QuadStats mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
+void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_plain(const Job& job, Scratch& scratch);
 #ifdef QUOIN_X86_KERNELS
-QuadStats mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
+void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_avx2(const Job& job, Scratch& scratch);
 #endif
-
-// 9 front neighbours' bits -> a quad's bits for levels and diagonal, for faces whose u lies along the bits, and along
-// the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
-struct LevelTables {
-  std::uint64_t u_along_bits[512];
-  std::uint64_t u_along_rows[512];
-  std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
-};
-const LevelTables& level_tables();
 
 // Makes room for `more` quads behind the first `used`; answers where they go.
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);

@@ -136,7 +136,9 @@ function checkPixels(count, seed) {
     const [x, y] = [Math.floor(random(width)), Math.floor(random(height))];
     const hit = hitAt(raycaster, x + 0.5, y + 0.5);
     if (!hit) continue;
-    const around = [[-1, -1], [2, -1], [-1, 2], [2, 2]].map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
+    // The pixel's own corners, lest a small voxel of another colour lies in it, and points a pixel away.
+    const offsets = [[0, 0], [1, 0], [0, 1], [1, 1], [-1, -1], [2, -1], [-1, 2], [2, 2]];
+    const around = offsets.map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
     const alike = (other) => other && String(other.texel) === String(hit.texel) && other.normal.dot(hit.normal) > 0.99 &&
       Math.abs(other.brightness - hit.brightness) < 0.03;
     if (!around.every(alike)) continue;

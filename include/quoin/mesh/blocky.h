@@ -21,11 +21,6 @@ struct QuadOptions {
   IBox region = kWholeChunk;
 };
 
-/// What a mesher did.
-struct QuadStats {
-  std::int64_t faces = 0;  ///< visible unit faces covered
-};
-
 /// Which processor instructions to use. Every choice gives the same bytes.
 enum class InstructionSet : std::uint8_t {
   Best,   ///< the widest that this machine has
@@ -49,7 +44,7 @@ class BlockyMesher {
   ///           directions in which the levels do not change.
   /// Order:    direction, layer, row, column; the same bytes on every machine.
   /// Cost:     O(rows of 64 voxels + visible faces); no allocation once `out` has grown.
-  QuadStats mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);
+  void mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);
 
   /// Finds the visible faces of the centre chunk's voxels in `region` (chunk coordinates); reads one voxel past it.
   ///

@@ -56,4 +56,7 @@ struct Quad {
 /// Quads of one chunk, in the order direction, layer, row, column. Reuse one between calls: it only grows.
 using QuadBuffer = std::vector<Quad>;
 
+/// Unit faces that the quads cover.
+[[nodiscard]] std::int64_t face_count(const QuadBuffer& quads);
+
 }  // namespace quoin
