@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -27,8 +28,8 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// One model of four voxels in two colours, in MagicaVoxel's oldest form.
-std::string tiny_vox() {
+/// A file in MagicaVoxel's oldest form: one model, whose voxels are four bytes each.
+std::string vox_file(std::array<std::uint32_t, 3> size, const std::string& voxels) {
   const auto word = [](std::uint32_t value) {
     std::string bytes(4, '\0');
     std::memcpy(bytes.data(), &value, 4);
@@ -37,17 +38,34 @@ std::string tiny_vox() {
   const auto chunk = [&](const std::string& id, const std::string& content) {
     return id + word(static_cast<std::uint32_t>(content.size())) + word(0) + content;
   };
-  const std::string voxels(
-      "\0\0\0\1"
-      "\1\0\0\1"
-      "\2\0\0\1"
-      "\2\0\1\2",
-      16);
   std::string palette;
   for (std::uint32_t i = 0; i < 256; ++i) palette += word(i == 0 ? 0xFF3366CCU : 0xFF112233U);
-  const std::string chunks =
-      chunk("SIZE", word(3) + word(4) + word(2)) + chunk("XYZI", word(4) + voxels) + chunk("RGBA", palette);
+  const std::string chunks = chunk("SIZE", word(size[0]) + word(size[1]) + word(size[2])) +
+                             chunk("XYZI", word(static_cast<std::uint32_t>(voxels.size() / 4)) + voxels) +
+                             chunk("RGBA", palette);
   return "VOX " + word(150) + "MAIN" + word(0) + word(static_cast<std::uint32_t>(chunks.size())) + chunks;
+}
+
+/// Four voxels in two colours.
+std::string tiny_vox() {
+  return vox_file({3, 4, 2}, std::string("\0\0\0\1"
+                                         "\1\0\0\1"
+                                         "\2\0\0\1"
+                                         "\2\0\1\2",
+                                         16));
+}
+
+/// 4,000 voxels that share no face: large in every format.
+std::string checkerboard_vox() {
+  std::string voxels;
+  for (int i = 0; i < 8'000; ++i) {
+    const int x = i % 20;
+    const int y = i / 20 % 20;
+    const int z = i / 400;
+    if ((x + y + z) % 2 != 0) continue;
+    for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
+  }
+  return vox_file({20, 20, 20}, voxels);
 }
 
 class Tool : public ::testing::Test {
@@ -169,6 +187,28 @@ TEST_F(Tool, failures_are_one_line_status_1_and_no_file) {
     const ToolRun result = run("convert tiny.vox " + out);
     EXPECT_EQ(result.status, 1) << out;
     expect_one_error_line(result);
+  }
+}
+
+TEST_F(Tool, a_full_disk_is_one_line_status_1_and_no_file) {
+  // A file system of 16 KiB, mounted where only these commands see it; the filler leaves one page of it.
+  const std::string in_small_disk =
+      "unshare -rm sh -c \"mkdir -p disk && mount -t tmpfs -o size=16k none disk && "
+      "head -c 12288 /dev/zero > disk/filler && ";
+  const std::string probe = "cd '" + folder_.file("").string() + "' && " + in_small_disk + "true\" 2> probe.txt";
+  if (std::system(probe.c_str()) != 0) GTEST_SKIP() << "a small file system cannot be mounted here";
+  std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox();
+  for (const std::string out : {"out.glb", "out.gltf", "out.obj", "out.vox"}) {
+    const std::string command = "cd '" + folder_.file("").string() + "' && " + in_small_disk +
+                                "'" QUOIN_TOOL "' convert large.vox disk/" + out +
+                                " 2> stderr.txt; echo \\$? > status.txt; ls -A disk > left.txt\" > stdout.txt";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    EXPECT_EQ(text_of(folder_.file("status.txt")), "1\n") << out;
+    EXPECT_EQ(text_of(folder_.file("left.txt")), "filler\n") << out;
+    const std::string error = text_of(folder_.file("stderr.txt"));
+    EXPECT_TRUE(error.starts_with("quoin: disk/")) << error;
+    EXPECT_NE(error.find("No space left"), std::string::npos) << error;
+    EXPECT_EQ(std::count(error.begin(), error.end(), '\n'), 1) << error;
   }
 }
 

@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::uint64_t kAllVoxels = ~std::uint64_t{0};
 constexpr int kSlabRows = 16;
-constexpr int kSlabVoxels = kSlabRows * kChunkEdge;
 
 int bits_for(std::size_t types) {
   if (types <= 2) return 1;
@@ -72,6 +71,7 @@ std::uint32_t Chunk::index_for(VoxelType type) {
   }
   if (m.palette.size() == std::size_t{1} << m.bits) widen(m.bits * 2);
   if (m.direct()) return type;
+  m.counts.reserve(m.counts.size() + 1);  // so that both grow or neither
   m.palette.push_back(type);
   m.counts.push_back(0);
   return static_cast<std::uint32_t>(m.palette.size() - 1);
@@ -246,6 +246,7 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
     }
     if (mask == kAllVoxels && part.size().y == 4 && part.size().z == 4) make_slab_uniform(slab, type);
   }
+  if (inside == IBox{IVec3{0}, IVec3{kChunkEdge}}) fill(type);
 }
 
 // Requires: every voxel of the slab is of this type already.

@@ -126,6 +126,17 @@ TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {
   EXPECT_LT(chunk.bytes(), 8'192U);
 }
 
+TEST(Chunk, FilledAsAWholeBecomesUniformAtAnyWidth) {
+  for (const int types : {2, 5, 100, 2'000}) {
+    Chunk chunk;
+    for (int i = 0; i < types; ++i) chunk.set(i % 64, i / 64, 7, static_cast<VoxelType>(i));
+    int rows = 0;
+    chunk.fill_box({{-5, 0, 0}, {64, 64, 70}}, 1'234, [&](int, int, std::uint64_t) { ++rows; });
+    EXPECT_EQ(rows, 64 * 64);
+    EXPECT_EQ(chunk.uniform(), 1'234);
+  }
+}
+
 TEST(Chunk, RandomEditsDoNotGrowWithoutBound) {
   std::mt19937 random(1);
   Chunk chunk;

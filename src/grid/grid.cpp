@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <limits>
 #include <set>
 
 #include <tsl/robin_map.h>
+
+#include "grid/long_box.h"
+#include "grid/reach.h"
 
 namespace quoin {
 namespace {
@@ -27,53 +28,9 @@ bool by_zyx(IVec3 a, IVec3 b) {
   return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
-// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets.
-class Reach {
- public:
-  void add(int y, int z, std::uint64_t changed) {
-    voxels += std::popcount(changed);
-    const unsigned x_sides = 0b010U | static_cast<unsigned>(changed & 1) | static_cast<unsigned>(changed >> 63) << 2;
-    const unsigned y_sides = sides(y);
-    const unsigned z_sides = sides(z);
-    for (unsigned dz = 0; dz < 3; ++dz) {
-      for (unsigned dy = 0; dy < 3; ++dy) {
-        if (((z_sides >> dz) & (y_sides >> dy) & 1U) != 0) mask |= x_sides << (dz * 9 + dy * 3);
-      }
-    }
-  }
-
-  std::int64_t voxels = 0;
-  std::uint32_t mask = 0;  ///< bit Neighbourhood::index(dx, dy, dz)
-
- private:
-  static unsigned sides(int local) {
-    return 0b010U | static_cast<unsigned>(local == 0) | static_cast<unsigned>(local == kChunkEdge - 1) << 2;
-  }
-};
-
-constexpr std::uint32_t kCentreOnly = std::uint32_t{1} << 13;
-
-constexpr int kMinChunk = std::numeric_limits<int>::min() >> kChunkShift;
-constexpr int kMaxChunk = std::numeric_limits<int>::max() >> kChunkShift;
-
-// The outermost chunks stay air, so that every neighbour's coordinates are representable.
-bool is_inside_world(IVec3 chunk) {
-  const auto fits = [](int c) { return c > kMinChunk && c < kMaxChunk; };
-  return fits(chunk.x) && fits(chunk.y) && fits(chunk.z);
-}
-
-// [min, max) in int64, so that corners at the ends of the int32 range do not overflow.
-struct LongBox {
-  std::array<std::int64_t, 3> min{};
-  std::array<std::int64_t, 3> max{};
-};
-
-LongBox clipped(LongBox box) {
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = std::max<std::int64_t>(box.min[axis], std::int64_t{kMinChunk + 1} * kChunkEdge);
-    box.max[axis] = std::min<std::int64_t>(box.max[axis], std::int64_t{kMaxChunk} * kChunkEdge);
-  }
-  return box;
+void sort_and_unite(std::vector<IVec3>& chunks) {
+  std::sort(chunks.begin(), chunks.end(), by_zyx);
+  chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
 }
 
 }  // namespace
@@ -86,7 +43,7 @@ struct Grid::Impl {
     bool is_dirty = false;  ///< its coordinates stand in `dirty`
   };
   tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
-  std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it twice
+  std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
 
   Entry* find(IVec3 chunk) const {
@@ -94,43 +51,45 @@ struct Grid::Impl {
     return it == entries.end() ? nullptr : it->second.get();
   }
   Entry& find_or_create(IVec3 chunk) {
-    auto& entry = entries[chunk];
-    if (entry == nullptr) entry = std::make_unique<Entry>();
-    return *entry;
+    if (Entry* entry = find(chunk)) return *entry;
+    return *entries.emplace(chunk, std::make_unique<Entry>()).first->second;
   }
 
   // Books that the mesh of a chunk may have changed.
   void touch(IVec3 chunk, Entry& entry) {
     entry.neighbourhood_version = version;
     if (entry.is_dirty) return;
-    entry.is_dirty = true;
+    if (dirty.size() == dirty.capacity()) make_room_in_dirty();
     dirty.push_back(chunk);
+    entry.is_dirty = true;
+  }
+
+  // Chunks that come and go would let the list grow for ever where nobody takes it.
+  void make_room_in_dirty() {
+    sort_and_unite(dirty);
+    dirty.reserve(std::max<std::size_t>(16, 2 * dirty.size()));
   }
 
   // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
   void finish_edit(IVec3 chunk, Entry& entry, const Reach& reach) {
-    if (reach.voxels == 0) {
-      if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
-      return;
-    }
-    entry.version = version;
-    if (reach.mask == kCentreOnly) {
+    if (reach.voxels != 0) {
+      entry.version = version;
       touch(chunk, entry);
-      if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
-      return;
+      if (reach.mask != Reach::kCentreOnly) touch_neighbours(chunk, reach.mask);
     }
+    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+  }
+
+  void touch_neighbours(IVec3 chunk, std::uint32_t mask) {
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
-          if ((reach.mask >> Neighbourhood::index(dx, dy, dz) & 1U) == 0) continue;
+          if ((mask >> Neighbourhood::index(dx, dy, dz) & 1U) == 0) continue;
           const IVec3 at = chunk + IVec3{dx, dy, dz};
-          Entry* neighbour = find(at);
-          if (neighbour == nullptr) continue;
-          touch(at, *neighbour);
+          if (Entry* neighbour = find(at)) touch(at, *neighbour);
         }
       }
     }
-    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
   }
 
   // Calls `change(chunk, entry, part of the box in chunk coordinates, reach)` for every chunk of a box. Chunks that are
@@ -151,15 +110,14 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   ++version;
   std::int64_t changed = 0;
   const auto edit_chunk = [&](IVec3 chunk, Entry& entry) {
-    IBox part;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::int64_t origin = std::int64_t{chunk[axis]} * kChunkEdge;
-      part.min[axis] = static_cast<int>(std::max<std::int64_t>(box.min[static_cast<std::size_t>(axis)] - origin, 0));
-      part.max[axis] =
-          static_cast<int>(std::min<std::int64_t>(box.max[static_cast<std::size_t>(axis)] - origin, kChunkEdge));
-    }
     Reach reach;
-    change(chunk, entry.chunk, part, reach);
+    try {
+      change(chunk, entry.chunk, part_of(box, chunk), reach);
+    } catch (...) {
+      reach.add_all();
+      finish_edit(chunk, entry, reach);
+      throw;
+    }
     changed += reach.voxels;
     finish_edit(chunk, entry, reach);
   };
@@ -361,8 +319,7 @@ std::vector<IVec3> Grid::take_dirty() {
   for (const IVec3 at : taken) {
     if (Impl::Entry* entry = impl_->find(at)) entry->is_dirty = false;
   }
-  std::sort(taken.begin(), taken.end(), by_zyx);
-  taken.erase(std::unique(taken.begin(), taken.end()), taken.end());
+  sort_and_unite(taken);
   return taken;
 }
 
@@ -409,7 +366,8 @@ void Grid::for_each(const std::function<void(IVec3 voxel, VoxelType type)>& visi
 }
 
 std::size_t Grid::bytes() const {
-  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bucket_count() * sizeof(void*) * 4;
+  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bucket_count() * sizeof(void*) * 4 +
+                      impl_->dirty.capacity() * sizeof(IVec3);
   for (const auto& [at, entry] : impl_->entries) total += sizeof(Impl::Entry) - sizeof(Chunk) + entry->chunk.bytes();
   return total;
 }

@@ -2,7 +2,9 @@
 
 #include <limits>
 #include <map>
+#include <new>
 #include <random>
+#include <set>
 #include <tuple>
 
 #include <gtest/gtest.h>
@@ -177,6 +179,112 @@ TEST(Grid, PuttingAChunkBooksOnlyWhatDiffers) {
   grid.put_chunk({2, 0, 0}, Chunk());
   EXPECT_EQ(grid.chunk_count(), 0U);
   EXPECT_EQ(grid.take_dirty().size(), 1U);
+}
+
+TEST(Grid, PuttingANewChunkDirtiesOnlyWhatItsVoxelsReach) {
+  Grid grid;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        if (IVec3{x, y, z} != IVec3{0}) grid.set(IVec3{x, y, z} * 64 + 32, 1);
+      }
+    }
+  }
+  grid.take_dirty();
+  Chunk inner;
+  inner.set(30, 30, 30, 1);
+  grid.put_chunk({0, 0, 0}, inner);
+  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}}));
+  Chunk with_side = inner;
+  with_side.set(63, 20, 20, 1);
+  grid.put_chunk({0, 0, 0}, with_side);
+  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
+}
+
+TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
+  std::mt19937 random(3);
+  Grid grid;
+  grid.fill_box({-100, -100, -100}, {100, 100, 100}, 1);
+  grid.take_dirty();
+  const auto near = [&] { return static_cast<int>(random() % 5) * 32 - 66 + static_cast<int>(random() % 5); };
+  for (int round = 0; round < 60; ++round) {
+    const Grid before = grid.clone();
+    const IVec3 a{near(), near(), near()};
+    const auto type = static_cast<VoxelType>(random() % 3);
+    const int extent = static_cast<int>(random() % 6);
+    switch (round % 4) {
+      case 0:
+        grid.fill_box(a, a + extent, type);
+        break;
+      case 1:
+        grid.fill_sphere(DVec3(a), extent, type);
+        break;
+      case 2:
+        grid.edit({a, a + extent}, [&](IVec3 v, VoxelType t) { return (v.x + v.y) % 3 == 0 ? type : t; });
+        break;
+      default: {
+        Chunk copy = *grid.find_chunk(chunk_of(a));
+        copy.set(local_of(a), type);
+        grid.put_chunk(chunk_of(a), std::move(copy));
+      }
+    }
+    std::set<std::tuple<int, int, int>> expected;  // z, y, x: the order of take_dirty
+    for (int z = a.z - 7; z <= a.z + 7; ++z) {
+      for (int y = a.y - 7; y <= a.y + 7; ++y) {
+        for (int x = a.x - 7; x <= a.x + 7; ++x) {
+          if (before.get({x, y, z}) == grid.get({x, y, z})) continue;
+          for (int i = 0; i < 27; ++i) {
+            const IVec3 chunk = chunk_of(IVec3{x, y, z} + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
+            if (before.find_chunk(chunk) != nullptr) expected.insert({chunk.z, chunk.y, chunk.x});
+          }
+        }
+      }
+    }
+    std::vector<IVec3> chunks;
+    for (const auto& [z, y, x] : expected) chunks.emplace_back(x, y, z);
+    EXPECT_EQ(grid.take_dirty(), chunks) << "round " << round;
+  }
+}
+
+TEST(Grid, AnEditThatThrowsIsBooked) {
+  Grid grid;
+  grid.set({1, 1, 1}, 1);
+  grid.set({64, 1, 1}, 1);
+  grid.take_dirty();
+  const std::uint64_t before = grid.version({0, 0, 0});
+  const auto pick = [](IVec3 v, VoxelType) {
+    if (v.y == 5) throw std::bad_alloc();
+    return VoxelType{2};
+  };
+  EXPECT_THROW(grid.edit({{0, 0, 0}, {64, 64, 64}}, pick), std::bad_alloc);
+  EXPECT_EQ(grid.get({63, 4, 0}), 2);
+  EXPECT_GT(grid.version({0, 0, 0}), before);
+  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
+}
+
+TEST(Grid, ChunksThatComeAndGoDoNotFillTheDirtyListForEver) {
+  Grid grid;
+  for (int i = 0; i < 100'000; ++i) grid.set({i % 3 * 64, 0, 0}, static_cast<VoxelType>(i / 3 % 2));
+  EXPECT_LT(grid.bytes(), 32'768U);
+  EXPECT_EQ(grid.take_dirty().size(), 3U);
+}
+
+TEST(Grid, CornersOfTheWorldCanBeEdited) {
+  constexpr int kLow = std::numeric_limits<int>::min() + 64;
+  constexpr int kHigh = std::numeric_limits<int>::max() - 64;
+  for (const int x : {kLow, kHigh}) {
+    for (const int z : {kLow, kHigh}) {
+      Grid grid;
+      EXPECT_TRUE(grid.set({x, 0, z}, 1));
+      EXPECT_EQ(grid.get({x, 0, z}), 1);
+      EXPECT_EQ(grid.bounds(), (IBox{{x, 0, z}, {x + 1, 1, z + 1}}));
+      EXPECT_EQ(grid.fill_sphere({x + 0.5, 0.5, z + 0.5}, 1.0, 2), 5);
+      EXPECT_EQ(grid.edit({{x, 0, z}, {x + 1, 1, z + 1}}, [](IVec3, VoxelType) { return VoxelType{3}; }), 1);
+      int visited = 0;
+      grid.for_each([&](IVec3, VoxelType) { ++visited; });
+      EXPECT_EQ(visited, 5);
+    }
+  }
 }
 
 TEST(GridReader, ReadsAsTheGridDoes) {

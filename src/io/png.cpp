@@ -4,15 +4,25 @@
 
 #include <cassert>
 #include <csetjmp>
+#include <new>
 
 namespace quoin {
 
 namespace {
 
+bool try_append(std::vector<std::byte>& out, std::span<const std::byte> bytes) {
+  try {
+    out.insert(out.end(), bytes.begin(), bytes.end());
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  return true;
+}
+
+/// An exception must not cross libpng's frames.
 void append_bytes(png_structp png, png_bytep data, std::size_t size) {
   auto& out = *static_cast<std::vector<std::byte>*>(png_get_io_ptr(png));
-  const auto* bytes = reinterpret_cast<const std::byte*>(data);
-  out.insert(out.end(), bytes, bytes + size);
+  if (!try_append(out, std::as_bytes(std::span(data, size)))) png_error(png, "out of memory");
 }
 
 void flush_nothing(png_structp) {}

@@ -84,6 +84,12 @@ MeshResults mesh_all(const Scene& scene, const std::vector<GridHandle>& grids, c
   return results;
 }
 
+/// A type that is not registered counts as opaque, so only opaque surfaces can have one.
+bool has_unregistered_type(const BlockyMesh& mesh, const VoxelRegistry& types) {
+  const std::vector<VoxelType>& used = mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Opaque)].types;
+  return !used.empty() && *std::max_element(used.begin(), used.end()) >= types.size();
+}
+
 void add_totals(SceneMeshes& meshes, const BlockyMesh& mesh) {
   meshes.faces_visible += mesh.faces_visible;
   meshes.faces_total += mesh.faces_total;
@@ -116,6 +122,10 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockyMeshOptions& opti
   meshes.hidden = hidden;
   meshes.grids.reserve(grids.size());
   for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (has_unregistered_type(**results[i], scene.types)) {
+      return fail(ErrorCode::InvalidArgument,
+                  "grid \"" + scene.grids()[grids[i]].name + "\" holds voxels of a type that is not registered");
+    }
     add_totals(meshes, **results[i]);
     meshes.grids.push_back({grids[i], std::move(**results[i])});
   }

@@ -59,6 +59,16 @@ TEST(SceneMeshes, instances_of_grids_that_are_gone_are_passed_over) {
   EXPECT_TRUE(meshes->grids.empty());
 }
 
+TEST(SceneMeshes, types_that_are_not_registered_are_refused) {
+  Scene scene;
+  const GridHandle grid = add_grid(scene, 3);
+  place(scene, grid);
+  scene.grids()[grid].grid.set({1, 0, 0}, 300);
+  const auto meshes = mesh_scene(scene, {});
+  ASSERT_FALSE(meshes);
+  EXPECT_EQ(meshes.error().code, ErrorCode::InvalidArgument);
+}
+
 TEST(SceneMeshes, progress_never_falls_and_ends_at_one) {
   Scene scene;
   for (const int length : {3, 700, 30, 1000}) place(scene, add_grid(scene, length));

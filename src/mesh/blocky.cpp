@@ -92,15 +92,22 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
   return &out[used].bits;
 }
 
-bool gather_border(const Job& job, Scratch& s) {
-  const auto chunk_offset = [](int i) { return i < 0 ? -1 : i > 63 ? 1 : 0; };
-  bool row_ends = false;
+namespace {
+
+constexpr int chunk_offset(int voxel) {
+  return voxel < 0 ? -1 : voxel > 63 ? 1 : 0;
+}
+
+// Rows of the 8 neighbours with the centre's x. Answers whether a voxel of those with another z may be opaque.
+bool gather_rows(const Job& job, Scratch& s) {
+  const auto first = [](int d) { return d > 0 ? 64 : d; };
+  const auto last = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 63; };
+  bool other_z = false;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
       if (dy == 0 && dz == 0) continue;
       const OpaqueVoxels voxels(job.chunks->at(0, dy, dz), *job.types);
-      const auto first = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 0; };
-      const auto last = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 63; };
+      other_z |= dz != 0 && !voxels.none();
       for (int z = first(dz); z <= last(dz); ++z) {
         for (int y = first(dy); y <= last(dy); ++y) {
           s.z.opaque.words[word_index(z, y)] = voxels.row(y & 63, z & 63);
@@ -108,12 +115,22 @@ bool gather_border(const Job& job, Scratch& s) {
       }
     }
   }
+  return other_z;
+}
+
+// Whether a voxel of the 18 neighbours with another x may be opaque.
+bool has_row_ends(const Job& job) {
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (const int dx : {-1, 1}) row_ends |= !OpaqueVoxels(job.chunks->at(dx, dy, dz), *job.types).none();
+      for (const int dx : {-1, 1}) {
+        if (!OpaqueVoxels(job.chunks->at(dx, dy, dz), *job.types).none()) return true;
+      }
     }
   }
-  if (!row_ends) return false;
+  return false;
+}
+
+void gather_row_ends(const Job& job, Scratch& s) {
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
       const OpaqueVoxels before(job.chunks->at(-1, dy, dz), *job.types);
@@ -128,6 +145,15 @@ bool gather_border(const Job& job, Scratch& s) {
       }
     }
   }
+}
+
+}  // namespace
+
+bool gather_border(const Job& job, Scratch& s) {
+  // The x view's rows lie along z, so what stands before and after those are voxels of the neighbours in z.
+  const bool other_z = gather_rows(job, s);
+  if (!other_z && !has_row_ends(job)) return false;
+  gather_row_ends(job, s);
   return true;
 }
 
@@ -223,9 +249,9 @@ struct Kernel {
 
 Kernel pick_kernel(InstructionSet wanted) {
 #ifdef QUOIN_X86_KERNELS
-  if (wanted != InstructionSet::Plain && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2")) {
-    return {blocky::mesh_avx2, blocky::find_faces_avx2};
-  }
+  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+                        __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt");
+  if (wanted != InstructionSet::Plain && has_avx2) return {blocky::mesh_avx2, blocky::find_faces_avx2};
 #endif
   static_cast<void>(wanted);
   return {blocky::mesh_plain, blocky::find_faces_plain};

@@ -1,4 +1,4 @@
-// The mesher's kernel for x86-64 processors with AVX2 and BMI2; called only where both were found.
+// The mesher's kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
 
 #include "grid/packed_row.h"
 #include "mesh/blocky_scratch.h"
@@ -8,10 +8,10 @@
 #include <immintrin.h>
 
 #if defined(__clang__)
-#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,popcnt,lzcnt"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,popcnt"))), apply_to = function)
 #else
 #pragma GCC push_options
-#pragma GCC target("avx2,bmi,bmi2,popcnt,lzcnt")
+#pragma GCC target("avx2,bmi,bmi2,popcnt")
 #endif
 
 #define QUOIN_KERNEL avx2

@@ -8,8 +8,8 @@
 namespace quoin::blocky::QUOIN_KERNEL {
 namespace {
 
-typedef std::uint64_t Words __attribute__((vector_size(32)));
-typedef std::uint64_t UnalignedWords __attribute__((vector_size(32), aligned(8)));
+using Words __attribute__((vector_size(32))) = std::uint64_t;
+using UnalignedWords __attribute__((vector_size(32), aligned(8))) = std::uint64_t;
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
 #define QUOIN_STAGE inline __attribute__((noinline))  // stands apart in a profile
@@ -39,8 +39,7 @@ QUOIN_INLINE std::uint64_t lowest_bit(std::uint64_t w) {
 #endif
 }
 
-// ---- Packed voxels to bit layers
-// -------------------------------------------------------------------------------------
+// From packed voxels to layers of bits.
 
 QUOIN_INLINE std::uint64_t even_bits(std::uint64_t w) {
 #if QUOIN_KERNEL_AVX2
@@ -327,8 +326,7 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
-// ---- Layouts
-// ---------------------------------------------------------------------------------------------------------
+// The layers in the layouts of the other views.
 
 // Word j of vector i becomes word i of vector j.
 QUOIN_INLINE void transpose_words(const Words (&in)[4], Words (&out)[4]) {
@@ -449,8 +447,7 @@ void copy_row_ends(Scratch& s) {
   }
 }
 
-// ---- One direction
-// ---------------------------------------------------------------------------------------------------
+// The passes over one direction.
 
 struct Pass {
   const View* view;
@@ -458,7 +455,7 @@ struct Pass {
   Range planes;
   Range rows;
   int side;       // +1 or -1: where the faces look
-  bool row_ends;  // some voxel before or after a row is opaque
+  bool row_ends;  // some voxel before or after a row may be opaque
 };
 
 // Visible faces of a batch of planes, and the list of groups of four rows that have any.
@@ -507,6 +504,7 @@ QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch&
     if constexpr (!kMerge) {
       store(b.starts + at, faces);
       store(b.ends + at, faces);
+      store(b.mergeable + at, Words{});
       continue;
     }
     const int here = word_index(first_plane, 0) + at;
@@ -634,7 +632,7 @@ QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row
       "cmovz %[next_starts], %[starts]\n\t"
       "cmovz %[next_ends], %[ends]\n\t"
       "cmovz %[next], %[row]"
-      : [starts] "+r"(starts), [ends] "+r"(ends), [row] "+r"(row)
+      : [starts] "+&r"(starts), [ends] "+&r"(ends), [row] "+r"(row)
       : [next_starts] "m"(next->starts), [next_ends] "m"(next->ends), [next] "r"(next)
       : "cc");
 #else

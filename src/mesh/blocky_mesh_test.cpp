@@ -1,61 +1,31 @@
 #include <quoin/mesh/blocky_mesh.h>
 
-#include <map>
-#include <tuple>
-
 #include <gtest/gtest.h>
 
 #include "mesh/mesh_oracle.h"
+#include "mesh/watertight_check.h"
 
 namespace quoin {
 namespace {
 
-using Point = std::tuple<int, int, int>;
-
-Point point(Vec3 p) {
-  return {static_cast<int>(p.x), static_cast<int>(p.y), static_cast<int>(p.z)};
-}
-
-// Checks the definition: every directed edge is met by as many opposite ones, none is longer than its neighbours allow
-// (an edge with a vertex inside has no opposite of its own length), and no triangle is degenerate.
-void expect_watertight(const BlockyTriangles& mesh) {
-  std::map<std::pair<Point, Point>, int> edges;
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    const Vec3 a = mesh.positions[mesh.indices[i]];
-    const Vec3 b = mesh.positions[mesh.indices[i + 1]];
-    const Vec3 c = mesh.positions[mesh.indices[i + 2]];
-    const Vec3 normal = glm::cross(b - a, c - a);
-    ASSERT_GT(glm::dot(normal, Vec3(normal_of(mesh.directions[mesh.indices[i]]))), 0.0F) << "inside out or degenerate";
-    for (const auto& [from, to] : {std::pair{a, b}, std::pair{b, c}, std::pair{c, a}})
-      ++edges[{point(from), point(to)}];
-  }
-  std::set<Point> vertices;
-  for (const Vec3 p : mesh.positions) vertices.insert(point(p));
-  for (const auto& [edge, count] : edges) {
-    const auto opposite = edges.find({edge.second, edge.first});
-    ASSERT_TRUE(opposite != edges.end() && opposite->second == count) << "an open edge";
-    const auto [ax, ay, az] = edge.first;
-    const auto [bx, by, bz] = edge.second;
-    const IVec3 from{ax, ay, az};
-    const IVec3 delta = IVec3{bx, by, bz} - from;
-    if (((delta.x != 0) + (delta.y != 0) + (delta.z != 0)) != 1) continue;  // diagonals lie inside their quad
-    const IVec3 step = glm::sign(delta);
-    for (IVec3 p = from + step; p != from + delta; p += step) {
-      ASSERT_EQ(vertices.count({p.x, p.y, p.z}), 0U) << "a vertex lies inside an edge";
-    }
-  }
-}
-
 class WatertightWorld : public testing::TestWithParam<unsigned> {};
 
 TEST_P(WatertightWorld, HasNoOpenEdgeAndNoVertexInsideAnEdge) {
-  const VoxelRegistry types = oracle::mixed_types();
-  const Grid grid = oracle::random_world(GetParam(), {IVec3{-20}, IVec3{25}}, 3, GetParam() % 3 * 0.04);
+  VoxelRegistry types = oracle::mixed_types();
+  VoxelProperties lamp = types[3];
+  lamp.emission = 1.0F;
+  types.replace(3, lamp);
   BlockyMeshOptions options;
   options.watertight = true;
-  const auto mesh = build_blocky_mesh(grid, types, options, {1});
-  ASSERT_TRUE(mesh.has_value());
-  expect_watertight(mesh->surfaces[0]);
+  for (const int type_count : {3, 5}) {
+    const Grid grid = oracle::random_world(GetParam(), {IVec3{-20}, IVec3{25}}, type_count, GetParam() % 3 * 0.04);
+    for (const bool occlusion : {true, false}) {
+      options.occlusion = occlusion;
+      const auto mesh = build_blocky_mesh(grid, types, options, {1});
+      ASSERT_TRUE(mesh.has_value());
+      EXPECT_EQ(oracle::watertight_fault(*mesh), "");
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, WatertightWorld, testing::Range(1U, 13U));
@@ -64,22 +34,20 @@ TEST(BlockyMesh, PlainGreedyQuadsAreNotWatertight) {
   Grid grid;
   grid.fill_box({0, 0, 0}, {9, 0, 9}, 1);
   grid.set({4, 1, 4}, 1);
-  const auto open_edges = [&](bool watertight) {
-    BlockyMeshOptions options;
-    options.watertight = watertight;
-    const auto mesh = build_blocky_mesh(grid, oracle::mixed_types(), options, {1});
-    std::map<std::pair<Point, Point>, int> edges;
-    const BlockyTriangles& t = mesh->surfaces[0];
-    for (std::size_t i = 0; i < t.indices.size(); ++i) {
-      const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
-      ++edges[{point(t.positions[t.indices[i]]), point(t.positions[t.indices[next]])}];
-    }
-    int open = 0;
-    for (const auto& [edge, count] : edges) open += edges.count({edge.second, edge.first}) == 0;
-    return open;
-  };
-  EXPECT_GT(open_edges(false), 0);
-  EXPECT_EQ(open_edges(true), 0);
+  BlockyMeshOptions options;
+  EXPECT_NE(oracle::watertight_fault(*build_blocky_mesh(grid, oracle::mixed_types(), options)), "");
+  options.watertight = true;
+  EXPECT_EQ(oracle::watertight_fault(*build_blocky_mesh(grid, oracle::mixed_types(), options)), "");
+}
+
+TEST(BlockyMesh, VoxelsThatTouchAlongAnEdgeAreWatertight) {
+  Grid grid;
+  grid.set({0, 0, 0}, 1);
+  grid.set({1, 1, 0}, 1);
+  grid.set({-1, 0, -1}, 1);
+  BlockyMeshOptions options;
+  options.watertight = true;
+  EXPECT_EQ(oracle::watertight_fault(*build_blocky_mesh(grid, oracle::mixed_types(), options)), "");
 }
 
 TEST(BlockyMesh, IsTheSameAtAnyThreadCount) {

@@ -112,7 +112,7 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& scratch);
 
 // Rows of opacity around the chunk, from its 26 neighbours, into the z view. Answers whether any voxel before or after
-// a row is opaque; only then are `before` and `after` written.
+// a row of any view may be opaque; only then are `before` and `after` written.
 bool gather_border(const Job& job, Scratch& scratch);
 
 }  // namespace quoin::blocky

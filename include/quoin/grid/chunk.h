@@ -33,6 +33,7 @@ inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
 ///
 /// Voxels lie in rows of 64 along x, so one bit plane of a row is one word. 4x4 rows (64x4x4 voxels) are a slab, the
 /// unit of uniformity: a slab of one type holds no voxel data, a chunk of one type holds nothing but that type.
+/// Single writes notice that a chunk became uniform below 16 bits a voxel; otherwise fills and `compact` do.
 /// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and
 /// tight bounds cost nothing to ask.
 class Chunk {

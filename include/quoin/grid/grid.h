@@ -19,7 +19,9 @@ namespace quoin {
 /// Edits:    an edit raises the version of every chunk in which a voxel changed, and the neighbourhood version of
 ///           every existing chunk whose mesh it can change: those that hold one of the 26 neighbours of a changed
 ///           voxel. Setting a voxel to what it is changes nothing. A chunk that is all air is dropped.
+///           When an edit throws (bad_alloc, or what a callback threw), what it did until then stays done and booked.
 /// Threads:  any number may read at once; an edit needs the grid to itself.
+/// Moving:   a grid that was moved from may only be assigned to or destroyed.
 class Grid {
  public:
   Grid();
@@ -40,9 +42,9 @@ class Grid {
   /// A negative or NaN radius or centre changes nothing.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
   /// Asks `pick(voxel, current type)` for the new type of every voxel of the box, x fastest, then y, then z within a
-  /// chunk, chunks likewise. Answers how many changed.
+  /// chunk, chunks likewise. Answers how many changed. Requires: `pick` leaves the grid alone.
   std::int64_t edit(const IBox& box, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick);
-  /// Puts a whole chunk in place; counts as an edit of whatever differs.
+  /// Puts a whole chunk in place; counts as an edit of whatever differs. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, Chunk voxels);
   void clear();
 
