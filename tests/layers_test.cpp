@@ -25,6 +25,7 @@ std::optional<std::string> breach(const std::string& folder, int level, const st
   const auto slash = inner.find('/');
   if (slash == std::string::npos) return std::nullopt;
   const std::string target = inner.substr(0, slash);
+  if (target == "." || target == "..") return folder + " includes " + path + ", which hides its layer";
   const auto found = kLevels.find(target);
   if (found == kLevels.end() || target == folder) return std::nullopt;
   if (found->second < level) return std::nullopt;
@@ -51,6 +52,7 @@ TEST(Layers, AWrongIncludeIsABreach) {
   EXPECT_TRUE(breach("grid", 1, "quoin/mesh/quad.h").has_value());
   EXPECT_TRUE(breach("mesh", 2, "trace/ray.h").has_value()) << "siblings";
   EXPECT_TRUE(breach("io", 5, "quoin/render/camera.h").has_value()) << "siblings";
+  EXPECT_TRUE(breach("grid", 1, "../mesh/watertight.h").has_value());
   EXPECT_FALSE(breach("io", 5, "quoin/mesh/quad.h").has_value());
   EXPECT_FALSE(breach("mesh", 2, "mesh/watertight.h").has_value());
   EXPECT_FALSE(breach("mesh", 2, "vector").has_value());

@@ -1,4 +1,4 @@
-// A program outside Quoin's tree: fills a box, meshes it, writes a GLB.
+// A program outside Quoin's tree: fills a box and meshes it.
 
 #include <cstdio>
 
