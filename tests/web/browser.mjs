@@ -10,6 +10,10 @@ const types = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/ja
 
 /** Ends the process with status 77 when something is missing. */
 async function requirements() {
+  if (Number(process.versions.node.split('.')[0]) < 18) {
+    console.log(`skipped: Node.js ${process.versions.node} is older than 18`);
+    process.exit(77);
+  }
   const chromium = process.env.CHROMIUM ?? '/usr/bin/chromium';
   try {
     const { chromium: launcher } = await import('playwright-core');

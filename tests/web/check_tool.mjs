@@ -1,4 +1,4 @@
-// Converts every .vox file below a folder with the tool and checks the results: node check_tool.mjs TOOL FOLDER [--pixels N]
+// Converts every .vox file below a folder with the tool and checks the results: node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded]
 //
 // Every GLB must pass the validator without a message, and N of them (default 4, spread over the list) the pixel check
 // against their voxels. Files that the tool refuses are listed, and count only when it did not refuse them properly (status 1, one
@@ -11,7 +11,9 @@ import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 
 const here = fileURLToPath(new URL('.', import.meta.url));
-const { values, positionals } = parseArgs({ allowPositionals: true, options: { pixels: { type: 'string', default: '4' } } });
+const { values, positionals } = parseArgs({ allowPositionals: true, options: {
+  pixels: { type: 'string', default: '4' }, occluded: { type: 'boolean', default: false },
+} });
 const [tool, folder] = positionals;
 if (!existsSync(tool ?? '') || !existsSync(folder ?? '')) {
   console.log('skipped: no such tool or folder');
@@ -46,7 +48,7 @@ function check() {
   statuses.push(script('validate.mjs', '--strict', ...written.map(([, glb]) => glb)));
   const step = Math.max(1, Math.floor(written.length / Math.max(1, Number(values.pixels))));
   for (let i = 0; i < written.length && i < step * Number(values.pixels); i += step) {
-    statuses.push(script('pixels.mjs', '--vox', dirname(written[i][0]), written[i][1]));
+    statuses.push(script('pixels.mjs', ...(values.occluded ? ['--occluded'] : []), '--vox', dirname(written[i][0]), written[i][1]));
   }
   const bad = statuses.filter((status) => status !== 0);
   return bad.some((status) => status !== 77) ? 1 : bad.length > 0 ? 77 : 0;

@@ -1,8 +1,9 @@
 // Loads GLB files in three.js in a headless Chromium, unlit, and checks that sampled pixels are the palette's colour
-// times the occlusion: node pixels.mjs [--vox FOLDER] FILE.glb...
+// times the occlusion: node pixels.mjs [--vox FOLDER] [--occluded] FILE.glb...
 //
 // With --vox, a GLB whose .vox of the same name lies in FOLDER and is a single plain model is compared with colours and
 // occlusion computed anew from those voxels, instead of with what the GLB says itself.
+// With --occluded it is a failure when no sampled pixel is darkened by occlusion.
 // Exit status: 0 all right, 1 not, 77 when the browser or the packages are not installed.
 import { existsSync } from 'node:fs';
 import { basename, join } from 'node:path';
@@ -13,7 +14,9 @@ import { withViewer } from './browser.mjs';
 const views = ['front', 'back', 'left', 'right', 'top', 'bottom', 'iso', 'iso2', 'iso3', 'iso4'];
 const pixelsPerView = 60;
 
-const { values: options, positionals: files } = parseArgs({ allowPositionals: true, options: { vox: { type: 'string' } } });
+const { values: options, positionals: files } = parseArgs({ allowPositionals: true, options: {
+  vox: { type: 'string' }, occluded: { type: 'boolean', default: false },
+} });
 
 let failed = false;
 for (const file of files) {
@@ -24,14 +27,15 @@ for (const file of files) {
     const from_voxels = truth && (await window.viewer.compareWith(truth));
     const sums = { from_voxels, checked: 0, inside_out: 0, darkened: 0, wrong: [] };
     list.forEach((view, index) => {
-      window.viewer.look(view);
+      window.viewer.look(view, 1, 32);
       const result = window.viewer.checkPixels(count, 12345 + index);
       for (const key of ['checked', 'inside_out', 'darkened']) sums[key] += result[key];
       sums.wrong.push(...result.wrong.map((pixel) => ({ view, ...pixel })));
     });
     return sums;
   }, [views, pixelsPerView, served[1] && '/truth.vox']), served[1]);
-  const good = totals.checked > 0 && totals.wrong.length === 0 && totals.inside_out === 0;
+  const good = totals.checked > 0 && totals.wrong.length === 0 && totals.inside_out === 0 &&
+    (totals.darkened > 0 || !options.occluded);
   failed ||= !good;
   console.log(`${good ? 'ok' : 'FAILED'} ${file}: ${totals.checked} pixels (${totals.darkened} occluded), ` +
               `${totals.wrong.length} wrong, ${totals.inside_out} inside out${totals.from_voxels ? ', against the voxels' : ''}`);

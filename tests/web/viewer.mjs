@@ -74,7 +74,8 @@ function unlit() {
   });
 }
 
-function look(view, zoom = 1) {
+/** `unit`: how many pixels a voxel must span at least; what does not fit then lies outside the picture. */
+function look(view, zoom = 1, unit = 0) {
   const direction = new THREE.Vector3(...(directions[view] ?? view)).normalize();
   const box = new THREE.Box3().setFromObject(models);
   const centre = box.getCenter(new THREE.Vector3());
@@ -92,7 +93,8 @@ function look(view, zoom = 1) {
     halfWidth = Math.max(halfWidth, Math.abs(point.x));
     halfHeight = Math.max(halfHeight, Math.abs(point.y));
   }
-  const half = Math.max(halfHeight, halfWidth / aspect) * 1.05 / zoom;
+  const whole = Math.max(halfHeight, halfWidth / aspect) * 1.05 / zoom;
+  const half = unit > 0 ? Math.min(whole, window.innerHeight / (2 * unit)) : whole;
   [camera.left, camera.right, camera.top, camera.bottom] = [-half * aspect, half * aspect, half, -half];
   camera.updateProjectionMatrix();
   renderer.render(scene, camera);
