@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin {
+
+/// Which voxels a tree holds.
+enum class Occupancy : std::uint8_t {
+  NonAir,       ///< whatever a ray can hit
+  Opaque,       ///< what blocks light
+  Transparent,  ///< what tints it
+};
+
+/// The traversal structure: which voxels of a grid are occupied, as bits, at every level of detail.
+///
+/// One shape serves all levels: a node is 16^3 units as 64 words, each the bits of 4^3 units (x + 4 y + 16 z). In a
+/// brick a unit is a voxel; in a chunk a cell of 4^3 voxels; in a region a chunk. Empty and full bricks are stored
+/// once. Memory:  about 0.14 bytes a solid voxel of a terrain. Threads: any number may read at once; an update needs
+/// the tree to itself.
+class OccupancyTree {
+ public:
+  /// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
+  using Node = std::array<std::uint64_t, 64>;
+
+  /// Of 64^3 voxels: which 4^3 cells hold any, and where the bricks of 16^3 voxels lie.
+  struct ChunkNode {
+    Node cells{};                            ///< word b: the cells of brick b
+    std::array<std::uint32_t, 64> bricks{};  ///< index into `bricks()`; 0 is empty, 1 is full
+  };
+
+  /// Of 16^3 chunks.
+  struct RegionNode {
+    Node chunks{};                            ///< which chunks hold any voxel
+    std::array<std::uint32_t, 4096> nodes{};  ///< index into `chunk_nodes()`, x + 16 y + 256 z; 0 is none
+  };
+
+  OccupancyTree();
+  OccupancyTree(OccupancyTree&&) noexcept;
+  OccupancyTree& operator=(OccupancyTree&&) noexcept;
+  ~OccupancyTree();
+
+  /// From the grid's own storage. Cost: about 20 microseconds a chunk that is not uniform.
+  static OccupancyTree build(const Grid& grid, const VoxelRegistry& types, Occupancy which = Occupancy::NonAir);
+
+  /// Takes over what changed in one chunk since; call it for the chunks that an edit touched.
+  void update(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
+
+  /// The smallest box around the occupied voxels, to the voxel.
+  [[nodiscard]] IBox bounds() const;
+  [[nodiscard]] bool is_occupied(IVec3 voxel) const;
+  /// Bytes held.
+  [[nodiscard]] std::size_t bytes() const;
+
+  /// Null where a region of 1,024^3 voxels is empty. Region coordinates are voxel coordinates / 1,024, rounded down.
+  [[nodiscard]] const RegionNode* find_region(IVec3 region) const;
+  [[nodiscard]] const ChunkNode* chunk_nodes() const;
+  [[nodiscard]] const Node* bricks() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin
