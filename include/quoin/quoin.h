@@ -24,3 +24,5 @@
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/scene/scene.h>
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/ray.h>
