@@ -8,6 +8,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/io/vox.h>
 
 #include "io/glb_for_tests.h"
 
@@ -55,17 +59,33 @@ std::string tiny_vox() {
                                          16));
 }
 
-/// 4,000 voxels that share no face: large in every format.
-std::string checkerboard_vox() {
+/// Voxels that share no face, half of a cube: large in every format. 4,000 of them unless told.
+std::string checkerboard_vox(int edge = 20) {
   std::string voxels;
-  for (int i = 0; i < 8'000; ++i) {
-    const int x = i % 20;
-    const int y = i / 20 % 20;
-    const int z = i / 400;
+  for (int i = 0; i < edge * edge * edge; ++i) {
+    const int x = i % edge;
+    const int y = i / edge % edge;
+    const int z = i / (edge * edge);
     if ((x + y + z) % 2 != 0) continue;
     for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
   }
-  return vox_file({20, 20, 20}, voxels);
+  const auto size = static_cast<std::uint32_t>(edge);
+  return vox_file({size, size, size}, voxels);
+}
+
+/// The model of `tiny_vox` at two places, of which as many as asked are hidden.
+std::string vox_with_hidden(int hidden) {
+  const std::string file = tiny_vox();
+  Scene scene = read_vox(std::as_bytes(std::span(file))).value().scene;
+  Instance second = scene.instances()[scene.instances().handles().front()];
+  second.position.x += 10;
+  scene.add_instance(second);
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    if (hidden-- > 0) scene.instances()[handle].visible = false;
+  }
+  std::vector<std::string> warnings;
+  const auto bytes = write_vox(scene, warnings).value();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 class Tool : public ::testing::Test {
@@ -76,9 +96,12 @@ class Tool : public ::testing::Test {
   }
 
   /// Runs the tool in the test's folder.
-  ToolRun run(const std::string& arguments) {
-    const std::string command =
-        "cd '" + folder_.file("").string() + "' && '" QUOIN_TOOL "' " + arguments + " > stdout.txt 2> stderr.txt";
+  ToolRun run(const std::string& arguments) { return shell("'" QUOIN_TOOL "' " + arguments); }
+
+  /// Runs a command line there.
+  ToolRun shell(const std::string& line) {
+    std::ofstream(folder_.file("run.sh")) << line << "\n";
+    const std::string command = "cd '" + folder_.file("").string() + "' && sh run.sh > stdout.txt 2> stderr.txt";
     ToolRun result;
     const int status = std::system(command.c_str());
     result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
@@ -141,9 +164,63 @@ TEST_F(Tool, convert_writes_every_format_and_counts) {
     EXPECT_EQ(object["triangles"], 2 * object["quads"].get<int>());
     EXPECT_GT(object["vertices"], 0);
   }
-  EXPECT_TRUE(exists("tiny.bin"));
-  EXPECT_TRUE(exists("tiny.mtl"));
-  EXPECT_TRUE(exists("tiny.png"));
+}
+
+TEST_F(Tool, convert_names_every_file_that_it_writes) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> files_of = {
+      {"a.glb", {"a.glb"}},
+      {"b.vox", {"b.vox"}},
+      {"c.gltf", {"c.gltf", "c.bin"}},
+      {"d.obj", {"d.obj", "d.mtl", "d_palette.png"}}};
+  run("--version");  // makes the files for its output
+  for (const auto& [out, files] : files_of) {
+    const std::size_t before = folder_.count();
+    const ToolRun json = run("convert tiny.vox " + out + " --json");
+    ASSERT_EQ(json.status, 0) << json.err;
+    EXPECT_EQ(Json::parse(json.out)["files"], Json(files));
+    const ToolRun text = run("convert tiny.vox " + out);
+    std::string list = "\nWrote ";
+    for (const std::string& file : files) list += file + ", ";
+    EXPECT_NE(text.out.find(list), std::string::npos) << text.out;
+    for (const std::string& file : files) EXPECT_TRUE(exists(file)) << file;
+    EXPECT_EQ(folder_.count(), before + files.size());
+  }
+}
+
+TEST_F(Tool, the_input_is_not_replaced_by_a_companion) {
+  for (const auto& [in, out] : std::vector<std::array<std::string, 2>>{
+           {"foo.bin", "foo.gltf"}, {"foo.mtl", "foo.obj"}, {"foo_palette.png", "foo.obj"}, {"link", "castle.gltf"}}) {
+    std::ofstream(folder_.file(in == "link" ? "castle.bin" : in), std::ios::binary) << tiny_vox();
+    if (in == "link") std::filesystem::create_symlink("castle.bin", folder_.file(in));
+    const ToolRun result = run("convert " + in + " " + out);
+    EXPECT_EQ(result.status, 1) << in;
+    expect_one_error_line(result);
+    EXPECT_EQ(text_of(folder_.file(in)), tiny_vox()) << in;
+    EXPECT_FALSE(exists(out));
+  }
+  EXPECT_FALSE(exists("foo.obj"));
+  std::ofstream(folder_.file("castle.png")) << "a picture";
+  ASSERT_EQ(run("convert tiny.vox castle.obj").status, 0);
+  EXPECT_EQ(text_of(folder_.file("castle.png")), "a picture") << "a picture of the same name is nobody's business";
+}
+
+TEST_F(Tool, hidden_instances_are_missed_only_where_they_are_left_out) {
+  const auto warnings = [&](const std::string& arguments) {
+    const ToolRun result = run(arguments + " --json");
+    EXPECT_EQ(result.status, 0) << result.err;
+    return Json::parse(result.out)["warnings"];
+  };
+  std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_with_hidden(1);
+  std::ofstream(folder_.file("two.vox"), std::ios::binary) << vox_with_hidden(2);
+  EXPECT_EQ(warnings("info one.vox"), Json::array());
+  EXPECT_EQ(warnings("convert one.vox out.vox"), Json::array());
+  EXPECT_EQ(warnings("convert one.vox out.glb --hidden"), Json::array());
+  EXPECT_EQ(warnings("convert one.vox out.glb"), Json({"1 hidden instance left out; --hidden includes it"}));
+  EXPECT_EQ(warnings("convert two.vox out.obj"),
+            Json({"2 hidden instances left out; --hidden includes them", "nothing to draw"}));
+  EXPECT_EQ(warnings("convert two.vox none.gltf"), warnings("convert two.vox out.obj"));
+  EXPECT_FALSE(exists("none.bin"));
+  EXPECT_EQ(run("convert one.vox out.glb").err, "quoin: warning: 1 hidden instance left out; --hidden includes it\n");
 }
 
 TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
@@ -212,6 +289,77 @@ TEST_F(Tool, a_full_disk_is_one_line_status_1_and_no_file) {
   }
 }
 
+TEST_F(Tool, a_limit_on_the_size_of_files_is_one_line_status_1_and_no_file) {
+  std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox();
+  for (const std::string out : {"out.glb", "out.gltf", "out.obj"}) {
+    const ToolRun result = shell("ulimit -f 40; '" QUOIN_TOOL "' convert large.vox " + out);
+    EXPECT_EQ(result.status, 1) << out;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with("quoin: out.")) << result.err;
+  }
+  EXPECT_EQ(folder_.count(), 5U) << "the two inputs, run.sh, stdout.txt and stderr.txt";
+}
+
+TEST_F(Tool, signals_leave_no_temporary_file) {
+  std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
+  for (const std::string signal : {"HUP", "INT", "TERM"}) {
+    // Each run ends before, during or after the signal; a few runs meet the middle of the writing.
+    for (int i = 0; i < 3; ++i) {
+      const std::string out = signal + std::to_string(i) + ".obj";
+      const ToolRun result = shell("'" QUOIN_TOOL "' convert large.vox " + out +
+                                   " & while kill -0 $! && ! ls -A | grep -q quoin-; do sleep 0.01; done; sleep 0.0" +
+                                   std::to_string(i * 3) + "; kill -" + signal + " $!; wait $!");
+      const auto files = shell("ls -A").out;
+      EXPECT_EQ(files.find(".quoin-"), std::string::npos) << files;
+      EXPECT_EQ(exists(out), result.status == 0) << result.status << result.err;
+    }
+  }
+}
+
+TEST_F(Tool, an_ignored_hangup_stays_ignored) {
+  std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
+  const ToolRun result = shell("trap '' HUP; '" QUOIN_TOOL
+                               "' convert large.vox out.obj & while kill -0 $! && ! ls -A | grep -q quoin-; do sleep "
+                               "0.01; done; kill -HUP $!; wait $!");
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(exists("out.obj"));
+}
+
+TEST_F(Tool, output_that_cannot_be_written_is_status_1) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  for (const std::string arguments :
+       {"--help", "--version", "convert --help", "info tiny.vox", "info tiny.vox --json"}) {
+    const ToolRun result = run(arguments + " > /dev/full");
+    EXPECT_EQ(result.status, 1) << arguments;
+    expect_one_error_line(result);
+  }
+}
+
+TEST_F(Tool, wrong_usage_names_the_argument) {
+  const std::vector<std::array<std::string, 2>> errors = {
+      {"info tiny.vox --frame -1", "quoin: --frame: must be 0 or more, not \"-1\""},
+      {"info tiny.vox --frame x", "quoin: --frame: must be 0 or more, not \"x\""},
+      {"info tiny.vox --frame 1.5", "quoin: --frame: must be 0 or more, not \"1.5\""},
+      {"info tiny.vox --frame 99999999999", "quoin: --frame: too large: \"99999999999\""},
+      {"convert tiny.vox out.glb --simplify -1", "quoin: --simplify: must be 0 or more, not \"-1\""},
+      {"convert tiny.vox out.glb --simplify nan", "quoin: --simplify: must be 0 or more, not \"nan\""},
+      {"", "quoin: no command; there are info, convert"},
+      {"bogus", "quoin: no command \"bogus\"; there are info, convert"},
+      {"bogus tiny.vox", "quoin: no command \"bogus\"; there are info, convert"},
+      {"info -dash.vox", "quoin: no option \"-dash.vox\"; a file of that name is ./-dash.vox"},
+      {"convert -dash.vox out.glb", "quoin: no option \"-dash.vox\"; a file of that name is ./-dash.vox"},
+      {"info tiny.vox --unknown", "quoin: no option \"--unknown\""},
+      {"--unknown", "quoin: no option \"--unknown\""},
+      {"info ''", "quoin: IN: must be the name of a file, not \"\""},
+      {"convert tiny.vox ''", "quoin: OUT: must be the name of a file, not \"\""}};
+  for (const auto& [arguments, error] : errors) {
+    const ToolRun result = run(arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with(error)) << arguments << ": " << result.err;
+  }
+}
+
 TEST_F(Tool, wrong_usage_is_status_2) {
   for (const std::string arguments :
        {"", "frobnicate", "render tiny.vox", "info", "info tiny.vox --frame -1", "convert tiny.vox",
@@ -233,6 +381,7 @@ TEST_F(Tool, the_smooth_mesher_is_announced_as_missing) {
 TEST_F(Tool, help_has_an_example_for_every_command) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
+  EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;
   for (const std::string command : {"info", "convert"}) {
     EXPECT_NE(all.out.find(command), std::string::npos);
     const ToolRun help = run(command + " --help");

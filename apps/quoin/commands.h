@@ -24,6 +24,12 @@ struct CommonOptions {
 /// Adds IN, --json, --threads, --hidden and --frame to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
+/// Refuses what is not a number of at least 0 (a whole one), in words for a person.
+[[nodiscard]] CLI::Validator not_negative();
+[[nodiscard]] CLI::Validator not_negative_whole();
+/// Refuses an empty name of a file.
+[[nodiscard]] CLI::Validator file_name();
+
 /// Each adds one command; once it has been parsed, `status` becomes what the command ends with.
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);

@@ -38,6 +38,7 @@ struct Outcome {
   std::int64_t voxels = 0;
   SceneMeshes meshes;
   std::uint64_t bytes = 0;
+  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   Seconds seconds;
   std::vector<std::string> warnings;
 };
@@ -71,6 +72,38 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
   return fail(ErrorCode::Unsupported, "not a mesh format", path.string());
 }
 
+std::vector<std::filesystem::path> files_of(const SceneMeshes& meshes, const FormatInfo& format,
+                                            const std::filesystem::path& path) {
+  if (format.format == FileFormat::Gltf) return gltf_files(meshes, path);
+  if (format.format == FileFormat::Obj) return obj_files(meshes, path);
+  return {path};
+}
+
+/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
+Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
+  for (const auto& file : files) {
+    std::error_code missing;
+    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
+    return fail(ErrorCode::InvalidArgument,
+                "the input, which " + options.output.string() + " would replace with its companion of this name",
+                file.string());
+  }
+  return {};
+}
+
+void warn_of_what_is_missing(const Scene& scene, const SceneMeshes& meshes, std::vector<std::string>& warnings) {
+  std::size_t left_out = 0;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (is_drawn(scene, instance, true) && !is_drawn(scene, instance, meshes.hidden)) ++left_out;
+  }
+  if (left_out == 1) warnings.emplace_back("1 hidden instance left out; --hidden includes it");
+  if (left_out > 1) {
+    warnings.push_back(std::to_string(left_out) + " hidden instances left out; --hidden includes them");
+  }
+  if (meshes.triangles == 0) warnings.emplace_back("nothing to draw");
+}
+
 Result<std::uint64_t> write_voxels(const Scene& scene, const std::filesystem::path& path,
                                    std::vector<std::string>& warnings) {
   auto bytes = write_vox(scene, warnings);
@@ -92,6 +125,9 @@ Status mesh_and_write(const Scene& scene, const ConvertOptions& options, const F
   if (!meshes) return tl::unexpected<Error>(meshes.error());
   outcome.meshes = std::move(*meshes);
   outcome.seconds.mesh = watch.lap();
+  warn_of_what_is_missing(scene, outcome.meshes, outcome.warnings);
+  outcome.files = files_of(outcome.meshes, format, options.output);
+  if (auto sound = check_companions(outcome.files, options); !sound) return sound;
   const auto bytes = write_meshes(scene, outcome.meshes, format, options.output, bar.listener("writing"));
   if (!bytes) return tl::unexpected<Error>(bytes.error());
   outcome.bytes = *bytes;
@@ -114,6 +150,7 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format)
     }
     return outcome;
   }
+  outcome.files = {options.output};
   const auto bytes = write_voxels(loaded->scene, options.output, outcome.warnings);
   if (!bytes) return tl::unexpected<Error>(bytes.error());
   outcome.bytes = *bytes;
@@ -122,6 +159,8 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format)
 }
 
 Json outcome_json(const Outcome& outcome) {
+  Json files = Json::array();
+  for (const auto& file : outcome.files) files.push_back(file.string());
   return {
       {"voxels", outcome.voxels},
       {"faces_visible", outcome.meshes.faces_visible},
@@ -130,11 +169,12 @@ Json outcome_json(const Outcome& outcome) {
       {"triangles", outcome.meshes.triangles},
       {"vertices", outcome.meshes.vertices},
       {"bytes", outcome.bytes},
+      {"files", files},
       {"seconds", {{"read", outcome.seconds.read}, {"mesh", outcome.seconds.mesh}, {"write", outcome.seconds.write}}},
       {"warnings", outcome.warnings}};
 }
 
-std::string outcome_text(const ConvertOptions& options, const FormatInfo& format, const Outcome& outcome) {
+std::string outcome_text(const FormatInfo& format, const Outcome& outcome) {
   std::string text = "Voxels: " + with_thousands(outcome.voxels) + "\n";
   if (format.is_mesh) {
     const SceneMeshes& meshes = outcome.meshes;
@@ -144,8 +184,9 @@ std::string outcome_text(const ConvertOptions& options, const FormatInfo& format
             with_thousands(meshes.vertices) + " vertices\n";
   }
   const double seconds = outcome.seconds.read + outcome.seconds.mesh + outcome.seconds.write;
-  return text + "Wrote " + options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
-         number_for_people(seconds) + " s\n";
+  text += "Wrote ";
+  for (const auto& file : outcome.files) text += file.string() + ", ";
+  return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
 /// The exit status of options that contradict each other or the output's format; kDone when they do not.
@@ -181,17 +222,20 @@ int run_convert(const ConvertOptions& options) {
   }
   if (options.common.json) return print_json(outcome_json(*outcome));
   print_warnings(outcome->warnings);
-  return print(outcome_text(options, *format, *outcome));
+  return print(outcome_text(*format, *outcome));
 }
 
 void add_mesh_options(CLI::App& command, ConvertOptions& options) {
-  command.add_option("--mesher", options.mesher, "How to mesh: culled, greedy or smooth (default greedy)")
+  command
+      .add_option("--mesher", options.mesher,
+                  "How to mesh: culled or greedy (default greedy); smooth is not in this version")
       ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
   command.add_flag("--no-ao", options.occlusion_off, "Leave ambient occlusion out");
   command.add_flag("--watertight", options.watertight, "No T-junctions: every edge meets its neighbours' corners");
-  command.add_option("--iso", options.iso, "Surface value of volumes (smooth only)");
-  command.add_option("--simplify", options.simplify, "Error allowed when simplifying (smooth only)")
-      ->check(CLI::NonNegativeNumber);
+  command.add_option("--iso", options.iso, "Surface value of volumes (smooth only: not in this version)");
+  command
+      .add_option("--simplify", options.simplify, "Error allowed when simplifying (smooth only: not in this version)")
+      ->check(not_negative());
 }
 
 }  // namespace
@@ -200,10 +244,12 @@ void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Turn a file into another format, by OUT's ending");
   const auto options = std::make_shared<ConvertOptions>();
   add_common_options(*command, options->common);
-  command->add_option("OUT", options->output, "File to write: " + writable_endings())->required();
+  command->add_option("OUT", options->output, "File to write: " + writable_endings())->required()->check(file_name());
   add_mesh_options(*command, *options);
-  command->footer("Reads " + readable_endings() + "; writes " + writable_endings() +
-                  ".\nExample: quoin convert castle.vox castle.glb");
+  command->footer(
+      "Reads " + readable_endings() + "; writes " + writable_endings() +
+      ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
+      "NAME_emissive.png. They replace files of these names.\nExample: quoin convert castle.vox castle.glb");
   command->callback([command, options, &status] {
     options->smooth_only = command->count("--iso") + command->count("--simplify") > 0;
     options->mesh_only = options->smooth_only ||

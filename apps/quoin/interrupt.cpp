@@ -1,5 +1,6 @@
 #include "interrupt.h"
 
+#include <array>
 #include <atomic>
 #include <csignal>
 
@@ -15,11 +16,22 @@ extern "C" void note_signal(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Whoever started the program may have it ignore a signal: nohup does so with SIGHUP, a shell's `&` with SIGINT.
+bool is_ignored(int signal) {
+  struct sigaction current {};
+  return ::sigaction(signal, nullptr, &current) == 0 && current.sa_handler == SIG_IGN;
+}
+
 }  // namespace
 
+void let_writes_fail() {
+  for (const int signal : std::array{SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_IGN);
+}
+
 void catch_interrupts() {
-  std::signal(SIGINT, note_signal);
-  std::signal(SIGTERM, note_signal);
+  for (const int signal : std::array{SIGINT, SIGTERM, SIGHUP}) {
+    if (!is_ignored(signal)) std::signal(signal, note_signal);
+  }
 }
 
 bool was_interrupted() {

@@ -2,8 +2,12 @@
 
 namespace quoin::tool {
 
-/// From now on the first Ctrl-C (or SIGTERM) only asks the work to stop, so that files under way are taken back; a
-/// second one ends the program at once.
+/// From now on a closed pipe and a limit on the size of files make writing fail, which is then reported like any other
+/// failure; by default they end the program and leave half-written files behind.
+void let_writes_fail();
+
+/// From now on the first Ctrl-C (or SIGTERM, or SIGHUP from a closed terminal) only asks the work to stop, so that
+/// files under way are taken back; a second one ends the program at once. Signals that are ignored stay so.
 void catch_interrupts();
 
 [[nodiscard]] bool was_interrupted();

@@ -1,35 +1,81 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "commands.h"
+#include "interrupt.h"
 #include "output.h"
 
 namespace quoin::tool {
 
-void add_common_options(CLI::App& command, CommonOptions& options) {
-  command.add_option("IN", options.input, "File to read")->required();
-  command.add_flag("--hidden", options.load.hidden, "Include hidden layers and nodes");
-  command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
-      ->check(CLI::NonNegativeNumber);
-  command.add_flag("--json", options.json, "Print one JSON object instead of text");
-  command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));
-}
-
 namespace {
 
+using Arguments = std::vector<std::string>;
+
+std::string command_names(CLI::App& app) {
+  std::string names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names += (names.empty() ? "" : ", ") + command->get_name();
+  }
+  return names;
+}
+
+/// The first argument that begins with a dash but is neither an option of `command` nor a number; or "".
+std::string unknown_option(const CLI::App& command, const Arguments& arguments) {
+  for (const std::string& argument : arguments) {
+    if (argument == "--") break;
+    if (argument.size() < 2 || argument[0] != '-' ||
+        std::string("0123456789.").find(argument[1]) != std::string::npos) {
+      continue;
+    }
+    if (command.get_option_no_throw(argument.substr(0, argument.find('='))) == nullptr) return argument;
+  }
+  return "";
+}
+
+/// What is wrong with the arguments, where CLI11's own words would not help.
+std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Arguments& arguments) {
+  const std::string hint = " (try --help)";
+  const auto chosen = app.get_subcommands();
+  if (chosen.empty() && arguments.empty()) return "no command; there are " + command_names(app) + hint;
+  if (chosen.empty() && !arguments[0].starts_with('-')) {
+    return "no command \"" + arguments[0] + "\"; there are " + command_names(app) + hint;
+  }
+  const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
+  if (code == CLI::ExitCodes::ExtrasError || code == CLI::ExitCodes::RequiredError) {
+    const std::string unknown = unknown_option(chosen.empty() ? app : *chosen[0], arguments);
+    if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty()))
+      return "no option \"" + unknown + "\"" + hint;
+    if (!unknown.empty()) return "no option \"" + unknown + "\"; a file of that name is ./" + unknown + hint;
+  }
+  return error.what() + hint;
+}
+
+/// Prints what --help or --version asked for.
+int print_answer(const CLI::App& app, const CLI::ParseError& request) {
+  std::ostringstream text;
+  app.exit(request, text, text);
+  return print(text.str());
+}
+
 int run(int argc, char** argv) {
+  let_writes_fail();
   CLI::App app("Voxel worlds in, lit meshes out.", "quoin");
   app.set_version_flag("--version", "quoin " QUOIN_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
+  app.footer("Example: quoin convert castle.vox castle.glb\n`quoin COMMAND --help` says more.");
   int status = kDone;
   add_info_command(app, status);
   add_convert_command(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error);
-    print_error(std::string(error.what()) + " (try --help)");
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_answer(app, error);
+    print_error(usage_error(app, error, Arguments(argv + std::min(argc, 1), argv + argc)));
     return kWrongUsage;
   }
   return status;

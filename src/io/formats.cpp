@@ -13,7 +13,7 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true},
     FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true},
-    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and .png", false, true, true},
+    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", false, true, true},
 };
 
 bool begins_with(std::span<const std::byte> bytes, std::string_view text) {

@@ -22,6 +22,10 @@ void write_chunk_header(std::uint64_t bytes, std::uint32_t kind, BlockWriter& ou
   out.put(std::array<std::uint32_t, 2>{static_cast<std::uint32_t>(bytes), kind});
 }
 
+std::filesystem::path buffer_path_of(std::filesystem::path path) {
+  return path.replace_extension(".bin");
+}
+
 tl::unexpected<Error> with_path(Error error, const std::filesystem::path& path) {
   if (error.path.empty()) error.path = path.string();
   return tl::unexpected<Error>(std::move(error));
@@ -82,13 +86,17 @@ Result<std::uint64_t> write_gltf(const Scene& scene, const SceneMeshes& meshes, 
                                  const Progress& progress) {
   const auto layout = lay_out_gltf(scene, meshes);
   if (!layout) return with_path(layout.error(), path);
-  std::filesystem::path buffer_path = path;
-  buffer_path.replace_extension(".bin");
+  const std::filesystem::path buffer_path = buffer_path_of(path);
   const auto json = gltf_json(scene, meshes, *layout, percent_encoded(buffer_path.filename().string()));
   if (!json) return with_path(json.error(), path);
   auto bytes = write_gltf_pair(*json, *layout, path, buffer_path, progress);
   if (!bytes) return with_path(bytes.error(), path);
   return bytes;
+}
+
+std::vector<std::filesystem::path> gltf_files(const SceneMeshes& meshes, const std::filesystem::path& path) {
+  if (meshes.triangles == 0) return {path};
+  return {path, buffer_path_of(path)};
 }
 
 }  // namespace quoin

@@ -1,5 +1,6 @@
 #include <quoin/io/obj.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -167,6 +168,18 @@ std::uint64_t expected_bytes(const Scene& scene, const SceneMeshes& meshes) {
   return static_cast<std::uint64_t>(bytes);
 }
 
+/// The names of the files that belong to one OBJ.
+struct ObjNames {
+  std::filesystem::path library;
+  std::filesystem::path palette;
+  std::filesystem::path emissive;
+};
+
+ObjNames names_beside(const std::filesystem::path& path) {
+  const std::string stem = (path.parent_path() / path.stem()).string();
+  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png"};
+}
+
 struct Companion {
   std::filesystem::path path;
   std::vector<std::byte> bytes;
@@ -176,22 +189,19 @@ struct Companion {
 Result<std::vector<Companion>> companions(const Scene& scene, const SceneMeshes& meshes,
                                           const std::filesystem::path& path) {
   const MaterialPalette palette(scene.types, meshes);
-  const std::filesystem::path stem = path.parent_path() / path.stem();
+  const ObjNames names = names_beside(path);
   std::vector<Companion> files;
-  files.push_back({stem.string() + ".png", {}});
   auto base = encode_png(palette.base_colour());
   if (!base) return tl::unexpected<Error>(base.error());
-  files[0].bytes = std::move(*base);
-  const std::string emissive_path = stem.string() + "_emissive.png";
+  files.push_back({names.palette, std::move(*base)});
   if (palette.has_emission()) {
     auto emissive = encode_png(palette.emissive());
     if (!emissive) return tl::unexpected<Error>(emissive.error());
-    files.push_back({emissive_path, std::move(*emissive)});
+    files.push_back({names.emissive, std::move(*emissive)});
   }
-  const std::string text =
-      mtl_text(palette, files[0].path.filename().string(), std::filesystem::path(emissive_path).filename().string());
+  const std::string text = mtl_text(palette, names.palette.filename().string(), names.emissive.filename().string());
   const auto bytes = std::as_bytes(std::span(text));
-  files.push_back({stem.string() + ".mtl", {bytes.begin(), bytes.end()}});
+  files.push_back({names.library, {bytes.begin(), bytes.end()}});
   return files;
 }
 
@@ -232,6 +242,17 @@ Result<std::uint64_t> write_obj(const Scene& scene, const SceneMeshes& meshes, c
                       : Result<std::uint64_t>(tl::unexpected<Error>(beside.error()));
   if (!bytes && bytes.error().path.empty()) bytes.error().path = path.string();
   return bytes;
+}
+
+std::vector<std::filesystem::path> obj_files(const SceneMeshes& meshes, const std::filesystem::path& path) {
+  const ObjNames names = names_beside(path);
+  std::vector<std::filesystem::path> files = {path, names.library, names.palette};
+  const bool emits = std::any_of(meshes.grids.begin(), meshes.grids.end(), [](const GridMesh& grid) {
+    return !grid.mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Emissive)].types.empty() ||
+           !grid.mesh.surfaces[static_cast<std::size_t>(SurfaceClass::EmissiveTransparent)].types.empty();
+  });
+  if (emits) files.push_back(names.emissive);
+  return files;
 }
 
 }  // namespace quoin

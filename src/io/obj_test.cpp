@@ -130,7 +130,7 @@ TEST_F(Obj, objects_are_baked_with_outward_windings_mirrored_ones_too) {
 TEST_F(Obj, texture_coordinates_meet_the_palette) {
   place({0, 0, 0});
   const ParsedObj obj = write();
-  const PngImage palette = *decode_png(*read_file(folder_.file("my model.png")));
+  const PngImage palette = *decode_png(*read_file(folder_.file("my model_palette.png")));
   std::set<std::array<int, 3>> seen;
   for (const auto& face : obj.faces) {
     const auto uv = obj.textures.at(face[0].texture);
@@ -149,9 +149,13 @@ TEST_F(Obj, materials_are_in_the_library_beside_it) {
   const std::string library = text_of(folder_.file("my model.mtl"));
   ASSERT_EQ(obj.materials.size(), 3U);
   for (const std::string& name : obj.materials) EXPECT_NE(library.find("newmtl " + name + "\n"), std::string::npos);
-  EXPECT_NE(library.find("map_Kd my model.png\n"), std::string::npos);
+  EXPECT_NE(library.find("map_Kd my model_palette.png\n"), std::string::npos);
   EXPECT_NE(library.find("Ke 3 3 3\nmap_Ke my model_emissive.png\n"), std::string::npos);
   EXPECT_TRUE(decode_png(*read_file(folder_.file("my model_emissive.png"))));
+  const auto files = obj_files(meshes_, folder_.file("my model.obj"));
+  EXPECT_EQ(files.front(), folder_.file("my model.obj"));
+  EXPECT_EQ(files.size(), 4U);
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
   EXPECT_EQ(folder_.count(), 4U);
 }
 

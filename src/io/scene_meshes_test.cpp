@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -60,13 +61,27 @@ TEST(SceneMeshes, instances_of_grids_that_are_gone_are_passed_over) {
 }
 
 TEST(SceneMeshes, types_that_are_not_registered_are_refused) {
+  for (const VoxelType type : std::array<VoxelType, 5>{2, 255, 256, 300, 65535}) {
+    for (const bool watertight : {false, true}) {
+      Scene scene;
+      const GridHandle grid = add_grid(scene, 1);
+      place(scene, grid);
+      scene.grids()[grid].grid.set({1, 0, 0}, type);
+      const auto meshes = mesh_scene(scene, {.merge = true, .occlusion = true, .watertight = watertight});
+      ASSERT_FALSE(meshes) << type;
+      EXPECT_EQ(meshes.error().code, ErrorCode::InvalidArgument);
+    }
+  }
+}
+
+TEST(SceneMeshes, types_that_are_not_registered_do_no_harm_where_no_face_shows_them) {
   Scene scene;
   const GridHandle grid = add_grid(scene, 3);
   place(scene, grid);
-  scene.grids()[grid].grid.set({1, 0, 0}, 300);
-  const auto meshes = mesh_scene(scene, {});
-  ASSERT_FALSE(meshes);
-  EXPECT_EQ(meshes.error().code, ErrorCode::InvalidArgument);
+  Grid& voxels = scene.grids()[grid].grid;
+  voxels.fill_box({0, 0, 0}, {2, 2, 2}, 1);
+  voxels.set({1, 1, 1}, 65535);
+  EXPECT_TRUE(mesh_scene(scene, {}));
 }
 
 TEST(SceneMeshes, progress_never_falls_and_ends_at_one) {

@@ -69,14 +69,12 @@ void warn(const std::string& of_what, std::int64_t count, std::vector<std::strin
   if (count > 0) warnings.push_back(of_what + ": " + std::to_string(count));
 }
 
-void add_warnings(const vox::Placements& placements, const vox::ModelLosses& losses, bool hidden_too,
+void add_warnings(const vox::Placements& placements, const vox::ModelLosses& losses,
                   std::vector<std::string>& warnings) {
   warnings.insert(warnings.end(), placements.warnings.begin(), placements.warnings.end());
   warn("voxels outside their model's size skipped", losses.outside, warnings);
   warn("voxels of colour 0, which is air, skipped", losses.colourless, warnings);
   warn("models placed nowhere", std::ranges::count(placements.is_model_used, false), warnings);
-  if (hidden_too) return;
-  warn("hidden instances skipped", std::ranges::count_if(placements.all, &vox::Placement::hidden), warnings);
 }
 
 }  // namespace
@@ -99,7 +97,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   if (!grids) return tl::unexpected(grids.error());
   add_instances(*placements, *grids, options, loaded.scene);
   warn("materials of no colour skipped", document->stray_materials, loaded.warnings);
-  add_warnings(*placements, builder.losses(), options.hidden, loaded.warnings);
+  add_warnings(*placements, builder.losses(), loaded.warnings);
   return loaded;
 }
 

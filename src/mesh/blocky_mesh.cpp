@@ -83,7 +83,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
   std::vector<QuadBuffer> parts(chunks.size());
   // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
-  Reporter reporter(progress, chunks.size());
+  Reporter reporter(progress, 2 * chunks.size());
   parallel_for(tasks, threads, [&](std::size_t task) {
     BlockyMesher mesher;
     QuadOptions quad_options;
@@ -121,6 +121,8 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
       }
     }
     quads = {};
+    reporter.step();
+    if (reporter.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
   }
   return mesh;
 }

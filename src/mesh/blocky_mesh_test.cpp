@@ -82,13 +82,33 @@ TEST(BlockyMesh, SortsTrianglesBySurfaceClass) {
   EXPECT_EQ(mesh->triangle_count(), 48);
 }
 
-TEST(BlockyMesh, StopsWhenProgressSaysSo) {
+Grid ten_chunks() {
   Grid grid;
   for (int i = 0; i < 10; ++i) grid.set({i * 64, 0, 0}, 1);
-  int calls = 0;
-  const auto mesh = build_blocky_mesh(grid, oracle::mixed_types(), {}, {1}, [&](double) { return ++calls < 3; });
-  ASSERT_FALSE(mesh.has_value());
-  EXPECT_EQ(mesh.error().code, ErrorCode::Cancelled);
+  return grid;
+}
+
+TEST(BlockyMesh, StopsWhenProgressSaysSo) {
+  // The first ten calls come while faces are found, the others while they become triangles.
+  for (const int last : {1, 3, 10, 11, 15, 20}) {
+    int calls = 0;
+    const auto go_on = [&](double) { return ++calls < last; };
+    const auto mesh = build_blocky_mesh(ten_chunks(), oracle::mixed_types(), {}, {1}, go_on);
+    ASSERT_FALSE(mesh.has_value()) << last;
+    EXPECT_EQ(mesh.error().code, ErrorCode::Cancelled);
+    EXPECT_EQ(calls, last) << "nobody is asked again after a no";
+  }
+}
+
+TEST(BlockyMesh, ProgressRisesToOneThroughBothHalves) {
+  std::vector<double> told;
+  const auto listen = [&](double fraction) {
+    told.push_back(fraction);
+    return true;
+  };
+  ASSERT_TRUE(build_blocky_mesh(ten_chunks(), oracle::mixed_types(), {}, {4}, listen).has_value());
+  ASSERT_EQ(told.size(), 20U);
+  for (std::size_t i = 0; i < told.size(); ++i) EXPECT_DOUBLE_EQ(told[i], static_cast<double>(i + 1) / 20.0);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <quoin/mesh/blocky.h>
 
+#include <ostream>
 #include <random>
 #include <set>
 
@@ -142,6 +143,11 @@ struct World {
   int types;  // 3: opaque only, 5: with transparent ones
   double density;
 };
+
+// Names the test; gtest would print the bytes, padding among them.
+void PrintTo(const World& world, std::ostream* out) {
+  *out << "seed " << world.seed << ", " << world.types << " types, density " << world.density;
+}
 
 class RandomWorld : public testing::TestWithParam<World> {
  protected:

@@ -36,7 +36,8 @@ class Grid {
   /// True when the voxel had another type before.
   bool set(IVec3 voxel, VoxelType type);
   /// Sets all voxels from `first` to `last`, both included, in any order of corners. Answers how many changed.
-  /// Cost: O(rows of 64 voxels); uniform regions take no memory per voxel.
+  /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel. It cannot be
+  /// cancelled: a box of millions of chunks is better filled piece by piece.
   std::int64_t fill_box(IVec3 first, IVec3 last, VoxelType type);
   /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Answers how many changed.
   /// A negative or NaN radius or centre changes nothing.

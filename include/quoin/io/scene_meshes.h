@@ -39,9 +39,8 @@ struct SceneMeshes {
 /// Meshes every grid that a drawn instance places.
 ///
 /// Order:  the same bytes at any thread count.
-/// Errors: those of build_blocky_mesh; Cancelled when `progress` says so; InvalidArgument when a visible voxel's type
-/// is
-///         not registered, since files could not say what it looks like.
+/// Errors: those of build_blocky_mesh; Cancelled when `progress` says so; InvalidArgument when a voxel that has a
+///         visible face is of a type that is not registered, since files could not say what it looks like.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockyMeshOptions& options, bool hidden = false,
                                              Threads threads = {}, const Progress& progress = {});
 

@@ -35,6 +35,7 @@ struct LoadOptions {
 ///          VoxelProperties::attributes. The palette's alpha means nothing to MagicaVoxel and is not read.
 /// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
 ///          last key or the end of the animation's range.
+/// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a frame that is not there; LimitExceeded when a scene graph or scattered voxels would

@@ -38,7 +38,8 @@ class BlockyMesher {
   /// Replaces `out` by the quads of the centre chunk's visible faces.
   ///
   /// Space:    voxels, origin at the chunk's minimum corner.
-  /// Border:   reads one voxel past each side; the chunk that owns the voxel emits the face.
+  /// Border:   reads one voxel past each side; the chunk that owns the voxel emits the face. A null centre is air and
+  ///           gives no quads.
   /// Lossless: every visible unit face of the region is covered by exactly one quad, of its type, whose levels
   ///           interpolate to that face's own; faces merge only where type and all four levels agree and along
   ///           directions in which the levels do not change.

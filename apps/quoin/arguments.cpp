@@ -1,0 +1,45 @@
+#include <charconv>
+#include <cmath>
+
+#include "commands.h"
+
+namespace quoin::tool {
+
+namespace {
+
+/// What is wrong with `text` as a number of at least 0; empty when nothing is.
+template <class Number>
+std::string fault_of_number(const std::string& text) {
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  const bool is_negative = text.starts_with('-') && value <= 0 && text.find_first_not_of("-0.") != std::string::npos;
+  if (error == std::errc::result_out_of_range && stop == end && !is_negative) return "too large: \"" + text + "\"";
+  const bool is_number = error == std::errc() && stop == end && std::isfinite(static_cast<double>(value));
+  return is_number && !is_negative ? "" : "must be 0 or more, not \"" + text + "\"";
+}
+
+}  // namespace
+
+CLI::Validator not_negative() {
+  return {[](std::string& text) { return fault_of_number<double>(text); }, ""};
+}
+
+CLI::Validator not_negative_whole() {
+  return {[](std::string& text) { return fault_of_number<int>(text); }, ""};
+}
+
+CLI::Validator file_name() {
+  return {[](std::string& text) { return std::string(text.empty() ? "must be the name of a file, not \"\"" : ""); },
+          ""};
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("IN", options.input, "File to read")->required()->check(file_name());
+  command.add_flag("--hidden", options.load.hidden, "Include hidden layers and nodes");
+  command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")->check(not_negative_whole());
+  command.add_flag("--json", options.json, "Print one JSON object instead of text");
+  command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));
+}
+
+}  // namespace quoin::tool
