@@ -1,5 +1,6 @@
 // The mesher's inner passes, compiled once for each instruction set: the including file defines QUOIN_KERNEL (a
 // namespace), QUOIN_KERNEL_AVX2 (0 or 1), and switches the compiler's target.
+// Longer than other files because all of it must be compiled under that target, and inlined into one another.
 //
 // Design: rows of 64 voxels are words. A corner's level is two bit planes, computed for 64 faces at once; merging along
 // a row and from row to row is a handful of word operations (an addition carries "every cell agrees" to a run's end).
