@@ -7,21 +7,12 @@
 
 #include <tsl/robin_map.h>
 
+#include "grid/coordinate_hash.h"
 #include "grid/long_box.h"
 #include "grid/reach.h"
 
 namespace quoin {
 namespace {
-
-struct ChunkHash {
-  std::size_t operator()(IVec3 c) const {
-    const auto mix = [](std::uint64_t h, std::int32_t v) {
-      return (h ^ static_cast<std::uint32_t>(v)) * 0x9E37'79B9'7F4A'7C15U;
-    };
-    const std::uint64_t h = mix(mix(mix(0, c.x), c.y), c.z);
-    return static_cast<std::size_t>(h ^ (h >> 32));
-  }
-};
 
 bool by_zyx(IVec3 a, IVec3 b) {
   if (a.z != b.z) return a.z < b.z;
@@ -42,7 +33,7 @@ struct Grid::Impl {
     std::uint64_t neighbourhood_version = 0;
     bool is_dirty = false;  ///< its coordinates stand in `dirty`
   };
-  tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
+  tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries;
   std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
 

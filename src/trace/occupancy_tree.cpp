@@ -5,21 +5,13 @@
 
 #include <tsl/robin_map.h>
 
+#include "grid/coordinate_hash.h"
+
 namespace quoin {
 namespace {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
-
-struct CoordinateHash {
-  std::size_t operator()(IVec3 c) const {
-    std::uint64_t h = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      h = (h ^ static_cast<std::uint32_t>(c[axis])) * 0x9E37'79B9'7F4A'7C15U;
-    }
-    return static_cast<std::size_t>(h ^ (h >> 32));
-  }
-};
 
 bool belongs(const VoxelRegistry& types, VoxelType type, Occupancy which) {
   if (type == kAir) return false;
