@@ -3,6 +3,8 @@
 /// All of Quoin. Including one folder's headers instead builds faster.
 
 #include <quoin/core/direction.h>
+#include <quoin/core/image.h>
+#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -18,11 +20,15 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/vox.h>
+#include <quoin/light/light_options.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/visible_faces.h>
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 #include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>

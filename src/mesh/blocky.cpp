@@ -249,9 +249,7 @@ struct Kernel {
 
 Kernel pick_kernel(InstructionSet wanted) {
 #ifdef QUOIN_X86_KERNELS
-  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
-                        __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt");
-  if (wanted != InstructionSet::Plain && has_avx2) return {blocky::mesh_avx2, blocky::find_faces_avx2};
+  if (resolve(wanted) != InstructionSet::Plain) return {blocky::mesh_avx2, blocky::find_faces_avx2};
 #endif
   static_cast<void>(wanted);
   return {blocky::mesh_plain, blocky::find_faces_plain};

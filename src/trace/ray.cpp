@@ -73,9 +73,15 @@ class Walk {
   bool find(double max_t) {
     for (int size = empty_size(); size != 0; size = empty_size()) {
       step(size);
-      if (!(t_ <= max_t) || voxel_[axis_] < bounds_.min[axis_] || voxel_[axis_] >= bounds_.max[axis_]) return false;
+      if (!is_within(max_t)) return false;
     }
     return true;
+  }
+
+  // Leaves the voxel it is in.
+  void leave_voxel() { step(1); }
+  [[nodiscard]] bool is_within(double max_t) const {
+    return t_ <= max_t && voxel_[axis_] >= bounds_.min[axis_] && voxel_[axis_] < bounds_.max[axis_];
   }
 
   [[nodiscard]] IVec3 voxel() const { return {voxel_[0], voxel_[1], voxel_[2]}; }
@@ -220,25 +226,37 @@ Direction facing(const DVec3& direction) {
   return static_cast<Direction>(2 * axis + (direction[axis] > 0.0 ? 1 : 0));
 }
 
+Direction face_of(const Walk& walk, const Ray& ray) {
+  if (walk.axis() < 0) return facing(ray.direction);
+  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
+}
+
 }  // namespace
 
 std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   if (!is_usable(ray, max_t)) return std::nullopt;
   Walk walk(tree, ray);
   if (!walk.enter(tree.bounds(), max_t) || !walk.find(max_t)) return std::nullopt;
-  RayHit hit;
-  hit.voxel = walk.voxel();
-  hit.t = walk.t();
-  hit.starts_inside = walk.axis() < 0;
-  hit.face = hit.starts_inside ? facing(ray.direction)
-                               : static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
-  return hit;
+  return RayHit{walk.voxel(), face_of(walk, ray), walk.t(), walk.axis() < 0};
 }
 
 bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   if (!is_usable(ray, max_t)) return false;
   Walk walk(tree, ray);
   return walk.enter(tree.bounds(), max_t) && walk.find(max_t);
+}
+
+void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
+                const std::function<bool(const VoxelSpan&)>& visit) {
+  if (!is_usable(ray, max_t)) return;
+  Walk walk(tree, ray);
+  if (!walk.enter(tree.bounds(), max_t)) return;
+  while (walk.find(max_t)) {
+    VoxelSpan span{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0};
+    walk.leave_voxel();
+    span.t_exit = walk.t();
+    if (!visit(span) || !walk.is_within(max_t)) return;
+  }
 }
 
 }  // namespace quoin

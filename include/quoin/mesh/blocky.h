@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -19,12 +20,6 @@ struct QuadOptions {
   bool merge = true;      ///< false: one quad a visible unit face
   bool occlusion = true;  ///< false: all levels 0, and faces merge whatever stands before them
   IBox region = kWholeChunk;
-};
-
-/// Which processor instructions to use. Every choice gives the same bytes.
-enum class InstructionSet : std::uint8_t {
-  Best,   ///< the widest that this machine has
-  Plain,  ///< none beyond the build's baseline
 };
 
 /// Turns chunks into quads; holds the scratch memory that this takes (about 1.5 MiB), so keep one a thread.

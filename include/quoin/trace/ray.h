@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -38,5 +39,19 @@ struct RayHit {
 /// Whether any occupied voxel touches the ray from 0 up to and including `max_t`. As `first_hit`, without asking where.
 [[nodiscard]] bool any_hit(const OccupancyTree& tree, const Ray& ray,
                            double max_t = std::numeric_limits<double>::infinity());
+
+/// A voxel that a ray passes through, from `t_enter` to `t_exit`.
+struct VoxelSpan {
+  IVec3 voxel{0};
+  Direction face = Direction::PosX;  ///< as in RayHit
+  double t_enter = 0.0;
+  double t_exit = 0.0;
+  bool starts_inside = false;
+};
+
+/// Calls `visit` for every occupied voxel along a ray that is entered up to and including `max_t`, in the order in
+/// which the ray passes them, until it answers false. `t_exit` is not cut at `max_t`.
+void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
+                const std::function<bool(const VoxelSpan&)>& visit);
 
 }  // namespace quoin

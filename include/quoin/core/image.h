@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace quoin {
+
+/// A picture as files hold it: 8-bit sRGB, rows from the top, pixels from the left, channels interleaved.
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb;  ///< 3 * width * height
+};
+
+/// One float a pixel, rows from the top: depth.
+struct FloatImage {
+  int width = 0;
+  int height = 0;
+  std::vector<float> values;  ///< width * height
+};
+
+}  // namespace quoin

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// Where ambient occlusion comes from.
+enum class OcclusionMode : std::uint8_t {
+  Off,
+  Rays,    ///< short rays over the face's hemisphere
+  Vertex,  ///< the four corner levels of the face, interpolated over its two triangles, as blocky meshes carry them
+};
+
+/// What ambient occlusion darkens.
+enum class OcclusionAffects : std::uint8_t {
+  Ambient,  ///< the ambient term only; lowest 0
+  All,      ///< everything, times 0.25 + 0.75 * openness
+};
+
+/// How surfaces are lit; the same for every renderer.
+struct LightOptions {
+  DVec3 sun{0.371, 0.743, 0.223};  ///< from the surface towards the sun; any length but 0
+  bool lit = true;                 ///< false: the voxels' own colours, nothing else
+  bool shadows = true;
+  OcclusionMode occlusion = OcclusionMode::Rays;
+  OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
+  int occlusion_rays = 9;           ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
+  double occlusion_distance = 6.0;  ///< voxels
+  double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels
+  double exposure = 1.0;
+};
+
+/// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of
+///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure.
+[[nodiscard]] Status check(const LightOptions& options);
+
+}  // namespace quoin

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include <quoin/core/image.h>
+#include <quoin/core/instruction_set.h>
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/light/light_options.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
+
+namespace quoin {
+
+struct RenderOptions {
+  int width = 1280;
+  int height = 720;
+  int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern
+  bool depth = false;  ///< also the distances
+  LightOptions light;
+  Threads threads;
+  InstructionSet instructions = InstructionSet::Best;
+};
+
+struct Picture {
+  Image colour;
+  /// Euclidean distance along the ray through each pixel's centre in world units; +infinity where nothing was hit.
+  /// Empty unless asked for.
+  FloatImage depth;
+  std::int64_t rays = 0;        ///< of every kind
+  std::int64_t pixels_hit = 0;  ///< whose centre shows a voxel
+};
+
+/// Takes pictures of a scene by ray marching on the processor.
+///
+/// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.
+class CpuRenderer {
+ public:
+  /// Copies nothing of the voxels but what traversal and shading need; `scene` must outlive it unchanged.
+  /// Instances that are not visible are left out unless `hidden`.
+  CpuRenderer(const Scene& scene, bool hidden = false, Threads threads = {});
+  CpuRenderer(CpuRenderer&&) noexcept;
+  CpuRenderer& operator=(CpuRenderer&&) noexcept;
+  ~CpuRenderer();
+
+  /// One picture. The same bytes for any number of threads and any instruction set.
+  ///
+  /// Errors: InvalidArgument when a size is not positive, there are more than 2^28 pixels, samples are out of range,
+  /// the
+  ///         camera holds a number that is not finite or an impossible angle, or `check` refuses the light;
+  ///         Cancelled when `progress` answers false.
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
+                                       const Progress& progress = {}) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// Where a picture is taken from. `right`, `up` and `forward` are unit and perpendicular; right-handed, so
+/// right = forward x up.
+struct Camera {
+  enum class Projection : std::uint8_t { Perspective, Orthographic };
+
+  DVec3 position{0.0};
+  DVec3 right{1.0, 0.0, 0.0};
+  DVec3 up{0.0, 1.0, 0.0};
+  DVec3 forward{0.0, 0.0, -1.0};
+  Projection projection = Projection::Perspective;
+  double vertical_fov = 0.0;  ///< perspective: radians, more than 0 and less than pi
+  double view_height = 0.0;   ///< orthographic: world units from the picture's lower to its upper edge
+};
+
+/// A perspective camera at `position` that looks at `target`, upright (+Y up; where it looks straight up or down, the
+/// picture's top is towards -Z when looking down and +Z when looking up).
+///
+/// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view (vertical,
+///         radians) is not more than 0 and less than pi.
+[[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov);
+
+/// The views that frame a whole scene by themselves. Front looks along -Z: what faces +Z is seen.
+enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
+
+/// The view of that name ("front", "iso" ...).
+[[nodiscard]] std::optional<View> view_of_name(std::string_view name);
+
+/// An orthographic or perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
+///
+/// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` is width / height.
+[[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);
+
+}  // namespace quoin

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include <quoin/core/instruction_set.h>
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/ray.h>
+
+namespace quoin {
+
+/// Sixteen rays side by side, in grid space. Rays that start near each other and point the same way are traced together
+/// several times as fast as one by one; the answers are the same.
+struct alignas(64) RayPacket {
+  static constexpr int kSize = 16;
+  template <class T>
+  using Lanes = std::array<T, kSize>;
+
+  Lanes<double> origin_x{}, origin_y{}, origin_z{};
+  Lanes<double> direction_x{}, direction_y{}, direction_z{};
+  Lanes<double> max_t{};     ///< up to and including; infinity is none
+  std::uint32_t active = 0;  ///< bit i: ray i counts
+
+  void set(int lane, const Ray& ray, double ray_max_t) {
+    const auto i = static_cast<std::size_t>(lane);
+    origin_x[i] = ray.origin.x, origin_y[i] = ray.origin.y, origin_z[i] = ray.origin.z;
+    direction_x[i] = ray.direction.x, direction_y[i] = ray.direction.y, direction_z[i] = ray.direction.z;
+    max_t[i] = ray_max_t;
+    active |= 1U << lane;
+  }
+  [[nodiscard]] Ray ray(int lane) const {
+    const auto i = static_cast<std::size_t>(lane);
+    return {{origin_x[i], origin_y[i], origin_z[i]}, {direction_x[i], direction_y[i], direction_z[i]}};
+  }
+};
+
+/// What `first_hits` found; lanes whose bit in `hit` is not set hold nothing of meaning.
+struct alignas(64) PacketHits {
+  std::uint32_t hit = 0;
+  std::uint32_t starts_inside = 0;
+  RayPacket::Lanes<std::int32_t> x{}, y{}, z{};  ///< the voxel
+  RayPacket::Lanes<double> t{};
+  RayPacket::Lanes<Direction> face{};
+
+  [[nodiscard]] RayHit operator[](int lane) const {
+    const auto i = static_cast<std::size_t>(lane);
+    return {{x[i], y[i], z[i]}, face[i], t[i], (starts_inside >> lane & 1U) != 0};
+  }
+};
+
+/// As the function for single rays, for each active ray: equal in every bit, whatever the other rays and the
+/// instructions.
+void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits,
+                InstructionSet instructions = InstructionSet::Best);
+
+/// Bit i: ray i is active and blocked.
+[[nodiscard]] std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays,
+                                     InstructionSet instructions = InstructionSet::Best);
+
+}  // namespace quoin
