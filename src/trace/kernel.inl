@@ -22,6 +22,7 @@ struct Axis {
   I base;  // voxels from the tables' origin, a multiple of 64
   Mask forward;
   Mask still;  // the direction has no such component
+  Mask moved;  // the ray does not start at `origin`, but came there
   F low;       // the box in which the lane moves
   F high;
 };
@@ -59,19 +60,25 @@ inline F first_of(const Planes& t, Crossing& which) {
   return least;
 }
 
-// Where a ray starts and ends, in voxels from the tables' origin.
+// Where a ray starts, in voxels from the tables' origin.
+struct Move {
+  double position[3];
+  double max_t;
+  int entered = -1;  // the axis of the bounds' plane to which it was moved
+};
+
 struct Starts {
   alignas(64) double position[3][kWidth];
   alignas(64) double max_t[kWidth];
-  alignas(64) std::int32_t entered[kWidth];  // the axis of the bounds' plane to which it was moved, or -1
+  alignas(64) std::int32_t entered[kWidth];
 };
 
 // Moves one ray that starts far away to where it enters the bounds; false when it misses them.
-inline bool move_to_bounds(const TreeView& tree, const double direction[3], Starts& starts, int lane) {
+inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move& ray) {
   double enter_t = -1.0;
   int enter_axis = -1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double p = starts.position[axis][lane];
+    const double p = ray.position[axis];
     const double d = direction[axis];
     const bool is_low = p < tree.box.min[axis];
     if (!is_low && p < tree.box.max[axis]) continue;
@@ -83,16 +90,16 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Star
     }
   }
   if (enter_axis < 0) return true;
-  if (!(enter_t <= starts.max_t[lane])) return false;
+  if (!(enter_t <= ray.max_t)) return false;
   for (int axis = 0; axis < 3; ++axis) {
     const double plane = direction[axis] > 0.0 ? tree.box.min[axis] : tree.box.max[axis];
-    const double p = axis == enter_axis ? plane : starts.position[axis][lane] + enter_t * direction[axis];
+    const double p = axis == enter_axis ? plane : ray.position[axis] + enter_t * direction[axis];
     // The others are inside by now, or never will be.
     if (!(p >= tree.box.min[axis] - 1e-3 && p <= tree.box.max[axis] + 1e-3)) return false;
-    starts.position[axis][lane] = p;
+    ray.position[axis] = p;
   }
-  starts.max_t[lane] -= enter_t;
-  starts.entered[lane] = enter_axis;
+  ray.max_t -= enter_t;
+  ray.entered = enter_axis;
   return true;
 }
 
@@ -153,7 +160,7 @@ inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before
   const F behind_t = crossing_t(axis, behind);
   const Mask is_short = ((ahead_t < t) | ((ahead_t == t) & ties_before)) & ~axis.still;
   // It was never out of the unit in which it started.
-  const Mask was_inside = axis.forward & (behind <= axis.origin);
+  const Mask was_inside = axis.forward & ((behind < axis.origin) | ((behind == axis.origin) & ~axis.moved));
   const Mask is_far = ((t < behind_t) | ((behind_t == t) & ties_after)) & ~axis.still & ~was_inside & ~is_short;
   const F one = select(axis.forward, all(1.0F), all(-1.0F));
   at = add_if(is_short, at, one);
@@ -192,7 +199,11 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   for (; far_lanes != 0; far_lanes &= far_lanes - 1) {
     const int lane = std::countr_zero(far_lanes);
     const double direction[3] = {directions[0][lane], directions[1][lane], directions[2][lane]};
-    if (!move_to_bounds(tree, direction, starts, lane)) missing |= 1U << lane;
+    Move ray{{starts.position[0][lane], starts.position[1][lane], starts.position[2][lane]}, starts.max_t[lane], -1};
+    if (!move_to_bounds(tree, direction, ray)) missing |= 1U << lane;
+    for (int axis = 0; axis < 3; ++axis) starts.position[axis][lane] = ray.position[axis];
+    starts.max_t[lane] = ray.max_t;
+    starts.entered[lane] = ray.entered;
   }
   lanes.live = lanes.live & ~mask_of(missing);
 
@@ -210,6 +221,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   const auto limit = [&](Axis& axis, int index, AxisT& limits) {
     F low = to_bound(tree.box.min[index], axis.base);
     F high = to_bound(tree.box.max[index], axis.base);
+    axis.moved = ~equals(moved, -1);
     clip(axis, low, high, reach, equals(moved, index), limits, lanes.live, cut);
   };
   limit(lanes.x, 0, tx);
