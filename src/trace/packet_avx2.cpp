@@ -27,6 +27,8 @@ namespace {
 
 #include "trace/single.inl"
 
+#include "trace/short.inl"
+
 }  // namespace
 
 const Kernel kAvx2Kernel = {first_single, trace_first, trace_any};

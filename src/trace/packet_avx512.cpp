@@ -28,6 +28,8 @@ namespace {
 
 #include "trace/single.inl"
 
+#include "trace/short.inl"
+
 }  // namespace
 
 const Kernel kAvx512Kernel = {first_single, trace_first, trace_any};

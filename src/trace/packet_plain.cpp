@@ -16,6 +16,8 @@ namespace {
 
 #include "trace/single.inl"
 
+#include "trace/short.inl"
+
 }  // namespace
 
 const Kernel kPlainKernel = {first_single, trace_first, trace_any};

@@ -20,6 +20,7 @@ TreeView view_of(const OccupancyTree& tree, const OccupancyTree::FlatTables& tab
   view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
   view.cell_strides = tables.cell_strides();
   view.brick_strides = tables.brick_strides();
+  view.brick_sizes = tables.chunks * 4;
   view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
   view.origin = DVec3(tables.origin);
   const IBox bounds = tree.bounds();

@@ -16,6 +16,7 @@ struct TreeView {
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
   IVec3 brick_strides;
+  IVec3 brick_sizes;
   DVec3 origin;  ///< of the tables, in the grid
   IBox box;      ///< tight, from `origin`
 };
