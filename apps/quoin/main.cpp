@@ -71,6 +71,7 @@ int run(int argc, char** argv) {
   int status = kDone;
   add_info_command(app, status);
   add_convert_command(app, status);
+  add_generate_command(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
