@@ -20,7 +20,8 @@ Status check(const TerrainOptions& options) {
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return fail(ErrorCode::InvalidArgument, "a terrain is 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
   }
-  if (std::max({options.first_x, -options.first_x, options.first_z, -options.first_z}) > kMaxPlace) {
+  if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
+      std::max(options.first_x, options.first_z) > kMaxPlace) {
     return fail(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
   }
   return {};
