@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -31,6 +30,23 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
 }
 
 }  // namespace
+
+// The points' indices: those of one grid together, in it those of one face, so that most groups of sixteen have all
+// their rays in parallel (7 % of a picture's time).
+std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint> points) const {
+  std::array<std::size_t, 7> begin{};
+  for (const SurfacePoint& point : points) ++begin[index_of(point.face) + 1];
+  for (std::size_t face = 1; face < begin.size(); ++face) begin[face] += begin[face - 1];
+  std::vector<std::uint32_t> order(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    order[begin[index_of(points[i].face)]++] = static_cast<std::uint32_t>(i);
+  }
+  if (frames_.size() > 1) {
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
+  }
+  return order;
+}
 
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
@@ -84,13 +100,7 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
   }
   std::int64_t rays = 0;
   std::array<Vec3, RayPacket::kSize> lit;
-  // Neighbours of one grid together, each grid's in their order.
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  if (frames_.size() > 1) {
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
-  }
+  const std::vector<std::uint32_t> order = coherent_order(points);
   for (std::size_t begin = 0; begin < order.size();) {
     Group group;
     while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
@@ -163,17 +173,21 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
   rays.max_t.fill(options_.occlusion_distance);
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
-    for (std::size_t i = 0; i < group.size; ++i) {
-      const SurfacePoint& point = *group.points[i];
-      const std::size_t face = index_of(point.face);
-      set_direction(rays, i,
-                    directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
-    }
+    set_occlusion_directions(group, ray, rays);
     const std::uint32_t blocked = view_->any_hits(group.placed, rays);
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
   return std::int64_t{count} * std::popcount(rays.active);
+}
+
+void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const {
+  for (std::size_t i = 0; i < group.size; ++i) {
+    const SurfacePoint& point = *group.points[i];
+    const std::size_t face = index_of(point.face);
+    set_direction(rays, i,
+                  directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
+  }
 }
 
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
