@@ -55,6 +55,7 @@ struct Lighting::Group {
   std::int32_t placed = 0;
   RayPacket origins;
   std::uint32_t surfaces = 0;  // lanes that are to be lit
+  bool is_one_face = true;
 
   void add(const SurfacePoint& point) {
     if (point.kind == PointKind::Surface) surfaces |= 1U << size;
@@ -66,6 +67,7 @@ struct Lighting::Group {
     origins.origin_z[size] = origin.z;
     set_direction(origins, size, DVec3(normal_of(point.face)));
     placed = point.placed;
+    is_one_face &= size == 0 || point.face == points[0]->face;
     points[size++] = &point;
   }
 };
@@ -182,6 +184,11 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
 }
 
 void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const {
+  if (directions_.is_fixed() && group.is_one_face) {
+    const DVec3 direction = directions_.fixed(index_of(group.points[0]->face), ray);
+    rays.direction_x.fill(direction.x), rays.direction_y.fill(direction.y), rays.direction_z.fill(direction.z);
+    return;
+  }
   for (std::size_t i = 0; i < group.size; ++i) {
     const SurfacePoint& point = *group.points[i];
     const std::size_t face = index_of(point.face);
