@@ -105,13 +105,13 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
 }
 
 // Answers where a lane enters through a plane of this axis; -1 when it starts between its planes.
-inline F clip(Axis& axis, F low, F high, F reach, Mask entered, Mask& live, Mask& cut) {
+inline F clip(Axis& axis, F low, F high, F reach, Mask entered, Mask& live, F& bounds_exit) {
   const F end = axis.origin + reach * axis.direction;
   const F far_before = select(axis.forward, high, low);
   low = max(low, floor(min(axis.origin, end) - all(kSlack)));
   high = min(high, floor(max(axis.origin, end) + all(kSlack)) + all(1.0F));
   const F far = select(axis.forward, high, low);
-  cut = cut | ~(far == far_before);
+  bounds_exit = min(bounds_exit, select(axis.still, all(kNever), crossing_t(axis, far_before)));
   const Mask is_low = axis.origin < low;
   const Mask is_high = high <= axis.origin;
   const Mask before = (((axis.forward & is_low) | (~axis.forward & is_high)) & ~axis.still) | entered;
@@ -211,17 +211,16 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   const F max_t = narrow(starts.max_t);
   const F reach = min(max_t, furthest);
   const I moved = load(starts.entered);
-  Mask cut = mask_of(0);
+  F bounds_exit = all(kNever);
   const auto limit = [&](Axis& axis, int index) {
     const F low = to_bound(tree.box.min[index], axis.base);
     const F high = to_bound(tree.box.max[index], axis.base);
     axis.moved = ~equals(moved, -1);
-    return clip(axis, low, high, reach, equals(moved, index), lanes.live, cut);
+    return clip(axis, low, high, reach, equals(moved, index), lanes.live, bounds_exit);
   };
   const F near_x = limit(lanes.x, 0);
   const F near_y = limit(lanes.y, 1);
   const F near_z = limit(lanes.z, 2);
-  lanes.unfinished = lanes.unfinished | (cut & (furthest < max_t) & mask_of(wanted));
 
   // Enters through the last plane; at a tie the later axis.
   const F enter_t = max(max(near_x, near_y), near_z);
@@ -234,6 +233,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   const Mask left = (lanes.x.far_t < t) | (lanes.y.far_t < t) | (lanes.z.far_t < t) |
                     ((lanes.x.far_t == t) & (entered.y | entered.z)) | ((lanes.y.far_t == t) & entered.z);
   lanes.live = lanes.live & ~left;
+  lanes.unfinished = lanes.unfinished | (lanes.live & (furthest < max_t) & (furthest < bounds_exit));
   lanes.exit_t = min(min(lanes.x.far_t, lanes.y.far_t), lanes.z.far_t);
   return lanes;
 }

@@ -58,7 +58,7 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
       __builtin_convertvector((I4{hi.x - ray.base[0], hi.y - ray.base[1], hi.z - ray.base[2], 1}), F4);
   const F4 low = max4(low_bound, floor4(min4(f, end) - kSlack));
   const F4 high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
-  ray.is_cut = false;
+  float bounds_exit = kNever;
   ray.is_moved = moved >= 0;
   ray.enter_t = -1.0F;
   ray.enter_axis = -1;
@@ -71,7 +71,7 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
     const bool is_high = high[a] <= ray.origin[a];
     const bool forward = ray.direction[a] > 0.0F;
     const float far = forward ? high[a] : low[a];
-    ray.is_cut |= far != (forward ? high_bound[a] : low_bound[a]);
+    const float bound = forward ? high_bound[a] : low_bound[a];
     if (ray.still[a]) {
       if (is_low || is_high) return SetUp::Misses;
       far_t[a] = kNever;
@@ -86,10 +86,12 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
     } else if (is_low || is_high) {
       return SetUp::Misses;
     }
+    const float bound_t = (bound - ray.origin[a]) * ray.inverse[a];
+    bounds_exit = bound_t < bounds_exit ? bound_t : bounds_exit;
     far_t[a] = (far - ray.origin[a]) * ray.inverse[a];
     ray.exit_t = far_t[a] < ray.exit_t ? far_t[a] : ray.exit_t;
   }
-  ray.is_cut &= furthest < max_t;
+  ray.is_cut = furthest < max_t && furthest < bounds_exit;
   if (ray.enter_axis < 0) ray.enter_t = 0.0F;
   for (int a = 0; a < 3; ++a) {
     if (far_t[a] < ray.enter_t || (far_t[a] == ray.enter_t && a < ray.enter_axis)) return SetUp::Misses;
