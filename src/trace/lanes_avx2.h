@@ -190,3 +190,9 @@ class BrickWindow {
  private:
   alignas(32) std::uint32_t bricks_[64];
 };
+
+// The sign bits of the first three.
+template <class I4>
+inline int mask3(I4 a) {
+  return _mm_movemask_ps(_mm_castsi128_ps(reinterpret_cast<__m128i>(a))) & 7;
+}

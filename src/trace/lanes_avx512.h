@@ -172,6 +172,37 @@ inline I merge(I which, I a, I b) {
   return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};
 }
 
+inline I as_bits(F a) {
+  return {_mm512_castps_si512(a.v)};
+}
+inline Mask operator<(I a, I b) {
+  return {_mm512_cmplt_epi32_mask(a.v, b.v)};
+}
+inline float least_of(Mask m, F a) {
+  return _mm512_mask_reduce_min_ps(m.m, a.v);
+}
+// Entry `at % 16`, or `at % 32`, of a table.
+inline I from_16(I table, I at) {
+  return {_mm512_permutexvar_epi32(at.v, table.v)};
+}
+inline I from_32(const std::int32_t* table, I at) {
+  return {_mm512_permutex2var_epi32(load(table).v, at.v, load(table + 16).v)};
+}
+inline F from_16(F table, I at) {
+  return {_mm512_permutexvar_ps(at.v, table.v)};
+}
+// The eight brick indices x, y and z further than `corner` or not, times 128.
+inline I eight_of(const std::uint32_t* corner, int x, int y, int z) {
+  const __m256i xs = _mm256_setr_epi32(0, -1, 0, -1, 0, -1, 0, -1);
+  const __m256i ys = _mm256_setr_epi32(0, 0, -1, -1, 0, 0, -1, -1);
+  const __m256i zs = _mm256_setr_epi32(0, 0, 0, 0, -1, -1, -1, -1);
+  const __m256i at = _mm256_add_epi32(
+      _mm256_and_si256(xs, _mm256_set1_epi32(x)),
+      _mm256_add_epi32(_mm256_and_si256(ys, _mm256_set1_epi32(y)), _mm256_and_si256(zs, _mm256_set1_epi32(z))));
+  const __m256i bricks = _mm256_i32gather_epi32(reinterpret_cast<const int*>(corner), at, 4);
+  return {_mm512_castsi256_si512(_mm256_slli_epi32(bricks, 7))};
+}
+
 // The indices of 4^3 bricks.
 class BrickWindow {
  public:
@@ -198,3 +229,9 @@ class BrickWindow {
  private:
   __m512i layers_[4];
 };
+
+// The sign bits of the first three.
+template <class I4>
+inline int mask3(I4 a) {
+  return _mm_movemask_ps(_mm_castsi128_ps(reinterpret_cast<__m128i>(a))) & 7;
+}

@@ -183,3 +183,9 @@ class BrickWindow {
   const std::uint32_t* corner_;
   IVec3 strides_;
 };
+
+// The sign bits of the first three.
+template <class I4>
+inline int mask3(I4 a) {
+  return (a[0] < 0 ? 1 : 0) | (a[1] < 0 ? 2 : 0) | (a[2] < 0 ? 4 : 0);
+}

@@ -27,6 +27,9 @@ namespace {
 
 #include "trace/single.inl"
 
+#define QUOIN_TRACE_SINGLE trace_single
+#include "trace/single_hit.inl"
+
 #include "trace/short.inl"
 
 }  // namespace

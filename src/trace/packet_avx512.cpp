@@ -28,6 +28,11 @@ namespace {
 
 #include "trace/single.inl"
 
+#include "trace/single_window.inl"
+
+#define QUOIN_TRACE_SINGLE trace_single
+#include "trace/single_hit.inl"
+
 #include "trace/short.inl"
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 using F4 = float __attribute__((vector_size(16)));
 using I4 = std::int32_t __attribute__((vector_size(16)));
+using D4 = double __attribute__((vector_size(32)));
 
 inline F4 floor4(F4 a) {
   const F4 whole = __builtin_convertvector(__builtin_convertvector(a, I4), F4);
@@ -14,16 +15,29 @@ inline F4 min4(F4 a, F4 b) {
 inline F4 max4(F4 a, F4 b) {
   return a > b ? a : b;
 }
+inline F4 all4(float x) {
+  return F4{x, x, x, x};
+}
+// Of the first three.
+inline float least3(F4 a) {
+  return std::min(std::min(a[0], a[1]), a[2]);
+}
+inline float greatest3(F4 a) {
+  return std::max(std::max(a[0], a[1]), a[2]);
+}
 
-// A ray's numbers by axis.
+// A ray's numbers by axis; masks are all ones or zeros. The fourth of each means nothing.
 struct SingleRay {
-  float origin[4];
-  float direction[4];
-  float inverse[4];  // 1 where it is still
-  float low[4];
-  float high[4];
-  bool still[4];
-  int base[4];
+  F4 origin;
+  F4 direction;
+  F4 inverse;  // 1 where it is still
+  F4 sign;
+  F4 low;
+  F4 high;
+  F4 far_t;
+  I4 forward;
+  I4 still;
+  I4 base;
   float exit_t;
   float enter_t;
   int enter_axis;
@@ -33,207 +47,181 @@ struct SingleRay {
 
 enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
 
-inline bool is_nearby(const TreeView& tree, const double* p) {
-  bool nearby = true;
-  for (int a = 0; a < 3; ++a) {
-    const auto at = static_cast<float>(p[a]);
-    nearby &=
-        static_cast<float>(tree.box.min[a]) - kNearby <= at && at <= static_cast<float>(tree.box.max[a]) + kNearby;
-  }
-  return nearby;
-}
-
 // The box of the ray's way, and where it enters and leaves it.
 inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, float greatest, int moved) {
-  const auto load4 = [](const float* from) { return F4{from[0], from[1], from[2], from[3]}; };
-  const F4 f = load4(ray.origin);
-  const F4 d = load4(ray.direction);
+  const F4 f = ray.origin;
   const float furthest = kReach / greatest;
-  const float reach = max_t < furthest ? max_t : furthest;
-  const F4 end = f + reach * d;
+  const F4 end = f + std::min(max_t, furthest) * ray.direction;
   const IVec3& lo = tree.box.min;
   const IVec3& hi = tree.box.max;
-  const F4 low_bound = __builtin_convertvector((I4{lo.x - ray.base[0], lo.y - ray.base[1], lo.z - ray.base[2], 0}), F4);
-  const F4 high_bound =
-      __builtin_convertvector((I4{hi.x - ray.base[0], hi.y - ray.base[1], hi.z - ray.base[2], 1}), F4);
-  const F4 low = max4(low_bound, floor4(min4(f, end) - kSlack));
-  const F4 high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
-  float bounds_exit = kNever;
-  ray.is_moved = moved >= 0;
-  ray.enter_t = -1.0F;
+  const F4 low_bound = __builtin_convertvector((I4{lo.x, lo.y, lo.z, 0} - ray.base), F4);
+  const F4 high_bound = __builtin_convertvector((I4{hi.x, hi.y, hi.z, 0} - ray.base), F4);
+  ray.low = max4(low_bound, floor4(min4(f, end) - kSlack));
+  ray.high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
+  const F4 far = ray.forward ? ray.high : ray.low;
+  const F4 bound = ray.forward ? high_bound : low_bound;
+  const I4 is_low = f < ray.low;
+  const I4 is_high = ray.high <= f;
+  const I4 axes = {0, 1, 2, 3};
+  const I4 entered = axes == moved;
+  const I4 before = (((ray.forward & is_low) | (~ray.forward & is_high)) & ~ray.still) | entered;
+  const I4 past = ((ray.forward & is_high) | (~ray.forward & is_low)) & ~entered;
+  if (mask3(past | (ray.still & is_high)) != 0) return SetUp::Misses;
+  const F4 near_t = before ? ((ray.forward ? ray.low : ray.high) - f) * ray.inverse : all4(-1.0F);
+  ray.far_t = ray.still ? all4(kNever) : (far - f) * ray.inverse;
+  const F4 bound_t = ray.still ? all4(kNever) : (bound - f) * ray.inverse;
+  ray.enter_t = greatest3(near_t);
   ray.enter_axis = -1;
-  ray.exit_t = kNever;
-  float far_t[3];
-  for (int a = 0; a < 3; ++a) {
-    ray.low[a] = low[a];
-    ray.high[a] = high[a];
-    const bool is_low = ray.origin[a] < low[a];
-    const bool is_high = high[a] <= ray.origin[a];
-    const bool forward = ray.direction[a] > 0.0F;
-    const float far = forward ? high[a] : low[a];
-    const float bound = forward ? high_bound[a] : low_bound[a];
-    if (ray.still[a]) {
-      if (is_low || is_high) return SetUp::Misses;
-      far_t[a] = kNever;
-      continue;
-    }
-    if ((forward ? is_low : is_high) || moved == a) {
-      const float t = ((forward ? low[a] : high[a]) - ray.origin[a]) * ray.inverse[a];
-      if (t >= ray.enter_t) {
-        ray.enter_t = t;
-        ray.enter_axis = a;
-      }
-    } else if (is_low || is_high) {
-      return SetUp::Misses;
-    }
-    const float bound_t = (bound - ray.origin[a]) * ray.inverse[a];
-    bounds_exit = bound_t < bounds_exit ? bound_t : bounds_exit;
-    far_t[a] = (far - ray.origin[a]) * ray.inverse[a];
-    ray.exit_t = far_t[a] < ray.exit_t ? far_t[a] : ray.exit_t;
+  if (ray.enter_t >= 0.0F) {
+    ray.enter_axis = 31 - std::countl_zero(static_cast<std::uint32_t>(mask3(near_t == all4(ray.enter_t))));
+  } else {
+    ray.enter_t = 0.0F;
   }
-  ray.is_cut = furthest < max_t && furthest < bounds_exit;
-  if (ray.enter_axis < 0) ray.enter_t = 0.0F;
-  for (int a = 0; a < 3; ++a) {
-    if (far_t[a] < ray.enter_t || (far_t[a] == ray.enter_t && a < ray.enter_axis)) return SetUp::Misses;
-  }
-  return SetUp::Ready;
+  ray.exit_t = least3(ray.far_t);
+  ray.is_cut = furthest < max_t && furthest < least3(bound_t);
+  ray.is_moved = moved >= 0;
+  const F4 t = all4(ray.enter_t);
+  const I4 left = (ray.far_t < t) | ((ray.far_t == t) & (axes < ray.enter_axis));
+  return mask3(left) != 0 ? SetUp::Misses : SetUp::Ready;
 }
 
 inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, SingleRay& out) {
-  double p[3];
-  float size[3];
-  for (int a = 0; a < 3; ++a) {
-    p[a] = ray.origin[a] - tree.origin[a];
-    out.direction[a] = static_cast<float>(ray.direction[a]);
-    size[a] = std::abs(out.direction[a]);
-  }
-  const float greatest = std::max(std::max(size[0], size[1]), size[2]);
+  D4 p = D4{ray.origin.x, ray.origin.y, ray.origin.z, ray.origin.z} -
+         D4{tree.origin.x, tree.origin.y, tree.origin.z, tree.origin.z};
+  const F4 d = __builtin_convertvector((D4{ray.direction.x, ray.direction.y, ray.direction.z, ray.direction.z}), F4);
+  const F4 size = max4(d, -d);
+  const float greatest = greatest3(size);
   auto limit = static_cast<float>(max_t);
-  if (!(size[0] <= 0x1p20F && size[1] <= 0x1p20F && size[2] <= 0x1p20F && greatest >= 0x1p-20F && limit >= 0.0F)) {
-    return SetUp::Unusual;
-  }
+  if (mask3(size <= all4(0x1p20F)) != 7 || !(greatest >= 0x1p-20F) || !(limit >= 0.0F)) return SetUp::Unusual;
+  const IVec3& lo = tree.box.min;
+  const IVec3& hi = tree.box.max;
+  const F4 rough = __builtin_convertvector(p, F4);
+  const F4 low_bound = __builtin_convertvector((I4{lo.x, lo.y, lo.z, lo.z}), F4) - kNearby;
+  const F4 high_bound = __builtin_convertvector((I4{hi.x, hi.y, hi.z, hi.z}), F4) + kNearby;
   int moved = -1;
-  if (!is_nearby(tree, p)) {
+  if (mask3((low_bound <= rough) & (rough <= high_bound)) != 7) {
     const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
     Move move{{p[0], p[1], p[2]}, max_t, -1};
     if (!move_to_bounds(tree, direction, move)) return SetUp::Misses;
-    for (int a = 0; a < 3; ++a) p[a] = move.position[a];
+    p = D4{move.position[0], move.position[1], move.position[2], move.position[2]};
     limit = static_cast<float>(move.max_t);
     moved = move.entered;
   }
-  for (int a = 0; a < 3; ++a) {
-    const int trunc = static_cast<int>(p[a]);
-    const int floor = trunc - (static_cast<double>(trunc) > p[a] ? 1 : 0);
-    out.base[a] = floor & ~63;
-    const auto inside = static_cast<float>(p[a] - out.base[a]);
-    const float last = static_cast<float>(floor - out.base[a]) + (1.0F - 0x1p-17F);
-    out.origin[a] = inside < last ? inside : last;
-    out.still[a] = size[a] < 0x1p-100F;
-    if (out.still[a]) out.direction[a] = 0.0F;
-    out.inverse[a] = 1.0F / (out.still[a] ? 1.0F : out.direction[a]);
-  }
-  out.origin[3] = out.direction[3] = 0.0F;
+  const I4 trunc = __builtin_convertvector(p, I4);
+  const I4 floor = trunc + __builtin_convertvector(__builtin_convertvector(trunc, D4) > p, I4);
+  out.base = floor & ~63;
+  const F4 inside = __builtin_convertvector(p - __builtin_convertvector(out.base, D4), F4);
+  out.origin = min4(inside, __builtin_convertvector(floor - out.base, F4) + (1.0F - 0x1p-17F));
+  out.still = size < all4(0x1p-100F);
+  out.direction = out.still ? all4(0.0F) : d;
+  out.forward = out.direction > 0.0F;
+  out.sign = out.forward ? all4(1.0F) : all4(-1.0F);
+  out.inverse = 1.0F / (out.still ? all4(1.0F) : d);
   return clip_single(tree, out, limit, greatest, moved);
 }
 
-// As `coordinate_after` of the lockstep kernel.
+// As `coordinate_after` of the lockstep kernel, for all axes but `axis`, the one just crossed, where it means nothing.
+inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 high, int axis) {
+  const F4 at = max4(min4(floor4(ray.origin + t * ray.direction), high), low);
+  const F4 ahead = ray.forward ? at + 1.0F : at;
+  const F4 behind = ray.forward ? at : at + 1.0F;
+  const F4 ahead_t = (ahead - ray.origin) * ray.inverse;
+  const F4 behind_t = (behind - ray.origin) * ray.inverse;
+  const F4 now = all4(t);
+  const I4 axes = {0, 1, 2, 3};
+  const I4 is_short = ((ahead_t < now) | ((ahead_t == now) & (axes < axis))) & ~ray.still;
+  const I4 was_inside =
+      ray.forward & ((behind < ray.origin) | ((behind == ray.origin) & (ray.is_moved ? I4{} : ~I4{})));
+  const I4 comes_later = axis < 0 ? I4{} : axes > axis;
+  const I4 is_far = ((now < behind_t) | ((behind_t == now) & comes_later)) & ~ray.still & ~was_inside & ~is_short;
+  return at + (is_short ? ray.sign : all4(0.0F)) - (is_far ? ray.sign : all4(0.0F));
+}
+
+// Where a ray stands: a unit on each axis, by its lower plane, and when it came there.
+struct Stand {
+  F4 lower;
+  float t;
+  int axis;  // of the last crossing; -1 before the first
+};
+
+// From the box just entered, by its lower and upper voxels, to the voxel.
+inline void enter(const SingleRay& ray, F4 low, F4 high, Stand& stand) {
+  const F4 others = single_coordinates_after(ray, stand.t, low, high, stand.axis);
+  const I4 axes = {0, 1, 2, 3};
+  stand.lower = axes == stand.axis ? (ray.forward ? low : high) : others;
+}
+
+// Where a ray starts within its box, or enters it.
+inline Stand first_stand(const SingleRay& ray) {
+  Stand stand{floor4(ray.origin), ray.enter_t, ray.enter_axis};
+  if (stand.axis >= 0) enter(ray, ray.low, ray.high - 1.0F, stand);
+  return stand;
+}
+
+// The planes through which a ray leaves units of this size.
+inline F4 exit_planes(const SingleRay& ray, F4 lower, float size) {
+  const F4 moving = ray.forward ? lower + size : lower;
+  return ray.still ? all4(kNever) : moving;
+}
+
+// The least steps of a walk: its next planes and when it crosses them.
+struct Steps {
+  float plane[3];
+  float t[3];
+  int index;
+};
+
+inline Steps make_steps(const SingleRay& ray, F4 planes, int index) {
+  const F4 t = (planes - ray.origin) * ray.inverse;
+  return {{planes[0], planes[1], planes[2]}, {t[0], t[1], t[2]}, index};
+}
+
+// Goes through the next plane; answers its axis.
 template <int kSize>
-inline int single_coordinate_after(const SingleRay& ray, int a, float t, int low, int high, int axis) {
-  const float position = ray.origin[a] + t * ray.direction[a];
-  const float scaled = position * (1.0F / kSize);
-  const int trunc = static_cast<int>(scaled);
-  const int floor = trunc - (static_cast<float>(trunc) > scaled ? 1 : 0);
-  int at = std::min(std::max(floor, low), high);
-  // Rounding can put a position on the wrong side of a plane only next to it.
-  const float past = (scaled - static_cast<float>(at)) * kSize;
-  if (past > 0.01F && past < kSize - 0.01F) return at;
-  if (ray.still[a]) return at;
-  const bool forward = ray.direction[a] > 0.0F;
-  const auto lower = static_cast<float>(at * kSize);
-  const float upper = lower + kSize;
-  const float behind = forward ? lower : upper;
-  const float ahead_t = ((forward ? upper : lower) - ray.origin[a]) * ray.inverse[a];
-  const float behind_t = (behind - ray.origin[a]) * ray.inverse[a];
-  if (ahead_t < t || (ahead_t == t && a < axis)) return at + (forward ? 1 : -1);
-  const bool was_inside = forward && (ray.is_moved ? behind < ray.origin[a] : behind <= ray.origin[a]);
-  if ((t < behind_t || (behind_t == t && axis >= 0 && axis < a)) && !was_inside) return at - (forward ? 1 : -1);
-  return at;
+inline int advance(const SingleRay& ray, const I4& strides, Steps& steps, float& now) {
+  constexpr auto kEdge = static_cast<float>(kSize);
+  const auto go = [&](int a) {
+    now = steps.t[a];
+    steps.plane[a] += ray.sign[a] * kEdge;
+    steps.t[a] = (steps.plane[a] - ray.origin[a]) * ray.inverse[a];
+    steps.index += strides[a];
+    return a;
+  };
+  if (steps.t[0] <= steps.t[1]) return steps.t[0] <= steps.t[2] ? go(0) : go(2);
+  return steps.t[1] <= steps.t[2] ? go(1) : go(2);
+}
+
+// Walks through the 64 voxels of the cell in which a ray stands; answers the index of the voxel met, or -1.
+inline int walk_cell(const SingleRay& ray, std::uint64_t word, F4 cell, Stand& stand) {
+  const I4 within = __builtin_convertvector(stand.lower - cell, I4);
+  Steps steps = make_steps(ray, exit_planes(ray, stand.lower, 1.0F),
+                           within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ);
+  const I4 codes = {kCodeX, kCodeY, kCodeZ, 0};
+  const I4 strides = ray.forward ? codes : -codes;
+  while ((word >> (steps.index & 63) & 1U) == 0) {
+    stand.axis = advance<1>(ray, strides, steps, stand.t);
+    if ((steps.index & kLeft) != 0) return -1;
+  }
+  return steps.index & 63;
+}
+
+inline std::uint64_t cell_word(const TreeView& tree, const SingleRay& ray, F4 lower) {
+  const I4 cell = (__builtin_convertvector(lower, I4) + ray.base) >> 2;
+  const I4 brick = cell >> 2;
+  const I4 within = cell & 3;
+  const int index = brick[0] + brick[1] * tree.brick_strides.y + brick[2] * tree.brick_strides.z;
+  const auto place = static_cast<std::size_t>(within[0] + 4 * within[1] + 16 * within[2]);
+  std::uint64_t word;
+  std::memcpy(&word, tree.words + (std::size_t{tree.bricks[index]} * 64 + place) * 2, sizeof word);
+  return word;
 }
 
 struct SingleHit {
   bool is_hit = false;
   bool is_unfinished = false;
   int axis = -1;  // of the face; -1 when it starts inside
-  int voxel[3] = {};
+  IVec3 voxel{0};
 };
-
-#define QUOIN_STEP(A)                                   \
-  {                                                     \
-    now = t##A;                                         \
-    axis = A;                                           \
-    plane##A += step##A;                                \
-    t##A = (plane##A - ray.origin[A]) * ray.inverse[A]; \
-    index += stride##A;                                 \
-  }
-#define QUOIN_STEP_FIRST \
-  if (t0 <= t1) {        \
-    if (t0 <= t2)        \
-      QUOIN_STEP(0)      \
-    else                 \
-      QUOIN_STEP(2)      \
-  } else {               \
-    if (t1 <= t2)        \
-      QUOIN_STEP(1)      \
-    else                 \
-      QUOIN_STEP(2)      \
-  }
-
-// Walks through a cell's 64 voxels from where the ray enters it; answers the index of the voxel met, or -1.
-inline int walk_cell(const SingleRay& ray, std::uint64_t word, const int lower[3], float entered_at, int& axis) {
-  int v[3];
-  float plane[3];
-  for (int a = 0; a < 3; ++a) {
-    const bool forward = ray.direction[a] > 0.0F;
-    v[a] = a == axis ? lower[a] + (forward ? 0 : 3)
-                     : single_coordinate_after<1>(ray, a, entered_at, lower[a], lower[a] + 3, axis);
-    plane[a] = ray.still[a] ? kNever : static_cast<float>(v[a] + (forward ? 1 : 0));
-    v[a] -= lower[a];
-  }
-  int index = v[0] * kCodeX + v[1] * kCodeY + v[2] * kCodeZ;
-  if ((word >> (index & 63) & 1U) != 0) return index & 63;
-  const int stride0 = ray.direction[0] > 0.0F ? kCodeX : -kCodeX;
-  const int stride1 = ray.direction[1] > 0.0F ? kCodeY : -kCodeY;
-  const int stride2 = ray.direction[2] > 0.0F ? kCodeZ : -kCodeZ;
-  const float step0 = ray.direction[0] > 0.0F ? 1.0F : -1.0F;
-  const float step1 = ray.direction[1] > 0.0F ? 1.0F : -1.0F;
-  const float step2 = ray.direction[2] > 0.0F ? 1.0F : -1.0F;
-  float plane0 = plane[0];
-  float plane1 = plane[1];
-  float plane2 = plane[2];
-  float t0 = (plane0 - ray.origin[0]) * ray.inverse[0];
-  float t1 = (plane1 - ray.origin[1]) * ray.inverse[1];
-  float t2 = (plane2 - ray.origin[2]) * ray.inverse[2];
-  float now = 0.0F;
-  for (;;) {
-    QUOIN_STEP_FIRST
-    if ((index & kLeft) != 0) return -1;
-    if ((word >> (index & 63) & 1U) != 0) {
-      static_cast<void>(now);
-      return index & 63;
-    }
-  }
-}
-
-inline std::uint64_t cell_word(const TreeView& tree, const SingleRay& ray, const int lower[3]) {
-  const int x = (lower[0] + ray.base[0]) >> 2;
-  const int y = (lower[1] + ray.base[1]) >> 2;
-  const int z = (lower[2] + ray.base[2]) >> 2;
-  const int brick = (x >> 2) + (y >> 2) * tree.brick_strides.y + (z >> 2) * tree.brick_strides.z;
-  const std::size_t cell = static_cast<std::size_t>((x & 3) + 4 * (y & 3) + 16 * (z & 3));
-  std::uint64_t word;
-  std::memcpy(&word, tree.words + (std::size_t{tree.bricks[brick]} * 64 + cell) * 2, sizeof word);
-  return word;
-}
 
 inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double max_t) {
   SingleRay ray;
@@ -241,72 +229,37 @@ inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double
   const SetUp ready = set_up_single(tree, world_ray, max_t, ray);
   hit.is_unfinished = ready == SetUp::Unusual;
   if (ready != SetUp::Ready) return hit;
-  int axis = ray.enter_axis;
-  float now = ray.enter_t;
-  float plane[3];
-  int index = tree.first_cell;
-  const int strides[3] = {1, tree.cell_strides.y, tree.cell_strides.z};
-  for (int a = 0; a < 3; ++a) {
-    const bool forward = ray.direction[a] > 0.0F;
-    const int low = static_cast<int>(ray.low[a]) >> 2;
-    const int high = (static_cast<int>(ray.high[a]) - 1) >> 2;
-    const int cell = a == axis ? (forward ? low : high) : single_coordinate_after<4>(ray, a, now, low, high, axis);
-    plane[a] = ray.still[a] ? kNever : static_cast<float>(cell * 4 + (forward ? 4 : 0));
-    index += (cell + (ray.base[a] >> 2)) * strides[a];
-  }
-  const int stride0 = ray.direction[0] > 0.0F ? 1 : -1;
-  const int stride1 = ray.direction[1] > 0.0F ? strides[1] : -strides[1];
-  const int stride2 = ray.direction[2] > 0.0F ? strides[2] : -strides[2];
-  const float step0 = ray.direction[0] > 0.0F ? 4.0F : -4.0F;
-  const float step1 = ray.direction[1] > 0.0F ? 4.0F : -4.0F;
-  const float step2 = ray.direction[2] > 0.0F ? 4.0F : -4.0F;
-  float plane0 = plane[0];
-  float plane1 = plane[1];
-  float plane2 = plane[2];
-  float t0 = (plane0 - ray.origin[0]) * ray.inverse[0];
-  float t1 = (plane1 - ray.origin[1]) * ray.inverse[1];
-  float t2 = (plane2 - ray.origin[2]) * ray.inverse[2];
-  const float planes_back[3] = {step0 > 0 ? 4.0F : 0.0F, step1 > 0 ? 4.0F : 0.0F, step2 > 0 ? 4.0F : 0.0F};
-  for (;;) {
-    if ((tree.cells[static_cast<std::uint32_t>(index) >> 5] >> (index & 31) & 1U) != 0) {
-      const float exits[3] = {plane0, plane1, plane2};
-      int lower[3];
-      for (int a = 0; a < 3; ++a) {
-        lower[a] = ray.still[a] ? static_cast<int>(std::floor(ray.origin[a] * 0.25F)) * 4
-                                : static_cast<int>(exits[a] - planes_back[a]);
+  Stand stand = first_stand(ray);
+  const I4 place = (__builtin_convertvector(stand.lower, I4) + ray.base) >> 2;
+  F4 cell = __builtin_convertvector(__builtin_convertvector(stand.lower, I4) & ~3, F4);
+  Steps steps =
+      make_steps(ray, exit_planes(ray, cell, 4.0F),
+                 tree.first_cell + place[0] + place[1] * tree.cell_strides.y + place[2] * tree.cell_strides.z);
+  const I4 cell_strides = {1, tree.cell_strides.y, tree.cell_strides.z, 0};
+  const I4 strides = ray.forward ? cell_strides : -cell_strides;
+  for (bool is_first = true;; is_first = false) {
+    const auto bit = static_cast<std::uint32_t>(steps.index);
+    if ((tree.cells[bit >> 5] >> (bit & 31U) & 1U) != 0) {
+      Stand inner = stand;
+      if (!is_first) {
+        const F4 exits = {steps.plane[0], steps.plane[1], steps.plane[2], 0.0F};
+        const F4 moving = ray.forward ? exits - 4.0F : exits;
+        cell = ray.still ? floor4(ray.origin * 0.25F) * 4.0F : moving;
+        enter(ray, cell, cell + 3.0F, inner);
       }
-      hit.axis = axis;
-      const int voxel = walk_cell(ray, cell_word(tree, ray, lower), lower, now, hit.axis);
+      const int voxel = walk_cell(ray, cell_word(tree, ray, cell), cell, inner);
       if (voxel >= 0) {
+        const I4 corner = __builtin_convertvector(cell, I4) + ray.base;
         hit.is_hit = true;
-        hit.voxel[0] = lower[0] + ray.base[0] + (voxel & 3);
-        hit.voxel[1] = lower[1] + ray.base[1] + (voxel >> 2 & 3);
-        hit.voxel[2] = lower[2] + ray.base[2] + (voxel >> 4);
+        hit.axis = inner.axis;
+        hit.voxel = IVec3{corner[0] + (voxel & 3), corner[1] + (voxel >> 2 & 3), corner[2] + (voxel >> 4)};
         return hit;
       }
     }
-    QUOIN_STEP_FIRST
-    if (!(now <= ray.exit_t)) {
+    stand.axis = advance<4>(ray, strides, steps, stand.t);
+    if (!(stand.t <= ray.exit_t)) {
       hit.is_unfinished = ray.is_cut;
       return hit;
     }
   }
-}
-
-#undef QUOIN_STEP
-#undef QUOIN_STEP_FIRST
-
-inline bool first_single(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished) {
-  const SingleHit found = trace_single(tree, ray, max_t);
-  unfinished = found.is_unfinished;
-  if (!found.is_hit) return false;
-  hit.voxel = IVec3{found.voxel[0], found.voxel[1], found.voxel[2]} + IVec3(tree.origin);
-  hit.starts_inside = found.axis < 0;
-  hit.t = 0.0;
-  if (hit.starts_inside) return true;
-  const double d = ray.direction[found.axis];
-  hit.face = static_cast<Direction>(2 * found.axis + (d > 0.0 ? 1 : 0));
-  const double plane = hit.voxel[found.axis] + (d > 0.0 ? 0.0 : 1.0);
-  hit.t = (plane - ray.origin[found.axis]) * (1.0 / d);
-  return hit.t <= max_t;
 }
