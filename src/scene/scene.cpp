@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <glm/mat3x3.hpp>
+#include "scene/instance_axes.h"
 
 namespace quoin {
 
@@ -22,6 +22,12 @@ glm::dmat3 exact_matrix(const DQuat& rotation) {
 }
 
 }  // namespace
+
+glm::dmat3 world_axes(const Instance& instance) {
+  glm::dmat3 axes = exact_matrix(instance.rotation);
+  if (instance.mirrored) axes[0] = -axes[0];
+  return axes;
+}
 
 bool Scene::remove_grid(GridHandle handle) {
   if (!grids_.remove(handle)) return false;

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+
+#include <quoin/core/instruction_set.h>
+#include <quoin/core/parallel.h>
+#include <quoin/core/vec.h>
+#include <quoin/scene/scene.h>
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/packet.h>
+#include <quoin/trace/ray.h>
+
+namespace quoin {
+
+/// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
+struct PlacedGrid {
+  InstanceHandle instance;
+  const SceneGrid* grid = nullptr;
+  const OccupancyTree* opaque = nullptr;
+  const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
+  glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
+  DVec3 position{0.0};         ///< of the grid's pivot, in the world
+  double voxel_size = 1.0;
+};
+
+/// The traversal structures of a scene's instances.
+class SceneTracer {
+ public:
+  /// `scene` must outlive it unchanged. Left out are instances that are not visible, unless `hidden`; empty grids; and
+  /// those whose numbers are not finite or whose size is not positive.
+  /// Cost: O(chunks of the grids that are placed), on several threads.
+  explicit SceneTracer(const Scene& scene, bool hidden = false, Threads threads = {});
+  SceneTracer(SceneTracer&&) noexcept;
+  SceneTracer& operator=(SceneTracer&&) noexcept;
+  ~SceneTracer();
+
+  /// In the order of the instances' handles.
+  [[nodiscard]] const std::vector<PlacedGrid>& placed() const;
+  [[nodiscard]] bool has_transparent() const;
+
+ private:
+  friend class SceneView;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What a packet of rays met in a scene; lanes whose bit in `grids.hit` is not set hold nothing of meaning.
+struct SceneHits {
+  PacketHits grids;                       ///< voxels and faces in the grid, distances of the packet's rays
+  RayPacket::Lanes<std::int32_t> placed;  ///< index into SceneTracer::placed
+};
+
+/// A transparent voxel on a ray.
+struct TransparentSpan {
+  VoxelSpan span;
+  std::int32_t placed = 0;
+};
+
+/// Traces rays through a scene, relative to a point near which they are.
+///
+/// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
+///         world's origin as near it; and grid, voxels of a placed grid. A ray's t is the same number in both.
+/// Threads: any number may trace at once.
+class SceneView {
+ public:
+  /// `tracer` must outlive it. Cost: O(instances).
+  SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet instructions = InstructionSet::Best);
+  SceneView(SceneView&&) noexcept;
+  SceneView& operator=(SceneView&&) noexcept;
+  ~SceneView();
+
+  [[nodiscard]] const SceneTracer& tracer() const;
+
+  /// The nearest opaque voxel of all instances for each ray, in view space; of equally near ones the instance that
+  /// comes first.
+  void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
+
+  /// Which rays meet an opaque voxel of any instance. They are in the space of grid `home`, which is asked first.
+  [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
+
+  /// Which rays meet a transparent voxel of any instance.
+  [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
+
+  /// Calls `visit` for every transparent voxel that one ray passes: instance by instance, each in the ray's order.
+  /// What `visit` answers false to is the end of that instance.
+  void visit_transparent(const Ray& ray_in_view, double max_t,
+                         const std::function<bool(const TransparentSpan&)>& visit) const;
+
+  [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
+  [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin

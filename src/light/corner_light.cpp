@@ -1,0 +1,40 @@
+#include "light/corner_light.h"
+
+#include <algorithm>
+
+namespace quoin {
+
+float interpolated_level(const FaceLevels& levels, float u, float v) {
+  const auto at = [&](std::size_t corner) { return static_cast<float>(levels[corner]); };
+  if (!flips_diagonal(levels)) {
+    // (0,1,2), below the diagonal from corner 0 to 2, and (0,2,3).
+    if (u >= v) return at(0) + u * (at(1) - at(0)) + v * (at(2) - at(1));
+    return at(0) + v * (at(3) - at(0)) + u * (at(2) - at(3));
+  }
+  // (0,1,3), on corner 0's side of the diagonal from 1 to 3, and (1,2,3).
+  if (u + v <= 1.0F) return at(0) + u * (at(1) - at(0)) + v * (at(3) - at(0));
+  return at(2) + (1.0F - u) * (at(3) - at(2)) + (1.0F - v) * (at(1) - at(2));
+}
+
+float corner_level(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face, DVec3 position) {
+  const FaceFrame& frame = frame_of(face);
+  const IVec3 front = voxel + normal_of(face);
+  std::array<std::array<bool, 3>, 3> is_occluder{};
+  for (int dv = -1; dv <= 1; ++dv) {
+    for (int du = -1; du <= 1; ++du) {
+      if (du == 0 && dv == 0) continue;
+      IVec3 at = front;
+      at[frame.u] += du;
+      at[frame.v] += dv;
+      is_occluder[static_cast<std::size_t>(dv + 1)][static_cast<std::size_t>(du + 1)] = types.is_opaque(grid.get(at));
+    }
+  }
+  const auto level = [&](std::size_t u, std::size_t v) {
+    return vertex_occlusion(is_occluder[1][u], is_occluder[v][1], is_occluder[v][u]);
+  };
+  const FaceLevels levels = {level(0, 0), level(2, 0), level(2, 2), level(0, 2)};
+  const auto within = [&](int axis) { return static_cast<float>(std::clamp(position[axis] - voxel[axis], 0.0, 1.0)); };
+  return interpolated_level(levels, within(frame.u), within(frame.v));
+}
+
+}  // namespace quoin

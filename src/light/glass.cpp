@@ -1,0 +1,83 @@
+#include "light/glass.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace quoin {
+namespace {
+
+// ln of the share of light below which a body counts as closed: a sixteenth of the least step of an 8-bit picture.
+constexpr double kClosed = -11.0;
+
+// Lengths of t within which two bodies touch; the rounding of placed grids.
+constexpr double kTouching = 1e-6;
+
+bool continues(const GlassBody& body, const GlassBody& next) {
+  return next.type == body.type && next.t_enter <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
+}
+
+}  // namespace
+
+void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
+                std::vector<GlassBody>& out) {
+  out.clear();
+  const double length = glm::length(ray_in_view.direction);
+  std::int32_t last_placed = -1;
+  double clarity = 0.0;
+  view.visit_transparent(ray_in_view, max_t, [&](const TransparentSpan& found) {
+    const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(found.placed)];
+    if (found.placed != last_placed) clarity = 0.0;
+    const VoxelSpan& span = found.span;
+    const VoxelType type = placed.grid->grid.get(span.voxel);
+    const double t_exit = std::min(span.t_exit, max_t);
+    const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size;
+    const GlassBody next{found.placed, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
+    if (found.placed == last_placed && continues(out.back(), next)) {
+      out.back().t_exit = t_exit;
+      out.back().voxels += voxels;
+    } else {
+      out.push_back(next);
+    }
+    last_placed = found.placed;
+    clarity += voxels > 0.0 ? surfaces[type].log_clarity * voxels : 0.0;
+    return clarity > kClosed;
+  });
+  std::sort(out.begin(), out.end(), [](const GlassBody& a, const GlassBody& b) {
+    return a.t_enter != b.t_enter ? a.t_enter < b.t_enter : a.placed < b.placed;
+  });
+  // Bodies of neighbouring grids that touch are one.
+  std::size_t kept = 0;
+  for (std::size_t i = 1; i < out.size(); ++i) {
+    if (continues(out[kept], out[i])) {
+      out[kept].t_exit = std::max(out[kept].t_exit, out[i].t_exit);
+      out[kept].voxels += out[i].voxels;
+    } else {
+      out[++kept] = out[i];
+    }
+  }
+  if (!out.empty()) out.resize(kept + 1);
+}
+
+Vec3 transmittance(const Surface& surface, double voxels) {
+  if (!(voxels > 0.0)) return Vec3(1.0F);
+  const auto length = static_cast<float>(voxels);
+  const Vec3 exponent = surface.log_transmittance * length;
+  return {std::exp(exponent.x), std::exp(exponent.y), std::exp(exponent.z)};
+}
+
+float own_share(const Surface& surface, double voxels) {
+  if (!(voxels > 0.0)) return 0.0F;
+  return 1.0F - std::exp(surface.log_clarity * static_cast<float>(voxels));
+}
+
+Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t) {
+  Vec3 passed(1.0F);
+  std::vector<GlassBody> bodies;
+  find_glass(view, surfaces, ray_in_view, max_t, bodies);
+  for (const GlassBody& body : bodies) passed *= transmittance(surfaces[body.type], body.voxels);
+  return passed;
+}
+
+}  // namespace quoin

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "light/surfaces.h"
+
+namespace quoin {
+
+/// A run of transparent voxels of one type along a ray: one piece of glass, whatever grids and chunks it lies in.
+struct GlassBody {
+  std::int32_t placed = 0;  ///< the grid in which the ray enters it
+  IVec3 voxel{0};           ///< where it enters
+  Direction face = Direction::PosX;
+  VoxelType type = kAir;
+  bool starts_inside = false;
+  double t_enter = 0.0;
+  double t_exit = 0.0;
+  double voxels = 0.0;  ///< length inside, in voxels of the grids
+};
+
+/// The bodies that a ray passes before `max_t`, nearest first. `out` is cleared first. Deep inside a body that lets
+/// nothing through any more the list ends.
+void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
+                std::vector<GlassBody>& out);
+
+/// What of each channel passes through a length of a surface's material (Beer and Lambert).
+[[nodiscard]] Vec3 transmittance(const Surface& surface, double voxels);
+/// The share of its own colour that such a length shows: what it does not let see past.
+[[nodiscard]] float own_share(const Surface& surface, double voxels);
+
+/// What of each channel passes through everything transparent on a ray.
+[[nodiscard]] Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view,
+                                       double max_t);
+
+}  // namespace quoin

@@ -1,0 +1,25 @@
+#include <quoin/light/light_options.h>
+
+#include <cmath>
+
+namespace quoin {
+
+Status check(const LightOptions& options) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  const DVec3 sun = options.sun;
+  if (!std::isfinite(sun.x) || !std::isfinite(sun.y) || !std::isfinite(sun.z)) return refuse("sun: must be finite");
+  if (sun == DVec3(0.0)) return refuse("sun: must not be 0,0,0");
+  if (options.occlusion_rays < 1 || options.occlusion_rays > 4096) {
+    return refuse("occlusion rays: must be 1 to 4096");
+  }
+  if (!std::isfinite(options.occlusion_distance) || options.occlusion_distance < 0.0) {
+    return refuse("occlusion distance: must be finite and not negative");
+  }
+  if (!(options.shadow_distance >= 0.0)) return refuse("shadow distance: must not be negative");
+  if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
+    return refuse("exposure: must be finite and not negative");
+  }
+  return {};
+}
+
+}  // namespace quoin

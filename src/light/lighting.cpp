@@ -1,0 +1,197 @@
+#include "light/lighting.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "light/corner_light.h"
+#include "light/glass.h"
+
+namespace quoin {
+namespace {
+
+constexpr double kLift = 0.01;  // voxels
+constexpr float kAmbient = 0.15F;
+constexpr float kAmbientWithoutOcclusion = 0.10F;
+constexpr float kLeastOfAll = 0.25F;  // what full occlusion leaves when it darkens everything
+
+std::size_t index_of(Direction face) {
+  return static_cast<std::size_t>(face);
+}
+
+void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
+  rays.direction_x[lane] = direction.x;
+  rays.direction_y[lane] = direction.y;
+  rays.direction_z[lane] = direction.z;
+}
+
+}  // namespace
+
+// Up to sixteen points of one placed grid, with the origins of their rays.
+struct Lighting::Group {
+  std::array<const SurfacePoint*, RayPacket::kSize> points{};
+  std::size_t size = 0;
+  std::int32_t placed = 0;
+  RayPacket origins;
+  std::uint32_t surfaces = 0;  // lanes that are to be lit
+
+  void add(const SurfacePoint& point) {
+    if (point.kind == PointKind::Surface) surfaces |= 1U << size;
+    const FaceFrame& frame = frame_of(point.face);
+    DVec3 origin = point.position;
+    origin[frame.axis] += kLift * frame.sign;
+    origins.origin_x[size] = origin.x;
+    origins.origin_y[size] = origin.y;
+    origins.origin_z[size] = origin.z;
+    set_direction(origins, size, DVec3(normal_of(point.face)));
+    placed = point.placed;
+    points[size++] = &point;
+  }
+};
+
+Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces,
+                   const LightOptions& options)
+    : view_(&view),
+      types_(&types),
+      surfaces_(&surfaces),
+      options_(options),
+      directions_(options.occlusion_rays),
+      exposure_(static_cast<float>(options.exposure)) {
+  // Scaled first: the square of a very small or large number is 0 or infinite.
+  const DVec3 size = glm::abs(options.sun);
+  const DVec3 to_sun = glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
+  for (const PlacedGrid& placed : view.tracer().placed()) {
+    Frame& frame = frames_.emplace_back();
+    frame.to_sun = glm::transpose(placed.world_axes) * to_sun;
+    for (const Direction face : kDirections) {
+      const double cosine = glm::dot(DVec3(normal_of(face)), frame.to_sun);
+      frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0));
+    }
+  }
+}
+
+std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const {
+  if (!options_.lit) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : (*surfaces_)[points[i].type].colour;
+    }
+    return 0;
+  }
+  std::int64_t rays = 0;
+  std::array<Vec3, RayPacket::kSize> lit;
+  // Neighbours of one grid together, each grid's in their order.
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0U);
+  if (frames_.size() > 1) {
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
+  }
+  for (std::size_t begin = 0; begin < order.size();) {
+    Group group;
+    while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
+      const SurfacePoint& next = points[order[begin + group.size]];
+      if (group.size > 0 && next.placed != group.placed) break;
+      group.add(next);
+    }
+    rays += light_group(group, lit);
+    for (std::size_t i = 0; i < group.size; ++i) colours[order[begin + i]] = lit[i];
+    begin += group.size;
+  }
+  return rays;
+}
+
+std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
+  std::array<Vec3, RayPacket::kSize> sunlight;
+  std::array<float, RayPacket::kSize> openness;
+  const std::int64_t rays = find_sunlight(group, sunlight) + find_openness(group, openness);
+  for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], sunlight[i], openness[i]);
+  return rays;
+}
+
+std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunlight) const {
+  const Frame& frame = frames_[static_cast<std::size_t>(group.placed)];
+  RayPacket rays = group.origins;
+  for (std::size_t i = 0; i < group.size; ++i) {
+    const float diffuse = frame.diffuse[index_of(group.points[i]->face)];
+    sunlight[i] = Vec3(diffuse);
+    if (diffuse > 0.0F && (group.surfaces >> i & 1U) != 0) rays.active |= 1U << i;
+  }
+  if (!options_.shadows || rays.active == 0) return 0;
+  rays.direction_x.fill(frame.to_sun.x);
+  rays.direction_y.fill(frame.to_sun.y);
+  rays.direction_z.fill(frame.to_sun.z);
+  rays.max_t.fill(options_.shadow_distance);
+  const std::int64_t count = std::popcount(rays.active);
+  const std::uint32_t blocked = view_->any_hits(group.placed, rays);
+  for (std::uint32_t left = blocked; left != 0; left &= left - 1) {
+    sunlight[static_cast<std::size_t>(std::countr_zero(left))] = Vec3(0.0F);
+  }
+  rays.active &= ~blocked;
+  if (view_->tracer().has_transparent() && rays.active != 0) tint_sunlight(group, rays, sunlight);
+  return count;
+}
+
+void Lighting::tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const {
+  const RayPacket in_view = view_->view_from_grid(group.placed, rays);
+  for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    sunlight[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i]);
+  }
+}
+
+std::int64_t Lighting::find_openness(const Group& group, std::span<float> openness) const {
+  if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
+  if (options_.occlusion == OcclusionMode::Off) return 0;
+  GridReader reader(view_->tracer().placed()[static_cast<std::size_t>(group.placed)].grid->grid);
+  for (std::size_t i = 0; i < group.size; ++i) {
+    const SurfacePoint& point = *group.points[i];
+    openness[i] = 1.0F - corner_level(reader, *types_, point.voxel, point.face, point.position) / 3.0F;
+  }
+  return 0;
+}
+
+std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openness) const {
+  std::array<int, RayPacket::kSize> open{};
+  RayPacket rays = group.origins;
+  rays.active = group.surfaces;
+  rays.max_t.fill(options_.occlusion_distance);
+  const int count = directions_.count();
+  for (int ray = 0; ray < count && rays.active != 0; ++ray) {
+    for (std::size_t i = 0; i < group.size; ++i) {
+      const SurfacePoint& point = *group.points[i];
+      const std::size_t face = index_of(point.face);
+      set_direction(rays, i,
+                    directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
+    }
+    const std::uint32_t blocked = view_->any_hits(group.placed, rays);
+    for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
+  }
+  for (std::size_t i = 0; i < group.size; ++i) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+  return std::int64_t{count} * std::popcount(rays.active);
+}
+
+Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
+  const Surface& surface = (*surfaces_)[point.type];
+  if (point.kind == PointKind::Unlit) return surface.colour;
+  Vec3 colour = surface.emitted;
+  if (point.kind == PointKind::Surface) {
+    Vec3 light(0.0F);
+    if (options_.occlusion == OcclusionMode::Off) {
+      light = kAmbientWithoutOcclusion + sunlight;
+    } else if (options_.occlusion_affects == OcclusionAffects::Ambient) {
+      light = kAmbient * openness + sunlight;
+    } else {
+      light = (kAmbient + sunlight) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
+    }
+    colour += surface.colour * light;
+  }
+  return colour * exposure_;
+}
+
+}  // namespace quoin

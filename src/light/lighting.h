@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/light/light_options.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "light/occlusion_directions.h"
+#include "light/surfaces.h"
+
+namespace quoin {
+
+/// What a point sends towards whoever sees it.
+enum class PointKind : std::uint8_t {
+  Surface,  ///< its lit colour and what it emits
+  Unlit,    ///< its own colour: seen from inside
+  Glow,     ///< only what it emits
+};
+
+/// A point of a voxel's face that is to be lit.
+struct SurfacePoint {
+  DVec3 position{0.0};  ///< in its grid, on the face
+  IVec3 voxel{0};
+  std::int32_t placed = 0;  ///< index into SceneTracer::placed
+  VoxelType type = kAir;
+  Direction face = Direction::PosX;
+  PointKind kind = PointKind::Surface;
+  std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
+};
+
+/// The reference model of light: a sun with shadows, an ambient term with occlusion, and what voxels emit.
+///
+///   colour * (0.15 * openness + diffuse) + emitted, times the exposure,
+///
+/// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way; without occlusion the ambient
+/// term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was
+/// hit.
+class Lighting {
+ public:
+  /// `view` and `surfaces` must outlive it. Requires: `check` accepts the options.
+  Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options);
+
+  /// Linear light of each point, not clamped; answers how many rays that took.
+  ///
+  /// Requires: as many places in `colours` as points. The answer for a point does not depend on the others; neighbours
+  /// should lie side by side, since sixteen are traced together.
+  std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
+
+  /// What the sun sends through everything transparent that a ray passes.
+  [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }
+
+ private:
+  /// Of one placed grid, in its own frame.
+  struct Frame {
+    DVec3 to_sun{0.0};
+    std::array<float, 6> diffuse{};
+  };
+  struct Group;
+  std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
+  std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
+  void tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const;
+  std::int64_t find_openness(const Group& group, std::span<float> openness) const;
+  std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
+  [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
+
+  const SceneView* view_;
+  const VoxelRegistry* types_;
+  const Surfaces* surfaces_;
+  LightOptions options_;
+  OcclusionDirections directions_;
+  std::vector<Frame> frames_;
+  float exposure_ = 1.0F;
+};
+
+}  // namespace quoin

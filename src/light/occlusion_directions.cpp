@@ -1,0 +1,67 @@
+#include "light/occlusion_directions.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <quoin/core/direction.h>
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kTurns = 1024;
+
+struct Basis {
+  DVec3 normal{0.0};
+  DVec3 u{0.0};
+  DVec3 v{0.0};
+};
+
+Basis basis_of(std::size_t face) {
+  const FaceFrame& frame = kFaceFrames[face];
+  Basis basis;
+  basis.normal[frame.axis] = frame.sign;
+  basis.u[frame.u] = 1.0;
+  basis.v[frame.v] = 1.0;
+  return basis;
+}
+
+}  // namespace
+
+OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(rays == 6 || rays == 9) {
+  const double half = std::sqrt(0.5);
+  const double third = std::sqrt(1.0 / 3.0);
+  for (std::size_t face = 0; is_fixed_ && face < 6; ++face) {
+    const auto [n, u, v] = basis_of(face);
+    fixed_[face] = {n, (n + u) * half, (n - u) * half, (n + v) * half, (n - v) * half};
+    if (rays == 6) {
+      fixed_[face][5] = DVec3(kFaceFrames[face].sign * third);
+      continue;
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      fixed_[face][5 + i] = (n + ((i & 1U) != 0 ? -u : u) + ((i & 2U) != 0 ? -v : v)) * third;
+    }
+  }
+  if (is_fixed_) return;
+  const auto angle = [](double radians) { return Angle{std::cos(radians), std::sin(radians)}; };
+  const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
+  for (int ray = 0; ray < rays; ++ray) ring_angles_.push_back(angle(golden * ray));
+  for (std::size_t i = 0; i < kTurns; ++i) {
+    turns_.push_back(angle(2.0 * std::numbers::pi * static_cast<double>(i) / kTurns));
+  }
+}
+
+DVec3 OcclusionDirections::spread(std::size_t face, int ray, std::uint32_t hash) const {
+  const Angle ring = ring_angles_[static_cast<std::size_t>(ray)];
+  const Angle turn = turns_[hash % kTurns];
+  const double shift = (static_cast<double>(hash / kTurns) + 0.5) * (kTurns * 0x1p-32);
+  const double sine_squared = (ray + shift) / count_;
+  const double radius = std::sqrt(sine_squared);
+  const FaceFrame& frame = kFaceFrames[face];
+  DVec3 direction;
+  direction[frame.axis] = frame.sign * std::sqrt(1.0 - sine_squared);
+  direction[frame.u] = radius * (ring.cosine * turn.cosine - ring.sine * turn.sine);
+  direction[frame.v] = radius * (ring.sine * turn.cosine + ring.cosine * turn.sine);
+  return direction;
+}
+
+}  // namespace quoin

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// Where the occlusion rays of each face point, as unit vectors in the grid's frame.
+///
+/// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) times the normal's
+///    sign: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four diagonals. Any other
+///    number: cosine-weighted, one ray in each of as many rings of equal weight, a golden angle apart; the whole is
+///    turned and shifted within the rings by a hash of the pixel.
+class OcclusionDirections {
+ public:
+  explicit OcclusionDirections(int rays);
+
+  [[nodiscard]] int count() const { return count_; }
+  /// Whether all pixels have the same.
+  [[nodiscard]] bool is_fixed() const { return is_fixed_; }
+  /// Requires: `is_fixed`. `face`: a Direction.
+  [[nodiscard]] DVec3 fixed(std::size_t face, int ray) const { return fixed_[face][static_cast<std::size_t>(ray)]; }
+  /// Requires: not `is_fixed`. `hash`: of the pixel.
+  [[nodiscard]] DVec3 spread(std::size_t face, int ray, std::uint32_t hash) const;
+
+ private:
+  int count_;
+  bool is_fixed_;
+  std::array<std::array<DVec3, 9>, 6> fixed_{};
+  struct Angle {
+    double cosine;
+    double sine;
+  };
+  std::vector<Angle> ring_angles_;
+  std::vector<Angle> turns_;
+};
+
+/// A well-mixed number of two, by integers only.
+[[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t a, std::uint32_t b) {
+  // Source: C. Wellons, "lowbias32".
+  std::uint32_t h = a * 0x9E37'79B9U + b * 0x85EB'CA6BU + 0x27D4'EB2FU;
+  h = (h ^ (h >> 16)) * 0x7FEB'352DU;
+  h = (h ^ (h >> 15)) * 0x846C'A68BU;
+  return h ^ (h >> 16);
+}
+
+}  // namespace quoin

@@ -1,0 +1,41 @@
+#include "light/surfaces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "light/srgb.h"
+
+namespace quoin {
+namespace {
+
+Surface surface_of(const VoxelProperties& properties) {
+  Surface surface;
+  const Rgba8 c = properties.colour;
+  surface.colour = {linear_from_srgb(c.r), linear_from_srgb(c.g), linear_from_srgb(c.b)};
+  // What overflows is as bright as can be; negative and NaN emit nothing.
+  const float emission =
+      properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
+  surface.emitted = surface.colour * emission;
+  if (properties.visibility != Visibility::Transparent) return surface;
+  // One voxel covers `alpha` of what lies behind it and tints the rest, the more the more it covers.
+  const float alpha = static_cast<float>(c.a) / 255.0F;
+  surface.log_clarity = std::log(1.0F - alpha);
+  for (int channel = 0; channel < 3; ++channel) {
+    surface.log_transmittance[channel] = std::log((1.0F - alpha) * (1.0F - alpha * (1.0F - surface.colour[channel])));
+  }
+  return surface;
+}
+
+}  // namespace
+
+Surfaces::Surfaces(const VoxelRegistry& types) {
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    surfaces_.push_back(surface_of(types[static_cast<VoxelType>(type)]));
+  }
+  Surface unknown;
+  unknown.colour = {1.0F, 0.0F, 1.0F};
+  surfaces_.push_back(unknown);
+}
+
+}  // namespace quoin

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin {
+
+/// What light needs to know of a type, in linear light.
+struct Surface {
+  Vec3 colour{0.0F};
+  Vec3 emitted{0.0F};  ///< colour * emission
+  /// Natural logarithms of what one voxel's length lets through: of each channel, and of what is not tinted but seen
+  /// past altogether. 0 for what is clear; minus infinity for what lets nothing through.
+  Vec3 log_transmittance{0.0F};
+  float log_clarity = 0.0F;
+};
+
+/// Surfaces by type; an id that is not registered gives a magenta that shows.
+class Surfaces {
+ public:
+  explicit Surfaces(const VoxelRegistry& types);
+  [[nodiscard]] const Surface& operator[](VoxelType type) const {
+    return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
+  }
+
+ private:
+  std::vector<Surface> surfaces_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <quoin/scene/camera.h>
+#include <quoin/trace/packet.h>
+
+namespace quoin {
+
+/// A place in a pixel, 0 to 1 from its upper left corner.
+struct PixelPoint {
+  double x = 0.5;
+  double y = 0.5;
+};
+
+/// Where sample `index` lies in every pixel. The first is the centre; all are a low-discrepancy sequence.
+///
+/// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018): R2.
+[[nodiscard]] PixelPoint sample_point(int index);
+
+/// The rays of a picture, relative to the camera's position (view space).
+class CameraRays {
+ public:
+  /// Pixels across and pixels down. Cost of a block: 16 square roots.
+  static constexpr int kBlock = 4;
+
+  CameraRays(const Camera& camera, int width, int height);
+
+  /// The rays of the 4x4 pixels from (`column`, `row`); lane x + 4 y. Directions are unit, so distances are world
+  /// units. Pixels outside the picture are not active.
+  void block(int column, int row, PixelPoint point, RayPacket& rays) const;
+
+ private:
+  int width_;
+  int height_;
+  bool is_perspective_;
+  DVec3 forward_;
+  // Per pixel to the right and down, and the picture's upper left corner, at a distance of 1.
+  DVec3 right_;
+  DVec3 down_;
+  DVec3 corner_;
+};
+
+}  // namespace quoin

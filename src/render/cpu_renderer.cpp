@@ -1,0 +1,127 @@
+#include <quoin/render/cpu_renderer.h>
+
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+#include "render/tile.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+
+bool is_finite(DVec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+Status check_camera(const Camera& camera) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  if (!is_finite(camera.position)) return refuse("camera: position must be finite");
+  for (const DVec3 axis : {camera.right, camera.up, camera.forward}) {
+    if (!(std::abs(glm::dot(axis, axis) - 1.0) < 1e-3)) return refuse("camera: directions must be unit vectors");
+  }
+  if (camera.projection == Camera::Projection::Perspective) {
+    if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
+      return refuse("camera: field of view must be more than 0 and less than 180 degrees");
+    }
+  } else if (!(camera.view_height > 0.0) || !std::isfinite(camera.view_height)) {
+    return refuse("camera: view height must be finite and more than 0");
+  }
+  return {};
+}
+
+Status check(const Camera& camera, const RenderOptions& options) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
+  if (std::int64_t{options.width} * options.height > kMostPixels) {
+    return refuse("size: more than 268,435,456 pixels");
+  }
+  if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
+  if (const Status camera_status = check_camera(camera); !camera_status) return camera_status;
+  return check(options.light);
+}
+
+Picture empty_picture(const RenderOptions& options) {
+  const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  Picture picture;
+  picture.colour = {options.width, options.height, std::vector<std::uint8_t>(3 * pixels)};
+  if (options.depth) picture.depth = {options.width, options.height, std::vector<float>(pixels)};
+  return picture;
+}
+
+// Counts what is done and tells the listener, one call at a time.
+class ProgressOfTiles {
+ public:
+  ProgressOfTiles(const Progress& listener, std::size_t tiles) : listener_(&listener), tiles_(tiles) {}
+  [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
+  void add(std::int64_t rays, std::int64_t pixels_hit) {
+    const std::lock_guard lock(mutex_);
+    rays_ += rays;
+    pixels_hit_ += pixels_hit;
+    ++done_;
+    if (is_cancelled_ || !*listener_) return;
+    if (!(*listener_)(static_cast<double>(done_) / static_cast<double>(tiles_))) is_cancelled_ = true;
+  }
+  void put_counts(Picture& picture) const {
+    picture.rays = rays_;
+    picture.pixels_hit = pixels_hit_;
+  }
+
+ private:
+  const Progress* listener_;
+  std::size_t tiles_;
+  std::size_t done_ = 0;
+  std::int64_t rays_ = 0;
+  std::int64_t pixels_hit_ = 0;
+  std::mutex mutex_;
+  std::atomic<bool> is_cancelled_{false};
+};
+
+}  // namespace
+
+struct CpuRenderer::Impl {
+  Impl(const Scene& of_scene, bool hidden, Threads threads)
+      : scene(&of_scene), tracer(of_scene, hidden, threads), surfaces(of_scene.types) {}
+
+  const Scene* scene;
+  SceneTracer tracer;
+  Surfaces surfaces;
+};
+
+CpuRenderer::CpuRenderer(const Scene& scene, bool hidden, Threads threads)
+    : impl_(std::make_unique<Impl>(scene, hidden, threads)) {}
+CpuRenderer::CpuRenderer(CpuRenderer&&) noexcept = default;
+CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
+CpuRenderer::~CpuRenderer() = default;
+
+Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
+                                    const Progress& progress) const {
+  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  const SceneView view(impl_->tracer, camera.position, options.instructions);
+  const CameraRays rays(camera, options.width, options.height);
+  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light);
+  const TileContext context{&view, &rays, &lighting, &options};
+  Picture picture = empty_picture(options);
+  const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
+  const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;
+  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  ProgressOfTiles done(progress, tiles);
+  parallel_for(tiles, options.threads, [&](std::size_t i) {
+    if (done.is_cancelled()) return;
+    const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * Tile::kEdge;
+    const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * Tile::kEdge;
+    Tile tile(context, column, row);
+    tile.render();
+    tile.write_to(picture);
+    done.add(tile.rays(), tile.pixels_hit());
+  });
+  if (done.is_cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+  done.put_counts(picture);
+  return picture;
+}
+
+}  // namespace quoin

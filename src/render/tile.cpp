@@ -1,0 +1,170 @@
+#include "render/tile.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <optional>
+
+#include <glm/common.hpp>
+
+#include "light/sky.h"
+#include "light/srgb.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kBlock = CameraRays::kBlock;
+// Secondary rays start at least this far inside the face that was hit, in voxels, so that they start in front of it
+// whatever the rounding.
+constexpr double kRim = 1e-6;
+
+// Where a ray meets a face, in the grid.
+DVec3 on_face(DVec3 position, IVec3 voxel, Direction face) {
+  const FaceFrame& frame = frame_of(face);
+  const DVec3 low(voxel);
+  DVec3 point = glm::clamp(position, low + kRim, low + (1.0 - kRim));
+  point[frame.axis] = low[frame.axis] + (frame.sign > 0 ? 1.0 : 0.0);
+  return point;
+}
+
+}  // namespace
+
+Tile::Tile(const TileContext& context, int column, int row) : context_(&context), column_(column), row_(row) {
+  points_.reserve(kPixels);
+  targets_.reserve(kPixels);
+}
+
+void Tile::render() {
+  const int samples = context_->options->samples;
+  for (int sample = 0; sample < samples; ++sample) {
+    take_sample(sample);
+    for (std::size_t i = 0; i < kPixels; ++i) {
+      // The minimum is taken second: what is not a number becomes 0.
+      sum_[i] += glm::min(glm::max(Vec3(0.0F), sample_[i]), Vec3(1.0F));
+    }
+  }
+}
+
+void Tile::take_sample(int sample) {
+  points_.clear();
+  targets_.clear();
+  sample_seed_ = hash_of(static_cast<std::uint32_t>(sample), 0);
+  const PixelPoint point = sample_point(sample);
+  RayPacket rays;
+  for (int y = 0; y < kEdge; y += kBlock) {
+    for (int x = 0; x < kEdge; x += kBlock) {
+      context_->camera->block(column_ + x, row_ + y, point, rays);
+      if (rays.active != 0) take_block(x, y, rays, sample);
+    }
+  }
+  light_points();
+}
+
+void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
+  SceneHits hits;
+  context_->view->first_hits(rays, hits);
+  rays_ += std::popcount(rays.active);
+  std::uint32_t through_glass = 0;
+  if (context_->view->tracer().has_transparent()) {
+    RayPacket visible = rays;
+    for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+      if ((hits.grids.hit >> i & 1U) != 0) visible.max_t[i] = hits.grids.t[i];
+    }
+    through_glass = context_->view->any_transparent(visible);
+  }
+  if (sample == 0) pixels_hit_ += std::popcount(hits.grids.hit | through_glass);
+  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    const auto pixel = static_cast<std::size_t>((y + lane / kBlock) * kEdge + x + lane % kBlock);
+    const bool is_hit = (hits.grids.hit >> lane & 1U) != 0;
+    const double t = is_hit ? hits.grids.t[i] : std::numeric_limits<double>::infinity();
+    if (sample == 0) depth_[pixel] = static_cast<float>(t);
+    Vec3 weight(1.0F);
+    if ((through_glass >> lane & 1U) != 0) {
+      weight = add_glass(rays.ray(lane), t, pixel);
+      if (sample == 0 && !glass_.empty()) depth_[pixel] = static_cast<float>(glass_.front().t_enter);
+    }
+    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * sky_colour(static_cast<float>(rays.direction_y[i]));
+    if (is_hit) add_opaque(lane, rays, hits, pixel, weight);
+  }
+}
+
+void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight) {
+  const auto i = static_cast<std::size_t>(lane);
+  const Ray ray = rays.ray(lane);
+  SurfacePoint point;
+  point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
+  point.face = hits.grids.face[i];
+  point.placed = hits.placed[i];
+  point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
+  add_point(point, pixel, weight);
+}
+
+Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
+  const Surfaces& surfaces = context_->lighting->surfaces();
+  find_glass(*context_->view, surfaces, ray, max_t, glass_);
+  Vec3 passed(1.0F);
+  for (const GlassBody& body : glass_) {
+    const Surface& surface = surfaces[body.type];
+    SurfacePoint point;
+    point.voxel = body.voxel;
+    point.face = body.face;
+    point.placed = body.placed;
+    point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
+    // Seen from inside, it tints and glows but has no surface.
+    if (body.starts_inside) point.kind = PointKind::Glow;
+    add_point(point, pixel, passed * own_share(surface, body.voxels));
+    passed *= transmittance(surface, body.voxels);
+  }
+  return passed;
+}
+
+void Tile::add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight) {
+  SurfacePoint& added = points_.emplace_back(point);
+  added.position = on_face(point.position, point.voxel, point.face);
+  const auto x = static_cast<std::uint32_t>(column_) + static_cast<std::uint32_t>(pixel % kEdge);
+  const auto y = static_cast<std::uint32_t>(row_) + static_cast<std::uint32_t>(pixel / kEdge);
+  added.pixel = hash_of(x, y) ^ sample_seed_;
+  targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
+}
+
+void Tile::light_points() {
+  const std::vector<PlacedGrid>& placed = context_->view->tracer().placed();
+  std::optional<GridReader> reader;
+  std::int32_t known = -1;
+  for (SurfacePoint& point : points_) {
+    if (point.placed != known) {
+      known = point.placed;
+      reader.emplace(placed[static_cast<std::size_t>(known)].grid->grid);
+    }
+    point.type = reader->get(point.voxel);
+  }
+  lit_.resize(points_.size());
+  rays_ += context_->lighting->light(points_, lit_);
+  for (std::size_t i = 0; i < points_.size(); ++i) sample_[targets_[i].pixel] += targets_[i].weight * lit_[i];
+}
+
+void Tile::write_to(Picture& picture) const {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  const int width = picture.colour.width;
+  const int columns = std::min(kEdge, width - column_);
+  const int rows = std::min(kEdge, picture.colour.height - row_);
+  const auto samples = static_cast<float>(context_->options->samples);
+  for (int y = 0; y < rows; ++y) {
+    const std::size_t from = static_cast<std::size_t>(y) * kEdge;
+    const std::size_t to =
+        static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column_);
+    std::uint8_t* rgb = picture.colour.rgb.data() + 3 * to;
+    for (int x = 0; x < columns; ++x) {
+      const Vec3 mean = sum_[from + static_cast<std::size_t>(x)] / samples;
+      for (int channel = 0; channel < 3; ++channel) *rgb++ = encode(mean[channel]);
+    }
+    if (picture.depth.values.empty()) continue;
+    std::copy_n(depth_.begin() + static_cast<std::ptrdiff_t>(from), columns,
+                picture.depth.values.begin() + static_cast<std::ptrdiff_t>(to));
+  }
+}
+
+}  // namespace quoin

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "light/glass.h"
+#include "light/lighting.h"
+#include "render/camera_rays.h"
+
+namespace quoin {
+
+/// What all tiles of a picture share.
+struct TileContext {
+  const SceneView* view = nullptr;
+  const CameraRays* camera = nullptr;
+  const Lighting* lighting = nullptr;
+  const RenderOptions* options = nullptr;
+};
+
+/// One square of a picture: its rays, what they hit, and the light of that.
+class Tile {
+ public:
+  static constexpr int kEdge = 32;  ///< pixels; a multiple of CameraRays::kBlock
+
+  /// `column` and `row` are of its upper left pixel.
+  Tile(const TileContext& context, int column, int row);
+
+  /// All samples of all pixels. The same numbers whatever the tile's size and place.
+  void render();
+  /// Puts the pixels that lie in the picture in place.
+  void write_to(Picture& picture) const;
+
+  [[nodiscard]] std::int64_t rays() const { return rays_; }
+  [[nodiscard]] std::int64_t pixels_hit() const { return pixels_hit_; }
+
+ private:
+  static constexpr std::size_t kPixels = std::size_t{kEdge} * kEdge;
+
+  void take_sample(int sample);
+  void take_block(int x, int y, const RayPacket& rays, int sample);
+  void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
+  // Adds what is seen of the glass before `max_t`; answers what passes through it.
+  Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);
+  void add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight);
+  void light_points();
+
+  const TileContext* context_;
+  int column_;
+  int row_;
+  std::uint32_t sample_seed_ = 0;
+  std::int64_t rays_ = 0;
+  std::int64_t pixels_hit_ = 0;
+  std::array<Vec3, kPixels> sum_{};     // of the samples so far
+  std::array<Vec3, kPixels> sample_{};  // the present one
+  std::array<float, kPixels> depth_{};
+  // Of the present sample: what is to be lit, and where and how much of it counts.
+  struct Target {
+    std::uint32_t pixel = 0;
+    Vec3 weight{1.0F};
+  };
+  std::vector<SurfacePoint> points_;
+  std::vector<Target> targets_;
+  std::vector<Vec3> lit_;
+  std::vector<GlassBody> glass_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,92 @@
+#include <quoin/scene/scene_tracer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "scene/instance_axes.h"
+#include "scene/scene_tracer_impl.h"
+
+namespace quoin {
+namespace {
+
+bool is_finite(DVec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool can_be_traced(const Instance& instance, const SceneGrid& grid) {
+  const DQuat& q = instance.rotation;
+  return is_finite(instance.position) && is_finite(grid.pivot) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&
+         std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0 && !grid.grid.bounds().empty();
+}
+
+// In the world, with room for rounding.
+DBox bounds_of(const Instance& instance, const SceneGrid& grid) {
+  const IBox tight = grid.grid.bounds();
+  DBox box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
+                      (corner & 4) != 0 ? tight.max.z : tight.min.z};
+    box.extend(world_from_grid(instance, grid, point));
+  }
+  const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
+  return {box.min - room, box.max + room};
+}
+
+bool has_transparent_types(const Grid& grid, const VoxelRegistry& types) {
+  const std::vector<VoxelType> all = grid.types();
+  return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
+}
+
+}  // namespace
+
+SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
+  std::map<GridHandle, std::size_t> slots;
+  std::vector<const SceneGrid*> grids;
+  std::vector<DBox> boxes;
+  std::vector<std::size_t> slot_of;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const SceneGrid* grid = scene.grids().find(instance.grid);
+    if (grid == nullptr || (!instance.visible && !hidden) || !can_be_traced(instance, *grid)) continue;
+    const auto [found, is_new] = slots.try_emplace(instance.grid, grids.size());
+    if (is_new) grids.push_back(grid);
+    slot_of.push_back(found->second);
+    boxes.push_back(bounds_of(instance, *grid));
+    PlacedGrid& placed = impl_->placed.emplace_back();
+    placed.instance = handle;
+    placed.grid = grid;
+    placed.world_axes = world_axes(instance);
+    placed.position = instance.position;
+    placed.voxel_size = instance.voxel_size;
+  }
+  impl_->trees.resize(grids.size());
+  parallel_for(grids.size(), threads, [&](std::size_t i) {
+    const Grid& grid = grids[i]->grid;
+    Impl::Trees& trees = impl_->trees[i];
+    trees.opaque = OccupancyTree::build(grid, scene.types, Occupancy::Opaque);
+    if (has_transparent_types(grid, scene.types)) {
+      trees.transparent.emplace(OccupancyTree::build(grid, scene.types, Occupancy::Transparent));
+    }
+  });
+  for (std::size_t i = 0; i < slot_of.size(); ++i) {
+    const Impl::Trees& trees = impl_->trees[slot_of[i]];
+    impl_->placed[i].opaque = &trees.opaque;
+    impl_->placed[i].transparent = trees.transparent ? &*trees.transparent : nullptr;
+    impl_->has_transparent |= trees.transparent.has_value();
+  }
+  impl_->instances = InstanceTree(std::move(boxes));
+}
+
+SceneTracer::SceneTracer(SceneTracer&&) noexcept = default;
+SceneTracer& SceneTracer::operator=(SceneTracer&&) noexcept = default;
+SceneTracer::~SceneTracer() = default;
+
+const std::vector<PlacedGrid>& SceneTracer::placed() const {
+  return impl_->placed;
+}
+bool SceneTracer::has_transparent() const {
+  return impl_->has_transparent;
+}
+
+}  // namespace quoin

@@ -1,0 +1,178 @@
+#include <bit>
+#include <functional>
+
+#include <glm/matrix.hpp>
+
+#include "scene/scene_tracer_impl.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kLanes = RayPacket::kSize;
+
+// Moves points and directions from one space to another.
+struct Affine {
+  glm::dmat3 axes{1.0};
+  DVec3 offset{0.0};
+  [[nodiscard]] DVec3 point(DVec3 p) const { return axes * p + offset; }
+};
+
+void turn(const glm::dmat3& axes, const RayPacket::Lanes<double> (&from)[3], DVec3 offset, RayPacket::Lanes<double>& x,
+          RayPacket::Lanes<double>& y, RayPacket::Lanes<double>& z) {
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const double fx = from[0][i];
+    const double fy = from[1][i];
+    const double fz = from[2][i];
+    x[i] = axes[0].x * fx + axes[1].x * fy + axes[2].x * fz + offset.x;
+    y[i] = axes[0].y * fx + axes[1].y * fy + axes[2].y * fz + offset.y;
+    z[i] = axes[0].z * fx + axes[1].z * fy + axes[2].z * fz + offset.z;
+  }
+}
+
+void move(const Affine& by, const RayPacket& from, RayPacket& to) {
+  turn(by.axes, {from.origin_x, from.origin_y, from.origin_z}, by.offset, to.origin_x, to.origin_y, to.origin_z);
+  turn(by.axes, {from.direction_x, from.direction_y, from.direction_z}, DVec3(0.0), to.direction_x, to.direction_y,
+       to.direction_z);
+  to.max_t = from.max_t;
+  to.active = from.active;
+}
+
+}  // namespace
+
+struct SceneView::Impl {
+  const SceneTracer* tracer = nullptr;
+  InstructionSet instructions = InstructionSet::Best;
+  std::vector<Affine> grid_from_view;
+  std::vector<Affine> view_from_grid;
+  InstanceTree instances;  // in view space
+  bool is_alone = false;   // there is one instance
+
+  void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
+    for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const auto i = static_cast<std::size_t>(lane);
+      const std::uint32_t bit = 1U << lane;
+      const auto index = static_cast<std::int32_t>(placed);
+      if ((hits.grids.hit & bit) != 0) {
+        if (found.t[i] > hits.grids.t[i]) continue;
+        if (found.t[i] == hits.grids.t[i] && index > hits.placed[i]) continue;
+      }
+      hits.grids.hit |= bit;
+      hits.grids.starts_inside = (hits.grids.starts_inside & ~bit) | (found.starts_inside & bit);
+      hits.grids.x[i] = found.x[i], hits.grids.y[i] = found.y[i], hits.grids.z[i] = found.z[i];
+      hits.grids.t[i] = found.t[i];
+      hits.grids.face[i] = found.face[i];
+      hits.placed[i] = index;
+      rays.max_t[i] = found.t[i];
+    }
+  }
+};
+
+SceneView::SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet instructions)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->tracer = &tracer;
+  impl_->instructions = instructions;
+  for (const PlacedGrid& placed : tracer.placed()) {
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 position = placed.position - origin;
+    const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
+    impl_->grid_from_view.push_back({grid_axes, placed.grid->pivot - grid_axes * position});
+    const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
+    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.grid->pivot});
+  }
+  impl_->instances = tracer.impl_->instances.moved(-origin);
+  impl_->is_alone = tracer.placed().size() == 1;
+}
+
+SceneView::SceneView(SceneView&&) noexcept = default;
+SceneView& SceneView::operator=(SceneView&&) noexcept = default;
+SceneView::~SceneView() = default;
+
+const SceneTracer& SceneView::tracer() const {
+  return *impl_->tracer;
+}
+
+void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
+  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
+  RayPacket rays;
+  hits.grids.hit = hits.grids.starts_inside = 0;
+  if (impl_->is_alone) {
+    move(impl_->grid_from_view[0], rays_in_view, rays);
+    quoin::first_hits(*placed[0].opaque, rays, hits.grids, impl_->instructions);
+    hits.placed.fill(0);
+    return;
+  }
+  if (rays_in_view.active == 0) return;
+  RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
+  RayInterval interval = interval_of(left);
+  PacketHits found;
+  impl_->instances.visit(interval, [&](std::size_t i) {
+    move(impl_->grid_from_view[i], left, rays);
+    quoin::first_hits(*placed[i].opaque, rays, found, impl_->instructions);
+    if (found.hit == 0) return true;
+    impl_->take_nearer(i, found, left, hits);
+    if (hits.grids.hit == left.active) interval.max_t = interval_of(left).max_t;
+    return true;
+  });
+}
+
+std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
+  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
+  const auto own = static_cast<std::size_t>(home);
+  std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid, impl_->instructions);
+  if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
+  RayPacket in_view;
+  move(impl_->view_from_grid[own], rays_in_grid, in_view);
+  in_view.active &= ~blocked;
+  RayInterval interval = interval_of(in_view);
+  RayPacket rays;
+  impl_->instances.visit(interval, [&](std::size_t i) {
+    if (i == own) return true;
+    move(impl_->grid_from_view[i], in_view, rays);
+    const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays, impl_->instructions);
+    blocked |= found;
+    in_view.active &= ~found;
+    return in_view.active != 0;
+  });
+  return blocked;
+}
+
+std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
+  if (rays_in_view.active == 0 || !impl_->tracer->has_transparent()) return 0;
+  RayPacket left = rays_in_view;
+  RayInterval interval = interval_of(left);
+  RayPacket rays;
+  impl_->instances.visit(interval, [&](std::size_t i) {
+    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
+    if (tree == nullptr) return true;
+    move(impl_->grid_from_view[i], left, rays);
+    left.active &= ~quoin::any_hits(*tree, rays, impl_->instructions);
+    return left.active != 0;
+  });
+  return rays_in_view.active & ~left.active;
+}
+
+void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
+                                  const std::function<bool(const TransparentSpan&)>& visit) const {
+  RayInterval interval{ray_in_view.origin, ray_in_view.origin, ray_in_view.direction, ray_in_view.direction, max_t};
+  impl_->instances.visit(interval, [&](std::size_t i) {
+    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
+    if (tree == nullptr) return true;
+    const Affine& to_grid = impl_->grid_from_view[i];
+    const Ray ray{to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction};
+    visit_hits(*tree, ray, max_t, [&](const VoxelSpan& span) { return visit({span, static_cast<std::int32_t>(i)}); });
+    return true;
+  });
+}
+
+DVec3 SceneView::grid_from_view(std::int32_t placed, DVec3 point_in_view) const {
+  return impl_->grid_from_view[static_cast<std::size_t>(placed)].point(point_in_view);
+}
+
+RayPacket SceneView::view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const {
+  RayPacket rays;
+  move(impl_->view_from_grid[static_cast<std::size_t>(placed)], rays_in_grid, rays);
+  return rays;
+}
+
+}  // namespace quoin
