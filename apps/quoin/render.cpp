@@ -41,7 +41,7 @@ Result<Camera> camera_for(const Scene& scene, const RenderArguments& arguments) 
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
   }
   const double aspect = static_cast<double>(arguments.render.width) / arguments.render.height;
-  return frame_view(scene.bounds(arguments.common.load.hidden), arguments.view, aspect);
+  return frame_scene(scene, arguments.view, aspect, arguments.common.load.hidden);
 }
 
 void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& picture,

@@ -7,7 +7,10 @@
 #include <limits>
 #include <numbers>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
+#include "scene/framing.h"
 
 namespace quoin {
 
@@ -43,22 +46,10 @@ void turn(Camera& camera, DVec3 forward) {
   camera.up = glm::cross(camera.right, camera.forward);
 }
 
-/// A box that has an inside, and its corners relative to its middle.
-struct Corners {
-  DVec3 middle;
-  std::array<DVec3, 8> offsets;
-};
-
-Corners corners_of(const DBox& bounds) {
-  DBox box = bounds.empty() ? DBox{DVec3{0.0}, DVec3{1.0}} : bounds;
-  if (box.min == box.max) box = {box.min - 0.5, box.max + 0.5};
-  Corners corners{box.min + 0.5 * (box.max - box.min), {}};
-  for (std::size_t i = 0; i < 8; ++i) {
-    const DVec3 corner{(i & 1U) != 0 ? box.max.x : box.min.x, (i & 2U) != 0 ? box.max.y : box.min.y,
-                       (i & 4U) != 0 ? box.max.z : box.min.z};
-    corners.offsets[i] = corner - corners.middle;
-  }
-  return corners;
+/// The box to frame: one that has an inside.
+DBox box_to_frame(const DBox& bounds) {
+  if (bounds.empty()) return {DVec3{0.0}, DVec3{1.0}};
+  return bounds.min == bounds.max ? DBox{bounds.min - 0.5, bounds.max + 0.5} : bounds;
 }
 
 /// Where a camera must stand, along one axis of the picture and along its view, to see all corners.
@@ -67,16 +58,10 @@ struct Stand {
   double forward;  ///< the furthest that it may go
 };
 
-/// Each corner at depth f may lie up to `slope * (f - stand)` to either side.
-Stand stand_for(const std::array<DVec3, 8>& offsets, DVec3 axis, DVec3 forward, double slope) {
-  double greatest = -std::numeric_limits<double>::infinity();
-  double least = greatest;
-  for (const DVec3& offset : offsets) {
-    const double side = glm::dot(offset, axis);
-    const double reach = slope * glm::dot(offset, forward);
-    greatest = std::max(greatest, side - reach);
-    least = std::max(least, -side - reach);
-  }
+/// Each point at depth f may lie up to `slope * (f - stand)` to either side.
+Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
+  const double greatest = reach(axis - slope * forward);
+  const double least = reach(-axis - slope * forward);
   return {0.5 * (greatest - least), -0.5 * (greatest + least) / slope};
 }
 
@@ -106,19 +91,25 @@ std::optional<View> view_of_name(std::string_view name) {
   return std::nullopt;
 }
 
-Camera frame_view(const DBox& bounds, View view, double aspect) {
+Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
   assert(aspect > 0.0 && std::isfinite(aspect));
-  assert(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)));
   Camera camera;
   camera.vertical_fov = kFramingFov;
   turn(camera, kViews[static_cast<std::size_t>(view)].forward);
-  const Corners corners = corners_of(bounds);
   const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
-  const Stand level = stand_for(corners.offsets, camera.right, camera.forward, slope * aspect);
-  const Stand upright = stand_for(corners.offsets, camera.up, camera.forward, slope);
-  camera.position = corners.middle + level.across * camera.right + upright.across * camera.up +
+  const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);
+  const Stand upright = stand_for(reach, camera.up, camera.forward, slope);
+  camera.position = middle + level.across * camera.right + upright.across * camera.up +
                     std::min(level.forward, upright.forward) * camera.forward;
   return camera;
+}
+
+Camera frame_view(const DBox& bounds, View view, double aspect) {
+  assert(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)));
+  const DBox box = box_to_frame(bounds);
+  const DVec3 half = 0.5 * (box.max - box.min);
+  return frame(
+      box.min + half, [half](DVec3 direction) { return glm::dot(glm::abs(direction), half); }, view, aspect);
 }
 
 }  // namespace quoin

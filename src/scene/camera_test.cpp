@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
+#include <quoin/scene/scene.h>
 
 namespace quoin {
 namespace {
@@ -178,6 +179,68 @@ TEST(Camera, FramedBoxesLieWithinThePictureAndFillIt) {
       expect_framed({{1e9, -1e9, 1e9}, {1e9 + 1, -1e9 + 1, 1e9 + 1}}, view, aspect);
     }
   }
+}
+
+/// A few voxels in grids that are turned, mirrored and of other sizes.
+Scene scattered_scene(std::mt19937_64& random) {
+  const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  Scene scene;
+  for (int i = 0; i < 3; ++i) {
+    SceneGrid grid;
+    grid.pivot = {between(-50, 50), between(-50, 50), between(-50, 50)};
+    for (int j = 0; j < 40; ++j) {
+      const DVec3 voxel{between(-90, 90), between(-40, 40), between(-90, 90)};
+      grid.grid.set(IVec3(voxel), 1);
+    }
+    Instance instance;
+    instance.grid = scene.add_grid(std::move(grid));
+    instance.position = {between(-1e6, 1e6), between(-100, 100), between(-100, 100)};
+    instance.rotation = glm::normalize(DQuat(between(-1, 1), between(-1, 1), between(-1, 1), between(-1, 1)));
+    instance.voxel_size = std::exp2(between(-2, 2));
+    instance.mirrored = i == 1;
+    instance.visible = i != 2;
+    scene.add_instance(instance);
+  }
+  return scene;
+}
+
+/// How far the scene's voxels reach to each side of the picture.
+Extent extent_of(const Camera& camera, double aspect, const Scene& scene, bool hidden_too) {
+  Extent all;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const SceneGrid& grid = scene.grids()[instance.grid];
+    if (!instance.visible && !hidden_too) continue;
+    grid.grid.for_each([&](IVec3 voxel, VoxelType) {
+      for (unsigned i = 0; i < 8; ++i) {
+        const DVec3 corner = DVec3(voxel) + DVec3{i & 1U, i >> 1U & 1U, i >> 2U & 1U};
+        const InPicture p = project(camera, aspect, world_from_grid(instance, grid, corner));
+        all.left = std::max(all.left, -p.x);
+        all.right = std::max(all.right, p.x);
+        all.low = std::max(all.low, -p.y);
+        all.high = std::max(all.high, p.y);
+        all.depth = std::min(all.depth, p.depth);
+      }
+    });
+  }
+  return all;
+}
+
+TEST(Camera, FramedScenesFillThePictureWithTheirVoxels) {
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 30; ++i) {
+    const Scene scene = scattered_scene(random);
+    const bool hidden_too = i % 2 == 0;
+    for (const View view : kAllViews) {
+      const double aspect = i % 3 == 0 ? 0.6 : 1.8;
+      const Extent extent = extent_of(frame_scene(scene, view, aspect, hidden_too), aspect, scene, hidden_too);
+      EXPECT_GT(extent.depth, 0.0);
+      for (const double side : {extent.left, extent.right, extent.low, extent.high}) EXPECT_LE(side, 0.92 + 1e-6);
+      EXPECT_TRUE(std::min(extent.left, extent.right) > 0.92 - 1e-6 || std::min(extent.low, extent.high) > 0.92 - 1e-6)
+          << "view " << static_cast<int>(view);
+    }
+  }
+  EXPECT_EQ(frame_scene({}, View::Iso, 1.5).position, frame_view({}, View::Iso, 1.5).position);
 }
 
 TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
