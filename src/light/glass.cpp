@@ -60,23 +60,21 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
   if (!out.empty()) out.resize(kept + 1);
 }
 
-Vec3 transmittance(const Surface& surface, double voxels) {
-  if (!(voxels > 0.0)) return Vec3(1.0F);
-  const auto length = static_cast<float>(voxels);
-  const Vec3 exponent = surface.log_transmittance * length;
-  return {std::exp(exponent.x), std::exp(exponent.y), std::exp(exponent.z)};
-}
-
-float own_share(const Surface& surface, double voxels) {
-  if (!(voxels > 0.0)) return 0.0F;
-  return 1.0F - std::exp(surface.log_clarity * static_cast<float>(voxels));
+GlassLook look_of(const Surface& surface, const GlassBody& body) {
+  const auto length = static_cast<float>(std::max(body.voxels, body.starts_inside ? 0.0 : 1.0));
+  // No length, no matter how dark the material: minus infinity times 0 is not a number.
+  const auto through = [&](float logarithm) { return length > 0.0F ? std::exp(logarithm * length) : 1.0F; };
+  GlassLook look;
+  for (int channel = 0; channel < 3; ++channel) look.passed[channel] = through(surface.log_transmittance[channel]);
+  look.own = 1.0F - through(surface.log_clarity);
+  return look;
 }
 
 Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t) {
   Vec3 passed(1.0F);
   std::vector<GlassBody> bodies;
   find_glass(view, surfaces, ray_in_view, max_t, bodies);
-  for (const GlassBody& body : bodies) passed *= transmittance(surfaces[body.type], body.voxels);
+  for (const GlassBody& body : bodies) passed *= look_of(surfaces[body.type], body).passed;
   return passed;
 }
 

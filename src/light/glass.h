@@ -26,10 +26,15 @@ struct GlassBody {
 void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
                 std::vector<GlassBody>& out);
 
-/// What of each channel passes through a length of a surface's material (Beer and Lambert).
-[[nodiscard]] Vec3 transmittance(const Surface& surface, double voxels);
-/// The share of its own colour that such a length shows: what it does not let see past.
-[[nodiscard]] float own_share(const Surface& surface, double voxels);
+/// How a body looks to whoever looks through it.
+struct GlassLook {
+  Vec3 passed{1.0F};  ///< what of each channel comes through
+  float own = 0.0F;   ///< the share of the body's own colour; `passed` and `own` together are at most 1
+};
+
+/// A length of a material lets through what Beer and Lambert say, and shows its own colour in place of what it does not
+/// let see past. A body that a ray enters counts as one voxel long at least, so that its edges are crisp.
+[[nodiscard]] GlassLook look_of(const Surface& surface, const GlassBody& body);
 
 /// What of each channel passes through everything transparent on a ray.
 [[nodiscard]] Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view,

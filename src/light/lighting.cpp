@@ -106,8 +106,8 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
 }
 
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
-  std::array<Vec3, RayPacket::kSize> sunlight;
-  std::array<float, RayPacket::kSize> openness;
+  std::array<Vec3, RayPacket::kSize> sunlight{};
+  std::array<float, RayPacket::kSize> openness{};
   const std::int64_t rays = find_sunlight(group, sunlight) + find_openness(group, openness);
   for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], sunlight[i], openness[i]);
   return rays;

@@ -50,7 +50,6 @@ class Lighting {
   /// should lie side by side, since sixteen are traced together.
   std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
 
-  /// What the sun sends through everything transparent that a ray passes.
   [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }
 
  private:

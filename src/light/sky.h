@@ -15,7 +15,7 @@ namespace quoin {
   constexpr float kGroundIsFull = -0.30F;
   const Vec3 zenith{0.145F, 0.335F, 0.700F};
   const Vec3 horizon{0.640F, 0.780F, 0.900F};
-  const Vec3 ground{0.240F, 0.235F, 0.225F};
+  const Vec3 ground{0.400F, 0.410F, 0.430F};
   const float y = std::clamp(up, -1.0F, 1.0F);
   if (y >= 0.0F) {
     const float low = (1.0F - y) * (1.0F - y);

@@ -107,7 +107,7 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   find_glass(*context_->view, surfaces, ray, max_t, glass_);
   Vec3 passed(1.0F);
   for (const GlassBody& body : glass_) {
-    const Surface& surface = surfaces[body.type];
+    const GlassLook look = look_of(surfaces[body.type], body);
     SurfacePoint point;
     point.voxel = body.voxel;
     point.face = body.face;
@@ -115,8 +115,8 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
     point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
     // Seen from inside, it tints and glows but has no surface.
     if (body.starts_inside) point.kind = PointKind::Glow;
-    add_point(point, pixel, passed * own_share(surface, body.voxels));
-    passed *= transmittance(surface, body.voxels);
+    add_point(point, pixel, passed * look.own);
+    passed *= look.passed;
   }
   return passed;
 }
