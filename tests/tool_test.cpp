@@ -294,7 +294,7 @@ TEST_F(Tool, help_has_an_example_for_every_command) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;
-  for (const std::string command : {"info", "convert", "render"}) {
+  for (const std::string command : {"info", "convert", "render", "generate"}) {
     EXPECT_NE(all.out.find(command), std::string::npos);
     const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);

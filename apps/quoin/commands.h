@@ -34,5 +34,6 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
 void add_render_command(CLI::App& app, int& status);
+void add_generate_command(CLI::App& app, int& status);
 
 }  // namespace quoin::tool

@@ -84,6 +84,7 @@ int run(int argc, char** argv) {
   add_convert_command(app, status);
   add_render_command(app, status);
   const Arguments arguments = readable_arguments(argc, argv);
+  add_generate_command(app, status);
   try {
     app.parse(Arguments(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::ParseError& error) {
