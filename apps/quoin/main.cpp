@@ -83,8 +83,8 @@ int run(int argc, char** argv) {
   add_info_command(app, status);
   add_convert_command(app, status);
   add_render_command(app, status);
-  const Arguments arguments = readable_arguments(argc, argv);
   add_generate_command(app, status);
+  const Arguments arguments = readable_arguments(argc, argv);
   try {
     app.parse(Arguments(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::ParseError& error) {

@@ -20,7 +20,7 @@ struct PngImage {
 /// What to spend on a small file.
 enum class PngEffort : std::uint8_t {
   Smallest,  ///< for palettes
-  Quick,     ///< for pictures: a third of the time, some 10 % more bytes
+  Quick,     ///< for pictures: a third of the time, some 10 to 20 % more bytes
 };
 
 /// A PNG file without colour-space chunks, so that readers take the numbers as they are; the same bytes on every run.
