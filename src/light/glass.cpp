@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <glm/geometric.hpp>
 
@@ -25,12 +26,16 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
   out.clear();
   const double length = glm::length(ray_in_view.direction);
   std::int32_t last_placed = -1;
+  std::optional<GridReader> voxels_of;
   double clarity = 0.0;
   view.visit_transparent(ray_in_view, max_t, [&](const TransparentSpan& found) {
     const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(found.placed)];
-    if (found.placed != last_placed) clarity = 0.0;
+    if (found.placed != last_placed) {
+      clarity = 0.0;
+      voxels_of.emplace(placed.grid->grid);
+    }
     const VoxelSpan& span = found.span;
-    const VoxelType type = placed.grid->grid.get(span.voxel);
+    const VoxelType type = voxels_of->get(span.voxel);
     const double t_exit = std::min(span.t_exit, max_t);
     const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size;
     const GlassBody next{found.placed, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};

@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -32,6 +31,23 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
 
 }  // namespace
 
+// The points' indices: those of one grid together, in it those of one face, so that most groups of sixteen have all
+// their rays in parallel (7 % of a picture's time).
+std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint> points) const {
+  std::array<std::size_t, 7> begin{};
+  for (const SurfacePoint& point : points) ++begin[index_of(point.face) + 1];
+  for (std::size_t face = 1; face < begin.size(); ++face) begin[face] += begin[face - 1];
+  std::vector<std::uint32_t> order(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    order[begin[index_of(points[i].face)]++] = static_cast<std::uint32_t>(i);
+  }
+  if (frames_.size() > 1) {
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
+  }
+  return order;
+}
+
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
   std::array<const SurfacePoint*, RayPacket::kSize> points{};
@@ -39,6 +55,7 @@ struct Lighting::Group {
   std::int32_t placed = 0;
   RayPacket origins;
   std::uint32_t surfaces = 0;  // lanes that are to be lit
+  bool is_one_face = true;
 
   void add(const SurfacePoint& point) {
     if (point.kind == PointKind::Surface) surfaces |= 1U << size;
@@ -50,6 +67,7 @@ struct Lighting::Group {
     origins.origin_z[size] = origin.z;
     set_direction(origins, size, DVec3(normal_of(point.face)));
     placed = point.placed;
+    is_one_face &= size == 0 || point.face == points[0]->face;
     points[size++] = &point;
   }
 };
@@ -84,13 +102,7 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
   }
   std::int64_t rays = 0;
   std::array<Vec3, RayPacket::kSize> lit;
-  // Neighbours of one grid together, each grid's in their order.
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  if (frames_.size() > 1) {
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
-  }
+  const std::vector<std::uint32_t> order = coherent_order(points);
   for (std::size_t begin = 0; begin < order.size();) {
     Group group;
     while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
@@ -163,17 +175,26 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
   rays.max_t.fill(options_.occlusion_distance);
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
-    for (std::size_t i = 0; i < group.size; ++i) {
-      const SurfacePoint& point = *group.points[i];
-      const std::size_t face = index_of(point.face);
-      set_direction(rays, i,
-                    directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
-    }
+    set_occlusion_directions(group, ray, rays);
     const std::uint32_t blocked = view_->any_hits(group.placed, rays);
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
   return std::int64_t{count} * std::popcount(rays.active);
+}
+
+void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const {
+  if (directions_.is_fixed() && group.is_one_face) {
+    const DVec3 direction = directions_.fixed(index_of(group.points[0]->face), ray);
+    rays.direction_x.fill(direction.x), rays.direction_y.fill(direction.y), rays.direction_z.fill(direction.z);
+    return;
+  }
+  for (std::size_t i = 0; i < group.size; ++i) {
+    const SurfacePoint& point = *group.points[i];
+    const std::size_t face = index_of(point.face);
+    set_direction(rays, i,
+                  directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
+  }
 }
 
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {

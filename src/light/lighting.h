@@ -59,11 +59,13 @@ class Lighting {
     std::array<float, 6> diffuse{};
   };
   struct Group;
+  [[nodiscard]] std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points) const;
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
   void tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
+  void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
 
   const SceneView* view_;

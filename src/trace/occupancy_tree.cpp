@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
+// Flat tables up to this size are made however sparse the world is.
+constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
 bool belongs(const VoxelRegistry& types, VoxelType type, Occupancy which) {
   if (type == kAir) return false;
@@ -79,6 +81,8 @@ struct OccupancyTree::Impl {
   std::vector<std::uint32_t> free_bricks;
   tsl::robin_map<IVec3, IBox, CoordinateHash> chunk_bounds;  // occupied voxels of each chunk, in grid coordinates
   IBox bounds;
+  FlatTables flat;  // no chunks: none
+  IBox flat_chunks;
 
   Impl() { bricks[1].fill(kAll); }
 
@@ -200,9 +204,89 @@ struct OccupancyTree::Impl {
     chunk_bounds[chunk] = {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge};
   }
 
-  void find_bounds() {
+  // The 16 cells along x at (y, z) of a chunk, as bits.
+  static std::uint64_t cell_row(const ChunkNode& node, int y, int z) {
+    std::uint64_t row = 0;
+    for (int brick_x = 0; brick_x < 4; ++brick_x) {
+      const auto brick = static_cast<std::size_t>(brick_x + 4 * (y >> 2) + 16 * (z >> 2));
+      row |= (node.cells[brick] >> (4 * (y & 3) + 16 * (z & 3)) & 15U) << (4 * brick_x);
+    }
+    return row;
+  }
+
+  // Puts 16 bits in place of those at `bit`.
+  static void put_bits(std::vector<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
+    const std::size_t word = bit / 32;
+    const unsigned shift = bit % 32;
+    const std::uint64_t mask = std::uint64_t{0xFFFF} << shift;
+    std::uint64_t both = words[word] | std::uint64_t{words[word + 1]} << 32;
+    both = (both & ~mask) | bits << shift;
+    words[word] = static_cast<std::uint32_t>(both);
+    words[word + 1] = static_cast<std::uint32_t>(both >> 32);
+  }
+
+  // Copies a chunk's cells and bricks into the flat tables.
+  void flatten(IVec3 chunk) {
+    const RegionNode* region = find({chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift});
+    const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
+    const ChunkNode& node = chunk_nodes[index];
+    const IVec3 at = chunk - flat_chunks.min;
+    const IVec3 cells = flat.cell_strides();
+    const IVec3 bricks_at = flat.brick_strides();
+    for (int z = 0; z < 16; ++z) {
+      for (int y = 0; y < 16; ++y) {
+        const IVec3 cell = at * 16 + IVec3{1, y + 1, z + 1};
+        const auto bit = static_cast<std::size_t>(cell.x) + static_cast<std::size_t>(cell.y) * cells.y +
+                         static_cast<std::size_t>(cell.z) * cells.z;
+        put_bits(flat.cells, bit, cell_row(node, y, z));
+      }
+    }
+    for (int i = 0; i < 64; ++i) {
+      const IVec3 brick = at * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
+      const auto to = static_cast<std::size_t>(brick.x) + static_cast<std::size_t>(brick.y) * bricks_at.y +
+                      static_cast<std::size_t>(brick.z) * bricks_at.z;
+      flat.bricks[to] = node.bricks[static_cast<std::size_t>(i)];
+    }
+  }
+
+  [[nodiscard]] const RegionNode* find(IVec3 region) const {
+    const auto found = regions.find(region);
+    return found == regions.end() ? nullptr : found->second.get();
+  }
+
+  // Makes the tables for the box of chunks, or none when they would be too large.
+  void make_flat(const IBox& chunks) {
+    flat = {};
+    flat_chunks = {};
+    const IVec3 size = chunks.size();
+    const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
+    const auto limit =
+        static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(bricks.size() * sizeof(Node) +
+                                                                             chunk_nodes.size() * sizeof(ChunkNode))));
+    const double cell_bits = static_cast<double>(cells) * (16.0 * size.z + 2.0);
+    const double brick_count = 64.0 * size.x * static_cast<double>(size.y) * size.z;
+    // Kernels count bits in 32 bits.
+    if (chunks.empty() || cell_bits / 8 + brick_count * 4 > limit || cell_bits > 2e9) return;
+    flat.origin = chunks.min * kChunkEdge;
+    flat.chunks = size;
+    flat.cells.assign(static_cast<std::size_t>(cell_bits) / 32 + 2, 0);
+    flat.bricks.assign(static_cast<std::size_t>(brick_count), 0);
+    flat_chunks = chunks;
+    for (const auto& [chunk, box] : chunk_bounds) flatten(chunk);
+  }
+
+  // After chunks have been put: the bounds, and the tables where they concern `changed`.
+  void finish(std::span<const IVec3> changed) {
     bounds = {};
-    for (const auto& [chunk, box] : chunk_bounds) bounds = unite(bounds, box);
+    IBox chunks;
+    for (const auto& [chunk, box] : chunk_bounds) {
+      bounds = unite(bounds, box);
+      chunks = unite(chunks, {chunk, chunk + 1});
+    }
+    if (flat_chunks.empty() || !(chunks == flat_chunks)) return make_flat(chunks);
+    for (const IVec3 chunk : changed) {
+      if (flat_chunks.contains(chunk)) flatten(chunk);
+    }
   }
 
   static constexpr IBox kWholeChunkBox = {IVec3{0}, IVec3{kChunkEdge}};
@@ -219,13 +303,13 @@ OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types,
   for (const IVec3 chunk : grid.chunks()) tree.impl_->put(grid.find_chunk(chunk), types, chunk);
   tree.impl_->chunk_nodes.shrink_to_fit();
   tree.impl_->bricks.shrink_to_fit();
-  tree.impl_->find_bounds();
+  tree.impl_->finish({});
   return tree;
 }
 
-void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
-  impl_->put(grid.find_chunk(chunk), types, chunk);
-  impl_->find_bounds();
+void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks) {
+  for (const IVec3 chunk : chunks) impl_->put(grid.find_chunk(chunk), types, chunk);
+  impl_->finish(chunks);
 }
 
 IBox OccupancyTree::bounds() const {
@@ -246,12 +330,12 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
-         impl_->chunk_bounds.bucket_count() * (sizeof(IVec3) + sizeof(IBox));
+         impl_->chunk_bounds.bucket_count() * (sizeof(IVec3) + sizeof(IBox)) +
+         (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 
 const OccupancyTree::RegionNode* OccupancyTree::find_region(IVec3 region) const {
-  const auto found = impl_->regions.find(region);
-  return found == impl_->regions.end() ? nullptr : found->second.get();
+  return impl_->find(region);
 }
 
 const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
@@ -259,6 +343,9 @@ const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
 }
 const OccupancyTree::Node* OccupancyTree::bricks() const {
   return impl_->bricks.data();
+}
+const OccupancyTree::FlatTables* OccupancyTree::flat_tables() const {
+  return impl_->flat_chunks.empty() ? nullptr : &impl_->flat;
 }
 
 }  // namespace quoin

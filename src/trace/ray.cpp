@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "trace/walk.h"
+
 namespace quoin {
 namespace {
 
@@ -217,8 +219,14 @@ bool is_usable(const Ray& ray, double max_t) {
   return length > 0.0 && max_t >= 0.0;
 }
 
-// The face that looks most against the ray; x before y before z.
-Direction facing(const DVec3& direction) {
+Direction face_of(const Walk& walk, const Ray& ray) {
+  if (walk.axis() < 0) return trace::facing(ray.direction);
+  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
+}
+
+}  // namespace
+
+Direction trace::facing(const DVec3& direction) {
   int axis = 0;
   for (int other = 1; other < 3; ++other) {
     if (std::abs(direction[other]) > std::abs(direction[axis])) axis = other;
@@ -226,24 +234,19 @@ Direction facing(const DVec3& direction) {
   return static_cast<Direction>(2 * axis + (direction[axis] > 0.0 ? 1 : 0));
 }
 
-Direction face_of(const Walk& walk, const Ray& ray) {
-  if (walk.axis() < 0) return facing(ray.direction);
-  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
-}
-
-}  // namespace
-
-std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
+std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   if (!is_usable(ray, max_t)) return std::nullopt;
   Walk walk(tree, ray);
   if (!walk.enter(tree.bounds(), max_t) || !walk.find(max_t)) return std::nullopt;
   return RayHit{walk.voxel(), face_of(walk, ray), walk.t(), walk.axis() < 0};
 }
 
+std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
+  return trace::walk_to_first_hit(tree, ray, max_t);
+}
+
 bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
-  if (!is_usable(ray, max_t)) return false;
-  Walk walk(tree, ray);
-  return walk.enter(tree.bounds(), max_t) && walk.find(max_t);
+  return trace::walk_to_first_hit(tree, ray, max_t).has_value();
 }
 
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,

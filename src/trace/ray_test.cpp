@@ -207,7 +207,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     }
     const std::vector<IVec3> dirty = grid.take_dirty();
     for (OccupancyTree& tree : trees) {
-      for (const IVec3 chunk : dirty) tree.update(grid, types, chunk);
+      tree.update(grid, types, dirty);
     }
     for (int i = 0; i < 20'000; ++i) {
       const IVec3 v{near(), near(), near()};
@@ -219,7 +219,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     EXPECT_EQ(trees[0].bounds(), grid.bounds());
   }
   grid.clear();
-  for (const IVec3 chunk : grid.take_dirty()) trees[0].update(grid, types, chunk);
+  trees[0].update(grid, types, grid.take_dirty());
   EXPECT_TRUE(trees[0].bounds().empty());
 }
 

@@ -1,5 +1,6 @@
 // rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time.
 
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -9,6 +10,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
 
 #include "bench/workloads.h"
@@ -93,19 +95,41 @@ const RayWorld& world() {
   return shared;
 }
 
-void trace(benchmark::State& state, const std::vector<Query>& rays, int expected) {
-  int hits = 0;
-  for (auto _ : state) {
-    hits = 0;
-    for (const Query& query : rays) hits += any_hit(world().tree, query.ray, query.max_t);
-  }
+void report(benchmark::State& state, std::size_t rays, int hits, int expected) {
   if (std::abs(hits - expected) > 30) {
     std::fprintf(stderr, "ray benchmark: %d hits, expected %d\n", hits, expected);
     std::exit(1);
   }
   state.counters["hits"] = hits;
   state.counters["rays_per_second"] =
-      benchmark::Counter(static_cast<double>(rays.size()), benchmark::Counter::kIsIterationInvariantRate);
+      benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void trace(benchmark::State& state, const std::vector<Query>& rays, int expected) {
+  int hits = 0;
+  for (auto _ : state) {
+    hits = 0;
+    for (const Query& query : rays) hits += any_hit(world().tree, query.ray, query.max_t);
+  }
+  report(state, rays.size(), hits, expected);
+}
+
+// Packets of 16 in the order of the rays.
+std::vector<RayPacket> packets_of(const std::vector<Query>& rays) {
+  std::vector<RayPacket> packets((rays.size() + 15) / 16);
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    packets[i / 16].set(static_cast<int>(i % 16), rays[i].ray, rays[i].max_t);
+  return packets;
+}
+
+void trace_packets(benchmark::State& state, const std::vector<Query>& rays, int expected, InstructionSet set) {
+  const std::vector<RayPacket> packets = packets_of(rays);
+  int hits = 0;
+  for (auto _ : state) {
+    hits = 0;
+    for (const RayPacket& packet : packets) hits += std::popcount(any_hits(world().tree, packet, set));
+  }
+  report(state, rays.size(), hits, expected);
 }
 
 void primary(benchmark::State& state) {
@@ -120,6 +144,33 @@ void occlusion(benchmark::State& state) {
 BENCHMARK(primary)->Name("rays/primary/single")->Unit(benchmark::kMillisecond);
 BENCHMARK(shadow)->Name("rays/shadow/single")->Unit(benchmark::kMillisecond);
 BENCHMARK(occlusion)->Name("rays/ao/single")->Unit(benchmark::kMillisecond);
+
+void primary_packets(benchmark::State& state, InstructionSet set) {
+  trace_packets(state, world().primary, 118'582, set);
+}
+void shadow_packets(benchmark::State& state, InstructionSet set) {
+  trace_packets(state, world().shadow, 86'217, set);
+}
+void occlusion_packets(benchmark::State& state, InstructionSet set) {
+  trace_packets(state, world().occlusion, 242'773, set);
+}
+
+[[maybe_unused]] const bool registered = [] {
+  const struct {
+    const char* suffix;
+    InstructionSet set;
+  } sets[] = {{"", InstructionSet::Best}, {"/avx2", InstructionSet::Avx2}, {"/plain", InstructionSet::Plain}};
+  for (const auto& s : sets) {
+    const auto add = [&](const char* name, void (*run)(benchmark::State&, InstructionSet)) {
+      benchmark::RegisterBenchmark((std::string("rays/") + name + "/packet" + s.suffix).c_str(), run, s.set)
+          ->Unit(benchmark::kMillisecond);
+    };
+    add("primary", primary_packets);
+    add("shadow", shadow_packets);
+    add("ao", occlusion_packets);
+  }
+  return true;
+}();
 
 void build(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(OccupancyTree::build(world().grid, world().types).bytes());

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -42,6 +43,21 @@ class OccupancyTree {
     std::array<std::uint32_t, 4096> nodes{};  ///< index into `chunk_nodes()`, x + 16 y + 256 z; 0 is none
   };
 
+  /// Two tables over the box of chunks around everything: what kernels of many rays read instead of regions and chunk
+  /// nodes, since an address is then a sum of products.
+  struct FlatTables {
+    IVec3 origin{0};                    ///< the voxel at the least corner
+    IVec3 chunks{0};                    ///< size
+    std::vector<std::uint32_t> cells;   ///< a bit a cell of 4^3 voxels; one empty cell around everything
+    std::vector<std::uint32_t> bricks;  ///< indices into `bricks()`, x first, then y, then z
+
+    /// Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
+    [[nodiscard]] IVec3 cell_strides() const {
+      return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)};
+    }
+    [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
+  };
+
   OccupancyTree();
   OccupancyTree(OccupancyTree&&) noexcept;
   OccupancyTree& operator=(OccupancyTree&&) noexcept;
@@ -50,8 +66,11 @@ class OccupancyTree {
   /// From the grid's own storage. Cost: about 20 microseconds a chunk that is not uniform.
   static OccupancyTree build(const Grid& grid, const VoxelRegistry& types, Occupancy which = Occupancy::NonAir);
 
-  /// Takes over what changed in one chunk since; call it for the chunks that an edit touched.
-  void update(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
+  /// Takes over what an edit changed, in place; `chunks` are those that it touched (Grid::take_dirty names them).
+  ///
+  /// Cost: about 20 microseconds a chunk; when the box of chunks around everything grows or shrinks, a copy of the flat
+  ///       tables besides.
+  void update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks);
 
   /// The smallest box around the occupied voxels, to the voxel.
   [[nodiscard]] IBox bounds() const;
@@ -63,6 +82,8 @@ class OccupancyTree {
   [[nodiscard]] const RegionNode* find_region(IVec3 region) const;
   [[nodiscard]] const ChunkNode* chunk_nodes() const;
   [[nodiscard]] const Node* bricks() const;
+  /// Null where the world is so sparse (islands far apart) that the tables would be larger than all the rest.
+  [[nodiscard]] const FlatTables* flat_tables() const;
 
  private:
   struct Impl;

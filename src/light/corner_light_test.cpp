@@ -1,0 +1,75 @@
+#include "light/corner_light.h"
+
+#include <array>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+// By barycentric coordinates in the triangle of the mesh that holds the point.
+double level_by_triangles(const FaceLevels& levels, double u, double v) {
+  constexpr double kU[] = {0, 1, 1, 0};
+  constexpr double kV[] = {0, 0, 1, 1};
+  const std::array<std::array<std::size_t, 3>, 2> triangles =
+      flips_diagonal(levels) ? std::array<std::array<std::size_t, 3>, 2>{{{1, 2, 3}, {0, 1, 3}}}
+                             : std::array<std::array<std::size_t, 3>, 2>{{{0, 1, 2}, {0, 2, 3}}};
+  for (const auto& [a, b, c] : triangles) {
+    const double area = (kU[b] - kU[a]) * (kV[c] - kV[a]) - (kU[c] - kU[a]) * (kV[b] - kV[a]);
+    const double at_b = ((u - kU[a]) * (kV[c] - kV[a]) - (kU[c] - kU[a]) * (v - kV[a])) / area;
+    const double at_c = ((kU[b] - kU[a]) * (v - kV[a]) - (u - kU[a]) * (kV[b] - kV[a])) / area;
+    if (at_b < -1e-9 || at_c < -1e-9 || at_b + at_c > 1.0 + 1e-9) continue;
+    return levels[a] * (1.0 - at_b - at_c) + levels[b] * at_b + levels[c] * at_c;
+  }
+  ADD_FAILURE() << "no triangle holds the point";
+  return 0.0;
+}
+
+TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
+  VoxelRegistry types;
+  VoxelProperties properties;
+  ASSERT_TRUE(types.add(properties).has_value());
+  properties.visibility = Visibility::Transparent;
+  ASSERT_TRUE(types.add(properties).has_value());
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  Grid grid;
+  // Across the corner of eight chunks.
+  const IBox box{IVec3{-6}, IVec3{6}};
+  grid.edit(box, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random() % 4 < 2 ? random() % 3 : 0); });
+  GridReader reader(grid);
+  double sum = 0.0;
+  for (int i = 0; i < 50'000; ++i) {
+    const auto coordinate = [&] { return static_cast<int>(random() % 12) - 6; };
+    const IVec3 voxel{coordinate(), coordinate(), coordinate()};
+    const Direction face = kDirections[random() % 6];
+    const FaceFrame& frame = frame_of(face);
+    const double u = share(random);
+    const double v = share(random);
+    DVec3 position(voxel);
+    position[frame.u] += u;
+    position[frame.v] += v;
+    if (frame.sign > 0) position[frame.axis] += 1.0;
+    const IVec3 chunk = chunk_of(voxel);
+    const FaceLevels levels = face_occlusion(grid.neighbourhood(chunk), types, local_of(voxel), face);
+    const float level = corner_level(reader, types, voxel, face, position);
+    ASSERT_NEAR(level, level_by_triangles(levels, u, v), 1e-5);
+    sum += level;
+  }
+  EXPECT_GT(sum, 10'000.0) << "the world has occlusion at all";
+}
+
+TEST(CornerLight, IsExactAtTheCorners) {
+  for (int code = 0; code < 256; ++code) {
+    const FaceLevels levels = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
+                               static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};
+    EXPECT_EQ(interpolated_level(levels, 0, 0), levels[0]);
+    EXPECT_EQ(interpolated_level(levels, 1, 0), levels[1]);
+    EXPECT_EQ(interpolated_level(levels, 1, 1), levels[2]);
+    EXPECT_EQ(interpolated_level(levels, 0, 1), levels[3]);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,47 @@
+#include <quoin/light/light_options.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(LightOptions, DefaultsAndLimitsAreAccepted) {
+  EXPECT_TRUE(check(LightOptions{}).has_value());
+  LightOptions options;
+  options.sun = {0, -1e-300, 0};
+  options.occlusion_rays = 4096;
+  options.occlusion_distance = options.shadow_distance = options.exposure = 0.0;
+  EXPECT_TRUE(check(options).has_value());
+}
+
+TEST(LightOptions, ImpossibleOnesAreRefusedByName) {
+  const auto expect_refused = [](const std::string& name, const std::function<void(LightOptions&)>& change) {
+    LightOptions options;
+    change(options);
+    const Status status = check(options);
+    ASSERT_FALSE(status.has_value()) << name;
+    EXPECT_EQ(status.error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(status.error().message.rfind(name, 0), 0U) << status.error().message;
+  };
+  expect_refused("sun", [](LightOptions& o) { o.sun = DVec3(0.0); });
+  expect_refused("sun", [](LightOptions& o) { o.sun.y = kNan; });
+  expect_refused("sun", [](LightOptions& o) { o.sun.z = kInfinity; });
+  expect_refused("occlusion rays", [](LightOptions& o) { o.occlusion_rays = 0; });
+  expect_refused("occlusion rays", [](LightOptions& o) { o.occlusion_rays = 4097; });
+  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance = -1; });
+  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance = kInfinity; });
+  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance = kNan; });
+  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance = -1; });
+  expect_refused("exposure", [](LightOptions& o) { o.exposure = -0.5; });
+  expect_refused("exposure", [](LightOptions& o) { o.exposure = kNan; });
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,218 @@
+#include <quoin/render/cpu_renderer.h>
+
+#include <atomic>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "light/sky.h"
+#include "render/camera_rays.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Opaque, transparent and glowing voxels, here and there, in two instances.
+Scene lively_scene() {
+  Scene scene;
+  const VoxelType stone = add_type(scene, {180, 120, 90, 255});
+  const VoxelType glass = add_type(scene, {120, 200, 240, 90}, Visibility::Transparent);
+  const VoxelType lamp = add_type(scene, {255, 220, 120, 255}, Visibility::Opaque, 2.0F);
+  std::mt19937 random(4);
+  Grid grid;
+  grid.edit({{-20, -4, -20}, {20, 4, 20}}, [&](IVec3 v, VoxelType) {
+    if (v.y < -2) return stone;
+    const unsigned dice = random() % 24;
+    return dice < 2 ? stone : dice == 2 ? glass : dice == 3 ? lamp : kAir;
+  });
+  SceneGrid shared;
+  shared.grid = std::move(grid);
+  const GridHandle handle = scene.add_grid(std::move(shared));
+  scene.add_instance({"", handle});
+  scene.add_instance({"", handle, {5, 12, -3}, glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 3))), 0.4});
+  return scene;
+}
+
+TEST(CpuRenderer, GivesTheSameBytesForAnyThreadsAndInstructions) {
+  const Scene scene = lively_scene();
+  const CpuRenderer renderer(scene);
+  const Camera camera = towards({25, 18, 30}, {0, 2, 0});
+  for (const int occlusion_rays : {9, 5}) {
+    RenderOptions options = sized(101, 67);
+    options.samples = 2;
+    options.light.occlusion_rays = occlusion_rays;
+    options.threads = {1};
+    const auto reference = renderer.render(camera, options);
+    ASSERT_TRUE(reference.has_value());
+    for (const unsigned threads : {2U, 0U}) {
+      for (const auto set : {InstructionSet::Plain, InstructionSet::Avx2, InstructionSet::Avx512}) {
+        options.threads = {threads};
+        options.instructions = set;
+        const auto picture = renderer.render(camera, options);
+        ASSERT_TRUE(picture.has_value());
+        EXPECT_EQ(picture->colour.rgb, reference->colour.rgb);
+        EXPECT_EQ(picture->depth.values, reference->depth.values);
+        EXPECT_EQ(picture->rays, reference->rays);
+        EXPECT_EQ(picture->pixels_hit, reference->pixels_hit);
+      }
+    }
+  }
+}
+
+TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
+  const Scene scene = lively_scene();
+  double last = 0.0;
+  std::atomic<int> inside{0};
+  bool is_fine = true;
+  const auto picture = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(200, 100), [&](double done) {
+    is_fine &= ++inside == 1 && done >= last;
+    last = done;
+    --inside;
+    return true;
+  });
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_TRUE(is_fine);
+  EXPECT_EQ(last, 1.0);
+}
+
+TEST(CpuRenderer, StopsWhenTold) {
+  const Scene scene = lively_scene();
+  int calls = 0;
+  const auto picture =
+      CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), [&](double) { return ++calls < 3; });
+  ASSERT_FALSE(picture.has_value());
+  EXPECT_EQ(picture.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ(calls, 3);
+}
+
+TEST(CpuRenderer, RefusesWhatCannotBe) {
+  const Scene scene = lively_scene();
+  const CpuRenderer renderer(scene);
+  const auto expect_refused = [&](const char* name, const std::function<void(Camera&, RenderOptions&)>& change) {
+    Camera camera = towards({25, 18, 30}, {0, 2, 0});
+    RenderOptions options = sized(8, 8);
+    change(camera, options);
+    const auto picture = renderer.render(camera, options);
+    ASSERT_FALSE(picture.has_value()) << name;
+    EXPECT_EQ(picture.error().code, ErrorCode::InvalidArgument) << name;
+    EXPECT_EQ(picture.error().message.rfind(name, 0), 0U) << picture.error().message;
+  };
+  expect_refused("size", [](Camera&, RenderOptions& o) { o.width = 0; });
+  expect_refused("size", [](Camera&, RenderOptions& o) { o.height = -1; });
+  expect_refused("size", [](Camera&, RenderOptions& o) { o.width = o.height = 31'623; });
+  expect_refused("size", [](Camera&, RenderOptions& o) { o.width = o.height = std::numeric_limits<int>::max(); });
+  expect_refused("samples", [](Camera&, RenderOptions& o) { o.samples = 0; });
+  expect_refused("samples", [](Camera&, RenderOptions& o) { o.samples = 4097; });
+  expect_refused("sun", [](Camera&, RenderOptions& o) { o.light.sun = DVec3(0.0); });
+  expect_refused("camera", [](Camera& c, RenderOptions&) { c.position.y = kNan; });
+  expect_refused("camera", [](Camera& c, RenderOptions&) { c.forward = DVec3(0.0); });
+  expect_refused("camera", [](Camera& c, RenderOptions&) { c.up.x = kNan; });
+  for (const double angle : {0.0, -1.0, std::numbers::pi, 4.0, kNan, kInfinity}) {
+    expect_refused("camera", [&](Camera& c, RenderOptions&) { c.vertical_fov = angle; });
+    expect_refused("camera", [&](Camera& c, RenderOptions&) {
+      c.projection = Camera::Projection::Orthographic;
+      c.view_height = angle > 0.0 && angle < 10.0 ? 0.0 : angle;
+    });
+  }
+}
+
+TEST(CpuRenderer, AnEmptySceneIsSky) {
+  const Scene scene;
+  const Picture picture = taken(scene, towards({0, 0, 0}, {0, 0, -1}), sized(9, 9));
+  EXPECT_EQ(picture.pixels_hit, 0);
+  EXPECT_EQ(picture.rays, 81);
+  for (const float depth : picture.depth.values) EXPECT_EQ(depth, static_cast<float>(kInfinity));
+  EXPECT_EQ(pixel_at(picture, 4, 4), encoded(sky_colour(0.0F)));
+  const Pixel top = pixel_at(picture, 4, 0);
+  const Pixel horizon = pixel_at(picture, 4, 4);
+  EXPECT_LT(top[0], horizon[0]) << "the sky is paler towards the horizon";
+}
+
+TEST(CpuRenderer, TheSkyHasNoStepAnywhere) {
+  for (int i = -10'000; i < 10'000; ++i) {
+    const Vec3 step = sky_colour(static_cast<float>(i + 1) * 1e-4F) - sky_colour(static_cast<float>(i) * 1e-4F);
+    ASSERT_LT(glm::length(step), 1e-3F) << i;
+  }
+}
+
+TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
+  Scene scene;
+  const Rgba8 red{200, 40, 30, 255};
+  const VoxelType type = add_type(scene, red);
+  Grid grid;
+  grid.set({2, 1, 0}, type);  // right of the middle and above it, seen along -Z
+  place(scene, std::move(grid));
+  RenderOptions options = sized(80, 80);
+  options.light.lit = false;
+  const Picture picture = taken(scene, towards({0, 0, 10}, {0, 0, 0}, 2.0 * std::atan(0.4)), options);
+  // At distance 9 the picture reaches 3.6 up from the middle: 11.1 pixels a voxel.
+  EXPECT_EQ(pixel_at(picture, 40 + 27, 40 - 16), encoded(linear(red)));
+  EXPECT_FLOAT_EQ(depth_at(picture, 40 + 27, 40 - 16),
+                  9.0F * static_cast<float>(glm::length(DVec3(27.5 / 100, 15.5 / 100, 1.0))));
+  for (const auto& [x, y] : {std::pair(-28, -16), {27, 16}, {-28, 16}}) {
+    EXPECT_EQ(depth_at(picture, 40 + x, 40 + y), static_cast<float>(kInfinity));
+  }
+  // The front, and narrow views of its left and its lower side.
+  EXPECT_GT(picture.pixels_hit, 123);
+  EXPECT_LT(picture.pixels_hit, 165);
+}
+
+TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
+  Scene scene;
+  Grid grid;
+  for (int i = 0; i < 256; ++i) {
+    grid.set({i % 16, 0, i / 16},
+             add_type(scene, {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(255 - i), 77, 255}));
+  }
+  place(scene, std::move(grid));
+  RenderOptions options = sized(16, 16);
+  options.light.lit = false;
+  options.light.exposure = 3.0;
+  options.samples = 3;
+  const Picture picture = taken(scene, from_above(8, 5, 8, 16), options);
+  for (int i = 0; i < 256; ++i) {
+    const Pixel expected{static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(255 - i), 77};
+    EXPECT_EQ(pixel_at(picture, i % 16, i / 16), expected);
+  }
+}
+
+TEST(CpuRenderer, SamplesSoftenEdgesOnly) {
+  Scene scene;
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {3, 3, 3}, add_type(scene, {255, 255, 255, 255}));
+  place(scene, std::move(grid));
+  RenderOptions options = sized(64, 64);
+  options.light.lit = false;
+  const Camera camera = towards({9, 7, 11}, {2, 2, 2});
+  const Picture one = taken(scene, camera, options);
+  options.samples = 16;
+  const Picture many = taken(scene, camera, options);
+  EXPECT_EQ(one.depth.values, many.depth.values) << "depth is that of the centre";
+  EXPECT_EQ(one.pixels_hit, many.pixels_hit);
+  int between = 0;
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) between += pixel_at(many, x, y)[0] > 240 && pixel_at(many, x, y)[0] < 255;
+  }
+  EXPECT_GT(between, 10);
+  EXPECT_LT(count_different(one, many, 2), 64 * 64 / 8);
+}
+
+TEST(CpuRenderer, SamplePointsStartInTheCentreAndFillThePixel) {
+  EXPECT_EQ(sample_point(0).x, 0.5);
+  EXPECT_EQ(sample_point(0).y, 0.5);
+  std::array<int, 16> cells{};
+  for (int i = 0; i < 256; ++i) {
+    const PixelPoint point = sample_point(i);
+    ++cells.at(static_cast<std::size_t>(point.x * 4) + 4 * static_cast<std::size_t>(point.y * 4));
+  }
+  for (const int count : cells) EXPECT_NEAR(count, 16, 3);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,183 @@
+// What transparent voxels do to a picture.
+
+#include <cmath>
+#include <limits>
+
+#include "light/glass.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr Rgba8 kWhite{240, 240, 240, 255};
+constexpr Rgba8 kGlass{90, 170, 230, 100};
+constexpr float kAlpha = 100.0F / 255.0F;
+
+struct GlassScene {
+  Scene scene;
+  VoxelType stone = add_type(scene, kWhite);
+  VoxelType glass = add_type(scene, kGlass, Visibility::Transparent);
+  VoxelType green = add_type(scene, {60, 220, 90, 100}, Visibility::Transparent);
+};
+
+// What one voxel's length of the glass lets through.
+Vec3 through_one() {
+  return (1.0F - kAlpha) * (Vec3(1.0F) - kAlpha * (Vec3(1.0F) - linear(kGlass)));
+}
+
+Vec3 power(Vec3 base, float exponent) {
+  return {std::pow(base.x, exponent), std::pow(base.y, exponent), std::pow(base.z, exponent)};
+}
+
+void expect_near(Pixel a, Pixel b, int tolerance) {
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
+}
+
+TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
+  for (const int thickness : {1, 2, 3, 7}) {
+    GlassScene s;
+    Grid grid;
+    grid.fill_box({-5, -1, -5}, {5, -1, 5}, s.stone);
+    grid.fill_box({-5, 3, -5}, {5, 2 + thickness, 5}, s.glass);
+    place(s.scene, std::move(grid));
+    RenderOptions options = sized(4, 4);
+    options.light.lit = false;
+    const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+    const auto length = static_cast<float>(thickness);
+    const Vec3 expected =
+        linear(kWhite) * power(through_one(), length) + linear(kGlass) * (1.0F - std::pow(1.0F - kAlpha, length));
+    expect_near(pixel_at(picture, 1, 2), encoded(expected), 1);
+    EXPECT_FLOAT_EQ(depth_at(picture, 1, 2), static_cast<float>(20 - 3 - thickness)) << "glass counts as hit";
+  }
+}
+
+TEST(RenderGlass, IsVisibleOnADarkGroundAndAgainstTheSky) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({-5, 0, -5}, {5, 0, 5}, s.glass);
+  place(s.scene, std::move(grid));
+  RenderOptions options = sized(2, 2);
+  const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+  EXPECT_EQ(picture.pixels_hit, 4);
+  Scene empty;
+  EXPECT_GT(count_different(picture, taken(empty, from_above(0, 20, 0, 4), options), 10), 3);
+}
+
+// The same glass in one grid, across a chunk's border, and in two grids that touch.
+TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
+  const auto picture_of = [](int shift, bool is_split) {
+    GlassScene s;
+    Grid grid;
+    grid.fill_box({shift - 9, -1, -9}, {shift + 9, -1, 9}, s.stone);
+    grid.fill_box({shift - 4, 1, -4}, {shift - 1, 4, 4}, s.glass);
+    Grid other;
+    (is_split ? other : grid).fill_box({shift, 1, -4}, {shift + 4, 4, 4}, s.glass);
+    place(s.scene, std::move(grid), {-shift, 0, 0});
+    if (is_split) place(s.scene, std::move(other), {-shift, 0, 0});
+    return taken(s.scene, towards({9, 8, 11}, {0, 1, 0}), sized(90, 70));
+  };
+  const Picture whole = picture_of(20, false);
+  EXPECT_EQ(count_different(whole, picture_of(64, false), 1), 0) << "a chunk's border";
+  EXPECT_EQ(count_different(whole, picture_of(64, true), 1), 0) << "two grids";
+}
+
+TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {0, 0, 1}, s.glass);
+  grid.fill_box({0, 0, 2}, {0, 0, 3}, s.green);
+  place(s.scene, std::move(grid));
+  const SceneTracer tracer(s.scene);
+  const SceneView view(tracer, DVec3(0.0));
+  std::vector<GlassBody> bodies;
+  find_glass(view, Surfaces(s.scene.types), {{0.5, 0.5, -3.0}, {0, 0, 2.0}}, 3.25, bodies);
+  ASSERT_EQ(bodies.size(), 2U);
+  EXPECT_EQ(bodies[0].type, s.glass);
+  EXPECT_DOUBLE_EQ(bodies[0].voxels, 2.0);
+  EXPECT_EQ(bodies[1].type, s.green);
+  EXPECT_DOUBLE_EQ(bodies[1].voxels, 1.5) << "as far as the ray goes";
+}
+
+TEST(RenderGlass, LengthsAreInVoxelsWhateverTheirSize) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {0, 0, 3}, s.glass);
+  const InstanceHandle instance = place(s.scene, std::move(grid), {0, 0, 10});
+  s.scene.instances()[instance].voxel_size = 0.5;
+  const SceneTracer tracer(s.scene);
+  const SceneView view(tracer, {0.25, 0.25, 0});
+  std::vector<GlassBody> bodies;
+  find_glass(view, Surfaces(s.scene.types), {{0, 0, 0}, {0, 0, 1}}, 100.0, bodies);
+  ASSERT_EQ(bodies.size(), 1U);
+  EXPECT_DOUBLE_EQ(bodies[0].voxels, 4.0);
+  EXPECT_DOUBLE_EQ(bodies[0].t_enter, 10.0);
+}
+
+TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({-9, -1, -9}, {9, -1, 9}, s.stone);
+  grid.fill_box({-9, 3, -9}, {9, 4, 9}, s.glass);
+  place(s.scene, std::move(grid));
+  RenderOptions options = sized(3, 3);
+  options.light.sun = {0, 1, 0};
+  const Picture picture = taken(s.scene, from_above(0, 2, 0, 4), options);
+  expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
+  options.light.shadows = false;
+  expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1), encoded(linear(kWhite) * 1.15F), 1);
+}
+
+TEST(RenderGlass, SeenFromInsideTintsOnly) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({-9, -1, -9}, {9, -1, 9}, s.stone);
+  grid.fill_box({-9, 0, -9}, {9, 9, 9}, s.glass);
+  place(s.scene, std::move(grid));
+  RenderOptions options = sized(3, 3);
+  options.light.lit = false;
+  const Picture picture = taken(s.scene, from_above(0, 2.5, 0, 2), options);
+  expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * power(through_one(), 2.5F)), 1);
+  EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
+}
+
+TEST(RenderGlass, ThatGlowsShinesInTheDarkFromOutsideAndInside) {
+  for (const double height : {20.0, 1.0}) {
+    std::array<Pixel, 2> seen{};
+    for (const float emission : {0.0F, 2.0F}) {
+      Scene scene;
+      const VoxelType glass = add_type(scene, kGlass, Visibility::Transparent, emission);
+      Grid grid;
+      grid.fill_box({-5, 0, -5}, {5, 3, 5}, glass);
+      grid.fill_box({-5, -1, -5}, {5, -1, 5}, add_type(scene, {0, 0, 0, 255}));
+      place(scene, std::move(grid));
+      RenderOptions options = sized(2, 2);
+      options.light.sun = {0, -1, 0};
+      seen.at(emission > 0.0F) = pixel_at(taken(scene, from_above(0, height, 0, 2), options), 0, 0);
+    }
+    EXPECT_GT(seen[1][2], seen[0][2] + 50) << height;
+  }
+}
+
+// Full cover, deep seas and grazing rays must give numbers.
+TEST(RenderGlass, DarkAndDeepGlassIsNeverNotANumber) {
+  Scene scene;
+  const VoxelType ink = add_type(scene, {0, 0, 0, 255}, Visibility::Transparent);
+  const VoxelType clear = add_type(scene, {255, 255, 255, 0}, Visibility::Transparent);
+  Grid grid;
+  grid.fill_box({-50, -50, -50}, {50, 0, 0}, ink);
+  grid.fill_box({-50, -50, 1}, {50, 0, 50}, clear);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(64, 48);
+  const Picture picture = taken(scene, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
+  Scene empty;
+  const Picture sky = taken(empty, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);
+  EXPECT_EQ(pixel_at(picture, 32, 0), pixel_at(sky, 32, 0));
+  EXPECT_GT(count_different(picture, sky, 10), 100);
+  const Picture inside = taken(scene, towards({0, -5, -5}, {1, -6, -9}), sized(8, 8));
+  for (const std::uint8_t byte : inside.colour.rgb) EXPECT_EQ(byte, 0);
+}
+
+}  // namespace
+}  // namespace quoin

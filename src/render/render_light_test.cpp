@@ -1,0 +1,210 @@
+// Pictures whose light is known by analysis.
+
+#include <cmath>
+#include <limits>
+
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr Rgba8 kGrey{188, 188, 188, 255};
+
+// The y = 0 plane is the top of a floor from -40 to 40.
+Grid floor_of(VoxelType type) {
+  Grid grid;
+  grid.fill_box({-40, -1, -40}, {39, -1, 39}, type);
+  return grid;
+}
+
+// The cosine of the sun on each axis, as the renderer rounds it.
+Vec3 cosines(DVec3 sun) {
+  return Vec3(glm::normalize(sun));
+}
+
+TEST(RenderLight, AnOpenFloorHasTheAmbientAndTheSunsShareExactly) {
+  Scene scene;
+  place(scene, floor_of(add_type(scene, kGrey)));
+  const LightOptions light;
+  const float sun = cosines(light.sun).y;
+  for (const int rays : {1, 6, 9, 32}) {
+    RenderOptions options = sized(16, 16);
+    options.light.occlusion_rays = rays;
+    const Picture picture = taken(scene, from_above(0, 30, 0, 20), options);
+    const Pixel expected = encoded(linear(kGrey) * (0.15F + sun));
+    for (int i = 0; i < 256; ++i) ASSERT_EQ(pixel_at(picture, i % 16, i / 16), expected);
+    EXPECT_EQ(picture.rays, 256 * (2 + rays));
+  }
+}
+
+TEST(RenderLight, WithoutOcclusionTheAmbientTermIsATenth) {
+  Scene scene;
+  place(scene, floor_of(add_type(scene, kGrey)));
+  RenderOptions options = sized(4, 4);
+  options.light.occlusion = OcclusionMode::Off;
+  options.light.sun = {0, 2, 0};
+  options.light.exposure = 0.5;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.55F));
+}
+
+TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
+  Scene scene;
+  Grid grid;
+  const VoxelType type = add_type(scene, kGrey);
+  grid.fill_box({-2, -2, -2}, {2, 2, 2}, type);
+  grid.fill_box({-1, -1, -1}, {1, 1, 1}, kAir);
+  place(scene, std::move(grid));
+  for (const int rays : {6, 9, 17}) {
+    RenderOptions options = sized(24, 24);
+    options.light.occlusion_rays = rays;
+    const Picture picture = taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options);
+    for (const std::uint8_t byte : picture.colour.rgb) ASSERT_EQ(byte, 0);
+    EXPECT_EQ(picture.pixels_hit, 24 * 24);
+    options.light.occlusion_affects = OcclusionAffects::All;
+    options.light.exposure = 4.0;
+    EXPECT_EQ(pixel_at(taken(scene, towards({0.5, 0.5, 1.5}, {0.3, 0.4, -5}, 2.0), options), 3, 3),
+              encoded(linear(kGrey) * 0.15F * 0.25F * 4.0F));
+  }
+}
+
+TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  const DVec3 low{1, 6, -2};
+  const DVec3 high{4, 8, 1};
+  grid.fill_box({1, 6, -2}, {3, 7, 0}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(160, 160);
+  options.light.occlusion = OcclusionMode::Off;
+  const DVec3 sun = options.light.sun;
+  const Picture picture = taken(scene, from_above(0, 30, 0, 32), options);
+  const Pixel lit = encoded(linear(kGrey) * (0.1F + cosines(sun).y));
+  const Pixel dark = encoded(linear(kGrey) * 0.1F);
+  int shadow = 0;
+  for (int row = 0; row < 160; ++row) {
+    for (int column = 0; column < 160; ++column) {
+      const DVec3 at{(column + 0.5) / 5 - 16, 0.01, (row + 0.5) / 5 - 16};
+      if (at.x > low.x && at.x < high.x && at.z > low.z && at.z < high.z) continue;  // the cube itself
+      // The stretch of the ray to the sun within each pair of the cube's planes.
+      const DVec3 a = (low - at) / sun;
+      const DVec3 b = (high - at) / sun;
+      const DVec3 enter = glm::min(a, b);
+      const DVec3 leave = glm::max(a, b);
+      const bool is_dark = std::max({enter.x, enter.y, enter.z}) < std::min({leave.x, leave.y, leave.z});
+      ASSERT_EQ(pixel_at(picture, column, row), is_dark ? dark : lit) << column << ", " << row;
+      shadow += is_dark;
+    }
+  }
+  EXPECT_GT(shadow, 200);
+}
+
+TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({-9, 10, -9}, {8, 10, 8}, type);
+  const InstanceHandle instance = place(scene, std::move(grid));
+  scene.instances()[instance].voxel_size = 0.25;
+  RenderOptions options = sized(1, 1);
+  options.light.occlusion = OcclusionMode::Off;
+  options.light.sun = {0, 0.001, 0};  // of any length
+  Camera camera = from_above(0, 1, 0, 0.1);
+  const Pixel dark = encoded(linear(kGrey) * 0.1F);
+  options.light.shadow_distance = 9.98;
+  EXPECT_NE(pixel_at(taken(scene, camera, options), 0, 0), dark);
+  options.light.shadow_distance = 10.0;
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 0, 0), dark);
+  options.light.shadows = false;
+  EXPECT_NE(pixel_at(taken(scene, camera, options), 0, 0), dark);
+}
+
+TEST(RenderLight, OcclusionEndsAtItsDistance) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({-40, 6, -40}, {39, 6, 39}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(1, 1);
+  options.light.shadows = false;
+  options.light.sun = {1, 0, 0};
+  // Only the ray along the normal reaches the ceiling.
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0),
+            encoded(linear(kGrey) * 0.15F * (8.0F / 9.0F)));
+  options.light.occlusion_distance = 5.98;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0), encoded(linear(kGrey) * 0.15F));
+}
+
+TEST(RenderLight, ASunBelowTheHorizonLightsWhatFacesIt) {
+  Scene scene;
+  place(scene, floor_of(add_type(scene, kGrey)));
+  RenderOptions options = sized(4, 4);
+  options.light.sun = {0, -1, 0};
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.15F));
+  Camera camera = from_above(0, -30, 0, 20);
+  camera.forward = {0, 1, 0};
+  camera.up = {0, 0, 1};
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 1, 1), encoded(linear(kGrey) * 1.15F));
+}
+
+TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
+  Scene scene;
+  const Rgba8 amber{200, 140, 60, 255};
+  place(scene, floor_of(add_type(scene, amber, Visibility::Opaque, 0.5F)));
+  RenderOptions options = sized(2, 2);
+  options.light.sun = {0, -1, 0};
+  options.light.exposure = 0.25;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 0, 0),
+            encoded((linear(amber) * 0.5F + linear(amber) * 0.15F) * 0.25F));
+}
+
+// Beside a wall, where the corner levels fall from 2 to 0 across one voxel.
+TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({4, 0, -40}, {4, 5, 39}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(40, 1);
+  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.shadows = false;
+  options.light.sun = {-1, 1, 0};
+  const float sun = cosines(options.light.sun).y;
+  for (const auto affects : {OcclusionAffects::Ambient, OcclusionAffects::All}) {
+    options.light.occlusion_affects = affects;
+    // One column of voxels across the picture: x from 3 to 4.
+    Camera camera = from_above(3.5, 3, 0.5, 1.0 / 40);
+    const Picture picture = taken(scene, camera, options);
+    for (int column = 0; column < 40; ++column) {
+      const float level = 2.0F * ((static_cast<float>(column) + 0.5F) / 40.0F);
+      const float light = affects == OcclusionAffects::Ambient ? 0.15F * (1.0F - level / 3.0F) + sun
+                                                               : (0.15F + sun) * (1.0F - 0.25F * level);
+      const Pixel expected = encoded(linear(kGrey) * light);
+      EXPECT_NEAR(pixel_at(picture, column, 0)[0], expected[0], 1) << column;
+    }
+  }
+}
+
+TEST(RenderLight, ASolidSeenFromInsideIsItsOwnColour) {
+  Scene scene;
+  place(scene, floor_of(add_type(scene, kGrey)));
+  const Picture picture = taken(scene, towards({0.5, -0.5, 0.5}, {0, -0.7, -4}), sized(5, 5));
+  for (int i = 0; i < 25; ++i) {
+    EXPECT_EQ(pixel_at(picture, i % 5, i / 5), encoded(linear(kGrey)));
+    EXPECT_EQ(depth_at(picture, i % 5, i / 5), 0.0F);
+  }
+}
+
+TEST(RenderLight, UnregisteredTypesShow) {
+  Scene scene;
+  add_type(scene, kGrey);
+  place(scene, floor_of(777));
+  RenderOptions options = sized(2, 2);
+  options.light.lit = false;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 9, 0, 4), options), 0, 0), (Pixel{255, 0, 255}));
+}
+
+}  // namespace
+}  // namespace quoin

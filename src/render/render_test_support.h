@@ -1,0 +1,107 @@
+#pragma once
+
+// Small scenes, cameras and expected pixels for the renderer's tests.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/render/cpu_renderer.h>
+
+#include "light/srgb.h"
+
+namespace quoin::render_test {
+
+using Pixel = std::array<std::uint8_t, 3>;
+
+inline VoxelType add_type(Scene& scene, Rgba8 colour, Visibility visibility = Visibility::Opaque,
+                          float emission = 0.0F) {
+  VoxelProperties properties;
+  properties.colour = colour;
+  properties.visibility = visibility;
+  properties.emission = emission;
+  const auto type = scene.types.add(properties);
+  EXPECT_TRUE(type.has_value());
+  return type.value_or(kAir);
+}
+
+inline InstanceHandle place(Scene& scene, Grid grid, DVec3 position = DVec3(0.0)) {
+  SceneGrid placed;
+  placed.grid = std::move(grid);
+  return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
+}
+
+/// Straight down from `height` above (x, z), `view_height` wide and high; the picture's right is +X, its top -Z.
+inline Camera from_above(double x, double height, double z, double view_height) {
+  Camera camera;
+  camera.position = {x, height, z};
+  camera.forward = {0, -1, 0};
+  camera.up = {0, 0, -1};
+  camera.right = {1, 0, 0};
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = view_height;
+  return camera;
+}
+
+inline Camera towards(DVec3 eye, DVec3 target, double vertical_fov = 0.8) {
+  Camera camera;
+  camera.position = eye;
+  camera.forward = glm::normalize(target - eye);
+  camera.right = glm::normalize(glm::cross(camera.forward, DVec3(0, 1, 0)));
+  camera.up = glm::cross(camera.right, camera.forward);
+  camera.vertical_fov = vertical_fov;
+  return camera;
+}
+
+inline RenderOptions sized(int width, int height) {
+  RenderOptions options;
+  options.width = width;
+  options.height = height;
+  options.depth = true;
+  return options;
+}
+
+inline Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options) {
+  auto picture = CpuRenderer(scene).render(camera, options);
+  EXPECT_TRUE(picture.has_value());
+  return picture ? std::move(*picture) : Picture{};
+}
+
+inline Pixel pixel_at(const Picture& picture, int x, int y) {
+  const auto at =
+      3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.colour.width) + static_cast<std::size_t>(x));
+  return {picture.colour.rgb.at(at), picture.colour.rgb.at(at + 1), picture.colour.rgb.at(at + 2)};
+}
+
+inline float depth_at(const Picture& picture, int x, int y) {
+  return picture.depth.values.at(static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.depth.width) +
+                                 static_cast<std::size_t>(x));
+}
+
+inline Vec3 linear(Rgba8 colour) {
+  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
+}
+
+inline Pixel encoded(Vec3 light) {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  return {encode(light.x), encode(light.y), encode(light.z)};
+}
+
+/// The pixels in which two pictures of one size differ by more than `tolerance` in a channel.
+inline int count_different(const Picture& a, const Picture& b, int tolerance) {
+  EXPECT_EQ(a.colour.rgb.size(), b.colour.rgb.size());
+  int different = 0;
+  for (std::size_t i = 0; i + 2 < a.colour.rgb.size() && i + 2 < b.colour.rgb.size(); i += 3) {
+    bool differs = false;
+    for (std::size_t c = 0; c < 3; ++c) differs |= std::abs(a.colour.rgb[i + c] - b.colour.rgb[i + c]) > tolerance;
+    different += differs;
+  }
+  return different;
+}
+
+}  // namespace quoin::render_test

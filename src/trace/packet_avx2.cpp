@@ -1,0 +1,38 @@
+// The kernel of rays in lockstep for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#include <bit>
+#include <cmath>
+
+#include "trace/tree_view.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include <immintrin.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,popcnt"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,bmi,bmi2,popcnt")
+#endif
+
+namespace quoin::trace {
+namespace {
+
+#include "trace/lanes_avx2.h"
+
+#include "trace/kernel.inl"
+
+}  // namespace
+
+const Kernel kAvx2Kernel = {trace_first, trace_any};
+
+}  // namespace quoin::trace
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+#endif

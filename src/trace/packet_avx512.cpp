@@ -1,0 +1,39 @@
+// The kernel of rays in lockstep for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
+
+#include <bit>
+#include <cmath>
+
+#include "trace/tree_view.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include <immintrin.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi,bmi2,popcnt"))), \
+                                 apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi,bmi2,popcnt")
+#endif
+
+namespace quoin::trace {
+namespace {
+
+#include "trace/lanes_avx512.h"
+
+#include "trace/kernel.inl"
+
+}  // namespace
+
+const Kernel kAvx512Kernel = {trace_first, trace_any};
+
+}  // namespace quoin::trace
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+#endif

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/packet.h>
+
+namespace quoin::trace {
+
+/// What the kernels read of a tree with flat tables.
+struct TreeView {
+  const std::uint32_t* cells;   ///< bits
+  const std::uint32_t* bricks;  ///< indices
+  const std::uint32_t* words;   ///< of bricks: 128 halves each, the lower half of a cell's word first
+  std::uint32_t last_cell_word;
+  int first_cell;  ///< bit of the table's cell (0, 0, 0)
+  IVec3 cell_strides;
+  IVec3 brick_strides;
+  DVec3 origin;  ///< of the tables, in the grid
+  IBox box;      ///< tight, from `origin`
+};
+
+/// What a kernel leaves of the lanes it was asked about.
+struct LaneHits {
+  std::uint32_t hit = 0;
+  std::uint32_t starts_inside = 0;
+  std::uint32_t unfinished = 0;                  ///< went further than a kernel goes: to be traced in double precision
+  RayPacket::Lanes<std::int32_t> x{}, y{}, z{};  ///< voxels, from the tables' origin
+  RayPacket::Lanes<std::int32_t> axis{};         ///< of the face
+};
+
+// Every kernel gives the same answers, those of a walk from one lattice plane to the next where the plane P of an axis
+// is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
+// of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
+struct Kernel {
+  /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
+  void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
+  /// Answers the lanes that are blocked.
+  std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
+};
+
+extern const Kernel kPlainKernel;
+#ifdef QUOIN_X86_KERNELS
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+#endif
+
+}  // namespace quoin::trace
