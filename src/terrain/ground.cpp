@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <span>
 
 #include "terrain/caves.h"
 
@@ -114,11 +115,11 @@ class GroundWriter {
 };
 
 struct Extent {
-  int all_stone;  ///< everything below is stone of one colour
-  int highest;    ///< everything above is air or water
+  int all_stone = 0;  ///< everything below is stone of one colour
+  int highest = 0;    ///< everything above is air or water
 };
 
-Extent extent_of(const std::vector<Column>& columns) {
+Extent extent_of(std::span<const Column> columns) {
   Extent extent{columns.front().height, columns.front().height};
   for (const Column& column : columns) {
     extent.all_stone = std::min(extent.all_stone, std::min(column.height - column.soil, column.lowest - 2));
@@ -127,32 +128,47 @@ Extent extent_of(const std::vector<Column>& columns) {
   return extent;
 }
 
+void fill(Chunk& chunk, const IBox& box, VoxelType type) {
+  if (!box.empty()) chunk.fill_box(box, type, [](int, int, std::uint64_t) {});
+}
+
+/// The layers of four slices, a slab deep, that have to be looked at one by one; those below are stone, those above
+/// water or air. Both ends are multiples of 4 but for the box's own.
+struct Layers {
+  int from;
+  int to;
+};
+
 }  // namespace
 
 Chunk make_ground(const Landform& land, const std::vector<Column>& columns, const TerrainTypes& types, IVec3 at,
                   const IBox& part, bool has_caves) {
-  const Extent extent = extent_of(columns);
   const int floor = at.y * kChunkEdge;
+  const int water_end = std::clamp(land.water_level() + 1 - floor, part.min.y, part.max.y);
+  const Extent whole = extent_of(columns);
   Chunk chunk;
-  const int end = std::min(part.max.y, std::max(extent.highest, land.water_level()) + 1 - floor);
-  if (part.empty() || end <= part.min.y) return chunk;
-  // Whole slabs of stone first: they stay uniform, which is quick and small.
-  const int rows_from = std::clamp((extent.all_stone - floor) & ~3, part.min.y, end);
-  if (rows_from > part.min.y) {
-    chunk.fill_box({part.min, {part.max.x, rows_from, part.max.z}}, types.stone, [](int, int, std::uint64_t) {});
-  }
+  if (part.empty() || std::max(whole.highest, land.water_level()) < floor) return chunk;
   const auto caves = has_caves ? std::make_unique<CaveMasks>() : nullptr;
-  if (caves != nullptr) find_caves(land.seed(), at, extent.highest + 1 - floor, *caves);
+  if (caves != nullptr) find_caves(land.seed(), at, whole.highest + 1 - floor, *caves);
   GroundWriter writer(types, chunk, floor, bits_between(part.min.x, part.max.x));
-  for (int z = part.min.z; z < part.max.z; ++z) {
-    const Slice slice = make_slice(columns.data() + z * kChunkEdge, floor, land.water_level());
-    for (int y = part.min.y; y < end; ++y) {
-      const bool is_bedrock = floor + y < 2;
-      const std::uint64_t hollow = caves == nullptr || is_bedrock ? 0 : caves->row(y, z) & slice.may_be_cave[y];
-      if (y >= rows_from) {
-        writer.write_row(slice, y, z, floor + y <= land.water_level(), hollow);
-      } else if (hollow != 0) {
-        writer.carve(y, z, hollow);
+  for (int first_z = part.min.z; first_z < part.max.z; first_z += 4) {
+    const std::span band(columns.data() + first_z * kChunkEdge, 4 * std::size_t{kChunkEdge});
+    const Extent extent = extent_of(band);
+    // Whole slabs at a time, where they are of one kind: they stay uniform, which is quick and small.
+    const Layers layers{std::clamp((extent.all_stone - floor) & ~3, part.min.y, part.max.y),
+                        std::clamp((extent.highest + 4 - floor) & ~3, part.min.y, part.max.y)};
+    fill(chunk, {{part.min.x, part.min.y, first_z}, {part.max.x, layers.from, first_z + 4}}, types.stone);
+    fill(chunk, {{part.min.x, layers.to, first_z}, {part.max.x, water_end, first_z + 4}}, types.water);
+    for (int z = first_z; z < first_z + 4; ++z) {
+      const Slice slice = make_slice(columns.data() + z * kChunkEdge, floor, land.water_level());
+      for (int y = part.min.y; y < layers.to; ++y) {
+        const bool is_bedrock = floor + y < 2;
+        const std::uint64_t hollow = caves == nullptr || is_bedrock ? 0 : caves->row(y, z) & slice.may_be_cave[y];
+        if (y >= layers.from) {
+          writer.write_row(slice, y, z, y < water_end, hollow);
+        } else if (hollow != 0) {
+          writer.carve(y, z, hollow);
+        }
       }
     }
   }

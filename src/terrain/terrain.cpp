@@ -20,7 +20,8 @@ Status check(const TerrainOptions& options) {
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
     return fail(ErrorCode::InvalidArgument, "a terrain is 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
   }
-  if (std::max({options.first_x, -options.first_x, options.first_z, -options.first_z}) > kMaxPlace) {
+  if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
+      std::max(options.first_x, options.first_z) > kMaxPlace) {
     return fail(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
   }
   return {};
@@ -49,8 +50,8 @@ class ColumnOfChunks {
     const IBox part = intersect({world_.min - origin, world_.max - origin}, {IVec3{0}, IVec3{kChunkEdge}});
     Chunk chunk = terrain::make_ground(land_, columns_, types, at, part, options_.caves);
     terrain::draw_plants(plants_, types, at, chunk);
-    chunk.compact();
-    return chunk;
+    Chunk without_slack(std::as_const(chunk));  // copied storage has no room to grow; a third of the memory otherwise
+    return without_slack;
   }
 
  private:
