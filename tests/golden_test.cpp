@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <ostream>
 #include <string>
 
 #include <quoin/render/cpu_renderer.h>
@@ -30,6 +31,10 @@ struct GoldenView {
   double fov_degrees;
   DVec3 sun;
 };
+
+void PrintTo(const GoldenView& view, std::ostream* out) {
+  *out << view.name;
+}
 
 const DVec3 kUsualSun = LightOptions{}.sun;
 /// From behind the ridge, so that its shadow falls over the slope and the water before it.

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -79,7 +80,8 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       surfaces_(&surfaces),
       options_(options),
       directions_(options.occlusion_rays),
-      exposure_(static_cast<float>(options.exposure)) {
+      // Never infinite: that times black is not a number.
+      exposure_(static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()))) {
   // Scaled first: the square of a very small or large number is 0 or infinite.
   const DVec3 size = glm::abs(options.sun);
   const DVec3 to_sun = glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
