@@ -124,6 +124,14 @@ TEST_P(Golden, PictureIsTheGoldenOne) {
   EXPECT_TRUE(is_golden(picture.colour, view.name, golden_folders()));
 }
 
+TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
+  const GoldenView& view = GetParam();
+  RenderOptions options = options_for(view);
+  options.instructions = InstructionSet::Plain;
+  options.threads = {1};
+  EXPECT_EQ(wrong_pixels(render(terrain_scene(), view, options), view), 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Views, Golden, ::testing::ValuesIn(kViews),
                          [](const auto& view) { return std::string(view.param.name); });
 
