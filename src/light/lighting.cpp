@@ -163,9 +163,13 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   if (options_.occlusion == OcclusionMode::Off) return 0;
   GridReader reader(view_->tracer().placed()[static_cast<std::size_t>(group.placed)].grid->grid);
+  FaceLevels levels{};
   for (std::size_t i = 0; i < group.size; ++i) {
     const SurfacePoint& point = *group.points[i];
-    openness[i] = 1.0F - corner_level(reader, *types_, point.voxel, point.face, point.position) / 3.0F;
+    // Neighbours often lie on the same face.
+    const bool is_new = i == 0 || point.voxel != group.points[i - 1]->voxel || point.face != group.points[i - 1]->face;
+    if (is_new) levels = corner_levels(reader, *types_, point.voxel, point.face);
+    openness[i] = 1.0F - level_at(levels, point.voxel, point.face, point.position) / 3.0F;
   }
   return 0;
 }
