@@ -39,9 +39,14 @@ struct RayWorkload {
 
 /// The terrain of one type, as wide and deep as asked.
 inline Grid terrain_grid(int width, int depth) {
+  std::vector<int> heights;
+  for (int z = 0; z < depth; ++z) {
+    for (int x = 0; x < width; ++x) heights.push_back(static_cast<int>(height(x, z)));
+  }
   Grid grid;
-  grid.edit({IVec3{0}, IVec3{width, 128, depth}},
-            [](IVec3 v, VoxelType) { return static_cast<VoxelType>(v.y <= height(v.x, v.z)); });
+  grid.edit({IVec3{0}, IVec3{width, 128, depth}}, [&](IVec3 v, VoxelType) {
+    return static_cast<VoxelType>(v.y <= heights[static_cast<std::size_t>(v.z * width + v.x)]);
+  });
   return grid;
 }
 
