@@ -80,7 +80,7 @@ int print_answer(const CLI::App& app, const CLI::ParseError& request) {
 
 int run(int argc, char** argv) {
   let_writes_fail();
-  CLI::App app("Voxel worlds in, lit meshes out.", "quoin");
+  CLI::App app("Voxel worlds in, lit meshes and pictures out.", "quoin");
   app.set_version_flag("--version", "quoin " QUOIN_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
