@@ -36,6 +36,12 @@ std::string unknown_option(const CLI::App& command, const Arguments& arguments) 
   return "";
 }
 
+/// The command that was chosen within a command, if it has any.
+const CLI::App& innermost(CLI::App& command) {
+  const auto chosen = command.get_subcommands();
+  return chosen.empty() ? command : innermost(*chosen[0]);
+}
+
 /// What is wrong with the arguments, where CLI11's own words would not help.
 std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Arguments& arguments) {
   const std::string hint = " (try --help)";
@@ -46,7 +52,7 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
   }
   const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
   if (code == CLI::ExitCodes::ExtrasError || code == CLI::ExitCodes::RequiredError) {
-    const std::string unknown = unknown_option(chosen.empty() ? app : *chosen[0], arguments);
+    const std::string unknown = unknown_option(chosen.empty() ? app : innermost(*chosen[0]), arguments);
     if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty()))
       return "no option \"" + unknown + "\"" + hint;
     if (!unknown.empty()) return "no option \"" + unknown + "\"; a file of that name is ./" + unknown + hint;
@@ -71,6 +77,7 @@ int run(int argc, char** argv) {
   int status = kDone;
   add_info_command(app, status);
   add_convert_command(app, status);
+  add_generate_command(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

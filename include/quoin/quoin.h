@@ -30,6 +30,8 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/terrain/noise.h>
+#include <quoin/terrain/terrain.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>

@@ -1,0 +1,180 @@
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <memory>
+
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/terrain/terrain.h>
+
+#include "commands.h"
+#include "interrupt.h"
+#include "output.h"
+#include "progress_bar.h"
+
+namespace quoin::tool {
+
+namespace {
+
+/// More than this many voxels would not fit into a .vox file.
+constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 31;
+
+struct GenerateOptions {
+  std::filesystem::path output;
+  std::string seed = "42";
+  std::string chunks = "4x2x4";
+  TerrainOptions terrain;
+  Threads threads;
+  bool json = false;
+};
+
+struct Outcome {
+  std::int64_t voxels = 0;
+  std::size_t types = 0;
+  std::uint64_t bytes = 0;
+  double seconds_generate = 0;
+  double seconds_write = 0;
+  std::vector<std::string> warnings;
+};
+
+template <class Number>
+bool read_number(std::string_view text, Number& out) {
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+  return error == std::errc() && stop == text.data() + text.size();
+}
+
+bool read_size(std::string_view text, IVec3& out) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t end = axis < 2 ? text.find('x') : text.size();
+    if (end == std::string_view::npos || !read_number(text.substr(0, end), out[axis])) return false;
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return true;
+}
+
+/// What is wrong with the options, which are read into `options.terrain`; empty when nothing is.
+std::string read_options(GenerateOptions& options) {
+  if (!read_number(std::string_view(options.seed), options.terrain.seed)) {
+    return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
+  }
+  IVec3& size = options.terrain.size;
+  const std::string got = ", not \"" + options.chunks + "\"";
+  if (!read_size(options.chunks, size)) return "--chunks: must be like 4x2x4" + got;
+  if (size.x < 1 || size.y < 1 || size.z < 1 || size.x > 1'024 || size.y > 32 || size.z > 1'024) {
+    return "--chunks: must be 1 to 1024 wide and deep and 1 to 32 high" + got;
+  }
+  constexpr std::int64_t kUnitVoxels = std::int64_t{kTerrainUnit} * kTerrainUnit * kTerrainUnit;
+  if (std::int64_t{size.x} * size.y * size.z > kMaxVoxels / kUnitVoxels) {
+    return "--chunks: must be at most " + with_thousands(kMaxVoxels / kUnitVoxels) + " in all" + got;
+  }
+  return "";
+}
+
+Scene scene_of(Grid grid, VoxelRegistry types, IVec3 size) {
+  Scene scene;
+  scene.types = std::move(types);
+  SceneGrid entry;
+  entry.name = "terrain";
+  entry.grid = std::move(grid);
+  entry.canvas = {IVec3{0}, size * kTerrainUnit};
+  Instance instance;
+  instance.name = entry.name;
+  instance.grid = scene.add_grid(std::move(entry));
+  scene.add_instance(std::move(instance));
+  return scene;
+}
+
+Result<Outcome> generate(const GenerateOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  catch_interrupts();
+  ProgressBar bar;
+  VoxelRegistry types;
+  const auto materials = add_terrain_types(types);
+  if (!materials) return tl::unexpected<Error>(materials.error());
+  auto grid = generate_terrain(options.terrain, *materials, options.threads, bar.listener("generating"));
+  if (!grid) return tl::unexpected<Error>(grid.error());
+  Outcome outcome;
+  outcome.voxels = grid->voxel_count();
+  outcome.types = grid->types().size();
+  outcome.seconds_generate = seconds();
+  const Scene scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
+  auto bytes = write_vox(scene, outcome.warnings);
+  if (!bytes) {
+    bytes.error().path = options.output.string();
+    return tl::unexpected<Error>(bytes.error());
+  }
+  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", options.output.string());
+  if (auto written = write_file(options.output, *bytes); !written) return tl::unexpected<Error>(written.error());
+  outcome.bytes = bytes->size();
+  outcome.seconds_write = seconds() - outcome.seconds_generate;
+  return outcome;
+}
+
+Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
+  const IVec3 size = options.terrain.size;
+  return {{"seed", options.terrain.seed},
+          {"chunks", {size.x, size.y, size.z}},
+          {"size", {size.x * kTerrainUnit, size.y * kTerrainUnit, size.z * kTerrainUnit}},
+          {"voxels", outcome.voxels},
+          {"types", outcome.types},
+          {"bytes", outcome.bytes},
+          {"files", {options.output.string()}},
+          {"seconds", {{"generate", outcome.seconds_generate}, {"write", outcome.seconds_write}}},
+          {"warnings", outcome.warnings}};
+}
+
+std::string outcome_text(const GenerateOptions& options, const Outcome& outcome) {
+  const IVec3 size = options.terrain.size * kTerrainUnit;
+  return "Terrain: seed " + std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " +
+         std::to_string(size.y) + " x " + std::to_string(size.z) + "\nVoxels: " + with_thousands(outcome.voxels) +
+         " of " + std::to_string(outcome.types) + " types\nWrote " + options.output.string() + ", " +
+         bytes_for_people(outcome.bytes) + " in " +
+         number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
+}
+
+int run_generate(GenerateOptions& options) {
+  const auto format = format_for_writing(options.output);
+  if (!format || format->format != FileFormat::Vox) {
+    print_error(options.output.string() +
+                ": a terrain is written as .vox; `quoin convert` turns that into other formats");
+    return kWrongUsage;
+  }
+  if (const std::string fault = read_options(options); !fault.empty()) {
+    print_error(fault + " (try --help)");
+    return kWrongUsage;
+  }
+  const auto outcome = generate(options);
+  if (!outcome) {
+    die_if_interrupted();
+    print_error(outcome.error());
+    return kFailed;
+  }
+  if (options.json) return print_json(outcome_json(options, *outcome));
+  print_warnings(outcome->warnings);
+  return print(outcome_text(options, *outcome));
+}
+
+}  // namespace
+
+void add_generate_command(CLI::App& app, int& status) {
+  CLI::App* command = app.add_subcommand("generate", "Make a world from a seed");
+  command->require_subcommand(1);
+  command->footer("Example: quoin generate terrain hills.vox");
+  CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
+  const auto options = std::make_shared<GenerateOptions>();
+  terrain->add_option("OUT", options->output, "File to write: .vox")->required()->check(file_name());
+  terrain->add_option("--seed", options->seed, "Which world: a whole number (default 42)");
+  terrain->add_option(
+      "--chunks", options->chunks,
+      "Width x height x depth in units of 32 voxels (default 4x2x4); 1024x32x1024 at most, 65,536 in all");
+  terrain->add_flag("--json", options->json, "Print one JSON object instead of text");
+  terrain->add_option("--threads", options->threads.count, "Threads to use (default: all)")
+      ->check(CLI::Range(1U, 1024U));
+  terrain->footer(
+      "The same seed gives the same world on every machine. The landscape's forms grow with the world's height.\n"
+      "Example: quoin generate terrain hills.vox --seed 7 --chunks 8x3x8");
+  terrain->callback([options, &status] { status = run_generate(*options); });
+}
+
+}  // namespace quoin::tool

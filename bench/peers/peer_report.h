@@ -1,0 +1,67 @@
+#pragma once
+
+// What the benchmarks of peers share: names as Quoin's own behind "peer/", hits checked before timing, the same
+// counters.
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "bench/ray_workload.h"
+
+namespace quoin::peers {
+
+/// Ends the run unless the count is that of the workload, within the tolerance that Quoin's own tracer has.
+inline void check_hits(const std::string& name, int hits, int expected) {
+  if (std::abs(hits - expected) <= workloads::kHitTolerance) return;
+  std::fprintf(stderr, "%s: %d hits, expected %d\n", name.c_str(), hits, expected);
+  std::exit(1);
+}
+
+/// Registers `count_hits(rays)`, which traces them all and answers how many hit. It is called once, and checked, before
+/// it is timed.
+template <class CountHits>
+void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (*rays)(), int (*expected)(),
+              CountHits count_hits) {
+  const auto run = [=](benchmark::State& state) {
+    int hits = count_hits(rays());
+    check_hits(name, hits, expected());
+    for (auto _ : state) benchmark::DoNotOptimize(hits = count_hits(rays()));
+    state.counters["hits"] = hits;
+    state.counters["rays_per_second"] =
+        benchmark::Counter(static_cast<double>(rays().size()), benchmark::Counter::kIsIterationInvariantRate);
+  };
+  benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
+}
+
+/// The three parts of the rays workload: `prefix` + "rays/primary/" + `kind` and so on. `first` is asked for primary
+/// rays, `any` for the others.
+template <class First, class Any>
+void add_workload(const std::string& prefix, const std::string& kind, First first, Any any) {
+  using workloads::ray_workload;
+  using Rays = const std::vector<workloads::RayQuery>&;
+  add_rays(
+      prefix + "rays/primary/" + kind, +[]() -> Rays { return ray_workload().primary; },
+      +[] { return workloads::kPrimaryHits; }, first);
+  add_rays(
+      prefix + "rays/shadow/" + kind, +[]() -> Rays { return ray_workload().shadow; },
+      +[] { return workloads::kShadowHits; }, any);
+  add_rays(
+      prefix + "rays/ao/" + kind, +[]() -> Rays { return ray_workload().occlusion; },
+      +[] { return workloads::kOcclusionHits; }, any);
+}
+
+/// rays/random600: first hits, one ray at a time.
+template <class First>
+void add_random(const std::string& prefix, First first) {
+  using workloads::random_ray_workload;
+  add_rays(
+      prefix + "rays/random600",
+      +[]() -> const std::vector<workloads::RayQuery>& { return random_ray_workload().rays; },
+      +[] { return random_ray_workload().hits; }, first);
+}
+
+}  // namespace quoin::peers

@@ -1,0 +1,170 @@
+#pragma once
+
+// The rays that benchmarks trace, Quoin's and its peers' alike. All mathematics in double.
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include <quoin/trace/ray.h>
+
+#include "bench/workloads.h"
+
+namespace quoin::workloads {
+
+struct RayQuery {
+  Ray ray;
+  double max_t = std::numeric_limits<double>::infinity();
+};
+
+/// Hits that the workload has, as a plain tracer in double precision counts them, and how far off a count may be.
+inline constexpr int kPrimaryHits = 118'582;
+inline constexpr int kShadowHits = 86'217;
+inline constexpr int kOcclusionHits = 242'773;
+inline constexpr int kHitTolerance = 30;
+
+/// rays/{primary,shadow,ao}: a picture of the 256x128x256 terrain and what shading it asks for. Sixteen rays that lie
+/// next to each other in `primary` are a tile of 4x4 pixels.
+struct RayWorkload {
+  Grid grid;
+  VoxelRegistry types = three_types();
+  OccupancyTree tree;
+  std::vector<RayQuery> primary;
+  std::vector<RayQuery> shadow;
+  std::vector<RayQuery> occlusion;
+};
+
+/// The terrain of one type, as wide and deep as asked.
+inline Grid terrain_grid(int width, int depth) {
+  Grid grid;
+  grid.edit({IVec3{0}, IVec3{width, 128, depth}},
+            [](IVec3 v, VoxelType) { return static_cast<VoxelType>(v.y <= height(v.x, v.z)); });
+  return grid;
+}
+
+namespace detail {
+
+inline constexpr int kRayColumns = 640;
+inline constexpr int kRayRows = 360;
+
+inline std::vector<RayQuery> camera_rays() {
+  const DVec3 eye{20, 90, 20};
+  const DVec3 forward = glm::normalize(DVec3{128, 40, 128} - eye);
+  const DVec3 right = glm::normalize(glm::cross(forward, DVec3{0, 1, 0}));
+  const DVec3 up = glm::cross(right, forward);
+  const double half = std::tan(70.0 * std::numbers::pi / 360.0);
+  std::vector<RayQuery> rays;
+  for (int tile = 0; tile < kRayColumns * kRayRows / 16; ++tile) {
+    for (int i = 0; i < 16; ++i) {
+      const int column = tile % (kRayColumns / 4) * 4 + i % 4;
+      const int row = tile / (kRayColumns / 4) * 4 + i / 4;
+      const double x = ((column + 0.5) / kRayColumns * 2 - 1) * half * kRayColumns / kRayRows;
+      const double y = (1 - (row + 0.5) / kRayRows * 2) * half;
+      rays.push_back({{eye, glm::normalize(forward + right * x + up * y)}});
+    }
+  }
+  return rays;
+}
+
+inline void add_secondary_rays(RayWorkload& workload, std::size_t index) {
+  const RayQuery& query = workload.primary[index];
+  const auto hit = first_hit(workload.tree, query.ray);
+  if (!hit) return;
+  const DVec3 n(normal_of(hit->face));
+  const int axis = frame_of(hit->face).axis;
+  DVec3 tangent{0};
+  DVec3 bitangent{0};
+  tangent[(axis + 1) % 3] = 1;
+  bitangent[(axis + 2) % 3] = 1;
+  const DVec3 origin = query.ray.origin + query.ray.direction * hit->t + n * 0.001;
+  workload.shadow.push_back({{origin, glm::normalize(DVec3{0.371, 0.743, 0.223})}});
+  const std::size_t tile = index / 16;
+  const std::size_t column = tile % (kRayColumns / 4) * 4 + index % 4;
+  const std::size_t row = tile / (kRayColumns / 4) * 4 + index % 16 / 4;
+  const auto pixel = static_cast<std::uint32_t>(row * kRayColumns + column);
+  const double xi = static_cast<double>(pixel * 2654435761U) / 4294967296.0;
+  for (int s = 0; s < 6; ++s) {
+    const double sin2 = (s + 0.5) / 6;
+    const double phi = 2 * std::numbers::pi * (s + xi) / 6;
+    const double r = std::sqrt(sin2);
+    const DVec3 d = n * std::sqrt(1 - sin2) + tangent * (r * std::cos(phi)) + bitangent * (r * std::sin(phi));
+    workload.occlusion.push_back({{origin, d}, 6.0});
+  }
+}
+
+}  // namespace detail
+
+/// Made at the first call, then shared.
+inline const RayWorkload& ray_workload() {
+  static const RayWorkload shared = [] {
+    RayWorkload w;
+    w.grid = terrain_grid(256, 256);
+    w.tree = OccupancyTree::build(w.grid, w.types);
+    w.primary = detail::camera_rays();
+    for (std::size_t i = 0; i < w.primary.size(); ++i) detail::add_secondary_rays(w, i);
+    return w;
+  }();
+  return shared;
+}
+
+/// rays/random600: the same terrain over 2048x2048 columns, and rays from just above it into every direction.
+struct RandomRayWorkload {
+  static constexpr int kWidth = 2'048;
+  Grid grid = terrain_grid(kWidth, kWidth);
+  VoxelRegistry types = three_types();
+  OccupancyTree tree = OccupancyTree::build(grid, types);
+  std::vector<RayQuery> rays;
+  int hits = 0;
+};
+
+namespace detail {
+
+/// xorshift64, as whole numbers and as doubles from 0 to 1.
+class FixedRandom {
+ public:
+  double next() {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 7;
+    state_ ^= state_ << 17;
+    return static_cast<double>(state_ >> 11) * 0x1p-53;
+  }
+
+ private:
+  std::uint64_t state_ = 42;
+};
+
+/// A direction of unit length: the first of the cube's points that lies in the ball.
+inline DVec3 random_direction(FixedRandom& random) {
+  for (;;) {
+    const double x = 2 * random.next() - 1;
+    const double y = 2 * random.next() - 1;
+    const double z = 2 * random.next() - 1;
+    const double square = x * x + y * y + z * z;
+    if (square <= 1.0 && square > 1e-6) return DVec3{x, y, z} / std::sqrt(square);
+  }
+}
+
+}  // namespace detail
+
+/// 20,000 rays from 1 to 20 units above the surface, up to 600 units long. Made at the first call, then shared.
+inline const RandomRayWorkload& random_ray_workload() {
+  static const RandomRayWorkload shared = [] {
+    RandomRayWorkload w;
+    detail::FixedRandom random;
+    for (int i = 0; i < 20'000; ++i) {
+      const double x = random.next() * RandomRayWorkload::kWidth;
+      const double z = random.next() * RandomRayWorkload::kWidth;
+      const double surface = height(std::floor(x), std::floor(z)) + 1;
+      const DVec3 origin{x, surface + 1 + 19 * random.next(), z};
+      w.rays.push_back({{origin, detail::random_direction(random)}, 600.0});
+      w.hits += any_hit(w.tree, w.rays.back().ray, w.rays.back().max_t);
+    }
+    return w;
+  }();
+  return shared;
+}
+
+}  // namespace quoin::workloads

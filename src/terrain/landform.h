@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <quoin/terrain/terrain.h>
+
+namespace quoin::terrain {
+
+/// What covers a column of ground.
+enum class Surface : std::uint8_t { Grass, Meadow, Earth, Stone, Sand, Gravel, Snow };
+inline constexpr int kSurfaces = 7;
+/// Bare rock shows a band of darker stone once in so many layers.
+inline constexpr int kStrata = 11;
+
+/// A column of ground before caves, plants and rocks.
+struct Column {
+  int height = 0;   ///< y of the topmost voxel of ground
+  int soil = 0;     ///< voxels of earth or sand between it and the stone
+  int lowest = 0;   ///< the least height of the column and its eight neighbours
+  int stratum = 0;  ///< how far the bands of stone are shifted here, 0 to kStrata - 1
+  Surface surface = Surface::Grass;
+  bool is_sandy = false;  ///< the soil is sand
+  bool is_steep = false;
+};
+
+/// The lie of the land: a function of seed, height of the world, x and z.
+class Landform {
+ public:
+  explicit Landform(const TerrainOptions& options);
+
+  /// y of the topmost voxel of ground. Cost: 18 evaluations of noise, about half a microsecond.
+  [[nodiscard]] int height(int x, int z) const;
+  /// Cost: nine times `height`.
+  [[nodiscard]] Column column(int x, int z) const;
+  /// The columns of a square, x fastest, for little more than one `height` each.
+  [[nodiscard]] std::vector<Column> columns(int first_x, int first_z, int edge) const;
+  /// How wooded the land is here: below 0 bare, 1 a dense forest.
+  [[nodiscard]] double forest(int x, int z) const;
+
+  /// y of the water's topmost voxel; -1 in a dry world.
+  [[nodiscard]] int water_level() const { return has_water_ ? sea_ : -1; }
+  [[nodiscard]] int sea() const { return sea_; }
+  [[nodiscard]] int snow_line() const { return snow_line_; }
+  [[nodiscard]] std::uint32_t seed() const { return seed_; }
+  /// Voxels that the world is high.
+  [[nodiscard]] int top() const { return top_; }
+
+ private:
+  [[nodiscard]] double elevation(double x, double z) const;
+  // `heights` is 3x3, x fastest.
+  [[nodiscard]] Column describe(int x, int z, const int* heights, std::size_t stride) const;
+
+  std::uint32_t seed_;
+  int top_;
+  int sea_;
+  int snow_line_;
+  bool has_water_;
+  double frequency_;  // of the main ridges, per voxel
+};
+
+}  // namespace quoin::terrain

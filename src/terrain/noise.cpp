@@ -1,0 +1,154 @@
+#include <quoin/terrain/noise.h>
+
+#include <algorithm>
+#include <array>
+
+namespace quoin {
+namespace {
+
+// A coordinate as a cell of the lattice and a place in it.
+struct Lattice {
+  std::int32_t cell;
+  double in_cell;
+
+  explicit Lattice(double x) : cell(static_cast<std::int32_t>(x)) {
+    if (x < static_cast<double>(cell)) --cell;
+    in_cell = x - static_cast<double>(cell);
+  }
+};
+
+double fade(double t) {
+  return t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+}
+
+double mix(double a, double b, double t) {
+  return a + t * (b - a);
+}
+
+struct Gradient2 {
+  double x, y;
+};
+
+// Every 22.5 degrees, none along an axis.
+constexpr double kNear = 0.98078528040323044913;
+constexpr double kFar = 0.19509032201612826785;
+constexpr double kMore = 0.83146961230254523708;
+constexpr double kLess = 0.55557023301960222474;
+constexpr std::array<Gradient2, 16> kGradients2 = {{{kNear, kFar},
+                                                    {kMore, kLess},
+                                                    {kLess, kMore},
+                                                    {kFar, kNear},
+                                                    {-kFar, kNear},
+                                                    {-kLess, kMore},
+                                                    {-kMore, kLess},
+                                                    {-kNear, kFar},
+                                                    {-kNear, -kFar},
+                                                    {-kMore, -kLess},
+                                                    {-kLess, -kMore},
+                                                    {-kFar, -kNear},
+                                                    {kFar, -kNear},
+                                                    {kLess, -kMore},
+                                                    {kMore, -kLess},
+                                                    {kNear, -kFar}}};
+
+double corner2(std::uint32_t seed, std::int32_t x, std::int32_t y, double dx, double dy) {
+  const Gradient2 g = kGradients2[hash_of(seed, x, y) >> 28];
+  return g.x * dx + g.y * dy;
+}
+
+struct Gradient3 {
+  double x, y, z;
+};
+
+// The middles of a cube's edges; four of them twice, so that there are 16.
+constexpr std::array<Gradient3, 16> kGradients3 = {{{1, 1, 0},
+                                                    {-1, 1, 0},
+                                                    {1, -1, 0},
+                                                    {-1, -1, 0},
+                                                    {1, 0, 1},
+                                                    {-1, 0, 1},
+                                                    {1, 0, -1},
+                                                    {-1, 0, -1},
+                                                    {0, 1, 1},
+                                                    {0, -1, 1},
+                                                    {0, 1, -1},
+                                                    {0, -1, -1},
+                                                    {1, 1, 0},
+                                                    {-1, 1, 0},
+                                                    {0, -1, 1},
+                                                    {0, -1, -1}}};
+
+double corner3(std::uint32_t seed, std::int32_t x, std::int32_t y, std::int32_t z, double dx, double dy, double dz) {
+  const Gradient3 g = kGradients3[hash_of(seed, x, y, z) >> 28];
+  return g.x * dx + g.y * dy + g.z * dz;
+}
+
+}  // namespace
+
+double noise2(std::uint32_t seed, double x, double y) {
+  const Lattice lx(x);
+  const Lattice ly(y);
+  const double u = fade(lx.in_cell);
+  const double near = mix(corner2(seed, lx.cell, ly.cell, lx.in_cell, ly.in_cell),
+                          corner2(seed, lx.cell + 1, ly.cell, lx.in_cell - 1.0, ly.in_cell), u);
+  const double far = mix(corner2(seed, lx.cell, ly.cell + 1, lx.in_cell, ly.in_cell - 1.0),
+                         corner2(seed, lx.cell + 1, ly.cell + 1, lx.in_cell - 1.0, ly.in_cell - 1.0), u);
+  return mix(near, far, fade(ly.in_cell));
+}
+
+double noise3(std::uint32_t seed, double x, double y, double z) {
+  // A turn by 60 degrees about (1, 1, 1): all nine entries are thirds.
+  constexpr double kThird = 1.0 / 3.0;
+  const Lattice lx((2.0 * x - y + 2.0 * z) * kThird);
+  const Lattice ly((2.0 * x + 2.0 * y - z) * kThird);
+  const Lattice lz((2.0 * y + 2.0 * z - x) * kThird);
+  const double u = fade(lx.in_cell);
+  const auto along_x = [&](std::int32_t j, std::int32_t k) {
+    const double dy = ly.in_cell - static_cast<double>(j);
+    const double dz = lz.in_cell - static_cast<double>(k);
+    return mix(corner3(seed, lx.cell, ly.cell + j, lz.cell + k, lx.in_cell, dy, dz),
+               corner3(seed, lx.cell + 1, ly.cell + j, lz.cell + k, lx.in_cell - 1.0, dy, dz), u);
+  };
+  const double v = fade(ly.in_cell);
+  return mix(mix(along_x(0, 0), along_x(1, 0), v), mix(along_x(0, 1), along_x(1, 1), v), fade(lz.in_cell));
+}
+
+namespace {
+
+// Twice as fine, and turned by the angle of the 3-4-5 triangle.
+void next_octave(double& x, double& y) {
+  const double turned_x = 1.6 * x - 1.2 * y;
+  y = 1.2 * x + 1.6 * y;
+  x = turned_x;
+}
+
+}  // namespace
+
+double fractal2(std::uint32_t seed, double x, double y, int octaves) {
+  double sum = 0.0;
+  double amplitude = 1.0;
+  for (int octave = 0; octave < octaves; ++octave) {
+    sum += amplitude * noise2(seed + static_cast<std::uint32_t>(octave), x, y);
+    amplitude *= 0.5;
+    next_octave(x, y);
+  }
+  return sum;
+}
+
+double ridged2(std::uint32_t seed, double x, double y, int octaves) {
+  double sum = 0.0;
+  double amplitude = 0.55;
+  double weight = 1.0;
+  for (int octave = 0; octave < octaves; ++octave) {
+    const double noise = noise2(seed + static_cast<std::uint32_t>(octave), x, y);
+    const double crest = 1.0 - std::min(1.0, 1.4 * (noise < 0.0 ? -noise : noise));
+    const double ridge = crest * crest * weight;
+    sum += amplitude * ridge;
+    amplitude *= 0.45;
+    weight = std::min(1.0, 1.6 * ridge);
+    next_octave(x, y);
+  }
+  return sum;
+}
+
+}  // namespace quoin

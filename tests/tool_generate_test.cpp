@@ -1,0 +1,112 @@
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/io/formats.h>
+#include <quoin/terrain/terrain.h>
+
+#include "tests/tool_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+using Json = nlohmann::json;
+
+class ToolGenerate : public ToolTest {};
+
+TEST_F(ToolGenerate, writes_the_same_world_as_the_library) {
+  const ToolRun result = run("generate terrain world.vox --seed 9 --chunks 3x2x2 --json");
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  VoxelRegistry registry;
+  TerrainOptions options;
+  options.seed = 9;
+  options.size = {3, 2, 2};
+  const Grid world = generate_terrain(options, add_terrain_types(registry).value()).value();
+  const Json json = Json::parse(result.out);
+  EXPECT_EQ(json["voxels"], world.voxel_count());
+  EXPECT_EQ(json["types"], world.types().size());
+  EXPECT_EQ(json["size"], Json({96, 64, 64}));
+  EXPECT_EQ(json["bytes"], std::filesystem::file_size(folder_.file("world.vox")));
+  for (const char* key : {"generate", "write"}) EXPECT_GE(json["seconds"][key], 0.0);
+  EXPECT_EQ(json["warnings"], Json::array());
+
+  const LoadedScene loaded = load_scene(folder_.file("world.vox")).value();
+  ASSERT_EQ(loaded.scene.grids().size(), 1U);
+  const SceneGrid& grid = loaded.scene.grids()[loaded.scene.grids().handles().front()];
+  EXPECT_EQ(grid.grid.voxel_count(), world.voxel_count());
+  int differing = 0;
+  world.for_each([&](IVec3 v, VoxelType type) { differing += grid.grid.get(v) != type; });
+  EXPECT_EQ(differing, 0);
+  EXPECT_TRUE(loaded.scene.types.is_transparent(6)) << "water";
+  EXPECT_EQ(loaded.scene.types[1].colour, (Rgba8{77, 179, 51, 255}));
+}
+
+TEST_F(ToolGenerate, is_seed_42_and_4x2x4_unless_told) {
+  EXPECT_EQ(run("generate terrain a.vox").status, 0);
+  EXPECT_EQ(run("generate terrain b.vox --seed 42 --chunks 4x2x4 --threads 3").status, 0);
+  EXPECT_EQ(run("generate terrain c.vox --seed 43").status, 0);
+  const std::string a = text_of(folder_.file("a.vox"));
+  EXPECT_GT(a.size(), 1'000'000U);
+  EXPECT_TRUE(a == text_of(folder_.file("b.vox"))) << "the same bytes for any number of threads";
+  EXPECT_FALSE(a == text_of(folder_.file("c.vox")));
+}
+
+TEST_F(ToolGenerate, says_what_it_made) {
+  const ToolRun result = run("generate terrain hills.vox --chunks 1x1x1");
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("seed 42, 32 x 32 x 32"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("Wrote hills.vox"), std::string::npos) << result.out;
+  EXPECT_NE(run("generate terrain --help").out.find("Example: quoin generate terrain"), std::string::npos);
+  EXPECT_NE(run("generate --help").out.find("Example: quoin generate terrain"), std::string::npos);
+}
+
+TEST_F(ToolGenerate, worlds_beyond_256_voxels_keep_every_voxel) {
+  const ToolRun made = run("generate terrain wide.vox --chunks 10x1x1 --json");
+  ASSERT_EQ(made.status, 0) << made.err;
+  const ToolRun info = run("info wide.vox --json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(Json::parse(info.out)["voxels"], Json::parse(made.out)["voxels"]);
+}
+
+TEST_F(ToolGenerate, wrong_usage_is_status_2_and_leaves_no_file) {
+  for (const std::string arguments : {"",
+                                      "terrain",
+                                      "forest out.vox",
+                                      "terrain out.glb",
+                                      "terrain out",
+                                      "terrain out.vox --chunks 0x2x4",
+                                      "terrain out.vox --chunks 4x-2x4",
+                                      "terrain out.vox --chunks 4x2",
+                                      "terrain out.vox --chunks 4x2x4x1",
+                                      "terrain out.vox --chunks 4,2,4",
+                                      "terrain out.vox --chunks ''",
+                                      "terrain out.vox --chunks 1025x1x1",
+                                      "terrain out.vox --chunks 1x33x1",
+                                      "terrain out.vox --chunks 1024x32x1024",
+                                      "terrain out.vox --chunks 99999999999x1x1",
+                                      "terrain out.vox --seed -1",
+                                      "terrain out.vox --seed x",
+                                      "terrain out.vox --seed 18446744073709551616",
+                                      "terrain out.vox --threads 0",
+                                      "terrain ''",
+                                      "terrain out.vox --unknown"}) {
+    const ToolRun result = run("generate " + arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    expect_one_error_line(result);
+  }
+  EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out"));
+  EXPECT_TRUE(run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: no option \"--unknown\""));
+}
+
+TEST_F(ToolGenerate, a_file_that_cannot_be_written_is_status_1) {
+  const ToolRun result = run("generate terrain nowhere/out.vox --chunks 1x1x1");
+  EXPECT_EQ(result.status, 1);
+  expect_one_error_line(result);
+}
+
+}  // namespace
+
+}  // namespace quoin
