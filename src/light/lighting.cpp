@@ -51,10 +51,10 @@ std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint
 
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
-  std::array<const SurfacePoint*, RayPacket::kSize> points{};
-  std::size_t size = 0;
-  std::int32_t placed = 0;
   RayPacket origins;
+  std::size_t size = 0;
+  std::array<const SurfacePoint*, RayPacket::kSize> points{};
+  std::int32_t placed = 0;
   std::uint32_t surfaces = 0;  // lanes that are to be lit
   bool is_one_face = true;
 

@@ -22,8 +22,10 @@ struct Axis {
   I base;  // voxels from the tables' origin, a multiple of 64
   Mask forward;
   Mask still;  // the direction has no such component
+  Mask moved;  // the ray does not start at `origin`, but came there
   F low;       // the box in which the lane moves
   F high;
+  F far_t;  // where it leaves that box along this axis
 };
 
 struct Lanes {
@@ -59,19 +61,25 @@ inline F first_of(const Planes& t, Crossing& which) {
   return least;
 }
 
-// Where a ray starts and ends, in voxels from the tables' origin.
+// Where a ray starts, in voxels from the tables' origin.
+struct Move {
+  double position[3];
+  double max_t;
+  int entered = -1;  // the axis of the bounds' plane to which it was moved
+};
+
 struct Starts {
   alignas(64) double position[3][kWidth];
   alignas(64) double max_t[kWidth];
-  alignas(64) std::int32_t entered[kWidth];  // the axis of the bounds' plane to which it was moved, or -1
+  alignas(64) std::int32_t entered[kWidth];
 };
 
 // Moves one ray that starts far away to where it enters the bounds; false when it misses them.
-inline bool move_to_bounds(const TreeView& tree, const double direction[3], Starts& starts, int lane) {
+inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move& ray) {
   double enter_t = -1.0;
   int enter_axis = -1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double p = starts.position[axis][lane];
+    const double p = ray.position[axis];
     const double d = direction[axis];
     const bool is_low = p < tree.box.min[axis];
     if (!is_low && p < tree.box.max[axis]) continue;
@@ -83,40 +91,36 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Star
     }
   }
   if (enter_axis < 0) return true;
-  if (!(enter_t <= starts.max_t[lane])) return false;
+  if (!(enter_t <= ray.max_t)) return false;
   for (int axis = 0; axis < 3; ++axis) {
     const double plane = direction[axis] > 0.0 ? tree.box.min[axis] : tree.box.max[axis];
-    const double p = axis == enter_axis ? plane : starts.position[axis][lane] + enter_t * direction[axis];
+    const double p = axis == enter_axis ? plane : ray.position[axis] + enter_t * direction[axis];
     // The others are inside by now, or never will be.
     if (!(p >= tree.box.min[axis] - 1e-3 && p <= tree.box.max[axis] + 1e-3)) return false;
-    starts.position[axis][lane] = p;
+    ray.position[axis] = p;
   }
-  starts.max_t[lane] -= enter_t;
-  starts.entered[lane] = enter_axis;
+  ray.max_t -= enter_t;
+  ray.entered = enter_axis;
   return true;
 }
 
-struct AxisT {
-  F near_t;  // of the plane through which the lane enters its box; -1 when it starts between
-  F far_t;
-};
-
-inline void clip(Axis& axis, F& low, F& high, F reach, Mask entered, AxisT& t, Mask& live, Mask& cut) {
+// Answers where a lane enters through a plane of this axis; -1 when it starts between its planes.
+inline F clip(Axis& axis, F low, F high, F reach, Mask entered, Mask& live, F& bounds_exit) {
   const F end = axis.origin + reach * axis.direction;
   const F far_before = select(axis.forward, high, low);
   low = max(low, floor(min(axis.origin, end) - all(kSlack)));
   high = min(high, floor(max(axis.origin, end) + all(kSlack)) + all(1.0F));
   const F far = select(axis.forward, high, low);
-  cut = cut | ~(far == far_before);
+  bounds_exit = min(bounds_exit, select(axis.still, all(kNever), crossing_t(axis, far_before)));
   const Mask is_low = axis.origin < low;
   const Mask is_high = high <= axis.origin;
   const Mask before = (((axis.forward & is_low) | (~axis.forward & is_high)) & ~axis.still) | entered;
   const Mask past = ((axis.forward & is_high) | (~axis.forward & is_low)) & ~entered;
   live = live & ~past & ~(axis.still & is_high);
-  t.near_t = select(before, crossing_t(axis, select(axis.forward, low, high)), all(-1.0F));
-  t.far_t = select(axis.still, all(kNever), crossing_t(axis, far));
+  axis.far_t = select(axis.still, all(kNever), crossing_t(axis, far));
   axis.low = low;
   axis.high = high;
+  return select(before, crossing_t(axis, select(axis.forward, low, high)), all(-1.0F));
 }
 
 inline Axis make_axis(const double* position, F direction) {
@@ -153,7 +157,7 @@ inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before
   const F behind_t = crossing_t(axis, behind);
   const Mask is_short = ((ahead_t < t) | ((ahead_t == t) & ties_before)) & ~axis.still;
   // It was never out of the unit in which it started.
-  const Mask was_inside = axis.forward & (behind <= axis.origin);
+  const Mask was_inside = axis.forward & ((behind < axis.origin) | ((behind == axis.origin) & ~axis.moved));
   const Mask is_far = ((t < behind_t) | ((behind_t == t) & ties_after)) & ~axis.still & ~was_inside & ~is_short;
   const F one = select(axis.forward, all(1.0F), all(-1.0F));
   at = add_if(is_short, at, one);
@@ -192,7 +196,11 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   for (; far_lanes != 0; far_lanes &= far_lanes - 1) {
     const int lane = std::countr_zero(far_lanes);
     const double direction[3] = {directions[0][lane], directions[1][lane], directions[2][lane]};
-    if (!move_to_bounds(tree, direction, starts, lane)) missing |= 1U << lane;
+    Move ray{{starts.position[0][lane], starts.position[1][lane], starts.position[2][lane]}, starts.max_t[lane], -1};
+    if (!move_to_bounds(tree, direction, ray)) missing |= 1U << lane;
+    for (int axis = 0; axis < 3; ++axis) starts.position[axis][lane] = ray.position[axis];
+    starts.max_t[lane] = ray.max_t;
+    starts.entered[lane] = ray.entered;
   }
   lanes.live = lanes.live & ~mask_of(missing);
 
@@ -203,32 +211,30 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& rays, int first, std:
   const F max_t = narrow(starts.max_t);
   const F reach = min(max_t, furthest);
   const I moved = load(starts.entered);
-  Mask cut = mask_of(0);
-  AxisT tx;
-  AxisT ty;
-  AxisT tz;
-  const auto limit = [&](Axis& axis, int index, AxisT& limits) {
-    F low = to_bound(tree.box.min[index], axis.base);
-    F high = to_bound(tree.box.max[index], axis.base);
-    clip(axis, low, high, reach, equals(moved, index), limits, lanes.live, cut);
+  F bounds_exit = all(kNever);
+  const auto limit = [&](Axis& axis, int index) {
+    const F low = to_bound(tree.box.min[index], axis.base);
+    const F high = to_bound(tree.box.max[index], axis.base);
+    axis.moved = ~equals(moved, -1);
+    return clip(axis, low, high, reach, equals(moved, index), lanes.live, bounds_exit);
   };
-  limit(lanes.x, 0, tx);
-  limit(lanes.y, 1, ty);
-  limit(lanes.z, 2, tz);
-  lanes.unfinished = lanes.unfinished | (cut & (furthest < max_t) & mask_of(wanted));
+  const F near_x = limit(lanes.x, 0);
+  const F near_y = limit(lanes.y, 1);
+  const F near_z = limit(lanes.z, 2);
 
   // Enters through the last plane; at a tie the later axis.
-  const F enter_t = max(max(tx.near_t, ty.near_t), tz.near_t);
+  const F enter_t = max(max(near_x, near_y), near_z);
   const Mask starts_outside = all(0.0F) <= enter_t;
-  entered.z = (tz.near_t == enter_t) & starts_outside;
-  entered.y = (ty.near_t == enter_t) & starts_outside & ~entered.z;
+  entered.z = (near_z == enter_t) & starts_outside;
+  entered.y = (near_y == enter_t) & starts_outside & ~entered.z;
   entered.x = starts_outside & ~entered.z & ~entered.y;
   t = max(enter_t, all(0.0F));
   // Through an edge of its box: it has left before it enters if the axis on which it leaves goes first.
-  const Mask left = (tx.far_t < t) | (ty.far_t < t) | (tz.far_t < t) | ((tx.far_t == t) & (entered.y | entered.z)) |
-                    ((ty.far_t == t) & entered.z);
+  const Mask left = (lanes.x.far_t < t) | (lanes.y.far_t < t) | (lanes.z.far_t < t) |
+                    ((lanes.x.far_t == t) & (entered.y | entered.z)) | ((lanes.y.far_t == t) & entered.z);
   lanes.live = lanes.live & ~left;
-  lanes.exit_t = min(min(tx.far_t, ty.far_t), tz.far_t);
+  lanes.unfinished = lanes.unfinished | (lanes.live & (furthest < max_t) & (furthest < bounds_exit));
+  lanes.exit_t = min(min(lanes.x.far_t, lanes.y.far_t), lanes.z.far_t);
   return lanes;
 }
 
@@ -427,26 +433,28 @@ inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entere
   }
 }
 
-inline void trace_packet(const TreeView& tree, const RayPacket& rays, std::uint32_t wanted, LaneHits& out) {
+inline void keep(const Met& met, int first, LaneHits& out) {
+  out.hit |= bits(met.hit) << first;
+  out.starts_inside |= bits(met.inside) << first;
+  store(out.x.data() + first, met.x);
+  store(out.y.data() + first, met.y);
+  store(out.z.data() + first, met.z);
+  store(out.axis.data() + first, met.axis);
+}
+
+constexpr std::uint32_t kAllLanes = (std::uint32_t{1} << kWidth) - 1U;
+
+inline void trace_packet(const TreeView& tree, const RayPacket& rays, LaneHits& out) {
   for (int first = 0; first < RayPacket::kSize; first += kWidth) {
-    const std::uint32_t lanes_wanted = wanted >> first & ((kWidth < 32 ? 1U << kWidth : 0U) - 1U);
-    if (lanes_wanted == 0) continue;
+    const std::uint32_t wanted = rays.active >> first & kAllLanes;
+    if (wanted == 0) continue;
     F t;
     Crossing entered;
-    Lanes lanes = set_up(tree, rays, first, lanes_wanted, t, entered);
-    std::uint32_t hit = 0;
-    if (any(lanes.live)) {
-      const Met met = trace(tree, lanes, t, entered);
-      hit = bits(met.hit);
-      out.hit |= hit << first;
-      out.starts_inside |= bits(met.inside) << first;
-      store(out.x.data() + first, met.x);
-      store(out.y.data() + first, met.y);
-      store(out.z.data() + first, met.z);
-      store(out.axis.data() + first, met.axis);
-    }
-    out.unfinished |= (bits(lanes.unfinished) & ~hit) << first;
+    Lanes lanes = set_up(tree, rays, first, wanted, t, entered);
+    if (any(lanes.live)) keep(trace(tree, lanes, t, entered), first, out);
+    out.unfinished |= bits(lanes.unfinished) << first;
   }
+  out.unfinished &= ~out.hit;
 }
 
 // The distances of the faces met, in double precision, and which of them lie within reach.
@@ -472,7 +480,7 @@ inline std::uint32_t measure(const TreeView& tree, const RayPacket& rays, const 
 
 inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
   LaneHits lanes;
-  trace_packet(tree, rays, rays.active, lanes);
+  trace_packet(tree, rays, lanes);
   hits.hit = measure(tree, rays, lanes, hits.t.data());
   hits.starts_inside = lanes.starts_inside & hits.hit;
   for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
@@ -485,13 +493,4 @@ inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits&
     hits.face[i] = static_cast<Direction>(2 * lanes.axis[i] + (d > 0.0 ? 1 : 0));
   }
   unfinished = lanes.unfinished;
-}
-
-inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
-  LaneHits lanes;
-  trace_packet(tree, rays, rays.active, lanes);
-  unfinished = lanes.unfinished;
-  if (lanes.hit == 0) return 0;
-  alignas(64) double t[RayPacket::kSize];
-  return measure(tree, rays, lanes, t);
 }

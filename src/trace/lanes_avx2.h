@@ -163,3 +163,30 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   rest.v = _mm256_set_m128(r[1], r[0]);
   whole.v = _mm256_set_m128(w[1], w[0]);
 }
+
+inline I or_of(I a, I b) {
+  return {_mm256_or_si256(a.v, b.v)};
+}
+// `a` where `which` has bits, else `b`.
+inline I merge(I which, I a, I b) {
+  return {_mm256_or_si256(_mm256_and_si256(which.v, a.v), _mm256_andnot_si256(which.v, b.v))};
+}
+
+// The indices of 4^3 bricks.
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const std::uint32_t* corner =
+        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+    for (int row = 0; row < 16; ++row) {
+      const std::uint32_t* from = corner + (row & 3) * tree.brick_strides.y + (row >> 2) * tree.brick_strides.z;
+      _mm_store_si128(reinterpret_cast<__m128i*>(bricks_ + 4 * row),
+                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+    }
+  }
+  // By x + 4 y + 16 z; further bits do not count.
+  [[nodiscard]] I brick(I place) const { return gather(bricks_, place & all(63)); }
+
+ private:
+  alignas(32) std::uint32_t bricks_[64];
+};

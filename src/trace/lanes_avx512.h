@@ -163,3 +163,38 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   rest.v = join(r[0], r[1]);
   whole.v = join(w[0], w[1]);
 }
+
+inline I or_of(I a, I b) {
+  return {_mm512_or_si512(a.v, b.v)};
+}
+// `a` where `which` has bits, else `b`.
+inline I merge(I which, I a, I b) {
+  return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};
+}
+
+// The indices of 4^3 bricks.
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const std::uint32_t* corner =
+        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+    for (int z = 0; z < 4; ++z) {
+      const auto row = [&](int y) {
+        return _mm_loadu_si128(
+            reinterpret_cast<const __m128i*>(corner + y * tree.brick_strides.y + z * tree.brick_strides.z));
+      };
+      const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(row(0)), row(1), 1);
+      const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(row(2)), row(3), 1);
+      layers_[z] = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+    }
+  }
+  // By x + 4 y + 16 z.
+  [[nodiscard]] I brick(I place) const {
+    const __m512i low = _mm512_permutex2var_epi32(layers_[0], place.v, layers_[1]);
+    const __m512i high = _mm512_permutex2var_epi32(layers_[2], place.v, layers_[3]);
+    return select(test(place, all(32)), I{high}, I{low});
+  }
+
+ private:
+  __m512i layers_[4];
+};

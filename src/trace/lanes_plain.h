@@ -157,3 +157,29 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   rest.v = static_cast<float>(*from - start);
   whole.v = static_cast<float>(std::floor(*from) - start);
 }
+
+inline I or_of(I a, I b) {
+  return as_lane(as_unsigned(a) | as_unsigned(b));
+}
+// `a` where `which` has bits, else `b`.
+inline I merge(I which, I a, I b) {
+  return as_lane((as_unsigned(which) & as_unsigned(a)) | (~as_unsigned(which) & as_unsigned(b)));
+}
+
+// The indices of 4^3 bricks.
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin)
+      : corner_(tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y +
+                (origin.z >> 4) * tree.brick_strides.z),
+        strides_(tree.brick_strides) {}
+  // By x + 4 y + 16 z; further bits do not count.
+  [[nodiscard]] I brick(I place) const {
+    const int p = place.v;
+    return as_lane(corner_[(p & 3) + (p >> 2 & 3) * strides_.y + (p >> 4 & 3) * strides_.z]);
+  }
+
+ private:
+  const std::uint32_t* corner_;
+  IVec3 strides_;
+};

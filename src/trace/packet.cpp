@@ -6,40 +6,11 @@
 #include "trace/walk.h"
 
 namespace quoin {
-namespace {
-
-const trace::Kernel& kernel_of(InstructionSet instructions) {
-#ifdef QUOIN_X86_KERNELS
-  const InstructionSet set = resolve(instructions);
-  if (set == InstructionSet::Avx512) return trace::kAvx512Kernel;
-  if (set == InstructionSet::Avx2) return trace::kAvx2Kernel;
-#endif
-  static_cast<void>(instructions);
-  return trace::kPlainKernel;
-}
-
-trace::TreeView view_of(const OccupancyTree& tree, const OccupancyTree::FlatTables& tables) {
-  trace::TreeView view;
-  view.cells = tables.cells.data();
-  view.bricks = tables.bricks.data();
-  view.words = reinterpret_cast<const std::uint32_t*>(tree.bricks());
-  view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
-  view.cell_strides = tables.cell_strides();
-  view.brick_strides = tables.brick_strides();
-  view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
-  view.origin = DVec3(tables.origin);
-  const IBox bounds = tree.bounds();
-  view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
-  return view;
-}
-
-}  // namespace
-
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits, InstructionSet instructions) {
   hits.hit = hits.starts_inside = 0;
   std::uint32_t unfinished = rays.active;
   if (const auto* tables = tree.flat_tables()) {
-    kernel_of(instructions).first_hits(view_of(tree, *tables), rays, hits, unfinished);
+    trace::kernel_of(instructions).first_hits(trace::view_of(tree, *tables), rays, hits, unfinished);
   }
   for (std::uint32_t inside = hits.starts_inside; inside != 0; inside &= inside - 1) {
     const int lane = std::countr_zero(inside);
@@ -62,7 +33,7 @@ std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays, Instruc
   std::uint32_t unfinished = rays.active;
   std::uint32_t blocked = 0;
   if (const auto* tables = tree.flat_tables()) {
-    blocked = kernel_of(instructions).any_hits(view_of(tree, *tables), rays, unfinished);
+    blocked = trace::kernel_of(instructions).any_hits(trace::view_of(tree, *tables), rays, unfinished);
   }
   for (; unfinished != 0; unfinished &= unfinished - 1) {
     const int lane = std::countr_zero(unfinished);

@@ -1,7 +1,9 @@
 // The kernel of rays in lockstep for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "trace/tree_view.h"
 
@@ -23,9 +25,13 @@ namespace {
 
 #include "trace/kernel.inl"
 
+#include "trace/single.inl"
+
+#include "trace/short.inl"
+
 }  // namespace
 
-const Kernel kAvx2Kernel = {trace_first, trace_any};
+const Kernel kAvx2Kernel = {first_single, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

@@ -1,7 +1,9 @@
 // The kernel of rays in lockstep for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "trace/tree_view.h"
 
@@ -24,9 +26,13 @@ namespace {
 
 #include "trace/kernel.inl"
 
+#include "trace/single.inl"
+
+#include "trace/short.inl"
+
 }  // namespace
 
-const Kernel kAvx512Kernel = {trace_first, trace_any};
+const Kernel kAvx512Kernel = {first_single, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

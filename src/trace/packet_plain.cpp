@@ -1,7 +1,9 @@
 // The kernel of rays in lockstep for any processor.
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "trace/tree_view.h"
 
@@ -12,8 +14,12 @@ namespace {
 
 #include "trace/kernel.inl"
 
+#include "trace/single.inl"
+
+#include "trace/short.inl"
+
 }  // namespace
 
-const Kernel kPlainKernel = {trace_first, trace_any};
+const Kernel kPlainKernel = {first_single, trace_first, trace_any};
 
 }  // namespace quoin::trace

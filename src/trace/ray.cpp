@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "trace/tree_view.h"
 #include "trace/walk.h"
 
 namespace quoin {
@@ -241,12 +242,21 @@ std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const 
   return RayHit{walk.voxel(), face_of(walk, ray), walk.t(), walk.axis() < 0};
 }
 
-std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
-  return trace::walk_to_first_hit(tree, ray, max_t);
+std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
+  const OccupancyTree::FlatTables* tables = tree.flat_tables();
+  if (tables == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
+  RayHit hit;
+  bool is_unfinished = false;
+  const bool is_hit =
+      trace::kernel_of(instructions).first_hit(trace::view_of(tree, *tables), ray, max_t, hit, is_unfinished);
+  if (is_unfinished) return trace::walk_to_first_hit(tree, ray, max_t);
+  if (!is_hit) return std::nullopt;
+  if (hit.starts_inside) hit.face = trace::facing(ray.direction);
+  return hit;
 }
 
-bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
-  return trace::walk_to_first_hit(tree, ray, max_t).has_value();
+bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
+  return first_hit(tree, ray, max_t, instructions).has_value();
 }
 
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,

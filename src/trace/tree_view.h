@@ -16,6 +16,7 @@ struct TreeView {
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
   IVec3 brick_strides;
+  IVec3 brick_sizes;
   DVec3 origin;  ///< of the tables, in the grid
   IBox box;      ///< tight, from `origin`
 };
@@ -33,6 +34,8 @@ struct LaneHits {
 // is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
 // of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
 struct Kernel {
+  /// One ray; `face` is not set where it starts inside.
+  bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
   /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
   void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
   /// Answers the lanes that are blocked.
@@ -44,5 +47,8 @@ extern const Kernel kPlainKernel;
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 #endif
+
+[[nodiscard]] const Kernel& kernel_of(InstructionSet instructions);
+[[nodiscard]] TreeView view_of(const OccupancyTree& tree, const OccupancyTree::FlatTables& tables);
 
 }  // namespace quoin::trace

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/instruction_set.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/occupancy_tree.h>
 
@@ -34,11 +35,13 @@ struct RayHit {
 /// Cost:      a few steps through empty space, whatever its size; never more than the planes crossed inside the bounds.
 /// Source:    A. Williams et al., "An efficient and robust ray-box intersection algorithm" (2005), for the clip.
 [[nodiscard]] std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray,
-                                              double max_t = std::numeric_limits<double>::infinity());
+                                              double max_t = std::numeric_limits<double>::infinity(),
+                                              InstructionSet instructions = InstructionSet::Best);
 
 /// Whether any occupied voxel touches the ray from 0 up to and including `max_t`. As `first_hit`, without asking where.
 [[nodiscard]] bool any_hit(const OccupancyTree& tree, const Ray& ray,
-                           double max_t = std::numeric_limits<double>::infinity());
+                           double max_t = std::numeric_limits<double>::infinity(),
+                           InstructionSet instructions = InstructionSet::Best);
 
 /// A voxel that a ray passes through, from `t_enter` to `t_exit`.
 struct VoxelSpan {
