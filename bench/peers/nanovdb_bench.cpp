@@ -80,7 +80,7 @@ void build(benchmark::State& state) {
 [[maybe_unused]] const bool registered = [] {
   using Rays = const std::vector<RayQuery>&;
   const auto one_world = [](Rays rays) { return count_hits(world(), rays); };
-  add_workload("peer/nanovdb/", "single", one_world, one_world);
+  add_workload("peer/nanovdb/", "single", one_world, one_world, one_world);
   add_random("peer/nanovdb/", [](Rays rays) { return count_hits(random_world(), rays); });
   return true;
 }();

@@ -115,7 +115,7 @@ void set_sequential(benchmark::State& state) {
 }
 
 [[maybe_unused]] const bool registered = [] {
-  add_workload("peer/openvdb/", "single", count_hits, count_hits);
+  add_workload("peer/openvdb/", "single", count_hits, count_hits, count_hits);
   return true;
 }();
 BENCHMARK(build)->Name("peer/openvdb/rays/build")->Unit(benchmark::kMillisecond);

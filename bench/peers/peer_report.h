@@ -37,21 +37,21 @@ void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
 }
 
-/// The three parts of the rays workload: `prefix` + "rays/primary/" + `kind` and so on. `first` is asked for primary
-/// rays, `any` for the others.
-template <class First, class Any>
-void add_workload(const std::string& prefix, const std::string& kind, First first, Any any) {
+/// The three parts of the rays workload: `prefix` + "rays/primary/" + `kind` and so on.
+template <class Primary, class Shadow, class Occlusion>
+void add_workload(const std::string& prefix, const std::string& kind, Primary primary, Shadow shadow,
+                  Occlusion occlusion) {
   using workloads::ray_workload;
   using Rays = const std::vector<workloads::RayQuery>&;
   add_rays(
       prefix + "rays/primary/" + kind, +[]() -> Rays { return ray_workload().primary; },
-      +[] { return workloads::kPrimaryHits; }, first);
+      +[] { return workloads::kPrimaryHits; }, primary);
   add_rays(
       prefix + "rays/shadow/" + kind, +[]() -> Rays { return ray_workload().shadow; },
-      +[] { return workloads::kShadowHits; }, any);
+      +[] { return workloads::kShadowHits; }, shadow);
   add_rays(
       prefix + "rays/ao/" + kind, +[]() -> Rays { return ray_workload().occlusion; },
-      +[] { return workloads::kOcclusionHits; }, any);
+      +[] { return workloads::kOcclusionHits; }, occlusion);
 }
 
 /// rays/random600: first hits, one ray at a time.

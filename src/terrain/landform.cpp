@@ -8,17 +8,15 @@ namespace quoin::terrain {
 namespace {
 
 // One stream of noise for each purpose.
-enum Stream : std::uint32_t {
-  kWarpX = 0x100,
-  kWarpZ = 0x200,
-  kRegion = 0x300,
-  kHills = 0x400,
-  kRidges = 0x500,
-  kRivers = 0x600,
-  kForest = 0x700,
-  kCover = 0x800,
-  kSpeckle = 0x900
-};
+constexpr std::uint32_t kWarpX = 0x100;
+constexpr std::uint32_t kWarpZ = 0x200;
+constexpr std::uint32_t kRegion = 0x300;
+constexpr std::uint32_t kHills = 0x400;
+constexpr std::uint32_t kRidges = 0x500;
+constexpr std::uint32_t kRivers = 0x600;
+constexpr std::uint32_t kForest = 0x700;
+constexpr std::uint32_t kCover = 0x800;
+constexpr std::uint32_t kSpeckle = 0x900;
 
 double smooth_step(double low, double high, double x) {
   const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
