@@ -1,10 +1,5 @@
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-
 #include <array>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -13,65 +8,13 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/glb_for_tests.h"
+#include "tests/tool_for_tests.h"
 
 namespace quoin {
 
 namespace {
 
 using Json = nlohmann::json;
-
-struct ToolRun {
-  int status = -1;
-  std::string out;
-  std::string err;
-};
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-/// A file in MagicaVoxel's oldest form: one model, whose voxels are four bytes each.
-std::string vox_file(std::array<std::uint32_t, 3> size, const std::string& voxels) {
-  const auto word = [](std::uint32_t value) {
-    std::string bytes(4, '\0');
-    std::memcpy(bytes.data(), &value, 4);
-    return bytes;
-  };
-  const auto chunk = [&](const std::string& id, const std::string& content) {
-    return id + word(static_cast<std::uint32_t>(content.size())) + word(0) + content;
-  };
-  std::string palette;
-  for (std::uint32_t i = 0; i < 256; ++i) palette += word(i == 0 ? 0xFF3366CCU : 0xFF112233U);
-  const std::string chunks = chunk("SIZE", word(size[0]) + word(size[1]) + word(size[2])) +
-                             chunk("XYZI", word(static_cast<std::uint32_t>(voxels.size() / 4)) + voxels) +
-                             chunk("RGBA", palette);
-  return "VOX " + word(150) + "MAIN" + word(0) + word(static_cast<std::uint32_t>(chunks.size())) + chunks;
-}
-
-/// Four voxels in two colours.
-std::string tiny_vox() {
-  return vox_file({3, 4, 2}, std::string("\0\0\0\1"
-                                         "\1\0\0\1"
-                                         "\2\0\0\1"
-                                         "\2\0\1\2",
-                                         16));
-}
-
-/// Voxels that share no face, half of a cube: large in every format. 4,000 of them unless told.
-std::string checkerboard_vox(int edge = 20) {
-  std::string voxels;
-  for (int i = 0; i < edge * edge * edge; ++i) {
-    const int x = i % edge;
-    const int y = i / edge % edge;
-    const int z = i / (edge * edge);
-    if ((x + y + z) % 2 != 0) continue;
-    for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
-  }
-  const auto size = static_cast<std::uint32_t>(edge);
-  return vox_file({size, size, size}, voxels);
-}
 
 /// The model of `tiny_vox` at two places, of which as many as asked are hidden.
 std::string vox_with_hidden(int hidden) {
@@ -88,38 +31,7 @@ std::string vox_with_hidden(int hidden) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-class Tool : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (std::string(QUOIN_TOOL).empty()) GTEST_SKIP() << "the tool is not built";
-    std::ofstream(folder_.file("tiny.vox"), std::ios::binary) << tiny_vox();
-  }
-
-  /// Runs the tool in the test's folder.
-  ToolRun run(const std::string& arguments) { return shell("'" QUOIN_TOOL "' " + arguments); }
-
-  /// Runs a command line there.
-  ToolRun shell(const std::string& line) {
-    std::ofstream(folder_.file("run.sh")) << line << "\n";
-    const std::string command = "cd '" + folder_.file("").string() + "' && sh run.sh > stdout.txt 2> stderr.txt";
-    ToolRun result;
-    const int status = std::system(command.c_str());
-    result.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    result.out = text_of(folder_.file("stdout.txt"));
-    result.err = text_of(folder_.file("stderr.txt"));
-    return result;
-  }
-
-  bool exists(const std::string& name) { return std::filesystem::exists(folder_.file(name)); }
-
-  TestFolder folder_{std::string("tool_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
-};
-
-void expect_one_error_line(const ToolRun& run) {
-  EXPECT_TRUE(run.err.starts_with("quoin: ")) << run.err;
-  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
-  EXPECT_EQ(run.out, "");
-}
+class Tool : public ToolTest {};
 
 TEST_F(Tool, info_says_what_is_in_a_file) {
   const ToolRun text = run("info tiny.vox");
@@ -362,8 +274,8 @@ TEST_F(Tool, wrong_usage_names_the_argument) {
 
 TEST_F(Tool, wrong_usage_is_status_2) {
   for (const std::string arguments :
-       {"", "frobnicate", "render tiny.vox", "info", "info tiny.vox --frame -1", "convert tiny.vox",
-        "convert tiny.vox out.xyz", "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
+       {"", "frobnicate", "info", "info tiny.vox --frame -1", "convert tiny.vox", "convert tiny.vox out.xyz",
+        "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
         "convert tiny.vox out.vox --no-ao", "info tiny.vox --threads 0", "info tiny.vox --unknown"}) {
     const ToolRun result = run(arguments);
     EXPECT_EQ(result.status, 2) << arguments;
@@ -382,7 +294,7 @@ TEST_F(Tool, help_has_an_example_for_every_command) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;
-  for (const std::string command : {"info", "convert"}) {
+  for (const std::string command : {"info", "convert", "render", "generate"}) {
     EXPECT_NE(all.out.find(command), std::string::npos);
     const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);

@@ -141,7 +141,7 @@ quoin::Result<Palette> add_palette(quoin::VoxelRegistry& types) {
                  {&Palette::plank, "plank", {142, 102, 64, 255}},
                  {&Palette::leaf, "leaf", {64, 116, 56, 255}},
                  {&Palette::leaf_light, "young leaf", {92, 142, 62, 255}},
-                 {&Palette::water, "water", {64, 134, 178, 150}},
+                 {&Palette::water, "water", {52, 140, 186, 84}},
                  {&Palette::glass, "glass", {190, 226, 236, 110}},
                  {&Palette::lamp, "lamp", {255, 204, 110, 255}},
                  {&Palette::flag, "flag", {40, 74, 150, 255}},

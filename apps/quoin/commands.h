@@ -33,6 +33,7 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 /// Each adds one command; once it has been parsed, `status` becomes what the command ends with.
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
+void add_render_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
 
 }  // namespace quoin::tool

@@ -1,4 +1,3 @@
-#include <chrono>
 #include <memory>
 
 #include <quoin/io/file.h>
@@ -11,6 +10,8 @@
 #include "interrupt.h"
 #include "output.h"
 #include "progress_bar.h"
+#include "scene_warnings.h"
+#include "stopwatch.h"
 
 namespace quoin::tool {
 
@@ -41,20 +42,6 @@ struct Outcome {
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   Seconds seconds;
   std::vector<std::string> warnings;
-};
-
-class Stopwatch {
- public:
-  /// Seconds since the last call, or since the start.
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
 Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes, const FormatInfo& format,
@@ -91,19 +78,6 @@ Status check_companions(const std::vector<std::filesystem::path>& files, const C
   return {};
 }
 
-void warn_of_what_is_missing(const Scene& scene, const SceneMeshes& meshes, std::vector<std::string>& warnings) {
-  std::size_t left_out = 0;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, true) && !is_drawn(scene, instance, meshes.hidden)) ++left_out;
-  }
-  if (left_out == 1) warnings.emplace_back("1 hidden instance left out; --hidden includes it");
-  if (left_out > 1) {
-    warnings.push_back(std::to_string(left_out) + " hidden instances left out; --hidden includes them");
-  }
-  if (meshes.triangles == 0) warnings.emplace_back("nothing to draw");
-}
-
 Result<std::uint64_t> write_voxels(const Scene& scene, const std::filesystem::path& path,
                                    std::vector<std::string>& warnings) {
   auto bytes = write_vox(scene, warnings);
@@ -125,7 +99,8 @@ Status mesh_and_write(const Scene& scene, const ConvertOptions& options, const F
   if (!meshes) return tl::unexpected<Error>(meshes.error());
   outcome.meshes = std::move(*meshes);
   outcome.seconds.mesh = watch.lap();
-  warn_of_what_is_missing(scene, outcome.meshes, outcome.warnings);
+  warn_of_left_out(scene, outcome.meshes.hidden, outcome.warnings);
+  if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   outcome.files = files_of(outcome.meshes, format, options.output);
   if (auto sound = check_companions(outcome.files, options); !sound) return sound;
   const auto bytes = write_meshes(scene, outcome.meshes, format, options.output, bar.listener("writing"));

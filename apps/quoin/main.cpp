@@ -60,6 +60,17 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
   return error.what() + hint;
 }
 
+/// The arguments, with negative numbers in the only form that CLI11 does not take for options: "-0.5", not "-.5".
+Arguments readable_arguments(int argc, char** argv) {
+  Arguments arguments(argv + std::min(argc, 1), argv + argc);
+  for (std::string& argument : arguments) {
+    const bool is_fraction =
+        argument.starts_with("-.") && argument.size() > 2 && argument[2] >= '0' && argument[2] <= '9';
+    if (is_fraction) argument.insert(1, "0");
+  }
+  return arguments;
+}
+
 /// Prints what --help or --version asked for.
 int print_answer(const CLI::App& app, const CLI::ParseError& request) {
   std::ostringstream text;
@@ -69,7 +80,7 @@ int print_answer(const CLI::App& app, const CLI::ParseError& request) {
 
 int run(int argc, char** argv) {
   let_writes_fail();
-  CLI::App app("Voxel worlds in, lit meshes out.", "quoin");
+  CLI::App app("Voxel worlds in, lit meshes and pictures out.", "quoin");
   app.set_version_flag("--version", "quoin " QUOIN_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
@@ -77,12 +88,14 @@ int run(int argc, char** argv) {
   int status = kDone;
   add_info_command(app, status);
   add_convert_command(app, status);
+  add_render_command(app, status);
   add_generate_command(app, status);
+  const Arguments arguments = readable_arguments(argc, argv);
   try {
-    app.parse(argc, argv);
+    app.parse(Arguments(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return print_answer(app, error);
-    print_error(usage_error(app, error, Arguments(argv + std::min(argc, 1), argv + argc)));
+    print_error(usage_error(app, error, arguments));
     return kWrongUsage;
   }
   return status;

@@ -18,6 +18,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/gltf.h>
 #include <quoin/io/obj.h>
+#include <quoin/io/picture_files.h>
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>

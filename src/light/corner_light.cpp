@@ -16,7 +16,7 @@ float interpolated_level(const FaceLevels& levels, float u, float v) {
   return at(2) + (1.0F - u) * (at(3) - at(2)) + (1.0F - v) * (at(1) - at(2));
 }
 
-float corner_level(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face, DVec3 position) {
+FaceLevels corner_levels(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face) {
   const FaceFrame& frame = frame_of(face);
   const IVec3 front = voxel + normal_of(face);
   std::array<std::array<bool, 3>, 3> is_occluder{};
@@ -32,7 +32,11 @@ float corner_level(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Di
   const auto level = [&](std::size_t u, std::size_t v) {
     return vertex_occlusion(is_occluder[1][u], is_occluder[v][1], is_occluder[v][u]);
   };
-  const FaceLevels levels = {level(0, 0), level(2, 0), level(2, 2), level(0, 2)};
+  return {level(0, 0), level(2, 0), level(2, 2), level(0, 2)};
+}
+
+float level_at(const FaceLevels& levels, IVec3 voxel, Direction face, DVec3 position) {
+  const FaceFrame& frame = frame_of(face);
   const auto within = [&](int axis) { return static_cast<float>(std::clamp(position[axis] - voxel[axis], 0.0, 1.0)); };
   return interpolated_level(levels, within(frame.u), within(frame.v));
 }

@@ -19,6 +19,23 @@ bool continues(const GlassBody& body, const GlassBody& next) {
   return next.type == body.type && next.t_enter <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
 }
 
+// Puts bodies in the ray's order and makes those one that touch, of neighbouring grids.
+void join_touching(std::vector<GlassBody>& bodies) {
+  std::sort(bodies.begin(), bodies.end(), [](const GlassBody& a, const GlassBody& b) {
+    return a.t_enter != b.t_enter ? a.t_enter < b.t_enter : a.placed < b.placed;
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 1; i < bodies.size(); ++i) {
+    if (continues(bodies[kept], bodies[i])) {
+      bodies[kept].t_exit = std::max(bodies[kept].t_exit, bodies[i].t_exit);
+      bodies[kept].voxels += bodies[i].voxels;
+    } else {
+      bodies[++kept] = bodies[i];
+    }
+  }
+  if (!bodies.empty()) bodies.resize(kept + 1);
+}
+
 }  // namespace
 
 void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
@@ -38,6 +55,7 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
     const VoxelType type = voxels_of->get(span.voxel);
     const double t_exit = std::min(span.t_exit, max_t);
     const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size;
+    if (!(voxels > 0.0)) return true;  // an edge that it only touches
     const GlassBody next{found.placed, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
     if (found.placed == last_placed && continues(out.back(), next)) {
       out.back().t_exit = t_exit;
@@ -46,23 +64,10 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
       out.push_back(next);
     }
     last_placed = found.placed;
-    clarity += voxels > 0.0 ? surfaces[type].log_clarity * voxels : 0.0;
+    clarity += surfaces[type].log_clarity * voxels;
     return clarity > kClosed;
   });
-  std::sort(out.begin(), out.end(), [](const GlassBody& a, const GlassBody& b) {
-    return a.t_enter != b.t_enter ? a.t_enter < b.t_enter : a.placed < b.placed;
-  });
-  // Bodies of neighbouring grids that touch are one.
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < out.size(); ++i) {
-    if (continues(out[kept], out[i])) {
-      out[kept].t_exit = std::max(out[kept].t_exit, out[i].t_exit);
-      out[kept].voxels += out[i].voxels;
-    } else {
-      out[++kept] = out[i];
-    }
-  }
-  if (!out.empty()) out.resize(kept + 1);
+  join_touching(out);
 }
 
 GlassLook look_of(const Surface& surface, const GlassBody& body) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -50,10 +51,10 @@ std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint
 
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
-  std::array<const SurfacePoint*, RayPacket::kSize> points{};
-  std::size_t size = 0;
-  std::int32_t placed = 0;
   RayPacket origins;
+  std::size_t size = 0;
+  std::array<const SurfacePoint*, RayPacket::kSize> points{};
+  std::int32_t placed = 0;
   std::uint32_t surfaces = 0;  // lanes that are to be lit
   bool is_one_face = true;
 
@@ -79,7 +80,8 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       surfaces_(&surfaces),
       options_(options),
       directions_(options.occlusion_rays),
-      exposure_(static_cast<float>(options.exposure)) {
+      // Never infinite: that times black is not a number.
+      exposure_(static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()))) {
   // Scaled first: the square of a very small or large number is 0 or infinite.
   const DVec3 size = glm::abs(options.sun);
   const DVec3 to_sun = glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
@@ -161,9 +163,13 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   if (options_.occlusion == OcclusionMode::Off) return 0;
   GridReader reader(view_->tracer().placed()[static_cast<std::size_t>(group.placed)].grid->grid);
+  FaceLevels levels{};
   for (std::size_t i = 0; i < group.size; ++i) {
     const SurfacePoint& point = *group.points[i];
-    openness[i] = 1.0F - corner_level(reader, *types_, point.voxel, point.face, point.position) / 3.0F;
+    // Neighbours often lie on the same face.
+    const bool is_new = i == 0 || point.voxel != group.points[i - 1]->voxel || point.face != group.points[i - 1]->face;
+    if (is_new) levels = corner_levels(reader, *types_, point.voxel, point.face);
+    openness[i] = 1.0F - level_at(levels, point.voxel, point.face, point.position) / 3.0F;
   }
   return 0;
 }

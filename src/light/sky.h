@@ -12,7 +12,7 @@ namespace quoin {
 /// `up`: the y of a unit direction.
 [[nodiscard]] inline Vec3 sky_colour(float up) {
   constexpr float kGroundBegins = -0.02F;
-  constexpr float kGroundIsFull = -0.30F;
+  constexpr float kGroundIsFull = -0.60F;
   const Vec3 zenith{0.145F, 0.335F, 0.700F};
   const Vec3 horizon{0.640F, 0.780F, 0.900F};
   const Vec3 ground{0.400F, 0.410F, 0.430F};

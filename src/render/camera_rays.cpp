@@ -2,11 +2,15 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
+
+#include <glm/geometric.hpp>
 
 namespace quoin {
 namespace {
 
 constexpr std::size_t kLanes = RayPacket::kSize;
+constexpr double kSkyFov = 50.0 * std::numbers::pi / 180.0;
 
 }  // namespace
 
@@ -26,6 +30,7 @@ CameraRays::CameraRays(const Camera& camera, int width, int height)
   const double pixel = picture_height / height;
   right_ = camera.right * pixel;
   down_ = camera.up * -pixel;
+  if (!is_perspective_) sky_scale_ = 2.0 * std::tan(kSkyFov / 2.0) / picture_height;
   corner_ = right_ * (-0.5 * width) + down_ * (-0.5 * height);
 }
 
@@ -61,6 +66,12 @@ void CameraRays::block(int column, int row, PixelPoint point, RayPacket& rays) c
     rays.direction_y[i] = dy * inverse;
     rays.direction_z[i] = dz * inverse;
   }
+}
+
+float CameraRays::sky_up(const RayPacket& rays, std::size_t lane) const {
+  if (is_perspective_) return static_cast<float>(rays.direction_y[lane]);
+  const DVec3 from_middle{rays.origin_x[lane], rays.origin_y[lane], rays.origin_z[lane]};
+  return static_cast<float>(glm::normalize(forward_ + from_middle * sky_scale_).y);
 }
 
 }  // namespace quoin

@@ -27,12 +27,16 @@ class CameraRays {
   /// The rays of the 4x4 pixels from (`column`, `row`); lane x + 4 y. Directions are unit, so distances are world
   /// units. Pixels outside the picture are not active.
   void block(int column, int row, PixelPoint point, RayPacket& rays) const;
+  /// How far up the sky is that a ray of the block shows where it hits nothing: its direction's y. Orthographic rays,
+  /// which are all parallel, show the sky that a perspective camera of 50 degrees would see there.
+  [[nodiscard]] float sky_up(const RayPacket& rays, std::size_t lane) const;
 
  private:
   int width_;
   int height_;
   bool is_perspective_;
   DVec3 forward_;
+  double sky_scale_ = 0.0;  // orthographic: turns the way from the picture's middle into the tangent of an angle
   // Per pixel to the right and down, and the picture's upper left corner, at a distance of 1.
   DVec3 right_;
   DVec3 down_;

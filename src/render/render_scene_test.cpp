@@ -179,6 +179,16 @@ TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
   EXPECT_LT(pixel_at(taken(world.scene, camera, options), 1, 1)[0], lit[0] / 2);
 }
 
+TEST(RenderScene, OrthographicPicturesHaveASkyToo) {
+  const Scene empty;
+  Camera camera = towards({0, 0, 0}, {0, 0, -1});
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 1000.0;
+  const Picture picture = taken(empty, camera, sized(2, 101));
+  EXPECT_LT(pixel_at(picture, 0, 0)[0], pixel_at(picture, 0, 50)[0]);
+  EXPECT_LT(pixel_at(picture, 0, 100)[0], pixel_at(picture, 0, 50)[0]);
+}
+
 TEST(RenderScene, LooksStraightUpAndDownAndFromFarAway) {
   World world;
   Grid slab;

@@ -64,30 +64,32 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
-  std::uint32_t through_glass = 0;
-  if (context_->view->tracer().has_transparent()) {
-    RayPacket visible = rays;
-    for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
-      if ((hits.grids.hit >> i & 1U) != 0) visible.max_t[i] = hits.grids.t[i];
-    }
-    through_glass = context_->view->any_transparent(visible);
-  }
-  if (sample == 0) pixels_hit_ += std::popcount(hits.grids.hit | through_glass);
+  const std::uint32_t through_glass = lanes_through_glass(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
     const auto pixel = static_cast<std::size_t>((y + lane / kBlock) * kEdge + x + lane % kBlock);
     const bool is_hit = (hits.grids.hit >> lane & 1U) != 0;
     const double t = is_hit ? hits.grids.t[i] : std::numeric_limits<double>::infinity();
-    if (sample == 0) depth_[pixel] = static_cast<float>(t);
+    glass_.clear();
     Vec3 weight(1.0F);
-    if ((through_glass >> lane & 1U) != 0) {
-      weight = add_glass(rays.ray(lane), t, pixel);
-      if (sample == 0 && !glass_.empty()) depth_[pixel] = static_cast<float>(glass_.front().t_enter);
+    if ((through_glass >> lane & 1U) != 0) weight = add_glass(rays.ray(lane), t, pixel);
+    if (sample == 0) {
+      depth_[pixel] = static_cast<float>(glass_.empty() ? t : glass_.front().t_enter);
+      pixels_hit_ += is_hit || !glass_.empty();
     }
-    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * sky_colour(static_cast<float>(rays.direction_y[i]));
+    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * sky_colour(context_->camera->sky_up(rays, i));
     if (is_hit) add_opaque(lane, rays, hits, pixel, weight);
   }
+}
+
+std::uint32_t Tile::lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const {
+  if (!context_->view->tracer().has_transparent()) return 0;
+  RayPacket visible = rays;
+  for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+    if ((hits.grids.hit >> i & 1U) != 0) visible.max_t[i] = hits.grids.t[i];
+  }
+  return context_->view->any_transparent(visible);
 }
 
 void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight) {

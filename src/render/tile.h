@@ -43,6 +43,7 @@ class Tile {
 
   void take_sample(int sample);
   void take_block(int x, int y, const RayPacket& rays, int sample);
+  [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // Adds what is seen of the glass before `max_t`; answers what passes through it.
   Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);

@@ -8,6 +8,8 @@
 
 namespace quoin {
 
+class Scene;
+
 /// Where a picture is taken from. `right`, `up` and `forward` are unit and perpendicular; right-handed, so
 /// right = forward x up.
 struct Camera {
@@ -39,5 +41,11 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 ///
 /// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` is width / height.
 [[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);
+
+/// As `frame_view`, but for the voxels themselves: closer, since boxes have corners where often nothing is.
+/// Hidden instances count when `hidden_too`.
+///
+/// Cost: O(instances * chunks of their grids), and the voxels of the few chunks that touch the picture's margin.
+[[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect, bool hidden_too = false);
 
 }  // namespace quoin

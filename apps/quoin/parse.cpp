@@ -1,0 +1,49 @@
+#include "parse.h"
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+namespace quoin::tool {
+
+namespace {
+
+template <class Number>
+std::optional<Number> parse_all(std::string_view text) {
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::optional<double> parse_number(std::string_view text) {
+  const auto value = parse_all<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+std::optional<DVec3> parse_triple(std::string_view text) {
+  DVec3 triple{0.0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t comma = axis < 2 ? text.find(',') : text.size();
+    if (comma == std::string_view::npos) return std::nullopt;
+    const auto value = parse_number(text.substr(0, comma));
+    if (!value) return std::nullopt;
+    triple[axis] = *value;
+    text.remove_prefix(axis < 2 ? comma + 1 : comma);
+  }
+  return triple;
+}
+
+std::optional<PictureSize> parse_size(std::string_view text) {
+  const std::size_t cross = text.find('x');
+  if (cross == std::string_view::npos) return std::nullopt;
+  const auto width = parse_all<int>(text.substr(0, cross));
+  const auto height = parse_all<int>(text.substr(cross + 1));
+  if (!width || !height || *width <= 0 || *height <= 0) return std::nullopt;
+  return PictureSize{*width, *height};
+}
+
+}  // namespace quoin::tool

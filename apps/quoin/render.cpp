@@ -1,0 +1,179 @@
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/picture_files.h>
+
+#include "interrupt.h"
+#include "output.h"
+#include "progress_bar.h"
+#include "render_arguments.h"
+#include "scene_warnings.h"
+#include "stopwatch.h"
+
+namespace quoin::tool {
+
+namespace {
+
+struct Outcome {
+  Picture picture;
+  Camera camera;
+  std::uint64_t bytes = 0;
+  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  double read = 0, build = 0, trace = 0, write = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Fails now rather than after all the work, where an output cannot be written.
+Status check_outputs(const RenderArguments& arguments) {
+  for (const auto& path : {arguments.output, arguments.depth}) {
+    if (path.empty()) continue;
+    if (auto file = AtomicFile::create(path); !file) return tl::unexpected<Error>(file.error());
+  }
+  return {};
+}
+
+Result<Camera> camera_for(const Scene& scene, const RenderArguments& arguments) {
+  if (arguments.position) {
+    return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
+  }
+  const double aspect = static_cast<double>(arguments.render.width) / arguments.render.height;
+  return frame_scene(scene, arguments.view, aspect, arguments.common.load.hidden);
+}
+
+void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& picture,
+                            std::vector<std::string>& warnings) {
+  if (scene.bounds(hidden).empty()) {
+    warnings.emplace_back("no voxel to draw: a picture of the sky");
+  } else if (picture.pixels_hit == 0) {
+    warnings.emplace_back("no voxel in sight of this camera: a picture of the sky");
+  }
+}
+
+/// Writes the files, and takes the picture's pixels out of memory once they are.
+Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
+  const auto png = write_png(outcome.picture.colour, arguments.output);
+  if (!png) return tl::unexpected<Error>(png.error());
+  outcome.files.push_back(arguments.output);
+  outcome.bytes = *png;
+  if (arguments.depth.empty()) return {};
+  const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
+  if (!pfm) return tl::unexpected<Error>(pfm.error());
+  outcome.files.push_back(arguments.depth);
+  outcome.bytes += *pfm;
+  return {};
+}
+
+Result<Outcome> render(const RenderArguments& arguments) {
+  const bool hidden = arguments.common.load.hidden;
+  Stopwatch watch;
+  if (auto writable = check_outputs(arguments); !writable) return tl::unexpected<Error>(writable.error());
+  auto loaded = load_scene(arguments.common.input, arguments.common.load);
+  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  const Scene& scene = loaded->scene;
+  Outcome outcome;
+  outcome.warnings = std::move(loaded->warnings);
+  outcome.read = watch.lap();
+  catch_interrupts();
+  const auto camera = camera_for(scene, arguments);
+  if (!camera) return tl::unexpected<Error>(camera.error());
+  outcome.camera = *camera;
+  const CpuRenderer renderer(scene, hidden, arguments.common.threads);
+  outcome.build = watch.lap();
+  {
+    ProgressBar bar;
+    auto picture = renderer.render(*camera, arguments.render, bar.listener("tracing"));
+    if (!picture) return tl::unexpected<Error>(picture.error());
+    outcome.picture = std::move(*picture);
+  }
+  outcome.trace = watch.lap();
+  warn_of_left_out(scene, hidden, outcome.warnings);
+  warn_of_empty_pictures(scene, hidden, outcome.picture, outcome.warnings);
+  if (auto written = write_outputs(arguments, outcome); !written) return tl::unexpected<Error>(written.error());
+  outcome.write = watch.lap();
+  return outcome;
+}
+
+Json triple(DVec3 v) {
+  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
+}
+
+Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
+  const Camera& camera = outcome.camera;
+  Json files = Json::array();
+  for (const auto& file : outcome.files) files.push_back(file.string());
+  return {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
+          {"rays", outcome.picture.rays},
+          {"pixels_hit", outcome.picture.pixels_hit},
+          {"backend", arguments.backend},
+          {"threads", resolve(arguments.common.threads)},
+          {"camera",
+           {{"position", triple(camera.position)},
+            {"forward", triple(camera.forward)},
+            {"up", triple(camera.up)},
+            {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}}},
+          {"bytes", outcome.bytes},
+          {"files", files},
+          {"seconds",
+           {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
+          {"warnings", outcome.warnings}};
+}
+
+std::string outcome_text(const Outcome& outcome) {
+  const Picture& picture = outcome.picture;
+  const double per_second = static_cast<double>(picture.rays) / std::max(outcome.trace, 1e-9);
+  std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
+                     std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
+                     " pixels show voxels\n";
+  text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
+          with_thousands(std::llround(per_second)) + " a second\n";
+  text += "Wrote ";
+  for (const auto& file : outcome.files) text += file.string() + ", ";
+  const double seconds = outcome.read + outcome.build + outcome.trace + outcome.write;
+  return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
+}
+
+int run_render(const RenderArguments& arguments) {
+  if (!arguments.missing.empty()) {
+    print_error(arguments.missing + " is not supported by this version");
+    return kFailed;
+  }
+  if (arguments.backend != "cpu") {
+    print_error("--backend " + arguments.backend + " is not supported by this version; cpu is");
+    return kFailed;
+  }
+  const auto outcome = render(arguments);
+  if (!outcome) {
+    die_if_interrupted();
+    print_error(outcome.error());
+    return kFailed;
+  }
+  if (arguments.common.json) return print_json(outcome_json(arguments, *outcome));
+  print_warnings(outcome->warnings);
+  return print(outcome_text(*outcome));
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, int& status) {
+  CLI::App* command = app.add_subcommand("render", "Draw a picture, with sun, shadows and ambient occlusion");
+  const auto arguments = std::make_shared<RenderArguments>();
+  add_render_options(*command, *arguments);
+  command->footer("Reads " + readable_endings() +
+                  ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
+                  "Example: quoin render castle.vox -o castle.png --view iso --samples 4\n"
+                  "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40");
+  command->callback([command, arguments, &status] {
+    if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
+      print_error(fault + " (try --help)");
+      status = kWrongUsage;
+      return;
+    }
+    status = run_render(*arguments);
+  });
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,190 @@
+#include "render_arguments.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "parse.h"
+
+namespace quoin::tool {
+
+namespace {
+
+constexpr int kMostSamples = 4'096;
+constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+
+/// An option whose text `settle` reads.
+CLI::Option* add_text_option(CLI::App& command, const std::string& name, const std::string& type,
+                             const std::string& description) {
+  return command.add_option(name, description)->type_name(type);
+}
+
+/// Reads the text of such an option, if it was given, into `value`; answers what is wrong with it, or "".
+template <class Read, class Value>
+std::string read_option(const CLI::App& command, const std::string& name, Read read, const std::string& must_be,
+                        Value& value) {
+  if (command.count(name) == 0) return "";
+  const std::string text = command.get_option(name)->results().back();
+  const auto found = read(text);
+  if (!found) return name + ": must be " + must_be + ", not \"" + text + "\"";
+  value = *found;
+  return "";
+}
+
+std::optional<DVec3> read_direction(const std::string& text) {
+  const auto direction = parse_triple(text);
+  if (!direction) return std::nullopt;
+  // Scaled, so that the length of any direction is a number.
+  const double largest = std::max({std::abs(direction->x), std::abs(direction->y), std::abs(direction->z)});
+  return largest > 0.0 ? std::optional(*direction / largest) : std::nullopt;
+}
+
+std::optional<double> read_angle(const std::string& text) {
+  const auto degrees = parse_number(text);
+  return degrees && *degrees > 0.0 && *degrees < 180.0 ? degrees : std::nullopt;
+}
+
+std::optional<double> read_exposure(const std::string& text) {
+  const auto exposure = parse_number(text);
+  return exposure && *exposure >= 0.0 ? exposure : std::nullopt;
+}
+
+std::optional<PictureSize> read_size(const std::string& text) {
+  const auto size = parse_size(text);
+  return size && std::int64_t{size->width} * size->height <= kMostPixels ? size : std::nullopt;
+}
+
+void add_camera_options(CLI::App& command, RenderArguments& arguments) {
+  command
+      .add_option("--view", arguments.view_name,
+                  "Frame the whole scene, seen from there: front, back, left, right, top or iso (default iso)")
+      ->check(CLI::IsMember({"front", "back", "left", "right", "top", "iso"}));
+  add_text_option(command, "--camera", "X,Y,Z", "Where the camera stands; with --look-at, instead of --view");
+  add_text_option(command, "--look-at", "X,Y,Z", "The point in the middle of the picture");
+  add_text_option(command, "--fov", "DEGREES", "Vertical field of view of --camera (default 45)");
+}
+
+void add_light_options(CLI::App& command, RenderArguments& arguments) {
+  add_text_option(command, "--sun", "X,Y,Z", "Direction towards the sun (default 0.371,0.743,0.223)");
+  command.add_option("--preset", arguments.preset, "Light: full, no-shadows, no-ao or unlit (default full)")
+      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit"}));
+  command
+      .add_option("--ao", arguments.occlusion,
+                  "Ambient occlusion by rays, or by the vertex levels that meshes carry (default rays)")
+      ->check(CLI::IsMember({"rays", "vertex"}));
+  command.add_option("--ao-rays", arguments.render.light.occlusion_rays, "Rays a point for --ao rays (default 9)")
+      ->check(CLI::Range(1, kMostSamples));
+  command
+      .add_option("--ao-affects", arguments.occlusion_affects,
+                  "What occlusion darkens: ambient light, or all (default ambient)")
+      ->check(CLI::IsMember({"ambient", "all"}));
+  add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
+}
+
+void add_missing_options(CLI::App& command, RenderArguments& arguments) {
+  command.add_option("--backend", arguments.backend, "What draws: cpu (default); vulkan is not in this version")
+      ->check(CLI::IsMember({"cpu", "vulkan"}));
+  command.add_flag("--lod-colours", arguments.lod_colours, "Tint by level of detail (not in this version)");
+  add_text_option(command, "--device", "N", "Which graphics device draws (not in this version)");
+}
+
+bool has_ending(const std::filesystem::path& path, const std::string& ending) {
+  return CLI::detail::to_lower(path.extension().string()) == ending;
+}
+
+/// Whether both name one file that is there.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code missing;
+  return std::filesystem::equivalent(a, b, missing);
+}
+
+std::string fault_of_files(const RenderArguments& arguments) {
+  const std::string out = arguments.output.string();
+  const std::string depth = arguments.depth.string();
+  if (!has_ending(arguments.output, ".png")) return "-o: the picture's name must end in .png, not \"" + out + "\"";
+  if (is_same_file(arguments.output, arguments.common.input)) return "-o: " + out + " is the input";
+  if (depth.empty()) return "";
+  if (!has_ending(arguments.depth, ".pfm")) return "--depth: the name must end in .pfm, not \"" + depth + "\"";
+  if (is_same_file(arguments.depth, arguments.common.input)) return "--depth: " + depth + " is the input";
+  if (is_same_file(arguments.depth, arguments.output)) return "--depth: " + depth + " is the picture itself";
+  return "";
+}
+
+std::string fault_of_camera(const CLI::App& command, const RenderArguments& arguments) {
+  const bool has_position = command.count("--camera") > 0;
+  const bool has_target = command.count("--look-at") > 0;
+  if (has_position && !has_target) return "--camera needs --look-at";
+  if (has_target && !has_position) return "--look-at needs --camera";
+  if (has_position && command.count("--view") > 0) return "--view and --camera exclude each other";
+  if (command.count("--fov") > 0 && !has_position) return "--fov needs --camera and --look-at; views frame the scene";
+  if (!arguments.position || !arguments.target) return "";
+  const auto camera = look_at(*arguments.position, *arguments.target, 1.0);
+  return camera ? "" : camera.error().message;
+}
+
+std::string fault_of_light(const CLI::App& command, const RenderArguments& arguments) {
+  const bool has_occlusion = arguments.preset == "full" || arguments.preset == "no-shadows";
+  for (const char* option : {"--ao", "--ao-rays", "--ao-affects"}) {
+    if (command.count(option) > 0 && !has_occlusion) {
+      return std::string(option) + ": the preset " + arguments.preset + " has no ambient occlusion";
+    }
+  }
+  if (command.count("--ao-rays") > 0 && arguments.occlusion != "rays") return "--ao-rays needs --ao rays";
+  return "";
+}
+
+/// Reads the options that are texts to CLI11; answers what is wrong with the first wrong one, or "".
+std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
+  const std::string three = "three numbers, as in 1,-2.5,3";
+  LightOptions& light = arguments.render.light;
+  PictureSize size{arguments.render.width, arguments.render.height};
+  const std::array faults = {
+      read_option(command, "--size", read_size, "WIDTHxHEIGHT of at most 2^28 pixels, as in 1280x720", size),
+      read_option(command, "--camera", parse_triple, three, arguments.position),
+      read_option(command, "--look-at", parse_triple, three, arguments.target),
+      read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),
+      read_option(command, "--sun", read_direction, "three numbers that are not all 0, as in 1,2,-0.5", light.sun),
+      read_option(command, "--exposure", read_exposure, "a number of at least 0", light.exposure)};
+  arguments.render.width = size.width;
+  arguments.render.height = size.height;
+  const auto* const wrong =
+      std::find_if(faults.begin(), faults.end(), [](const std::string& fault) { return !fault.empty(); });
+  return wrong == faults.end() ? "" : *wrong;
+}
+
+}  // namespace
+
+void add_render_options(CLI::App& command, RenderArguments& arguments) {
+  add_common_options(command, arguments.common);
+  command.add_option("-o,--output", arguments.output, "Picture to write: .png")->required()->check(file_name());
+  add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
+  add_camera_options(command, arguments);
+  add_light_options(command, arguments);
+  command.add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges (default 1)")
+      ->check(CLI::Range(1, kMostSamples));
+  command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
+  add_missing_options(command, arguments);
+}
+
+std::string settle(const CLI::App& command, RenderArguments& arguments) {
+  for (const std::string& fault : {read_texts(command, arguments), fault_of_files(arguments),
+                                   fault_of_camera(command, arguments), fault_of_light(command, arguments)}) {
+    if (!fault.empty()) return fault;
+  }
+  for (const char* option : {"--lod-colours", "--device"}) {
+    if (command.count(option) > 0) arguments.missing = option;
+  }
+  arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
+  LightOptions& light = arguments.render.light;
+  light.occlusion = arguments.occlusion == "vertex" ? OcclusionMode::Vertex : OcclusionMode::Rays;
+  if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;
+  if (arguments.preset == "no-ao") light.occlusion = OcclusionMode::Off;
+  if (arguments.preset == "no-shadows") light.shadows = false;
+  if (arguments.preset == "unlit") light.lit = false;
+  arguments.render.depth = !arguments.depth.empty();
+  arguments.render.threads = arguments.common.threads;
+  return "";
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/camera.h>
+
+#include "commands.h"
+
+namespace quoin::tool {
+
+/// What `quoin render` was asked for.
+struct RenderArguments {
+  CommonOptions common;
+  std::filesystem::path output;
+  std::filesystem::path depth;  ///< empty: none
+  RenderOptions render;         ///< size, samples and light
+  std::string view_name = "iso";
+  View view = View::Iso;
+  std::optional<DVec3> position;  ///< with `target`, instead of the view
+  std::optional<DVec3> target;
+  double fov_degrees = 45.0;
+  std::string preset = "full";
+  std::string occlusion = "rays";
+  std::string occlusion_affects = "ambient";
+  std::string backend = "cpu";
+  bool lod_colours = false;
+  std::string missing;  ///< an option that this version does not have; empty when none was given
+};
+
+/// Adds the command's options, which fill in what CLI11 can read by itself.
+void add_render_options(CLI::App& command, RenderArguments& arguments);
+
+/// Once all are parsed: reads the rest, settles what several options decide together, and answers what is wrong with
+/// the usage, or "".
+[[nodiscard]] std::string settle(const CLI::App& command, RenderArguments& arguments);
+
+}  // namespace quoin::tool

@@ -1,0 +1,19 @@
+#include "scene_warnings.h"
+
+#include <quoin/io/scene_meshes.h>
+
+namespace quoin::tool {
+
+void warn_of_left_out(const Scene& scene, bool hidden, std::vector<std::string>& warnings) {
+  std::size_t left_out = 0;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (is_drawn(scene, instance, true) && !is_drawn(scene, instance, hidden)) ++left_out;
+  }
+  if (left_out == 1) warnings.emplace_back("1 hidden instance left out; --hidden includes it");
+  if (left_out > 1) {
+    warnings.push_back(std::to_string(left_out) + " hidden instances left out; --hidden includes them");
+  }
+}
+
+}  // namespace quoin::tool

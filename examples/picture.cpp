@@ -1,0 +1,50 @@
+// A picture of a scene, with sun, shadows and ambient occlusion: OUT.png, or staircase.png.
+
+#include <cstdio>
+#include <string>
+
+#include <quoin/io/picture_files.h>
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
+
+namespace {
+
+quoin::Result<quoin::Scene> make_staircase() {
+  quoin::Scene scene;
+  quoin::VoxelProperties properties;
+  properties.name = "stone";
+  properties.colour = {150, 140, 128, 255};
+  const auto stone = scene.types.add(properties);
+  if (!stone) return tl::unexpected<quoin::Error>(stone.error());
+  quoin::SceneGrid stairs;
+  for (int step = 0; step < 12; ++step) stairs.grid.fill_box({0, 0, -2 * step}, {9, step, -2 * step - 1}, *stone);
+  quoin::Instance placed;
+  placed.grid = scene.add_grid(std::move(stairs));
+  scene.add_instance(placed);
+  return scene;
+}
+
+quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
+  quoin::RenderOptions options;
+  options.width = 320;
+  options.height = 240;
+  options.samples = 4;
+  const quoin::CpuRenderer renderer(scene);
+  const quoin::Camera camera = quoin::frame_scene(scene, quoin::View::Iso, 320.0 / 240.0);
+  const auto picture = renderer.render(camera, options);
+  if (!picture) return tl::unexpected<quoin::Error>(picture.error());
+  const auto size = quoin::write_png(picture->colour, path);
+  if (!size) return tl::unexpected<quoin::Error>(size.error());
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto scene = make_staircase();
+  const quoin::Status status =
+      scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : tl::unexpected<quoin::Error>(scene.error());
+  if (!status) std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
+  return status ? 0 : 1;
+}

@@ -1,0 +1,115 @@
+#include <quoin/scene/camera.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "scene/framing.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr double kFramingFov = 30.0 * std::numbers::pi / 180.0;  // little enough to keep towers upright
+constexpr double kMargin = 0.04;                                 // of the picture's width (height), on each side
+
+struct NamedView {
+  std::string_view name;
+  View view;
+  DVec3 forward;
+};
+
+/// `iso` looks along the diagonal of a cube, as isometric drawings do.
+constexpr double kThird = 0.57735026918962576451;
+const std::array<NamedView, 6> kViews = {{{"front", View::Front, {0, 0, -1}},
+                                          {"back", View::Back, {0, 0, 1}},
+                                          {"left", View::Left, {1, 0, 0}},
+                                          {"right", View::Right, {-1, 0, 0}},
+                                          {"top", View::Top, {0, -1, 0}},
+                                          {"iso", View::Iso, {-kThird, -kThird, -kThird}}}};
+
+bool is_finite(DVec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Sets the axes for looking along `forward`, a unit vector: upright; with +X to the right straight up and down.
+void turn(Camera& camera, DVec3 forward) {
+  camera.forward = forward;
+  const double level = std::hypot(forward.x, forward.z);
+  camera.right = level > 0.0 ? DVec3{-forward.z / level + 0.0, 0.0, forward.x / level} : DVec3{1.0, 0.0, 0.0};
+  camera.up = glm::cross(camera.right, camera.forward);
+}
+
+/// The box to frame: one that has an inside.
+DBox box_to_frame(const DBox& bounds) {
+  if (bounds.empty()) return {DVec3{0.0}, DVec3{1.0}};
+  return bounds.min == bounds.max ? DBox{bounds.min - 0.5, bounds.max + 0.5} : bounds;
+}
+
+/// Where a camera must stand, along one axis of the picture and along its view, to see all corners.
+struct Stand {
+  double across;   ///< along the picture's axis, midway between the two edges' limits
+  double forward;  ///< the furthest that it may go
+};
+
+/// Each point at depth f may lie up to `slope * (f - stand)` to either side.
+Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
+  const double greatest = reach(axis - slope * forward);
+  const double least = reach(-axis - slope * forward);
+  return {0.5 * (greatest - least), -0.5 * (greatest + least) / slope};
+}
+
+}  // namespace
+
+Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
+  if (!is_finite(position)) return fail(ErrorCode::InvalidArgument, "the camera's position is not finite");
+  if (!is_finite(target)) return fail(ErrorCode::InvalidArgument, "the point to look at is not finite");
+  if (!(vertical_fov > 0.0 && vertical_fov < std::numbers::pi)) {
+    return fail(ErrorCode::InvalidArgument, "the field of view is not more than 0 and less than 180 degrees");
+  }
+  // Halved so that the difference of the greatest numbers is one; then scaled so that no square is lost.
+  const DVec3 half = 0.5 * target - 0.5 * position;
+  const double largest = std::max({std::abs(half.x), std::abs(half.y), std::abs(half.z)});
+  if (!(largest > 0.0)) return fail(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
+  Camera camera;
+  camera.position = position;
+  camera.vertical_fov = vertical_fov;
+  turn(camera, glm::normalize(half / largest));
+  return camera;
+}
+
+std::optional<View> view_of_name(std::string_view name) {
+  for (const NamedView& known : kViews) {
+    if (known.name == name) return known.view;
+  }
+  return std::nullopt;
+}
+
+Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
+  assert(aspect > 0.0 && std::isfinite(aspect));
+  Camera camera;
+  camera.vertical_fov = kFramingFov;
+  turn(camera, kViews[static_cast<std::size_t>(view)].forward);
+  const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
+  const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);
+  const Stand upright = stand_for(reach, camera.up, camera.forward, slope);
+  camera.position = middle + level.across * camera.right + upright.across * camera.up +
+                    std::min(level.forward, upright.forward) * camera.forward;
+  return camera;
+}
+
+Camera frame_view(const DBox& bounds, View view, double aspect) {
+  assert(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)));
+  const DBox box = box_to_frame(bounds);
+  const DVec3 half = 0.5 * (box.max - box.min);
+  return frame(
+      box.min + half, [half](DVec3 direction) { return glm::dot(glm::abs(direction), half); }, view, aspect);
+}
+
+}  // namespace quoin

@@ -1,0 +1,211 @@
+// Pictures of a terrain, compared with golden ones to the last bit. QUOIN_ACCEPT_GOLDEN=1 (`./dev golden --accept`)
+// makes what is rendered the golden pictures instead.
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+#include <ostream>
+#include <string>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/terrain/terrain.h>
+
+#include "io/glb_for_tests.h"
+#include "tests/golden_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 180;
+constexpr std::int64_t kPixels = kWidth * kHeight;
+
+/// Axes as everywhere, +Y up; the terrain fills 128 x 64 x 128 voxels from the origin, two chunks along x and z.
+struct GoldenView {
+  const char* name;
+  DVec3 position;
+  DVec3 target;
+  double fov_degrees;
+  DVec3 sun;
+};
+
+void PrintTo(const GoldenView& view, std::ostream* out) {
+  *out << view.name;
+}
+
+const DVec3 kUsualSun = LightOptions{}.sun;
+/// From behind the ridge, so that its shadow falls over the slope and the water before it.
+const DVec3 kLowSun{-1.0, 0.9, -0.5};
+
+const std::array<GoldenView, 7> kViews = {{
+    {"front", {64, 60, 230}, {64, 20, 64}, 38, kUsualSun},
+    {"corner", {175, 90, 175}, {63, 12, 63}, 42, kUsualSun},
+    {"top_down", {64, 240, 64}, {64, 0, 64}, 36, kUsualSun},
+    {"boundary", {84, 62, 112}, {62, 22, 64}, 55, kUsualSun},  // the border at x = 64 runs through the middle
+    {"edge", {150, 40, 140}, {118, 14, 100}, 50, kUsualSun},
+    {"shadow", {110, 50, 150}, {60, 16, 70}, 45, kLowSun},
+    {"ao", {74, 44, 104}, {48, 16, 74}, 55, kUsualSun},
+}};
+
+const GoldenView& view_called(const std::string& name) {
+  return *std::find_if(kViews.begin(), kViews.end(), [&](const GoldenView& view) { return view.name == name; });
+}
+
+Grid terrain(VoxelRegistry& types) {
+  const TerrainOptions options{.seed = 42, .size = {4, 2, 4}};
+  return generate_terrain(options, add_terrain_types(types).value()).value();
+}
+
+Scene scene_of(VoxelRegistry types, Grid grid) {
+  Scene scene;
+  scene.types = std::move(types);
+  SceneGrid placed;
+  placed.grid = std::move(grid);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(placed));
+  scene.add_instance(instance);
+  return scene;
+}
+
+Scene terrain_scene() {
+  VoxelRegistry types;
+  Grid grid = terrain(types);
+  return scene_of(std::move(types), std::move(grid));
+}
+
+/// The same terrain without what lies beyond x = 64.
+Scene scene_without_neighbours() {
+  VoxelRegistry types;
+  Grid grid = terrain(types);
+  grid.fill_box({64, 0, 0}, {127, 63, 127}, kAir);
+  return scene_of(std::move(types), std::move(grid));
+}
+
+RenderOptions options_for(const GoldenView& view) {
+  RenderOptions options;
+  options.width = kWidth;
+  options.height = kHeight;
+  options.depth = true;
+  options.light.sun = view.sun;
+  return options;
+}
+
+Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& options) {
+  const Camera camera = look_at(view.position, view.target, view.fov_degrees * std::numbers::pi / 180.0).value();
+  return CpuRenderer(scene).render(camera, options).value();
+}
+
+GoldenFolders golden_folders() {
+  return {QUOIN_SOURCE_DIR "/tests/golden", QUOIN_BINARY_DIR "/golden"};
+}
+
+/// How many pixels of the golden picture the twin gets wrong.
+std::int64_t wrong_pixels(const Picture& twin, const GoldenView& view) {
+  const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));
+  if (!golden || golden->rgb.size() != twin.colour.rgb.size()) {
+    ADD_FAILURE() << "no golden picture of this size";
+    return 0;
+  }
+  return difference_of(twin.colour, *golden).pixels;
+}
+
+class Golden : public ::testing::TestWithParam<GoldenView> {};
+
+TEST_P(Golden, PictureIsTheGoldenOne) {
+  const GoldenView& view = GetParam();
+  const Picture picture = render(terrain_scene(), view, options_for(view));
+  if (const char* accept = std::getenv("QUOIN_ACCEPT_GOLDEN"); accept != nullptr && std::string(accept) == "1") {
+    const auto path = golden_folders().golden / (std::string(view.name) + ".png");
+    ASSERT_TRUE(write_png(picture.colour, path)) << path;
+  }
+  EXPECT_TRUE(is_golden(picture.colour, view.name, golden_folders()));
+}
+
+TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
+  const GoldenView& view = GetParam();
+  const Scene scene = terrain_scene();
+  RenderOptions options = options_for(view);
+  const Picture usual = render(scene, view, options);
+  options.instructions = InstructionSet::Plain;
+  options.threads = {1};
+  const Picture plain = render(scene, view, options);
+  EXPECT_EQ(difference_of(plain.colour, usual.colour).pixels, 0);
+  EXPECT_TRUE(plain.depth.values == usual.depth.values);
+}
+
+INSTANTIATE_TEST_SUITE_P(Views, Golden, ::testing::ValuesIn(kViews),
+                         [](const auto& view) { return std::string(view.param.name); });
+
+TEST(GoldenTwin, ShadowViewFailsWithoutShadows) {
+  const GoldenView& view = view_called("shadow");
+  RenderOptions options = options_for(view);
+  options.light.shadows = false;
+  const std::int64_t wrong = wrong_pixels(render(terrain_scene(), view, options), view);
+  EXPECT_GT(wrong, kPixels / 8) << "of " << kPixels;
+}
+
+TEST(GoldenTwin, AoViewFailsWithoutOcclusion) {
+  const GoldenView& view = view_called("ao");
+  RenderOptions options = options_for(view);
+  options.light.occlusion = OcclusionMode::Off;
+  const std::int64_t wrong = wrong_pixels(render(terrain_scene(), view, options), view);
+  EXPECT_GT(wrong, kPixels / 2) << "of " << kPixels;
+}
+
+TEST(GoldenTwin, BoundaryViewFailsWithoutTheNeighbour) {
+  const GoldenView& view = view_called("boundary");
+  const RenderOptions options = options_for(view);
+  const Picture whole = render(terrain_scene(), view, options);
+  const Picture halved = render(scene_without_neighbours(), view, options);
+  EXPECT_GT(wrong_pixels(halved, view), kPixels / 3) << "of " << kPixels;
+  // On what is still there, too: light is blocked across the border.
+  int same_place = 0;
+  int other_light = 0;
+  for (std::size_t i = 0; i < whole.depth.values.size(); ++i) {
+    if (whole.depth.values[i] != halved.depth.values[i] || std::isinf(whole.depth.values[i])) continue;
+    ++same_place;
+    const auto pixel = static_cast<std::ptrdiff_t>(3 * i);
+    const auto colour = whole.colour.rgb.begin() + pixel;
+    if (!std::equal(colour, colour + 3, halved.colour.rgb.begin() + pixel)) ++other_light;
+  }
+  EXPECT_GT(same_place, kPixels / 5) << "of " << kPixels;
+  EXPECT_GT(other_light, 100) << "of " << same_place;
+}
+
+TEST(GoldenComparer, WritesWhatDiffersWhenAPixelDoes) {
+  const TestFolder folder("golden_comparer");
+  const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
+  std::filesystem::create_directories(folders.golden);
+  const Image right{2, 1, {10, 20, 30, 40, 50, 60}};
+  ASSERT_TRUE(write_png(right, folders.golden / "a.png"));
+  EXPECT_TRUE(is_golden(right, "a", folders));
+  EXPECT_FALSE(std::filesystem::exists(folders.failures / "a.actual.png"));
+  Image wrong = right;
+  wrong.rgb[4] = 51;
+  const auto failure = is_golden(wrong, "a", folders);
+  EXPECT_FALSE(failure);
+  EXPECT_NE(std::string(failure.message()).find("a: 1 of 2 pixels differ, by up to 1\n"), std::string::npos)
+      << failure.message();
+  EXPECT_EQ(read_png(folders.failures / "a.actual.png")->rgb, wrong.rgb);
+  EXPECT_EQ(read_png(folders.failures / "a.difference.png")->rgb, (std::vector<std::uint8_t>{0, 0, 0, 0, 64, 0}));
+  EXPECT_TRUE(is_golden(right, "a", folders)) << "and once it is right again";
+  EXPECT_FALSE(std::filesystem::exists(folders.failures / "a.actual.png")) << "the pictures of the failure go";
+}
+
+TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
+  const TestFolder folder("golden_nothing");
+  const GoldenFolders folders{folder.file("golden"), folder.file("failures")};
+  std::filesystem::create_directories(folders.golden);
+  const Image picture{2, 1, {10, 20, 30, 40, 50, 60}};
+  EXPECT_FALSE(is_golden(picture, "a", folders)) << "no golden picture";
+  EXPECT_TRUE(std::filesystem::exists(folders.failures / "a.actual.png"));
+  ASSERT_TRUE(write_png({1, 2, picture.rgb}, folders.golden / "a.png"));
+  EXPECT_FALSE(is_golden(picture, "a", folders)) << "as many pixels, but another size";
+}
+
+}  // namespace
+
+}  // namespace quoin

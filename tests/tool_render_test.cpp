@@ -1,0 +1,250 @@
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/io/picture_files.h>
+
+#include "tests/tool_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+using Json = nlohmann::json;
+
+class ToolRender : public ToolTest {
+ protected:
+  /// Draws and answers the JSON object.
+  Json drawn(const std::string& arguments) {
+    const ToolRun result = run("render " + arguments + " --json");
+    EXPECT_EQ(result.status, 0) << arguments << ": " << result.err;
+    return result.status == 0 ? Json::parse(result.out) : Json();
+  }
+  std::string bytes(const std::string& name) { return text_of(folder_.file(name)); }
+  /// One voxel: in Quoin's axes from (0, 0, -1) to (1, 1, 0).
+  void write_one_voxel() {
+    std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_file({1, 1, 1}, std::string("\0\0\0\1", 4));
+  }
+};
+
+DVec3 triple(const Json& json) {
+  return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
+}
+
+TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
+  const Json said = drawn("tiny.vox -o out.png --size 64x48 --threads 2");
+  EXPECT_EQ(said["size"], Json({64, 48}));
+  EXPECT_GT(said["rays"], 64 * 48);
+  EXPECT_GT(said["pixels_hit"], 100);
+  EXPECT_LT(said["pixels_hit"], 64 * 48);
+  EXPECT_EQ(said["backend"], "cpu");
+  EXPECT_EQ(said["threads"], 2);
+  EXPECT_EQ(said["files"], Json({"out.png"}));
+  EXPECT_EQ(said["bytes"], std::filesystem::file_size(folder_.file("out.png")));
+  for (const char* key : {"read", "build", "trace"}) EXPECT_GE(said["seconds"][key], 0.0);
+  EXPECT_EQ(said["warnings"], Json::array());
+  const auto picture = read_png(folder_.file("out.png"));
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->width, 64);
+  EXPECT_EQ(picture->height, 48);
+  const ToolRun text = run("render tiny.vox -o out.png");
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_NE(text.out.find("Picture: 1280 x 720, "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("\nWrote out.png, "), std::string::npos) << text.out;
+}
+
+TEST_F(ToolRender, TheSameBytesAtAnyNumberOfThreads) {
+  const std::string flags = " --size 80x60 --samples 3 --ao-rays 12 --depth ";
+  drawn("tiny.vox -o a.png --threads 1" + flags + "a.pfm");
+  drawn("tiny.vox -o b.png --threads 7" + flags + "b.pfm");
+  drawn("tiny.vox -o c.png" + flags + "c.pfm");
+  EXPECT_FALSE(bytes("a.png").empty());
+  EXPECT_EQ(bytes("a.png"), bytes("b.png"));
+  EXPECT_EQ(bytes("a.png"), bytes("c.png"));
+  EXPECT_EQ(bytes("a.pfm"), bytes("b.pfm"));
+  EXPECT_EQ(bytes("a.pfm"), bytes("c.pfm"));
+}
+
+TEST_F(ToolRender, DepthIsTheDistanceAlongEachRay) {
+  write_one_voxel();
+  const DBox box = [&] {
+    const Json info = Json::parse(run("info one.vox --json").out);
+    return DBox{triple(info["bounds"]["min"]), triple(info["bounds"]["max"])};
+  }();
+  const DVec3 middle = 0.5 * (box.min + box.max);
+  const std::string x = std::to_string(middle.x);
+  const std::string y = std::to_string(middle.y);
+  const std::string camera = " --camera " + x + "," + y + "," + std::to_string(box.max.z + 2.0);
+  const std::string target = " --look-at " + x + "," + y + "," + std::to_string(middle.z);
+  const Json said = drawn("one.vox -o out.png --depth out.pfm --size 31x21 --fov 60" + camera + target);
+  EXPECT_EQ(said["files"], Json({"out.png", "out.pfm"}));
+  const auto depth = read_pfm(folder_.file("out.pfm"));
+  ASSERT_TRUE(depth);
+  ASSERT_EQ(depth->width, 31);
+  ASSERT_EQ(depth->height, 21);
+  const double half = std::tan(std::acos(-1.0) / 6.0);
+  int hit = 0;
+  for (int row = 0; row < 21; ++row) {
+    for (int column = 0; column < 31; ++column) {
+      const double right = ((column + 0.5) / 31 * 2 - 1) * half * 31 / 21;
+      const double up = (1 - (row + 0.5) / 21 * 2) * half;
+      const float value = depth->values[static_cast<std::size_t>(row * 31 + column)];
+      // The front face lies 2 before the camera.
+      if (std::abs(2 * right) < 0.5 && std::abs(2 * up) < 0.5) {
+        EXPECT_NEAR(value, 2 * std::sqrt(1 + right * right + up * up), 1e-5);
+        ++hit;
+      } else {
+        EXPECT_EQ(value, std::numeric_limits<float>::infinity());
+      }
+    }
+  }
+  EXPECT_GT(hit, 20);
+  EXPECT_EQ(said["pixels_hit"], hit);
+}
+
+TEST_F(ToolRender, NegativeNumbersAreNoOptions) {
+  const std::string size = "tiny.vox -o out.png --size 8x8 ";
+  const Json camera = drawn(size + "--camera -3,5,2 --look-at -.5,-1e0,-0 --sun -1,.5,0")["camera"];
+  EXPECT_EQ(triple(camera["position"]), DVec3(-3, 5, 2));
+  const Json again = drawn(size + "--camera=-3,5,2 --look-at=-0.5,-1,0 --sun=-1,0.5,0")["camera"];
+  EXPECT_EQ(camera, again);
+  EXPECT_EQ(drawn(size + "--camera -.25,5,2 --look-at 0,0,0")["camera"]["position"][0], -0.25);
+  EXPECT_EQ(camera["fov"], 45.0);
+}
+
+TEST_F(ToolRender, EveryOptionChangesThePicture) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
+  const std::string base = "many.vox -o out.png --size 64x48";
+  drawn(base);
+  const std::string plain = bytes("out.png");
+  for (const std::string flags :
+       {"--view front", "--view top", "--sun=-1,1,0", "--preset no-shadows", "--preset no-ao", "--preset unlit",
+        "--ao vertex", "--ao-rays 6", "--ao-affects all", "--exposure 0.5", "--samples 4",
+        "--camera 30,30,30 --look-at 0,0,0", "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
+    drawn(base + " " + flags);
+    EXPECT_NE(bytes("out.png"), plain) << flags;
+  }
+  drawn(base + " --preset full --ao rays --ao-rays 9 --ao-affects ambient --exposure 1 --samples 1 --view iso");
+  EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
+}
+
+TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
+  std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
+  EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"no voxel to draw: a picture of the sky"}));
+  EXPECT_TRUE(exists("a.png"));
+  EXPECT_EQ(drawn("tiny.vox -o b.png --size 9x9 --camera 0,90,0 --look-at 0,99,0")["warnings"],
+            Json({"no voxel in sight of this camera: a picture of the sky"}));
+}
+
+TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
+  std::ofstream(folder_.file("vox.png"), std::ios::binary) << tiny_vox();
+  std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.png"));
+  std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.pfm"));
+  const std::string out = "tiny.vox -o out.png ";
+  const std::vector<std::pair<std::string, std::string>> errors = {
+      {"tiny.vox", "--output is required"},
+      {"tiny.vox -o out.jpg", "-o: the picture's name must end in .png, not \"out.jpg\""},
+      {"tiny.vox -o ''", "--output: must be the name of a file"},
+      {"vox.png -o vox.png", "-o: vox.png is the input"},
+      {"tiny.vox -o link.png", "-o: link.png is the input"},
+      {out + "--depth link.pfm", "--depth: link.pfm is the input"},
+      {out + "--depth depth.png", "--depth: the name must end in .pfm"},
+      {out + "--size 0x9", "--size: must be"},
+      {out + "--size 9x-9", "--size: must be"},
+      {out + "--size 9", "--size: must be"},
+      {out + "--size 9x9x9", "--size: must be"},
+      {out + "--size 9.5x9", "--size: must be"},
+      {out + "--size 99999999999x1", "--size: must be"},
+      {out + "--size 40000x25000", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels"},
+      {out + "--view side", "--view: "},
+      {out + "--camera 1,2,3", "--camera needs --look-at"},
+      {out + "--look-at 1,2,3", "--look-at needs --camera"},
+      {out + "--fov 30", "--fov needs --camera"},
+      {out + "--view top --camera 1,2,3 --look-at 0,0,0", "--view and --camera exclude each other"},
+      {out + "--camera 1,2 --look-at 0,0,0", "--camera: must be three numbers"},
+      {out + "--camera 1,2,3x --look-at 0,0,0", "--camera: must be three numbers"},
+      {out + "--camera 1,2,3,4 --look-at 0,0,0", "--camera: must be three numbers"},
+      {out + "--camera 1,,3 --look-at 0,0,0", "--camera: must be three numbers"},
+      {out + "--camera nan,2,3 --look-at 0,0,0", "--camera: must be three numbers"},
+      {out + "--camera 1,2,3 --look-at inf,0,0", "--look-at: must be three numbers"},
+      {out + "--camera 1,2,3 --look-at 1e999,0,0", "--look-at: must be three numbers"},
+      {out + "--camera 1,2,3 --look-at 1,2,3", "the camera looks at the point where it stands"},
+      {out + "--camera 1,2,3 --look-at 0,0,0 --fov 0", "--fov: must be more than 0 and less than 180, not \"0\""},
+      {out + "--camera 1,2,3 --look-at 0,0,0 --fov 180", "--fov: must be"},
+      {out + "--camera 1,2,3 --look-at 0,0,0 --fov nan", "--fov: must be"},
+      {out + "--sun 0,0,0", "--sun: must be three numbers that are not all 0"},
+      {out + "--sun 1,2", "--sun: must be three numbers"},
+      {out + "--sun nan,1,1", "--sun: must be three numbers"},
+      {out + "--preset dark", "--preset: "},
+      {out + "--ao none", "--ao: "},
+      {out + "--ao-rays 0", "--ao-rays: "},
+      {out + "--ao-rays 5000", "--ao-rays: "},
+      {out + "--ao vertex --ao-rays 9", "--ao-rays needs --ao rays"},
+      {out + "--preset no-ao --ao rays", "--ao: the preset no-ao has no ambient occlusion"},
+      {out + "--preset unlit --ao-affects all", "--ao-affects: the preset unlit has no ambient occlusion"},
+      {out + "--exposure -1", "--exposure: must be a number of at least 0"},
+      {out + "--exposure 1e", "--exposure: must be"},
+      {out + "--samples 0", "--samples: "},
+      {out + "--samples 4097", "--samples: "},
+      {out + "--samples 2.5", "--samples: "},
+      {out + "--backend gpu", "--backend: "}};
+  for (const auto& [arguments, error] : errors) {
+    const ToolRun result = run("render " + arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with("quoin: " + error)) << arguments << ": " << result.err;
+  }
+  EXPECT_FALSE(exists("out.png"));
+  EXPECT_EQ(bytes("tiny.vox"), tiny_vox());
+}
+
+TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
+  std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
+  std::filesystem::create_directory(folder_.file("folder.png"));
+  for (const std::string arguments :
+       {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png", "tiny.vox -o folder.png",
+        "tiny.vox -o out.png --depth none/out.pfm", "tiny.vox -o out.png --backend vulkan",
+        "tiny.vox -o out.png --device 0", "tiny.vox -o out.png --lod-colours"}) {
+    const ToolRun result = run("render " + arguments);
+    EXPECT_EQ(result.status, 1) << arguments;
+    expect_one_error_line(result);
+    EXPECT_FALSE(exists("out.png")) << arguments;
+  }
+  EXPECT_EQ(shell("ls -A").out.find(".quoin-"), std::string::npos);
+}
+
+TEST_F(ToolRender, ASignalEndsItWithoutAFile) {
+  for (const auto& [signal, status] : {std::pair{"INT", 130}, {"TERM", 143}}) {
+    // Under a shell that is not interactive a job in the background ignores SIGINT; env makes it heed it again.
+    const ToolRun result = shell("env --default-signal=INT '" QUOIN_TOOL
+                                 "' render tiny.vox -o out.png --samples 4096 --depth out.pfm & sleep 0.4; kill -" +
+                                 std::string(signal) + " $!; wait $!");
+    EXPECT_EQ(result.status, status) << result.err;
+    const std::string files = shell("ls -A").out;
+    EXPECT_EQ(files.find(".quoin-"), std::string::npos) << files;
+    EXPECT_FALSE(exists("out.png") || exists("out.pfm"));
+  }
+}
+
+TEST_F(ToolRender, AFullDiskLeavesNoFile) {
+  const ToolRun result =
+      shell("ulimit -f 40; '" QUOIN_TOOL "' render tiny.vox -o out.png --size 320x200 --depth d.pfm");
+  EXPECT_EQ(result.status, 1);
+  expect_one_error_line(result);
+  EXPECT_TRUE(result.err.starts_with("quoin: d.pfm: ")) << result.err;
+  EXPECT_FALSE(exists("d.pfm"));
+}
+
+TEST_F(ToolRender, ItsHelpHasAnExample) {
+  const ToolRun help = run("render --help");
+  EXPECT_EQ(help.status, 0);
+  EXPECT_NE(help.out.find("Example: quoin render"), std::string::npos) << help.out;
+}
+
+}  // namespace
+
+}  // namespace quoin
