@@ -6,6 +6,7 @@
 #include <tsl/robin_map.h>
 
 #include "grid/coordinate_hash.h"
+#include "trace/tree_view.h"
 
 namespace quoin {
 namespace {
@@ -83,6 +84,7 @@ struct OccupancyTree::Impl {
   IBox bounds;
   FlatTables flat;  // no chunks: none
   IBox flat_chunks;
+  trace::TreeView view{};
 
   Impl() { bricks[1].fill(kAll); }
 
@@ -277,6 +279,11 @@ struct OccupancyTree::Impl {
 
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
   void finish(std::span<const IVec3> changed) {
+    renew_tables(changed);
+    if (!flat_chunks.empty()) view = trace::make_view(flat, bricks.data(), bounds);
+  }
+
+  void renew_tables(std::span<const IVec3> changed) {
     bounds = {};
     IBox chunks;
     for (const auto& [chunk, box] : chunk_bounds) {
@@ -343,6 +350,9 @@ const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
 }
 const OccupancyTree::Node* OccupancyTree::bricks() const {
   return impl_->bricks.data();
+}
+const trace::TreeView* OccupancyTree::view() const {
+  return impl_->flat_chunks.empty() ? nullptr : &impl_->view;
 }
 const OccupancyTree::FlatTables* OccupancyTree::flat_tables() const {
   return impl_->flat_chunks.empty() ? nullptr : &impl_->flat;

@@ -9,8 +9,8 @@ namespace quoin {
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits, InstructionSet instructions) {
   hits.hit = hits.starts_inside = 0;
   std::uint32_t unfinished = rays.active;
-  if (const auto* tables = tree.flat_tables()) {
-    trace::kernel_of(instructions).first_hits(trace::view_of(tree, *tables), rays, hits, unfinished);
+  if (const trace::TreeView* view = tree.view()) {
+    trace::kernel_of(instructions).first_hits(*view, rays, hits, unfinished);
   }
   for (std::uint32_t inside = hits.starts_inside; inside != 0; inside &= inside - 1) {
     const int lane = std::countr_zero(inside);
@@ -32,8 +32,8 @@ void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hi
 std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays, InstructionSet instructions) {
   std::uint32_t unfinished = rays.active;
   std::uint32_t blocked = 0;
-  if (const auto* tables = tree.flat_tables()) {
-    blocked = trace::kernel_of(instructions).any_hits(trace::view_of(tree, *tables), rays, unfinished);
+  if (const trace::TreeView* view = tree.view()) {
+    blocked = trace::kernel_of(instructions).any_hits(*view, rays, unfinished);
   }
   for (; unfinished != 0; unfinished &= unfinished - 1) {
     const int lane = std::countr_zero(unfinished);

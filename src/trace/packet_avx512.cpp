@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "trace/tree_view.h"
 
@@ -28,16 +29,13 @@ namespace {
 
 #include "trace/single.inl"
 
-#include "trace/single_window.inl"
-
-#define QUOIN_TRACE_SINGLE trace_single
 #include "trace/single_hit.inl"
 
 #include "trace/short.inl"
 
 }  // namespace
 
-const Kernel kAvx512Kernel = {first_single, trace_first, trace_any};
+const Kernel kAvx512Kernel = {first_single, any_single, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

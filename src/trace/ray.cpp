@@ -243,12 +243,11 @@ std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const 
 }
 
 std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
-  const OccupancyTree::FlatTables* tables = tree.flat_tables();
-  if (tables == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
+  const trace::TreeView* view = tree.view();
+  if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
   RayHit hit;
   bool is_unfinished = false;
-  const bool is_hit =
-      trace::kernel_of(instructions).first_hit(trace::view_of(tree, *tables), ray, max_t, hit, is_unfinished);
+  const bool is_hit = trace::kernel_of(instructions).first_hit(*view, ray, max_t, hit, is_unfinished);
   if (is_unfinished) return trace::walk_to_first_hit(tree, ray, max_t);
   if (!is_hit) return std::nullopt;
   if (hit.starts_inside) hit.face = trace::facing(ray.direction);
@@ -256,7 +255,11 @@ std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, doubl
 }
 
 bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
-  return first_hit(tree, ray, max_t, instructions).has_value();
+  const trace::TreeView* view = tree.view();
+  if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t).has_value();
+  bool is_unfinished = false;
+  const bool is_hit = trace::kernel_of(instructions).any_hit(*view, ray, max_t, is_unfinished);
+  return is_unfinished ? trace::walk_to_first_hit(tree, ray, max_t).has_value() : is_hit;
 }
 
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,

@@ -93,13 +93,13 @@ inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, S
   const float greatest = greatest3(size);
   auto limit = static_cast<float>(max_t);
   if (mask3(size <= all4(0x1p20F)) != 7 || !(greatest >= 0x1p-20F) || !(limit >= 0.0F)) return SetUp::Unusual;
-  const IVec3& lo = tree.box.min;
-  const IVec3& hi = tree.box.max;
   const F4 rough = __builtin_convertvector(p, F4);
-  const F4 low_bound = __builtin_convertvector((I4{lo.x, lo.y, lo.z, lo.z}), F4) - kNearby;
-  const F4 high_bound = __builtin_convertvector((I4{hi.x, hi.y, hi.z, hi.z}), F4) + kNearby;
+  const F4 low_bound = {tree.low[0], tree.low[1], tree.low[2], 0.0F};
+  const F4 high_bound = {tree.high[0], tree.high[1], tree.high[2], 0.0F};
+  const I4 leaves = ((high_bound < rough) & (d >= 0.0F)) | ((rough < low_bound) & (d <= 0.0F));
+  if (mask3(leaves) != 0) return SetUp::Misses;
   int moved = -1;
-  if (mask3((low_bound <= rough) & (rough <= high_bound)) != 7) {
+  if (mask3((low_bound - kNearby <= rough) & (rough <= high_bound + kNearby)) != 7) {
     const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
     Move move{{p[0], p[1], p[2]}, max_t, -1};
     if (!move_to_bounds(tree, direction, move)) return SetUp::Misses;
@@ -122,7 +122,11 @@ inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, S
 
 // As `coordinate_after` of the lockstep kernel, for all axes but `axis`, the one just crossed, where it means nothing.
 inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 high, int axis) {
-  const F4 at = max4(min4(floor4(ray.origin + t * ray.direction), high), low);
+  const F4 position = ray.origin + t * ray.direction;
+  const F4 at = max4(min4(floor4(position), high), low);
+  // Rounding can put a position on the wrong side of a plane only next to it.
+  const F4 past = position - at;
+  if ((mask3((past < 0.01F) | (past > 0.99F)) & ~(1 << (axis & 3))) == 0) return at;
   const F4 ahead = ray.forward ? at + 1.0F : at;
   const F4 behind = ray.forward ? at : at + 1.0F;
   const F4 ahead_t = (ahead - ray.origin) * ray.inverse;
@@ -164,42 +168,53 @@ inline F4 exit_planes(const SingleRay& ray, F4 lower, float size) {
   return ray.still ? all4(kNever) : moving;
 }
 
-// The least steps of a walk: its next planes and when it crosses them.
+// The next planes of a walk and when it crosses them, each in a variable of its own so that it can live in a register.
 struct Steps {
-  float plane[3];
-  float t[3];
+  float plane0, plane1, plane2;
+  float t0, t1, t2;
+  float step0, step1, step2;
+  int stride0, stride1, stride2;
   int index;
 };
 
-inline Steps make_steps(const SingleRay& ray, F4 planes, int index) {
+inline Steps make_steps(const SingleRay& ray, F4 planes, float size, int index, I4 strides) {
   const F4 t = (planes - ray.origin) * ray.inverse;
-  return {{planes[0], planes[1], planes[2]}, {t[0], t[1], t[2]}, index};
+  const F4 step = ray.sign * size;
+  const I4 signed_strides = ray.forward ? strides : -strides;
+  return {planes[0],         planes[1],         planes[2],         t[0], t[1], t[2], step[0], step[1], step[2],
+          signed_strides[0], signed_strides[1], signed_strides[2], index};
 }
 
 // Goes through the next plane; answers its axis.
-template <int kSize>
-inline int advance(const SingleRay& ray, const I4& strides, Steps& steps, float& now) {
-  constexpr auto kEdge = static_cast<float>(kSize);
-  const auto go = [&](int a) {
-    now = steps.t[a];
-    steps.plane[a] += ray.sign[a] * kEdge;
-    steps.t[a] = (steps.plane[a] - ray.origin[a]) * ray.inverse[a];
-    steps.index += strides[a];
-    return a;
-  };
-  if (steps.t[0] <= steps.t[1]) return steps.t[0] <= steps.t[2] ? go(0) : go(2);
-  return steps.t[1] <= steps.t[2] ? go(1) : go(2);
+inline int advance(const SingleRay& ray, Steps& s, float& now) {
+  if (s.t0 <= s.t1 && s.t0 <= s.t2) {
+    now = s.t0;
+    s.plane0 += s.step0;
+    s.t0 = (s.plane0 - ray.origin[0]) * ray.inverse[0];
+    s.index += s.stride0;
+    return 0;
+  }
+  if (s.t1 <= s.t2) {
+    now = s.t1;
+    s.plane1 += s.step1;
+    s.t1 = (s.plane1 - ray.origin[1]) * ray.inverse[1];
+    s.index += s.stride1;
+    return 1;
+  }
+  now = s.t2;
+  s.plane2 += s.step2;
+  s.t2 = (s.plane2 - ray.origin[2]) * ray.inverse[2];
+  s.index += s.stride2;
+  return 2;
 }
 
 // Walks through the 64 voxels of the cell in which a ray stands; answers the index of the voxel met, or -1.
 inline int walk_cell(const SingleRay& ray, std::uint64_t word, F4 cell, Stand& stand) {
   const I4 within = __builtin_convertvector(stand.lower - cell, I4);
-  Steps steps = make_steps(ray, exit_planes(ray, stand.lower, 1.0F),
-                           within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ);
-  const I4 codes = {kCodeX, kCodeY, kCodeZ, 0};
-  const I4 strides = ray.forward ? codes : -codes;
+  Steps steps = make_steps(ray, exit_planes(ray, stand.lower, 1.0F), 1.0F,
+                           within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ, I4{kCodeX, kCodeY, kCodeZ, 0});
   while ((word >> (steps.index & 63) & 1U) == 0) {
-    stand.axis = advance<1>(ray, strides, steps, stand.t);
+    stand.axis = advance(ray, steps, stand.t);
     if ((steps.index & kLeft) != 0) return -1;
   }
   return steps.index & 63;
@@ -232,17 +247,15 @@ inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double
   Stand stand = first_stand(ray);
   const I4 place = (__builtin_convertvector(stand.lower, I4) + ray.base) >> 2;
   F4 cell = __builtin_convertvector(__builtin_convertvector(stand.lower, I4) & ~3, F4);
-  Steps steps =
-      make_steps(ray, exit_planes(ray, cell, 4.0F),
-                 tree.first_cell + place[0] + place[1] * tree.cell_strides.y + place[2] * tree.cell_strides.z);
-  const I4 cell_strides = {1, tree.cell_strides.y, tree.cell_strides.z, 0};
-  const I4 strides = ray.forward ? cell_strides : -cell_strides;
+  Steps steps = make_steps(ray, exit_planes(ray, cell, 4.0F), 4.0F,
+                           tree.first_cell + place[0] + place[1] * tree.cell_strides.y + place[2] * tree.cell_strides.z,
+                           I4{1, tree.cell_strides.y, tree.cell_strides.z, 0});
   for (bool is_first = true;; is_first = false) {
     const auto bit = static_cast<std::uint32_t>(steps.index);
     if ((tree.cells[bit >> 5] >> (bit & 31U) & 1U) != 0) {
       Stand inner = stand;
       if (!is_first) {
-        const F4 exits = {steps.plane[0], steps.plane[1], steps.plane[2], 0.0F};
+        const F4 exits = {steps.plane0, steps.plane1, steps.plane2, 0.0F};
         const F4 moving = ray.forward ? exits - 4.0F : exits;
         cell = ray.still ? floor4(ray.origin * 0.25F) * 4.0F : moving;
         enter(ray, cell, cell + 3.0F, inner);
@@ -256,7 +269,7 @@ inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double
         return hit;
       }
     }
-    stand.axis = advance<4>(ray, strides, steps, stand.t);
+    stand.axis = advance(ray, steps, stand.t);
     if (!(stand.t <= ray.exit_t)) {
       hit.is_unfinished = ray.is_cut;
       return hit;

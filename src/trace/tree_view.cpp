@@ -1,30 +1,39 @@
 #include "trace/tree_view.h"
 
+#include <algorithm>
+
 namespace quoin::trace {
 
 const Kernel& kernel_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS
-  const InstructionSet set = resolve(instructions);
-  if (set == InstructionSet::Avx512) return kAvx512Kernel;
-  if (set == InstructionSet::Avx2) return kAvx2Kernel;
-#endif
+  // One ray alone gains nothing from sixteen lanes, and masks in registers of their own cost it moves.
+  static const Kernel kWide = {kAvx2Kernel.first_hit, kAvx2Kernel.any_hit, kAvx512Kernel.first_hits,
+                               kAvx512Kernel.any_hits};
+  static const Kernel* const kKernels[] = {nullptr, &kWide, &kAvx2Kernel, &kPlainKernel};
+  static const InstructionSet kBest = resolve(InstructionSet::Best);
+  return *kKernels[static_cast<int>(std::max(instructions, kBest))];
+#else
   static_cast<void>(instructions);
   return kPlainKernel;
+#endif
 }
 
-TreeView view_of(const OccupancyTree& tree, const OccupancyTree::FlatTables& tables) {
-  TreeView view;
+TreeView make_view(const OccupancyTree::FlatTables& tables, const OccupancyTree::Node* bricks, const IBox& bounds) {
+  TreeView view{};
   view.cells = tables.cells.data();
   view.bricks = tables.bricks.data();
-  view.words = reinterpret_cast<const std::uint32_t*>(tree.bricks());
+  view.words = reinterpret_cast<const std::uint32_t*>(bricks);
   view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
   view.cell_strides = tables.cell_strides();
   view.brick_strides = tables.brick_strides();
   view.brick_sizes = tables.chunks * 4;
   view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
   view.origin = DVec3(tables.origin);
-  const IBox bounds = tree.bounds();
   view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
+  for (int axis = 0; axis < 3; ++axis) {
+    view.low[axis] = static_cast<float>(view.box.min[axis]);
+    view.high[axis] = static_cast<float>(view.box.max[axis]);
+  }
   return view;
 }
 

@@ -19,6 +19,9 @@ struct TreeView {
   IVec3 brick_sizes;
   DVec3 origin;  ///< of the tables, in the grid
   IBox box;      ///< tight, from `origin`
+  // The box again, as single rays read it.
+  alignas(16) float low[4];
+  alignas(16) float high[4];
 };
 
 /// What a kernel leaves of the lanes it was asked about.
@@ -36,6 +39,8 @@ struct LaneHits {
 struct Kernel {
   /// One ray; `face` is not set where it starts inside.
   bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
+  /// Whether one ray is blocked.
+  bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);
   /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
   void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
   /// Answers the lanes that are blocked.
@@ -49,6 +54,7 @@ extern const Kernel kAvx512Kernel;
 #endif
 
 [[nodiscard]] const Kernel& kernel_of(InstructionSet instructions);
-[[nodiscard]] TreeView view_of(const OccupancyTree& tree, const OccupancyTree::FlatTables& tables);
+[[nodiscard]] TreeView make_view(const OccupancyTree::FlatTables& tables, const OccupancyTree::Node* bricks,
+                                 const IBox& bounds);
 
 }  // namespace quoin::trace

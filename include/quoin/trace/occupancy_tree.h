@@ -13,6 +13,10 @@
 
 namespace quoin {
 
+namespace trace {
+struct TreeView;
+}  // namespace trace
+
 /// Which voxels a tree holds.
 enum class Occupancy : std::uint8_t {
   NonAir,       ///< whatever a ray can hit
@@ -84,6 +88,8 @@ class OccupancyTree {
   [[nodiscard]] const Node* bricks() const;
   /// Null where the world is so sparse (islands far apart) that the tables would be larger than all the rest.
   [[nodiscard]] const FlatTables* flat_tables() const;
+  /// The same for the library's own kernels.
+  [[nodiscard]] const trace::TreeView* view() const;
 
  private:
   struct Impl;
