@@ -31,11 +31,13 @@ namespace {
 
 #include "trace/single_hit.inl"
 
+#include "trace/single_window.inl"
+
 #include "trace/short.inl"
 
 }  // namespace
 
-const Kernel kAvx512Kernel = {first_single, any_single, trace_first, trace_any};
+const Kernel kAvx512Kernel = {first_single, any_short_single, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

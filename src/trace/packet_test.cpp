@@ -70,7 +70,7 @@ class Packets : public testing::TestWithParam<unsigned> {
   RayPacket packet() {
     RayPacket rays;
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
-      if (whole(0, 9) != 0) rays.set(lane, ray(), whole(0, 2) == 0 ? uniform(0, 30) : kInfinity);
+      if (whole(0, 9) != 0) rays.set(lane, ray(), whole(0, 1) == 0 ? uniform(0, whole(0, 1) == 0 ? 8 : 30) : kInfinity);
     }
     return rays;
   }
@@ -95,6 +95,11 @@ TEST_P(Packets, AnswerTheSameWithEveryInstructionSetAndOneByOne) {
       if ((rays.active >> lane & 1U) == 0) continue;
       const auto single = first_hit(tree_, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
       ASSERT_EQ(single.has_value(), (found[0].hit >> lane & 1U) != 0);
+      for (const InstructionSet set : kSets) {
+        const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+        ASSERT_EQ(any_hit(tree_, rays.ray(lane), max_t, set), single.has_value());
+        ASSERT_EQ(first_hit(tree_, rays.ray(lane), max_t, set).has_value(), single.has_value());
+      }
       if (!single) continue;
       ++hits;
       ASSERT_EQ(single->voxel, found[0][lane].voxel);

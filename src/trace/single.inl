@@ -50,16 +50,22 @@ enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
 // The box of the ray's way, and where it enters and leaves it.
 inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, float greatest, int moved) {
   const F4 f = ray.origin;
-  const float furthest = kReach / greatest;
-  const F4 end = f + std::min(max_t, furthest) * ray.direction;
   const IVec3& lo = tree.box.min;
   const IVec3& hi = tree.box.max;
   const F4 low_bound = __builtin_convertvector((I4{lo.x, lo.y, lo.z, 0} - ray.base), F4);
   const F4 high_bound = __builtin_convertvector((I4{hi.x, hi.y, hi.z, 0} - ray.base), F4);
-  ray.low = max4(low_bound, floor4(min4(f, end) - kSlack));
-  ray.high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
+  ray.low = low_bound;
+  ray.high = high_bound;
+  ray.is_cut = false;
+  // Endless rays leave a small world before they reach further than they may.
+  if (!(tree.is_small && max_t > kReach / 0x1p-20F)) {
+    const float furthest = kReach / greatest;
+    const F4 end = f + std::min(max_t, furthest) * ray.direction;
+    ray.low = max4(low_bound, floor4(min4(f, end) - kSlack));
+    ray.high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
+    ray.is_cut = furthest < max_t;
+  }
   const F4 far = ray.forward ? ray.high : ray.low;
-  const F4 bound = ray.forward ? high_bound : low_bound;
   const I4 is_low = f < ray.low;
   const I4 is_high = ray.high <= f;
   const I4 axes = {0, 1, 2, 3};
@@ -69,7 +75,6 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
   if (mask3(past | (ray.still & is_high)) != 0) return SetUp::Misses;
   const F4 near_t = before ? ((ray.forward ? ray.low : ray.high) - f) * ray.inverse : all4(-1.0F);
   ray.far_t = ray.still ? all4(kNever) : (far - f) * ray.inverse;
-  const F4 bound_t = ray.still ? all4(kNever) : (bound - f) * ray.inverse;
   ray.enter_t = greatest3(near_t);
   ray.enter_axis = -1;
   if (ray.enter_t >= 0.0F) {
@@ -78,17 +83,29 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
     ray.enter_t = 0.0F;
   }
   ray.exit_t = least3(ray.far_t);
-  ray.is_cut = furthest < max_t && furthest < least3(bound_t);
+  if (ray.is_cut) {
+    const F4 bound = ray.forward ? high_bound : low_bound;
+    const F4 bound_t = ray.still ? all4(kNever) : (bound - f) * ray.inverse;
+    ray.is_cut = kReach / greatest < least3(bound_t);
+  }
   ray.is_moved = moved >= 0;
+  if (ray.enter_axis < 0) return SetUp::Ready;
   const F4 t = all4(ray.enter_t);
   const I4 left = (ray.far_t < t) | ((ray.far_t == t) & (axes < ray.enter_axis));
   return mask3(left) != 0 ? SetUp::Misses : SetUp::Ready;
 }
 
 inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, SingleRay& out) {
-  D4 p = D4{ray.origin.x, ray.origin.y, ray.origin.z, ray.origin.z} -
-         D4{tree.origin.x, tree.origin.y, tree.origin.z, tree.origin.z};
-  const F4 d = __builtin_convertvector((D4{ray.direction.x, ray.direction.y, ray.direction.z, ray.direction.z}), F4);
+  static_assert(sizeof(Ray) == 6 * sizeof(double));
+  D4 p;
+  D4 direction64;
+  D4 corner;
+  std::memcpy(&p, &ray.origin.x, sizeof p);
+  std::memcpy(&direction64, &ray.origin.z, sizeof direction64);
+  std::memcpy(&corner, tree.corner, sizeof corner);
+  p -= corner;
+  using L4 = std::int64_t __attribute__((vector_size(32)));
+  const F4 d = __builtin_convertvector(__builtin_shuffle(direction64, L4{1, 2, 3, 3}), F4);
   const F4 size = max4(d, -d);
   const float greatest = greatest3(size);
   auto limit = static_cast<float>(max_t);
@@ -208,16 +225,36 @@ inline int advance(const SingleRay& ray, Steps& s, float& now) {
   return 2;
 }
 
-// Walks through the 64 voxels of the cell in which a ray stands; answers the index of the voxel met, or -1.
-inline int walk_cell(const SingleRay& ray, std::uint64_t word, F4 cell, Stand& stand) {
-  const I4 within = __builtin_convertvector(stand.lower - cell, I4);
-  Steps steps = make_steps(ray, exit_planes(ray, stand.lower, 1.0F), 1.0F,
-                           within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ, I4{kCodeX, kCodeY, kCodeZ, 0});
-  while ((word >> (steps.index & 63) & 1U) == 0) {
-    stand.axis = advance(ray, steps, stand.t);
-    if ((steps.index & kLeft) != 0) return -1;
+// The voxel of a cell into which a ray has just come, counted from the cell's lower corner.
+inline I4 voxel_entered(const SingleRay& ray, F4 cell, const Stand& stand) {
+  const F4 position = ray.origin + stand.t * ray.direction - cell;
+  const I4 trunc = __builtin_convertvector(position, I4);
+  const I4 not_negative = trunc > 0 ? trunc : I4{};
+  const I4 at = not_negative < 3 ? not_negative : I4{3, 3, 3, 3};
+  const F4 past = position - __builtin_convertvector(at, F4);
+  const I4 axes = {0, 1, 2, 3};
+  const I4 entered = axes == stand.axis;
+  // Rounding can put a position on the wrong side of a plane only next to it.
+  if (mask3(((past < 0.01F) | (past > 0.99F)) & ~entered) != 0) {
+    Stand exact = stand;
+    enter(ray, cell, cell + 3.0F, exact);
+    return __builtin_convertvector(exact.lower - cell, I4);
   }
-  return steps.index & 63;
+  return entered ? (~ray.forward & 3) : at;
+}
+
+// Walks through the 64 voxels of a cell; answers the index of the voxel met, or -1.
+inline int walk_cell(const SingleRay& ray, std::uint64_t word, F4 cell, I4 within, int& axis) {
+  const F4 lower = cell + __builtin_convertvector(within, F4);
+  const int index = within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ;
+  if ((word >> (index & 63) & 1U) != 0) return index & 63;
+  Steps steps = make_steps(ray, exit_planes(ray, lower, 1.0F), 1.0F, index, I4{kCodeX, kCodeY, kCodeZ, 0});
+  float t = 0.0F;
+  for (;;) {
+    axis = advance(ray, steps, t);
+    if ((steps.index & kLeft) != 0) return -1;
+    if ((word >> (steps.index & 63) & 1U) != 0) return steps.index & 63;
+  }
 }
 
 inline std::uint64_t cell_word(const TreeView& tree, const SingleRay& ray, F4 lower) {
@@ -253,18 +290,19 @@ inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double
   for (bool is_first = true;; is_first = false) {
     const auto bit = static_cast<std::uint32_t>(steps.index);
     if ((tree.cells[bit >> 5] >> (bit & 31U) & 1U) != 0) {
-      Stand inner = stand;
+      I4 within = __builtin_convertvector(stand.lower - cell, I4);
       if (!is_first) {
         const F4 exits = {steps.plane0, steps.plane1, steps.plane2, 0.0F};
         const F4 moving = ray.forward ? exits - 4.0F : exits;
         cell = ray.still ? floor4(ray.origin * 0.25F) * 4.0F : moving;
-        enter(ray, cell, cell + 3.0F, inner);
+        within = voxel_entered(ray, cell, stand);
       }
-      const int voxel = walk_cell(ray, cell_word(tree, ray, cell), cell, inner);
+      int axis = stand.axis;
+      const int voxel = walk_cell(ray, cell_word(tree, ray, cell), cell, within, axis);
       if (voxel >= 0) {
         const I4 corner = __builtin_convertvector(cell, I4) + ray.base;
         hit.is_hit = true;
-        hit.axis = inner.axis;
+        hit.axis = axis;
         hit.voxel = IVec3{corner[0] + (voxel & 3), corner[1] + (voxel >> 2 & 3), corner[2] + (voxel >> 4)};
         return hit;
       }

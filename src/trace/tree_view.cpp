@@ -6,10 +6,7 @@ namespace quoin::trace {
 
 const Kernel& kernel_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS
-  // One ray alone gains nothing from sixteen lanes, and masks in registers of their own cost it moves.
-  static const Kernel kWide = {kAvx2Kernel.first_hit, kAvx2Kernel.any_hit, kAvx512Kernel.first_hits,
-                               kAvx512Kernel.any_hits};
-  static const Kernel* const kKernels[] = {nullptr, &kWide, &kAvx2Kernel, &kPlainKernel};
+  static const Kernel* const kKernels[] = {nullptr, &kAvx512Kernel, &kAvx2Kernel, &kPlainKernel};
   static const InstructionSet kBest = resolve(InstructionSet::Best);
   return *kKernels[static_cast<int>(std::max(instructions, kBest))];
 #else
@@ -30,7 +27,10 @@ TreeView make_view(const OccupancyTree::FlatTables& tables, const OccupancyTree:
   view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
   view.origin = DVec3(tables.origin);
   view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
+  const IVec3 size = view.box.size();
+  view.is_small = std::max(std::max(size.x, size.y), size.z) <= 1'900;
   for (int axis = 0; axis < 3; ++axis) {
+    view.corner[axis] = view.origin[axis];
     view.low[axis] = static_cast<float>(view.box.min[axis]);
     view.high[axis] = static_cast<float>(view.box.max[axis]);
   }

@@ -19,7 +19,9 @@ struct TreeView {
   IVec3 brick_sizes;
   DVec3 origin;  ///< of the tables, in the grid
   IBox box;      ///< tight, from `origin`
-  // The box again, as single rays read it.
+  bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
+  // The same again, as single rays read it.
+  alignas(32) double corner[4];
   alignas(16) float low[4];
   alignas(16) float high[4];
 };

@@ -1,0 +1,141 @@
+// Whether one short ray is blocked, in sixteen lanes: all its crossings at once instead of one after the other, so that
+// nothing waits and the answer decides no branch. The same answers as trace_single in trace/single.inl. Included once
+// for each instruction set of sixteen lanes, after trace/single.inl.
+//
+// The crossings of the x planes are in the first lanes, then those of y, then z. Where a lane stands is the sum of the
+// steps of all crossings that come before it or are its own.
+
+// Voxels along |x| + |y| + |z| that a ray may reach: with one crossing more on each axis they are at most fifteen.
+constexpr float kWindowReach = 11.0F;
+// Later than any crossing.
+constexpr float kAfterAll = 2e37F;
+// The lane that holds where the ray starts.
+constexpr int kStartLane = 15;
+
+struct WindowTables {
+  alignas(64) std::int32_t lane[kWidth];
+  // -1 in lanes from j on: at a tie the crossing in lane j comes before theirs, and is itself among them.
+  alignas(64) std::int32_t order[kWidth][kWidth];
+  // The spread bits, as in trace/short.inl but for five bits an axis, of x, y and z.
+  alignas(64) std::int32_t spread[3][2 * kWidth];
+};
+
+constexpr WindowTables make_window_tables() {
+  WindowTables tables{};
+  for (int i = 0; i < kWidth; ++i) {
+    tables.lane[i] = i;
+    for (int j = 0; j < kWidth; ++j) tables.order[j][i] = i >= j ? -1 : 0;
+  }
+  for (int c = 0; c < 2 * kWidth; ++c) {
+    for (int axis = 0; axis < 3; ++axis) {
+      tables.spread[axis][c] = (c & 3) << (2 * axis) | (c >> 2 & 3) << (6 + 2 * axis) | (c >> 4) << (12 + axis);
+    }
+  }
+  return tables;
+}
+
+constexpr WindowTables kTables = make_window_tables();
+
+// Each lane's own axis of four numbers.
+inline F of_axis(F4 numbers, I axis) {
+  return from_16(F{_mm512_castps128_ps512(reinterpret_cast<__m128>(numbers))}, axis);
+}
+
+struct CrossingWindow {
+  F t;
+  I axis;
+  Mask valid;  // within the box, or where the ray starts
+};
+
+// All crossings of a ray that starts in the voxel whose lower planes these are.
+inline CrossingWindow all_crossings(const SingleRay& ray, F4 lower) {
+  const F4 first = ray.forward ? lower + 1.0F : lower;
+  const F4 ends = ray.forward ? ray.high : ray.low;
+  // Those within the box; the one that leaves it does not count.
+  const I4 count = ~ray.still & __builtin_convertvector((ends - first) * ray.sign, I4);
+  const int x = count[0];
+  const int xy = x + count[1];
+  const I lane = load(kTables.lane);
+  const Mask from_y = all(x - 1) < lane;
+  const Mask from_z = all(xy - 1) < lane;
+  CrossingWindow window;
+  window.axis = add_if(from_z, add_if(from_y, all(0), all(1)), all(1));
+  const Mask is_crossing = lane < all(std::min(xy + count[2], kStartLane));
+  const I number = add_if(from_z, add_if(from_y, lane, all(-x)), all(x - xy));
+  const F plane = of_axis(first, window.axis) + to_float(number) * of_axis(ray.sign, window.axis);
+  const F t = (plane - of_axis(ray.origin, window.axis)) * of_axis(ray.inverse, window.axis);
+  // No negative zeros: times are compared as whole numbers.
+  const Mask is_start = ~(lane < all(kStartLane));
+  window.t = select(is_crossing, t + all(0.0F), select(is_start, all(-1.0F), all(kAfterAll)));
+  const int exit_axis = std::countr_zero(static_cast<std::uint32_t>(mask3(ray.far_t == all4(ray.exit_t))));
+  const Mask before_exit =
+      (window.t < all(ray.exit_t)) | ((window.t == all(ray.exit_t)) & (window.axis < all(exit_axis)));
+  window.valid = (is_crossing & before_exit) | is_start;
+  return window;
+}
+
+// The sums of the steps up to each lane.
+inline I sums(const CrossingWindow& window, int start, I4 step) {
+  alignas(64) std::int32_t times[kWidth];
+  alignas(64) std::int32_t steps[kWidth];
+  const I t = as_bits(window.t);
+  store(times, t);
+  store(steps, from_16(I{_mm512_castsi128_si512(reinterpret_cast<__m128i>(step))}, window.axis));
+  // Broadcasts straight from memory: as shuffles they would all want the same port.
+  asm volatile("" : "+m"(times), "+m"(steps));
+  I sum = all(start);
+#pragma GCC unroll 15
+  for (int j = 0; j < kStartLane; ++j) {
+    const Mask is_later = all(times[j]) + load(kTables.order[j]) < t;
+    sum = add_if(is_later, sum, all(steps[j]));
+  }
+  return sum;
+}
+
+// The eight bricks about a window, times 128.
+inline I bricks_about(const TreeView& tree, I4 brick) {
+  const I4 last = I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 1} - 1;
+  const auto clamped = [last](I4 at) {
+    const I4 low = at < 0 ? I4{} : at;
+    return low < last ? low : last;
+  };
+  const I4 strides = {1, tree.brick_strides.y, tree.brick_strides.z, 0};
+  const I4 near = clamped(brick) * strides;
+  const I4 step = clamped(brick + 1) * strides - near;
+  return eight_of(tree.bricks + near[0] + near[1] + near[2], step[0], step[1], step[2]);
+}
+
+enum class Blocked : std::uint8_t { No, Yes, Doubtful };
+
+inline Blocked any_in_window(const TreeView& tree, const SingleRay& ray, float max_t) {
+  const F4 lower = floor4(ray.origin);
+  const CrossingWindow window = all_crossings(ray, lower);
+  const I4 at = __builtin_convertvector(lower, I4) + ray.base;
+  const I4 brick = (ray.forward ? at : at - 15) >> 4;
+  const I4 within = at - (brick << 4);
+  const I4 step = I4{1, 1 << 5, 1 << 10, 0};
+  const I code = sums(window, within[0] | within[1] << 5 | within[2] << 10, ray.forward ? step : -step);
+  const I spread_code = or_of(or_of(from_32(kTables.spread[0], code), from_32(kTables.spread[1], shift_right<5>(code))),
+                              from_32(kTables.spread[2], shift_right<10>(code)));
+  const I half =
+      from_16(bricks_about(tree, brick), shift_right<12>(spread_code)) + (shift_right<5>(spread_code) & all(127));
+  const Mask met = test_bit(gather(tree.words, half), spread_code) & window.valid;
+  // Crossings up to here are surely within reach.
+  const F4 sure_t = max_t - 0.01F * max4(ray.inverse, -ray.inverse);
+  const Mask sure = met & (window.t < of_axis(sure_t, window.axis));
+  if (any(met) && !any(sure)) return Blocked::Doubtful;
+  return any(sure) ? Blocked::Yes : Blocked::No;
+}
+
+inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
+  const double reach = max_t * (std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z));
+  if (!(reach <= kWindowReach)) return any_single(tree, ray, max_t, unfinished);
+  SingleRay single;
+  const SetUp ready = set_up_single(tree, ray, max_t, single);
+  unfinished = ready == SetUp::Unusual;
+  if (ready != SetUp::Ready) return false;
+  if (single.enter_axis >= 0) return any_single(tree, ray, max_t, unfinished);
+  const Blocked blocked = any_in_window(tree, single, static_cast<float>(max_t));
+  if (blocked == Blocked::Doubtful) return any_single(tree, ray, max_t, unfinished);
+  return blocked == Blocked::Yes;
+}
