@@ -1,6 +1,7 @@
 #include <quoin/trace/packet.h>
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -111,6 +112,100 @@ TEST_P(Packets, AnswerTheSameWithEveryInstructionSetAndOneByOne) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Packets, testing::Range(1U, 9U));
+
+// Rays of every kind through a tree that followed edits are those through a new one.
+TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
+  const VoxelRegistry types = oracle::mixed_types();
+  Grid grid;
+  grid.fill_box({-70, -70, -70}, {70, -20, 70}, 1);
+  OccupancyTree tree = OccupancyTree::build(grid, types);
+  static_cast<void>(grid.take_dirty());
+  std::mt19937 random(3);
+  const auto near = [&](int reach) { return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach; };
+  for (int round = 0; round < 24; ++round) {
+    // Within the box of chunks, and now and then beyond it.
+    const int reach = round % 6 == 5 ? 400 : 70;
+    const auto type = static_cast<VoxelType>(random() % 3);
+    if (round % 2 == 0) {
+      grid.fill_sphere({near(reach), near(reach), near(reach)}, 15.0, type);
+    } else {
+      grid.set({near(reach), near(reach), near(reach)}, type);
+    }
+    tree.update(grid, types, grid.take_dirty());
+    const OccupancyTree fresh = OccupancyTree::build(grid, types);
+    ASSERT_EQ(tree.bounds(), fresh.bounds());
+    for (int i = 0; i < 200; ++i) {
+      RayPacket rays;
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const DVec3 o{near(90) + 0.5, near(90) + 0.25, near(90) + 0.125};
+        rays.set(lane, {o, {near(1000) + 0.5, near(1000), near(1000)}}, kInfinity);
+      }
+      PacketHits followed;
+      PacketHits expected;
+      first_hits(tree, rays, followed);
+      first_hits(fresh, rays, expected);
+      ASSERT_NO_FATAL_FAILURE(expect_same(followed, expected));
+    }
+  }
+}
+
+// Rays longer than single precision would do for, and worlds without flat tables, are walked in double.
+TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
+  const VoxelRegistry types = oracle::mixed_types();
+  for (const int gap : {5'000, 1'000'000}) {
+    Grid grid;
+    grid.fill_box({0, 0, 0}, {8, 40, 40}, 1);
+    grid.fill_sphere({gap, 20, 20}, 15.0, 2);
+    const OccupancyTree tree = OccupancyTree::build(grid, types);
+    EXPECT_EQ(tree.flat_tables() == nullptr, gap == 1'000'000);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> uniform(0.0, 40.0);
+    int hits = 0;
+    for (int i = 0; i < 40; ++i) {
+      RayPacket rays;
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const DVec3 from{8.5, uniform(random), uniform(random)};
+        const DVec3 to{static_cast<double>(gap), uniform(random), uniform(random)};
+        rays.set(lane, {from, glm::normalize(to - from)}, kInfinity);
+      }
+      PacketHits found;
+      first_hits(tree, rays, found);
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        const Ray ray = rays.ray(lane);
+        ASSERT_EQ(first_hit(tree, ray).has_value(), (found.hit >> lane & 1U) != 0);
+        if (gap > 5'000) continue;  // the dense tracer would take minutes
+        const auto dense = oracle::dense_first_hit(grid, grid.bounds(), ray, kInfinity);
+        ASSERT_EQ(dense.has_value(), (found.hit >> lane & 1U) != 0);
+        ASSERT_TRUE(!dense || dense->voxel == found[lane].voxel);
+      }
+      hits += std::popcount(found.hit);
+    }
+    EXPECT_GT(hits, 100);
+  }
+}
+
+TEST(PacketsOf, OfNoRaysHitNothing) {
+  Grid grid;
+  grid.fill_box({-5, -5, -5}, {5, 5, 5}, 1);
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  RayPacket rays;
+  EXPECT_EQ(any_hits(tree, rays), 0U);
+  rays.set(3, {{nan, 0, 0}, {1, 0, 0}}, kInfinity);
+  rays.set(4, {{0, 0, 0}, {0, 0, 0}}, kInfinity);
+  rays.set(5, {{0, 0, 0}, {1, kInfinity, 0}}, kInfinity);
+  rays.set(6, {{0, 0, 0}, {1, 0, 0}}, nan);
+  rays.set(7, {{0, 0, 0}, {1, 0, 0}}, -1.0);
+  rays.set(8, {{1e300, 0, 0}, {-1, 0, 0}}, kInfinity);
+  rays.set(9, {{0, 0, 0}, {1, 0, 0}}, 0.0);
+  for (const InstructionSet set : kSets) {
+    PacketHits found;
+    first_hits(tree, rays, found, set);
+    EXPECT_EQ(found.hit, 0x300U) << "the far one and the one that starts inside";
+    EXPECT_EQ(any_hits(tree, rays, set), 0x300U);
+    EXPECT_EQ(any_hits(OccupancyTree::build(Grid(), oracle::mixed_types()), rays, set), 0U);
+  }
+}
 
 }  // namespace
 }  // namespace quoin

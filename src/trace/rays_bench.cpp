@@ -1,6 +1,7 @@
 // rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time and in packets; rays/random600.
 
 #include <bit>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -30,54 +31,59 @@ void report(benchmark::State& state, std::size_t rays, int hits, int expected) {
       benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-void trace(benchmark::State& state, const std::vector<RayQuery>& rays, int expected) {
+enum class Ask : std::uint8_t { First, Any };
+
+struct Case {
+  const char* name;
+  Ask ask;
+  const std::vector<RayQuery>& (*rays)();
+  int expected;
+};
+
+const Case kCases[] = {
+    {"primary", Ask::First, [] -> const std::vector<RayQuery>& { return ray_workload().primary; },
+     workloads::kPrimaryHits},
+    {"shadow", Ask::Any, [] -> const std::vector<RayQuery>& { return ray_workload().shadow; }, workloads::kShadowHits},
+    {"ao", Ask::Any, [] -> const std::vector<RayQuery>& { return ray_workload().occlusion; },
+     workloads::kOcclusionHits},
+};
+
+void trace(benchmark::State& state, const Case& c, InstructionSet set) {
+  const OccupancyTree& tree = ray_workload().tree;
+  const std::vector<RayQuery>& rays = c.rays();
   int hits = 0;
   for (auto _ : state) {
     hits = 0;
-    for (const RayQuery& query : rays) hits += any_hit(ray_workload().tree, query.ray, query.max_t);
+    for (const RayQuery& query : rays) {
+      hits += c.ask == Ask::First ? first_hit(tree, query.ray, query.max_t, set).has_value()
+                                  : any_hit(tree, query.ray, query.max_t, set);
+    }
   }
-  report(state, rays.size(), hits, expected);
+  report(state, rays.size(), hits, c.expected);
 }
 
 // Packets of 16 in the order of the rays.
 std::vector<RayPacket> packets_of(const std::vector<RayQuery>& rays) {
   std::vector<RayPacket> packets((rays.size() + 15) / 16);
-  for (std::size_t i = 0; i < rays.size(); ++i)
+  for (std::size_t i = 0; i < rays.size(); ++i) {
     packets[i / 16].set(static_cast<int>(i % 16), rays[i].ray, rays[i].max_t);
+  }
   return packets;
 }
 
-void trace_packets(benchmark::State& state, const std::vector<RayQuery>& rays, int expected, InstructionSet set) {
-  const std::vector<RayPacket> packets = packets_of(rays);
+void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
+  const OccupancyTree& tree = ray_workload().tree;
+  const std::vector<RayPacket> packets = packets_of(c.rays());
+  PacketHits found;
   int hits = 0;
   for (auto _ : state) {
     hits = 0;
-    for (const RayPacket& packet : packets) hits += std::popcount(any_hits(ray_workload().tree, packet, set));
+    for (const RayPacket& packet : packets) {
+      if (c.ask == Ask::First) first_hits(tree, packet, found, set);
+      hits += std::popcount(c.ask == Ask::First ? found.hit : any_hits(tree, packet, set));
+    }
   }
-  report(state, rays.size(), hits, expected);
-}
-
-void primary(benchmark::State& state) {
-  trace(state, ray_workload().primary, workloads::kPrimaryHits);
-}
-void shadow(benchmark::State& state) {
-  trace(state, ray_workload().shadow, workloads::kShadowHits);
-}
-void occlusion(benchmark::State& state) {
-  trace(state, ray_workload().occlusion, workloads::kOcclusionHits);
-}
-BENCHMARK(primary)->Name("rays/primary/single")->Unit(benchmark::kMillisecond);
-BENCHMARK(shadow)->Name("rays/shadow/single")->Unit(benchmark::kMillisecond);
-BENCHMARK(occlusion)->Name("rays/ao/single")->Unit(benchmark::kMillisecond);
-
-void primary_packets(benchmark::State& state, InstructionSet set) {
-  trace_packets(state, ray_workload().primary, workloads::kPrimaryHits, set);
-}
-void shadow_packets(benchmark::State& state, InstructionSet set) {
-  trace_packets(state, ray_workload().shadow, workloads::kShadowHits, set);
-}
-void occlusion_packets(benchmark::State& state, InstructionSet set) {
-  trace_packets(state, ray_workload().occlusion, workloads::kOcclusionHits, set);
+  report(state, c.rays().size(), hits, c.expected);
 }
 
 [[maybe_unused]] const bool registered = [] {
@@ -86,13 +92,14 @@ void occlusion_packets(benchmark::State& state, InstructionSet set) {
     InstructionSet set;
   } sets[] = {{"", InstructionSet::Best}, {"/avx2", InstructionSet::Avx2}, {"/plain", InstructionSet::Plain}};
   for (const auto& s : sets) {
-    const auto add = [&](const char* name, void (*run)(benchmark::State&, InstructionSet)) {
-      benchmark::RegisterBenchmark((std::string("rays/") + name + "/packet" + s.suffix).c_str(), run, s.set)
-          ->Unit(benchmark::kMillisecond);
-    };
-    add("primary", primary_packets);
-    add("shadow", shadow_packets);
-    add("ao", occlusion_packets);
+    for (const Case& c : kCases) {
+      const auto add = [&](const std::string& kind, void (*run)(benchmark::State&, const Case&, InstructionSet)) {
+        benchmark::RegisterBenchmark(("rays/" + std::string(c.name) + kind + s.suffix).c_str(), run, c, s.set)
+            ->Unit(benchmark::kMillisecond);
+      };
+      add("/single", trace);
+      add("/packet", trace_packets);
+    }
   }
   return true;
 }();
@@ -110,11 +117,31 @@ void random600(benchmark::State& state) {
 BENCHMARK(random600)->Name("rays/random600")->Unit(benchmark::kMillisecond);
 
 void build(benchmark::State& state) {
-  for (auto _ : state)
+  for (auto _ : state) {
     benchmark::DoNotOptimize(OccupancyTree::build(ray_workload().grid, ray_workload().types).bytes());
+  }
   state.counters["bytes"] = static_cast<double>(ray_workload().tree.bytes());
 }
 BENCHMARK(build)->Name("rays/build")->Unit(benchmark::kMillisecond);
+
+// Following an edit of a cube of this edge, the edit itself not counted.
+void update(benchmark::State& state) {
+  Grid grid = workloads::terrain_grid(256, 256);
+  static_cast<void>(grid.take_dirty());
+  OccupancyTree tree = OccupancyTree::build(grid, ray_workload().types);
+  const IVec3 corner{100, 20, 100};
+  const IVec3 size{static_cast<int>(state.range(0))};
+  bool is_solid = false;
+  for (auto _ : state) {
+    state.PauseTiming();
+    grid.fill_box(corner, corner + size, is_solid ? VoxelType{1} : kAir);
+    is_solid = !is_solid;
+    const std::vector<IVec3> dirty = grid.take_dirty();
+    state.ResumeTiming();
+    tree.update(grid, ray_workload().types, dirty);
+  }
+}
+BENCHMARK(update)->Name("rays/update")->Arg(1)->Arg(32)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace quoin

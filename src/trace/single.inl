@@ -104,8 +104,7 @@ inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, S
   std::memcpy(&direction64, &ray.origin.z, sizeof direction64);
   std::memcpy(&corner, tree.corner, sizeof corner);
   p -= corner;
-  using L4 = std::int64_t __attribute__((vector_size(32)));
-  const F4 d = __builtin_convertvector(__builtin_shuffle(direction64, L4{1, 2, 3, 3}), F4);
+  const F4 d = __builtin_convertvector(__builtin_shufflevector(direction64, direction64, 1, 2, 3, 3), F4);
   const F4 size = max4(d, -d);
   const float greatest = greatest3(size);
   auto limit = static_cast<float>(max_t);
