@@ -24,13 +24,17 @@ namespace {
 
 #include "trace/lanes_avx2.h"
 
-#include "trace/kernel.inl"
+#include "trace/kernel_common.inl"
+
+#include "trace/lockstep_setup.inl"
+
+#include "trace/lockstep.inl"
 
 #include "trace/single.inl"
 
 #include "trace/single_hit.inl"
 
-#include "trace/short.inl"
+#include "trace/lockstep_short.inl"
 
 }  // namespace
 

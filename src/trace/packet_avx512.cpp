@@ -25,7 +25,11 @@ namespace {
 
 #include "trace/lanes_avx512.h"
 
-#include "trace/kernel.inl"
+#include "trace/kernel_common.inl"
+
+#include "trace/lockstep_setup.inl"
+
+#include "trace/lockstep.inl"
 
 #include "trace/single.inl"
 
@@ -33,7 +37,7 @@ namespace {
 
 #include "trace/single_window.inl"
 
-#include "trace/short.inl"
+#include "trace/lockstep_short.inl"
 
 }  // namespace
 

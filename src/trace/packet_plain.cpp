@@ -1,4 +1,4 @@
-// The kernel of rays in lockstep for any processor.
+// The kernel for any processor: rays one by one.
 
 #include <algorithm>
 #include <bit>
@@ -11,18 +11,49 @@
 namespace quoin::trace {
 namespace {
 
-#include "trace/lanes_plain.h"
+// The sign bits of the first three.
+template <class I4>
+inline int mask3(I4 a) {
+  return (a[0] < 0 ? 1 : 0) | (a[1] < 0 ? 2 : 0) | (a[2] < 0 ? 4 : 0);
+}
 
-#include "trace/kernel.inl"
+#include "trace/kernel_common.inl"
 
 #include "trace/single.inl"
 
 #include "trace/single_hit.inl"
 
-#include "trace/short.inl"
+void first_one_by_one(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
+  hits.hit = hits.starts_inside = unfinished = 0;
+  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    const auto i = static_cast<std::size_t>(lane);
+    RayHit hit;
+    bool is_unfinished = false;
+    const bool is_hit = first_single(tree, rays.ray(lane), rays.max_t[i], hit, is_unfinished);
+    unfinished |= std::uint32_t{is_unfinished} << lane;
+    hits.hit |= std::uint32_t{is_hit} << lane;
+    hits.starts_inside |= std::uint32_t{is_hit && hit.starts_inside} << lane;
+    hits.x[i] = hit.voxel.x, hits.y[i] = hit.voxel.y, hits.z[i] = hit.voxel.z;
+    hits.t[i] = hit.t;
+    hits.face[i] = hit.face;
+  }
+}
+
+std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
+  std::uint32_t blocked = unfinished = 0;
+  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    bool is_unfinished = false;
+    const bool is_blocked = any_single(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)], is_unfinished);
+    unfinished |= std::uint32_t{is_unfinished} << lane;
+    blocked |= std::uint32_t{is_blocked} << lane;
+  }
+  return blocked;
+}
 
 }  // namespace
 
-const Kernel kPlainKernel = {first_single, any_single, trace_first, trace_any};
+const Kernel kPlainKernel = {first_single, any_single, first_one_by_one, any_one_by_one};
 
 }  // namespace quoin::trace

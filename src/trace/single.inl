@@ -1,5 +1,5 @@
-// One ray, walked in plain code; the same answers as the lockstep kernel in trace/kernel.inl, whose comments explain
-// the arithmetic. Included once for each instruction set, within its namespace, after the kernel.
+// One ray, walked in plain code; the same answers as the lockstep kernel in trace/lockstep_setup.inl, whose comments
+// explain the arithmetic. Included once for each instruction set, within its namespace, after the kernel.
 
 using F4 = float __attribute__((vector_size(16)));
 using I4 = std::int32_t __attribute__((vector_size(16)));

@@ -16,7 +16,7 @@ struct WindowTables {
   alignas(64) std::int32_t lane[kWidth];
   // -1 in lanes from j on: at a tie the crossing in lane j comes before theirs, and is itself among them.
   alignas(64) std::int32_t order[kWidth][kWidth];
-  // The spread bits, as in trace/short.inl but for five bits an axis, of x, y and z.
+  // The spread bits, as in trace/lockstep_short.inl but for five bits an axis, of x, y and z.
   alignas(64) std::int32_t spread[3][2 * kWidth];
 };
 
