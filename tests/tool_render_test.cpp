@@ -144,6 +144,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   std::ofstream(folder_.file("vox.png"), std::ios::binary) << tiny_vox();
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.png"));
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.pfm"));
+  std::filesystem::create_symlink("out.png", folder_.file("ahead.pfm"));
   const std::string out = "tiny.vox -o out.png ";
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"tiny.vox", "--output is required"},
@@ -152,6 +153,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {"vox.png -o vox.png", "-o: vox.png is the input"},
       {"tiny.vox -o link.png", "-o: link.png is the input"},
       {out + "--depth link.pfm", "--depth: link.pfm is the input"},
+      {out + "--depth ahead.pfm", "--depth: ahead.pfm is the picture itself"},
       {out + "--depth depth.png", "--depth: the name must end in .pfm"},
       {out + "--size 0x9", "--size: must be"},
       {out + "--size 9x-9", "--size: must be"},
