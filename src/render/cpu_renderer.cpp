@@ -14,10 +14,6 @@ namespace {
 
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
 
-bool is_finite(DVec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 Status check_camera(const Camera& camera) {
   const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
   if (!is_finite(camera.position)) return refuse("camera: position must be finite");

@@ -30,8 +30,10 @@ struct RayHit {
 ///
 /// Voxels are half-open: a point on the face between two belongs to the one on its greater side. Where a ray crosses
 /// several planes at once, x goes before y before z.
-/// Precision: double throughout; steps are found anew from the origin each time, so errors do not add up. Far from the
-///            grid's origin a ray is as exact as its own coordinates.
+/// Precision: a ray is moved, in double, next to its start, and followed in single precision as far as that is exact
+///            enough; beyond, and in worlds so sparse that they have no flat tables, in double. Every crossing is found
+///            anew from the origin, so errors do not add up: t is right to 1e-4 of itself (of 1, when it is less). Far
+///            from the grid's origin a ray is as exact as its own coordinates.
 /// Cost:      a few steps through empty space, whatever its size; never more than the planes crossed inside the bounds.
 /// Source:    A. Williams et al., "An efficient and robust ray-box intersection algorithm" (2005), for the clip.
 [[nodiscard]] std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray,
