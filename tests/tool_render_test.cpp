@@ -140,6 +140,18 @@ TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
             Json({"no voxel in sight of this camera: a picture of the sky"}));
 }
 
+TEST_F(ToolRender, HiddenInstancesAreDrawnAndFramedOnlyWhenAskedFor) {
+  std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_with_hidden(1);
+  std::ofstream(folder_.file("both.vox"), std::ios::binary) << vox_with_hidden(0);
+  const Json without = drawn("one.vox -o one.png --size 64x48");
+  EXPECT_EQ(without["warnings"], Json({"1 hidden instance left out; --hidden includes it"}));
+  const Json with = drawn("one.vox -o hidden.png --size 64x48 --hidden");
+  EXPECT_EQ(with["warnings"], Json::array());
+  EXPECT_NE(with["camera"], without["camera"]);
+  drawn("both.vox -o both.png --size 64x48");
+  EXPECT_EQ(bytes("hidden.png"), bytes("both.png"));
+}
+
 TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   std::ofstream(folder_.file("vox.png"), std::ios::binary) << tiny_vox();
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.png"));
