@@ -20,7 +20,8 @@ struct RayQuery {
   double max_t = std::numeric_limits<double>::infinity();
 };
 
-/// Hits that the workload has, as a plain tracer in double precision counts them, and how far off a count may be.
+/// Hits that the workload is known by, and how far off a count may be: a plain tracer in double precision counts
+/// 118,583, 86,210 and 242,778.
 inline constexpr int kPrimaryHits = 118'582;
 inline constexpr int kShadowHits = 86'217;
 inline constexpr int kOcclusionHits = 242'773;

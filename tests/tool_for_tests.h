@@ -9,7 +9,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
+#include <vector>
+
+#include <quoin/io/vox.h>
 
 #include "io/glb_for_tests.h"
 
@@ -52,6 +56,21 @@ inline std::string tiny_vox() {
                                          "\2\0\0\1"
                                          "\2\0\1\2",
                                          16));
+}
+
+/// The model of `tiny_vox` at two places, of which as many as asked are hidden.
+inline std::string vox_with_hidden(int hidden) {
+  const std::string file = tiny_vox();
+  Scene scene = read_vox(std::as_bytes(std::span(file))).value().scene;
+  Instance second = scene.instances()[scene.instances().handles().front()];
+  second.position.x += 10;
+  scene.add_instance(second);
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    if (hidden-- > 0) scene.instances()[handle].visible = false;
+  }
+  std::vector<std::string> warnings;
+  const auto bytes = write_vox(scene, warnings).value();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// Voxels that share no face, half of a cube: large in every format. 4,000 of them unless told.

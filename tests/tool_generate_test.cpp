@@ -98,11 +98,13 @@ TEST_F(ToolGenerate, wrong_usage_is_status_2_and_leaves_no_file) {
     expect_one_error_line(result);
   }
   EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out"));
+  EXPECT_EQ(run("generate forest out.vox").err, "quoin: generate needs one of: terrain (try --help)\n");
   EXPECT_TRUE(run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: no option \"--unknown\""));
 }
 
-TEST_F(ToolGenerate, a_file_that_cannot_be_written_is_status_1) {
-  const ToolRun result = run("generate terrain nowhere/out.vox --chunks 1x1x1");
+// Before the work: this world would take minutes and gigabytes.
+TEST_F(ToolGenerate, a_file_that_cannot_be_written_is_status_1_at_once) {
+  const ToolRun result = shell("ulimit -t 10; '" QUOIN_TOOL "' generate terrain nowhere/out.vox --chunks 1024x2x32");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);
 }

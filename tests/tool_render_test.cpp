@@ -140,10 +140,23 @@ TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
             Json({"no voxel in sight of this camera: a picture of the sky"}));
 }
 
+TEST_F(ToolRender, HiddenInstancesAreDrawnAndFramedOnlyWhenAskedFor) {
+  std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_with_hidden(1);
+  std::ofstream(folder_.file("both.vox"), std::ios::binary) << vox_with_hidden(0);
+  const Json without = drawn("one.vox -o one.png --size 64x48");
+  EXPECT_EQ(without["warnings"], Json({"1 hidden instance left out; --hidden includes it"}));
+  const Json with = drawn("one.vox -o hidden.png --size 64x48 --hidden");
+  EXPECT_EQ(with["warnings"], Json::array());
+  EXPECT_NE(with["camera"], without["camera"]);
+  drawn("both.vox -o both.png --size 64x48");
+  EXPECT_EQ(bytes("hidden.png"), bytes("both.png"));
+}
+
 TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   std::ofstream(folder_.file("vox.png"), std::ios::binary) << tiny_vox();
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.png"));
   std::filesystem::create_hard_link(folder_.file("tiny.vox"), folder_.file("link.pfm"));
+  std::filesystem::create_symlink("out.png", folder_.file("ahead.pfm"));
   const std::string out = "tiny.vox -o out.png ";
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"tiny.vox", "--output is required"},
@@ -152,6 +165,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {"vox.png -o vox.png", "-o: vox.png is the input"},
       {"tiny.vox -o link.png", "-o: link.png is the input"},
       {out + "--depth link.pfm", "--depth: link.pfm is the input"},
+      {out + "--depth ahead.pfm", "--depth: ahead.pfm is the picture itself"},
       {out + "--depth depth.png", "--depth: the name must end in .pfm"},
       {out + "--size 0x9", "--size: must be"},
       {out + "--size 9x-9", "--size: must be"},

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include <quoin/io/vox.h>
-
 #include "tests/tool_for_tests.h"
 
 namespace quoin {
@@ -15,21 +13,6 @@ namespace quoin {
 namespace {
 
 using Json = nlohmann::json;
-
-/// The model of `tiny_vox` at two places, of which as many as asked are hidden.
-std::string vox_with_hidden(int hidden) {
-  const std::string file = tiny_vox();
-  Scene scene = read_vox(std::as_bytes(std::span(file))).value().scene;
-  Instance second = scene.instances()[scene.instances().handles().front()];
-  second.position.x += 10;
-  scene.add_instance(second);
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    if (hidden-- > 0) scene.instances()[handle].visible = false;
-  }
-  std::vector<std::string> warnings;
-  const auto bytes = write_vox(scene, warnings).value();
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 class Tool : public ToolTest {};
 

@@ -1,6 +1,3 @@
-#include <array>
-#include <charconv>
-#include <chrono>
 #include <memory>
 
 #include <quoin/io/file.h>
@@ -10,7 +7,10 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
+#include "parse.h"
 #include "progress_bar.h"
+#include "stopwatch.h"
 
 namespace quoin::tool {
 
@@ -37,29 +37,14 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
-template <class Number>
-bool read_number(std::string_view text, Number& out) {
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-  return error == std::errc() && stop == text.data() + text.size();
-}
-
-bool read_size(std::string_view text, IVec3& out) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t end = axis < 2 ? text.find('x') : text.size();
-    if (end == std::string_view::npos || !read_number(text.substr(0, end), out[axis])) return false;
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return true;
-}
-
 /// What is wrong with the options, which are read into `options.terrain`; empty when nothing is.
 std::string read_options(GenerateOptions& options) {
-  if (!read_number(std::string_view(options.seed), options.terrain.seed)) {
-    return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
-  }
-  IVec3& size = options.terrain.size;
+  const auto seed = parse_unsigned(options.seed);
+  if (!seed) return "--seed: must be a whole number from 0 to 18446744073709551615, not \"" + options.seed + "\"";
   const std::string got = ", not \"" + options.chunks + "\"";
-  if (!read_size(options.chunks, size)) return "--chunks: must be like 4x2x4" + got;
+  const auto parsed = parse_box_size(options.chunks);
+  if (!parsed) return "--chunks: must be like 4x2x4" + got;
+  const IVec3 size = *parsed;
   if (size.x < 1 || size.y < 1 || size.z < 1 || size.x > 1'024 || size.y > 32 || size.z > 1'024) {
     return "--chunks: must be 1 to 1024 wide and deep and 1 to 32 high" + got;
   }
@@ -67,6 +52,8 @@ std::string read_options(GenerateOptions& options) {
   if (std::int64_t{size.x} * size.y * size.z > kMaxVoxels / kUnitVoxels) {
     return "--chunks: must be at most " + with_thousands(kMaxVoxels / kUnitVoxels) + " in all" + got;
   }
+  options.terrain.seed = *seed;
+  options.terrain.size = size;
   return "";
 }
 
@@ -85,8 +72,8 @@ Scene scene_of(Grid grid, VoxelRegistry types, IVec3 size) {
 }
 
 Result<Outcome> generate(const GenerateOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  Stopwatch watch;
+  if (auto writable = check_outputs({options.output}); !writable) return tl::unexpected<Error>(writable.error());
   catch_interrupts();
   ProgressBar bar;
   VoxelRegistry types;
@@ -97,7 +84,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   Outcome outcome;
   outcome.voxels = grid->voxel_count();
   outcome.types = grid->types().size();
-  outcome.seconds_generate = seconds();
+  outcome.seconds_generate = watch.lap();
   const Scene scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
   auto bytes = write_vox(scene, outcome.warnings);
   if (!bytes) {
@@ -107,7 +94,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", options.output.string());
   if (auto written = write_file(options.output, *bytes); !written) return tl::unexpected<Error>(written.error());
   outcome.bytes = bytes->size();
-  outcome.seconds_write = seconds() - outcome.seconds_generate;
+  outcome.seconds_write = watch.lap();
   return outcome;
 }
 

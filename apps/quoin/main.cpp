@@ -15,7 +15,7 @@ namespace {
 
 using Arguments = std::vector<std::string>;
 
-std::string command_names(CLI::App& app) {
+std::string command_names(const CLI::App& app) {
   std::string names;
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
     names += (names.empty() ? "" : ", ") + command->get_name();
@@ -56,6 +56,11 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
     if (unknown.starts_with("--") || (chosen.empty() && !unknown.empty()))
       return "no option \"" + unknown + "\"" + hint;
     if (!unknown.empty()) return "no option \"" + unknown + "\"; a file of that name is ./" + unknown + hint;
+  }
+  if (!chosen.empty()) {
+    const CLI::App& command = innermost(*chosen[0]);
+    const std::string inner = command_names(command);
+    if (!inner.empty()) return command.get_name() + " needs one of: " + inner + hint;
   }
   return error.what() + hint;
 }

@@ -17,6 +17,21 @@ std::optional<Number> parse_all(std::string_view text) {
   return value;
 }
 
+/// Three values between two separators, each read by `read`.
+template <class Triple, class Read>
+std::optional<Triple> parse_three(std::string_view text, char separator, Read read) {
+  Triple triple{0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t end = axis < 2 ? text.find(separator) : text.size();
+    if (end == std::string_view::npos) return std::nullopt;
+    const auto value = read(text.substr(0, end));
+    if (!value) return std::nullopt;
+    triple[axis] = *value;
+    text.remove_prefix(axis < 2 ? end + 1 : end);
+  }
+  return triple;
+}
+
 }  // namespace
 
 std::optional<double> parse_number(std::string_view text) {
@@ -24,17 +39,12 @@ std::optional<double> parse_number(std::string_view text) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
+std::optional<std::uint64_t> parse_unsigned(std::string_view text) {
+  return parse_all<std::uint64_t>(text);
+}
+
 std::optional<DVec3> parse_triple(std::string_view text) {
-  DVec3 triple{0.0};
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t comma = axis < 2 ? text.find(',') : text.size();
-    if (comma == std::string_view::npos) return std::nullopt;
-    const auto value = parse_number(text.substr(0, comma));
-    if (!value) return std::nullopt;
-    triple[axis] = *value;
-    text.remove_prefix(axis < 2 ? comma + 1 : comma);
-  }
-  return triple;
+  return parse_three<DVec3>(text, ',', parse_number);
 }
 
 std::optional<PictureSize> parse_size(std::string_view text) {
@@ -44,6 +54,10 @@ std::optional<PictureSize> parse_size(std::string_view text) {
   const auto height = parse_all<int>(text.substr(cross + 1));
   if (!width || !height || *width <= 0 || *height <= 0) return std::nullopt;
   return PictureSize{*width, *height};
+}
+
+std::optional<IVec3> parse_box_size(std::string_view text) {
+  return parse_three<IVec3>(text, 'x', parse_all<int>);
 }
 
 }  // namespace quoin::tool

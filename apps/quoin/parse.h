@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -10,7 +11,10 @@ namespace quoin::tool {
 /// The finite number that all of `text` spells, whatever the locale; nothing when it is none.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text);
 
-/// "x,y,z": three such numbers.
+/// The whole number of at least 0 that all of `text` spells.
+[[nodiscard]] std::optional<std::uint64_t> parse_unsigned(std::string_view text);
+
+/// "x,y,z": three finite numbers.
 [[nodiscard]] std::optional<DVec3> parse_triple(std::string_view text);
 
 /// Width and height of a picture.
@@ -21,5 +25,8 @@ struct PictureSize {
 
 /// "1280x720": two positive whole numbers.
 [[nodiscard]] std::optional<PictureSize> parse_size(std::string_view text);
+
+/// "4x2x4": three whole numbers.
+[[nodiscard]] std::optional<IVec3> parse_box_size(std::string_view text);
 
 }  // namespace quoin::tool

@@ -3,12 +3,12 @@
 #include <memory>
 #include <numbers>
 
-#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
 
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
 #include "progress_bar.h"
 #include "render_arguments.h"
 #include "scene_warnings.h"
@@ -27,15 +27,6 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
-/// Fails now rather than after all the work, where an output cannot be written.
-Status check_outputs(const RenderArguments& arguments) {
-  for (const auto& path : {arguments.output, arguments.depth}) {
-    if (path.empty()) continue;
-    if (auto file = AtomicFile::create(path); !file) return tl::unexpected<Error>(file.error());
-  }
-  return {};
-}
-
 Result<Camera> camera_for(const Scene& scene, const RenderArguments& arguments) {
   if (arguments.position) {
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
@@ -53,13 +44,14 @@ void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& pict
   }
 }
 
-/// Writes the files, and takes the picture's pixels out of memory once they are.
 Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
+  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.output.string());
   const auto png = write_png(outcome.picture.colour, arguments.output);
   if (!png) return tl::unexpected<Error>(png.error());
   outcome.files.push_back(arguments.output);
   outcome.bytes = *png;
   if (arguments.depth.empty()) return {};
+  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
   const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
   if (!pfm) return tl::unexpected<Error>(pfm.error());
   outcome.files.push_back(arguments.depth);
@@ -70,7 +62,8 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 Result<Outcome> render(const RenderArguments& arguments) {
   const bool hidden = arguments.common.load.hidden;
   Stopwatch watch;
-  if (auto writable = check_outputs(arguments); !writable) return tl::unexpected<Error>(writable.error());
+  if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable)
+    return tl::unexpected<Error>(writable.error());
   auto loaded = load_scene(arguments.common.input, arguments.common.load);
   if (!loaded) return tl::unexpected<Error>(loaded.error());
   const Scene& scene = loaded->scene;

@@ -93,10 +93,20 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
   return CLI::detail::to_lower(path.extension().string()) == ending;
 }
 
-/// Whether both name one file that is there.
+/// Where a name leads: behind symbolic links, also behind one that leads to no file yet.
+std::filesystem::path destination(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(path, error); ++i) {
+    path = path.parent_path() / std::filesystem::read_symlink(path, error);
+  }
+  return std::filesystem::weakly_canonical(path, error);
+}
+
+/// Whether both name one file, which need not be there yet.
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code missing;
-  return std::filesystem::equivalent(a, b, missing);
+  return std::filesystem::equivalent(a, b, missing) || destination(a) == destination(b);
 }
 
 std::string fault_of_files(const RenderArguments& arguments) {

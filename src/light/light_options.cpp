@@ -6,9 +6,8 @@ namespace quoin {
 
 Status check(const LightOptions& options) {
   const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
-  const DVec3 sun = options.sun;
-  if (!std::isfinite(sun.x) || !std::isfinite(sun.y) || !std::isfinite(sun.z)) return refuse("sun: must be finite");
-  if (sun == DVec3(0.0)) return refuse("sun: must not be 0,0,0");
+  if (!is_finite(options.sun)) return refuse("sun: must be finite");
+  if (options.sun == DVec3(0.0)) return refuse("sun: must not be 0,0,0");
   if (options.occlusion_rays < 1 || options.occlusion_rays > 4096) {
     return refuse("occlusion rays: must be 1 to 4096");
   }

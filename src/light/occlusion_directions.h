@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/hash.h>
 #include <quoin/core/vec.h>
 
 namespace quoin {
@@ -40,11 +41,7 @@ class OcclusionDirections {
 
 /// A well-mixed number of two, by integers only.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t a, std::uint32_t b) {
-  // Source: C. Wellons, "lowbias32".
-  std::uint32_t h = a * 0x9E37'79B9U + b * 0x85EB'CA6BU + 0x27D4'EB2FU;
-  h = (h ^ (h >> 16)) * 0x7FEB'352DU;
-  h = (h ^ (h >> 15)) * 0x846C'A68BU;
-  return h ^ (h >> 16);
+  return mix_bits(a * 0x9E37'79B9U + b * 0x85EB'CA6BU + 0x27D4'EB2FU);
 }
 
 }  // namespace quoin

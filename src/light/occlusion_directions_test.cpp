@@ -1,5 +1,6 @@
 #include "light/occlusion_directions.h"
 
+#include <array>
 #include <cmath>
 #include <set>
 #include <vector>
@@ -85,6 +86,17 @@ TEST(OcclusionDirections, OtherNumbersAreSpreadByTheCosine) {
     EXPECT_NEAR(cosines / (50 * kRays), 2.0 / 3.0, 0.002);
     EXPECT_NEAR(glm::length(mean / (50.0 * kRays) - n * (2.0 / 3.0)), 0.0, 0.01);
   }
+}
+
+TEST(OcclusionDirections, TheWholeIsTurnedFromPixelToPixel) {
+  const OcclusionDirections directions(1);
+  constexpr std::uint32_t kPixels = 4000;
+  std::array<int, 4> quarters{};
+  for (std::uint32_t pixel = 0; pixel < kPixels; ++pixel) {
+    const DVec3 d = directions.spread(static_cast<std::size_t>(Direction::PosY), 0, hash_of(pixel, 3));
+    ++quarters.at(static_cast<std::size_t>((d.x > 0.0 ? 1 : 0) + (d.z > 0.0 ? 2 : 0)));
+  }
+  for (const int count : quarters) EXPECT_NEAR(count, kPixels / 4, 120);
 }
 
 TEST(OcclusionDirections, PixelsDiffer) {

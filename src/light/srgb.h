@@ -8,7 +8,7 @@ namespace quoin {
 
 /// The light that an sRGB byte stands for, 0 to 1.
 ///
-/// Source: IEC 61966-2-1. Computed in double, rounded to float once.
+/// Source: IEC 61966-2-1. Computed in long double, rounded to float once.
 [[nodiscard]] float linear_from_srgb(std::uint8_t encoded);
 
 /// Turns linear light into sRGB bytes, rounded to the nearest: exactly, for every float. Less than 0 and NaN give 0,

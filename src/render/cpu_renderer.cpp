@@ -14,10 +14,6 @@ namespace {
 
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
 
-bool is_finite(DVec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 Status check_camera(const Camera& camera) {
   const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
   if (!is_finite(camera.position)) return refuse("camera: position must be finite");
@@ -53,18 +49,24 @@ Picture empty_picture(const RenderOptions& options) {
   return picture;
 }
 
-// Counts what is done and tells the listener, one call at a time.
+// Counts what is done and tells the listener, one call at a time: after each sample of a tile, since a tile of many
+// samples can take minutes.
 class ProgressOfTiles {
  public:
-  ProgressOfTiles(const Progress& listener, std::size_t tiles) : listener_(&listener), tiles_(tiles) {}
+  ProgressOfTiles(const Progress& listener, std::size_t samples) : listener_(&listener), samples_(samples) {}
   [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
-  void add(std::int64_t rays, std::int64_t pixels_hit) {
+  /// Answers whether to go on.
+  bool add_sample() {
     const std::lock_guard lock(mutex_);
-    rays_ += rays;
-    pixels_hit_ += pixels_hit;
     ++done_;
-    if (is_cancelled_ || !*listener_) return;
-    if (!(*listener_)(static_cast<double>(done_) / static_cast<double>(tiles_))) is_cancelled_ = true;
+    if (is_cancelled_ || !*listener_) return !is_cancelled_;
+    if (!(*listener_)(static_cast<double>(done_) / static_cast<double>(samples_))) is_cancelled_ = true;
+    return !is_cancelled_;
+  }
+  void add_counts(const Tile& tile) {
+    const std::lock_guard lock(mutex_);
+    rays_ += tile.rays();
+    pixels_hit_ += tile.pixels_hit();
   }
   void put_counts(Picture& picture) const {
     picture.rays = rays_;
@@ -73,7 +75,7 @@ class ProgressOfTiles {
 
  private:
   const Progress* listener_;
-  std::size_t tiles_;
+  std::size_t samples_;
   std::size_t done_ = 0;
   std::int64_t rays_ = 0;
   std::int64_t pixels_hit_ = 0;
@@ -109,15 +111,15 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
   const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;
   const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
-  ProgressOfTiles done(progress, tiles);
+  ProgressOfTiles done(progress, tiles * static_cast<std::size_t>(options.samples));
   parallel_for(tiles, options.threads, [&](std::size_t i) {
     if (done.is_cancelled()) return;
     const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * Tile::kEdge;
     const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * Tile::kEdge;
     Tile tile(context, column, row);
-    tile.render();
+    if (!tile.render([&] { return done.add_sample(); })) return;
     tile.write_to(picture);
-    done.add(tile.rays(), tile.pixels_hit());
+    done.add_counts(tile);
   });
   if (done.is_cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
   done.put_counts(picture);

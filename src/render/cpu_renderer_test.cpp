@@ -91,6 +91,20 @@ TEST(CpuRenderer, StopsWhenTold) {
   EXPECT_EQ(calls, 3);
 }
 
+TEST(CpuRenderer, TellsOfEverySampleAndStopsAmongThem) {
+  const Scene scene = lively_scene();
+  RenderOptions options = sized(16, 16);  // one tile
+  options.samples = 50;
+  int calls = 0;
+  const auto count = [&](double) { return ++calls != 7; };
+  const auto stopped = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, count);
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ(calls, 7);
+  ASSERT_TRUE(CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, count).has_value());
+  EXPECT_EQ(calls, 57);
+}
+
 TEST(CpuRenderer, RefusesWhatCannotBe) {
   const Scene scene = lively_scene();
   const CpuRenderer renderer(scene);

@@ -125,6 +125,12 @@ TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
   options.light.sun = {0, 1, 0};
   const Picture picture = taken(s.scene, from_above(0, 2, 0, 4), options);
   expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
+  // Floor at 0, glass from 3 to 5.
+  options.light.shadow_distance = 2.5;
+  expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1), encoded(linear(kWhite) * 1.15F), 1);
+  options.light.shadow_distance = 4.49;
+  expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1),
+              encoded(linear(kWhite) * (0.15F + power(through_one(), 1.5F))), 1);
   options.light.shadows = false;
   expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1), encoded(linear(kWhite) * 1.15F), 1);
 }

@@ -137,6 +137,26 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0), encoded(linear(kGrey) * 0.15F));
 }
 
+// Every ray of this picture meets one point, of whose sky a wall hides a part.
+TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({1, 0, -40}, {1, 9, 39}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(1, 1);
+  options.light.sun = {0, -1, 0};
+  options.light.occlusion_rays = 1;
+  const Camera camera = from_above(0.9, 5, 0.5, 1e-6);
+  const Pixel open = encoded(linear(kGrey) * 0.15F);
+  const std::uint8_t one = pixel_at(taken(scene, camera, options), 0, 0)[0];
+  EXPECT_TRUE(one == 0 || one == open[0]);
+  options.samples = 200;
+  const std::uint8_t many = pixel_at(taken(scene, camera, options), 0, 0)[0];
+  EXPECT_GT(many, open[0] / 4);
+  EXPECT_LT(many, open[0] - 5);
+}
+
 TEST(RenderLight, ASunBelowTheHorizonLightsWhatFacesIt) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
@@ -195,6 +215,7 @@ TEST(RenderLight, ASolidSeenFromInsideIsItsOwnColour) {
     EXPECT_EQ(pixel_at(picture, i % 5, i / 5), encoded(linear(kGrey)));
     EXPECT_EQ(depth_at(picture, i % 5, i / 5), 0.0F);
   }
+  EXPECT_EQ(picture.rays, 25) << "there is nothing to light";
 }
 
 TEST(RenderLight, UnregisteredTypesShow) {

@@ -34,7 +34,7 @@ Tile::Tile(const TileContext& context, int column, int row) : context_(&context)
   targets_.reserve(kPixels);
 }
 
-void Tile::render() {
+bool Tile::render(const std::function<bool()>& goes_on) {
   const int samples = context_->options->samples;
   for (int sample = 0; sample < samples; ++sample) {
     take_sample(sample);
@@ -42,7 +42,9 @@ void Tile::render() {
       // The minimum is taken second: what is not a number becomes 0.
       sum_[i] += glm::min(glm::max(Vec3(0.0F), sample_[i]), Vec3(1.0F));
     }
+    if (!goes_on()) return false;
   }
+  return true;
 }
 
 void Tile::take_sample(int sample) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -31,7 +32,9 @@ class Tile {
   Tile(const TileContext& context, int column, int row);
 
   /// All samples of all pixels. The same numbers whatever the tile's size and place.
-  void render();
+  ///
+  /// Asks `goes_on` after each sample; once that answers false, so does this, and the tile is not to be used.
+  [[nodiscard]] bool render(const std::function<bool()>& goes_on);
   /// Puts the pixels that lie in the picture in place.
   void write_to(Picture& picture) const;
 

@@ -34,10 +34,6 @@ const std::array<NamedView, 6> kViews = {{{"front", View::Front, {0, 0, -1}},
                                           {"top", View::Top, {0, -1, 0}},
                                           {"iso", View::Iso, {-kThird, -kThird, -kThird}}}};
 
-bool is_finite(DVec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 /// Sets the axes for looking along `forward`, a unit vector: upright; with +X to the right straight up and down.
 void turn(Camera& camera, DVec3 forward) {
   camera.forward = forward;

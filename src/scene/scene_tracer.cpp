@@ -10,10 +10,6 @@
 namespace quoin {
 namespace {
 
-bool is_finite(DVec3 v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 bool can_be_traced(const Instance& instance, const SceneGrid& grid) {
   const DQuat& q = instance.rotation;
   return is_finite(instance.position) && is_finite(grid.pivot) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&

@@ -156,8 +156,9 @@ TEST(SceneTracer, EquallyNearHitsBelongToTheFirstInstance) {
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, 1);
   const GridHandle handle = scene.add_grid(std::move(grid));
-  // The middle one comes first in the tree's order of places.
-  for (const double x : {5.0, -5.0, 0.0, 0.0, 3.0, 7.0, 9.0}) scene.add_instance({"", handle, {x, 0, 0}});
+  // So many in one place that the tree's leaves hold some of them each.
+  for (const double x : {5.0, -5.0}) scene.add_instance({"", handle, {x, 0, 0}});
+  for (int i = 0; i < 30; ++i) scene.add_instance({"", handle});
   const SceneTracer tracer(scene);
   EXPECT_EQ(tracer.placed()[0].opaque, tracer.placed()[6].opaque) << "trees are shared";
   const SceneView view(tracer, DVec3(0.0));

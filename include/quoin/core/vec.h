@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -17,6 +18,11 @@ using Vec3 = glm::vec3;
 using DVec3 = glm::dvec3;
 /// Rotations. Constructor order is glm's: (w, x, y, z).
 using DQuat = glm::dquat;
+
+/// Neither infinite nor NaN in any component.
+[[nodiscard]] inline bool is_finite(DVec3 v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 /// A box of whole voxels (or chunks): `min` inclusive, `max` exclusive.
 ///

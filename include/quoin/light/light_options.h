@@ -12,7 +12,8 @@ namespace quoin {
 enum class OcclusionMode : std::uint8_t {
   Off,
   Rays,    ///< short rays over the face's hemisphere
-  Vertex,  ///< the four corner levels of the face, interpolated over its two triangles, as blocky meshes carry them
+  Vertex,  ///< the four corner levels of the face, interpolated over its two triangles, as blocky meshes carry them:
+           ///< they know of the face's own grid only
 };
 
 /// What ambient occlusion darkens.

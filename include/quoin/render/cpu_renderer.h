@@ -55,10 +55,11 @@ class CpuRenderer {
 
   /// One picture. The same bytes for any number of threads and any instruction set.
   ///
-  /// Errors: InvalidArgument when a size is not positive, there are more than 2^28 pixels, samples are out of range,
-  /// the
-  ///         camera holds a number that is not finite or an impossible angle, or `check` refuses the light;
-  ///         Cancelled when `progress` answers false.
+  /// Requires: the camera's axes are perpendicular.
+  /// Errors:   InvalidArgument when a size is not positive, there are more than 2^28 pixels, samples are out of range,
+  ///           the camera's position is not finite, its axes are not of unit length, its angle or height is
+  ///           impossible, or `check` refuses the light; Cancelled when `progress` answers false, which is asked after
+  ///           every sample of a tile.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {}) const;
 

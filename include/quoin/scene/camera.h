@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -37,7 +38,7 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 /// The view of that name ("front", "iso" ...).
 [[nodiscard]] std::optional<View> view_of_name(std::string_view name);
 
-/// An orthographic or perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
+/// A perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
 ///
 /// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` is width / height.
 [[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);

@@ -2,16 +2,9 @@
 
 #include <cstdint>
 
-namespace quoin {
+#include <quoin/core/hash.h>
 
-/// Spreads the bits of a word: every input bit changes about half of the output's.
-///
-/// Source: C. Wellons, "Prospecting for hash functions" (2018), the function called lowbias32.
-[[nodiscard]] constexpr std::uint32_t mix_bits(std::uint32_t x) {
-  x = (x ^ (x >> 16)) * 0x7FEB'352DU;
-  x = (x ^ (x >> 15)) * 0x846C'A68BU;
-  return x ^ (x >> 16);
-}
+namespace quoin {
 
 /// A hash of whole coordinates: the same on every machine.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t seed, std::int32_t x, std::int32_t y, std::int32_t z = 0) {

@@ -28,8 +28,10 @@ enum class Occupancy : std::uint8_t {
 ///
 /// One shape serves all levels: a node is 16^3 units as 64 words, each the bits of 4^3 units (x + 4 y + 16 z). In a
 /// brick a unit is a voxel; in a chunk a cell of 4^3 voxels; in a region a chunk. Empty and full bricks are stored
-/// once. Memory:  about 0.14 bytes a solid voxel of a terrain. Threads: any number may read at once; an update needs
-/// the tree to itself.
+/// once.
+///
+/// Memory:  about 0.14 bytes a solid voxel of a terrain.
+/// Threads: any number may read at once; an update needs the tree to itself.
 class OccupancyTree {
  public:
   /// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
@@ -72,8 +74,8 @@ class OccupancyTree {
 
   /// Takes over what an edit changed, in place; `chunks` are those that it touched (Grid::take_dirty names them).
   ///
-  /// Cost: about 20 microseconds a chunk; when the box of chunks around everything grows or shrinks, a copy of the flat
-  ///       tables besides.
+  /// Cost: about 20 microseconds a chunk, and a look at the bounds of every other; when the box of chunks around
+  ///       everything grows or shrinks, the flat tables anew besides.
   void update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks);
 
   /// The smallest box around the occupied voxels, to the voxel.
