@@ -173,6 +173,8 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--size 9x9x9", "--size: must be"},
       {out + "--size 9.5x9", "--size: must be"},
       {out + "--size 99999999999x1", "--size: must be"},
+      {out + "--size 1000001x1", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side"},
+      {out + "--size 1x1000001", "--size: must be"},
       {out + "--size 40000x25000", "--size: must be WIDTHxHEIGHT of at most 2^28 pixels"},
       {out + "--view side", "--view: "},
       {out + "--camera 1,2,3", "--camera needs --look-at"},

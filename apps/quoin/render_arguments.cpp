@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kMostSamples = 4'096;
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+constexpr int kLongestSide = 1'000'000;  // what readers and writers of PNG take
 
 /// An option whose text `settle` reads.
 CLI::Option* add_text_option(CLI::App& command, const std::string& name, const std::string& type,
@@ -52,7 +53,9 @@ std::optional<double> read_exposure(const std::string& text) {
 
 std::optional<PictureSize> read_size(const std::string& text) {
   const auto size = parse_size(text);
-  return size && std::int64_t{size->width} * size->height <= kMostPixels ? size : std::nullopt;
+  const bool fits = size && std::max(size->width, size->height) <= kLongestSide &&
+                    std::int64_t{size->width} * size->height <= kMostPixels;
+  return fits ? size : std::nullopt;
 }
 
 void add_camera_options(CLI::App& command, RenderArguments& arguments) {
@@ -150,7 +153,8 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   LightOptions& light = arguments.render.light;
   PictureSize size{arguments.render.width, arguments.render.height};
   const std::array faults = {
-      read_option(command, "--size", read_size, "WIDTHxHEIGHT of at most 2^28 pixels, as in 1280x720", size),
+      read_option(command, "--size", read_size,
+                  "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side, as in 1280x720", size),
       read_option(command, "--camera", parse_triple, three, arguments.position),
       read_option(command, "--look-at", parse_triple, three, arguments.target),
       read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),

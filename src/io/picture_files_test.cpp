@@ -140,6 +140,7 @@ TEST_F(PictureFiles, ImpossiblePicturesAndPathsAreErrors) {
     ASSERT_FALSE(written);
     EXPECT_EQ(written.error().code, ErrorCode::InvalidArgument);
   }
+  EXPECT_EQ(write_png(noise(1'000'001, 1, 1), file("a.png")).error().code, ErrorCode::LimitExceeded);
   EXPECT_EQ(folder_.count(), 0U);
   EXPECT_EQ(write_png(noise(1, 1, 1), file("no/a.png")).error().code, ErrorCode::CannotWrite);
   EXPECT_EQ(write_pfm({1, 1, {1}}, file("no/a.pfm")).error().code, ErrorCode::CannotWrite);

@@ -37,7 +37,7 @@ Status check(const Camera& camera, const RenderOptions& options) {
     return refuse("size: more than 268,435,456 pixels");
   }
   if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
-  if (const Status camera_status = check_camera(camera); !camera_status) return camera_status;
+  if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
   return check(options.light);
 }
 

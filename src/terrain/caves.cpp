@@ -50,7 +50,7 @@ bool corners_of(const Samples& samples, IVec3 cell, Corners& corners) {
   }
   return std::all_of(corners.begin(), corners.end(), [](const std::array<double, 8>& values) {
     const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-    return *least<kReach&& * greatest> - kReach;
+    return -kReach < *greatest && *least < kReach;
   });
 }
 
