@@ -61,7 +61,7 @@ void add_random(const std::string& prefix, First first) {
   add_rays(
       prefix + "rays/random600",
       +[]() -> const std::vector<workloads::RayQuery>& { return random_ray_workload().rays; },
-      +[] { return random_ray_workload().hits; }, first);
+      +[] { return workloads::kRandomHits; }, first);
 }
 
 }  // namespace quoin::peers

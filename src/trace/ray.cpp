@@ -245,12 +245,16 @@ std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const 
 std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
   const trace::TreeView* view = tree.view();
   if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
-  RayHit hit;
+  std::optional<RayHit> hit(std::in_place);
   bool is_unfinished = false;
-  const bool is_hit = trace::kernel_of(instructions).first_hit(*view, ray, max_t, hit, is_unfinished);
-  if (is_unfinished) return trace::walk_to_first_hit(tree, ray, max_t);
-  if (!is_hit) return std::nullopt;
-  if (hit.starts_inside) hit.face = trace::facing(ray.direction);
+  const bool is_hit = trace::kernel_of(instructions).first_hit(*view, ray, max_t, *hit, is_unfinished);
+  if (is_hit) {
+    if (hit->starts_inside) hit->face = trace::facing(ray.direction);
+  } else if (is_unfinished) {
+    hit = trace::walk_to_first_hit(tree, ray, max_t);
+  } else {
+    hit.reset();
+  }
   return hit;
 }
 

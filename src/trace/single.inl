@@ -274,7 +274,7 @@ struct SingleHit {
   IVec3 voxel{0};
 };
 
-inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double max_t) {
+__attribute__((always_inline)) inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double max_t) {
   SingleRay ray;
   SingleHit hit;
   const SetUp ready = set_up_single(tree, world_ray, max_t, ray);
