@@ -159,7 +159,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   std::filesystem::create_symlink("out.png", folder_.file("ahead.pfm"));
   const std::string out = "tiny.vox -o out.png ";
   const std::vector<std::pair<std::string, std::string>> errors = {
-      {"tiny.vox", "--output is required"},
+      {"tiny.vox", "-o OUT is required"},
       {"tiny.vox -o out.jpg", "-o: the picture's name must end in .png, not \"out.jpg\""},
       {"tiny.vox -o ''", "--output: must be the name of a file"},
       {"vox.png -o vox.png", "-o: vox.png is the input"},

@@ -62,6 +62,9 @@ std::string usage_error(CLI::App& app, const CLI::ParseError& error, const Argum
     const std::string inner = command_names(command);
     if (!inner.empty()) return command.get_name() + " needs one of: " + inner + hint;
   }
+  if (code == CLI::ExitCodes::RequiredError && std::string(error.what()).starts_with("--output")) {
+    return "-o OUT is required" + hint;
+  }
   return error.what() + hint;
 }
 

@@ -22,7 +22,7 @@ Status check_camera(const Camera& camera) {
   }
   if (camera.projection == Camera::Projection::Perspective) {
     if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
-      return refuse("camera: field of view must be more than 0 and less than 180 degrees");
+      return refuse("camera: field of view must be more than 0 and less than pi radians (180 degrees)");
     }
   } else if (!(camera.view_height > 0.0) || !std::isfinite(camera.view_height)) {
     return refuse("camera: view height must be finite and more than 0");

@@ -228,5 +228,22 @@ TEST(CpuRenderer, SamplePointsStartInTheCentreAndFillThePixel) {
   for (const int count : cells) EXPECT_NEAR(count, 16, 3);
 }
 
+TEST(CameraRays, AreThoseThatPickThePixel) {
+  Camera perspective = *look_at({3, 4, 5}, {-20, 1, 9}, 0.7);
+  Camera orthographic = perspective;
+  orthographic.projection = Camera::Projection::Orthographic;
+  orthographic.view_height = 12.5;
+  for (const Camera& camera : {perspective, orthographic}) {
+    RayPacket rays;
+    CameraRays(camera, 37, 21).block(12, 8, {0.25, 0.75}, rays);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const Ray expected = ray_through(camera, 12 + lane % 4 + 0.25, 8 + lane / 4 + 0.75, 37, 21);
+      const Ray in_view = rays.ray(lane);
+      EXPECT_NEAR(glm::distance(in_view.origin + camera.position, expected.origin), 0.0, 1e-12);
+      EXPECT_NEAR(glm::distance(in_view.direction, expected.direction), 0.0, 1e-12);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace quoin

@@ -67,7 +67,7 @@ Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
   if (!is_finite(position)) return fail(ErrorCode::InvalidArgument, "the camera's position is not finite");
   if (!is_finite(target)) return fail(ErrorCode::InvalidArgument, "the point to look at is not finite");
   if (!(vertical_fov > 0.0 && vertical_fov < std::numbers::pi)) {
-    return fail(ErrorCode::InvalidArgument, "the field of view is not more than 0 and less than 180 degrees");
+    return fail(ErrorCode::InvalidArgument, "the field of view is not more than 0 and less than pi radians (180 degrees)");
   }
   // Halved so that the difference of the greatest numbers is one; then scaled so that no square is lost.
   const DVec3 half = 0.5 * target - 0.5 * position;
@@ -78,6 +78,15 @@ Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
   camera.vertical_fov = vertical_fov;
   turn(camera, glm::normalize(half / largest));
   return camera;
+}
+
+Ray ray_through(const Camera& camera, double x, double y, int width, int height) {
+  const bool is_perspective = camera.projection == Camera::Projection::Perspective;
+  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height;
+  const double pixel = picture_height / height;
+  const DVec3 across = camera.right * ((x - 0.5 * width) * pixel) + camera.up * ((0.5 * height - y) * pixel);
+  if (!is_perspective) return {camera.position + across, camera.forward};
+  return {camera.position, glm::normalize(camera.forward + across)};
 }
 
 std::optional<View> view_of_name(std::string_view name) {

@@ -41,10 +41,11 @@ struct Case {
 };
 
 const Case kCases[] = {
-    {"primary", Ask::First, [] -> const std::vector<RayQuery>& { return ray_workload().primary; },
+    {"primary", Ask::First, []() -> const std::vector<RayQuery>& { return ray_workload().primary; },
      workloads::kPrimaryHits},
-    {"shadow", Ask::Any, [] -> const std::vector<RayQuery>& { return ray_workload().shadow; }, workloads::kShadowHits},
-    {"ao", Ask::Any, [] -> const std::vector<RayQuery>& { return ray_workload().occlusion; },
+    {"shadow", Ask::Any, []() -> const std::vector<RayQuery>& { return ray_workload().shadow; },
+     workloads::kShadowHits},
+    {"ao", Ask::Any, []() -> const std::vector<RayQuery>& { return ray_workload().occlusion; },
      workloads::kOcclusionHits},
 };
 

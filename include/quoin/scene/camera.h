@@ -6,6 +6,7 @@
 
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/trace/ray.h>
 
 namespace quoin {
 
@@ -31,6 +32,13 @@ struct Camera {
 /// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view (vertical,
 ///         radians) is not more than 0 and less than pi.
 [[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov);
+
+/// The ray of a point of the picture, in world space: from the camera for a perspective one, from the picture's plane
+/// for an orthographic one. `direction` is unit, so distances along it are world units.
+///
+/// `x` and `y` are in pixels from the picture's upper left corner; a pixel's centre is at + 0.5.
+/// Requires: width and height are positive.
+[[nodiscard]] Ray ray_through(const Camera& camera, double x, double y, int width, int height);
 
 /// The views that frame a whole scene by themselves. Front looks along -Z: what faces +Z is seen.
 enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };

@@ -51,8 +51,8 @@ class SceneTracer {
 
 /// What a packet of rays met in a scene; lanes whose bit in `grids.hit` is not set hold nothing of meaning.
 struct SceneHits {
-  PacketHits grids;                       ///< voxels and faces in the grid, distances of the packet's rays
-  RayPacket::Lanes<std::int32_t> placed;  ///< index into SceneTracer::placed
+  PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
+  RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
 };
 
 /// A transparent voxel on a ray.

@@ -22,6 +22,7 @@ struct alignas(64) RayPacket {
   Lanes<double> max_t{};     ///< up to and including; infinity is none
   std::uint32_t active = 0;  ///< bit i: ray i counts
 
+  /// Puts a ray into a lane, which becomes active; lanes that are no longer wanted leave `active` by hand.
   void set(int lane, const Ray& ray, double ray_max_t) {
     const auto i = static_cast<std::size_t>(lane);
     origin_x[i] = ray.origin.x, origin_y[i] = ray.origin.y, origin_z[i] = ray.origin.z;
