@@ -44,12 +44,12 @@ void fail_unless(bool holds, const char* what, std::int64_t found) {
   std::exit(1);
 }
 
-void picture(benchmark::State& state, const LightOptions& light) {
+void picture(benchmark::State& state, const LightOptions& light, Threads threads = {1}) {
   static const Scene scene = terrain();
   fail_unless(scene.voxel_count() == kVoxels, "the number of voxels", scene.voxel_count());
   const CpuRenderer renderer(scene, false, {1});
   RenderOptions options;
-  options.threads = {1};
+  options.threads = threads;
   options.light = light;
   std::int64_t rays = 0;
   for (auto _ : state) {
@@ -66,6 +66,10 @@ void picture(benchmark::State& state, const LightOptions& light) {
 void full(benchmark::State& state) {
   picture(state, {});
 }
+void all_threads(benchmark::State& state) {
+  picture(state, {}, {});
+  state.counters["threads"] = resolve(Threads{});
+}
 void unlit(benchmark::State& state) {
   LightOptions light;
   light.lit = false;
@@ -77,6 +81,11 @@ void vertex(benchmark::State& state) {
   picture(state, light);
 }
 BENCHMARK(full)->Name("render/terrain/1280x720")->Unit(benchmark::kMillisecond)->Iterations(5);
+BENCHMARK(all_threads)
+    ->Name("render/terrain/1280x720/all_threads")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(5)
+    ->UseRealTime();
 BENCHMARK(unlit)->Name("render/terrain/1280x720/unlit")->Unit(benchmark::kMillisecond)->Iterations(5);
 BENCHMARK(vertex)->Name("render/terrain/1280x720/vertex")->Unit(benchmark::kMillisecond)->Iterations(5);
 
