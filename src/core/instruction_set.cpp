@@ -19,9 +19,9 @@ InstructionSet widest() {
 }  // namespace
 
 InstructionSet resolve(InstructionSet wanted) {
-  static const InstructionSet kWidest = widest();
+  static const InstructionSet on_this_machine = widest();
   // Declared from the widest to the plainest.
-  return wanted < kWidest ? kWidest : wanted;
+  return wanted < on_this_machine ? on_this_machine : wanted;
 }
 
 }  // namespace quoin

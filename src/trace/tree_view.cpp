@@ -6,9 +6,9 @@ namespace quoin::trace {
 
 const Kernel& kernel_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS
-  static const Kernel* const kKernels[] = {nullptr, &kAvx512Kernel, &kAvx2Kernel, &kPlainKernel};
-  static const InstructionSet kBest = resolve(InstructionSet::Best);
-  return *kKernels[static_cast<int>(std::max(instructions, kBest))];
+  static const Kernel* const kernels[] = {nullptr, &kAvx512Kernel, &kAvx2Kernel, &kPlainKernel};
+  static const InstructionSet best = resolve(InstructionSet::Best);
+  return *kernels[static_cast<int>(std::max(instructions, best))];
 #else
   static_cast<void>(instructions);
   return kPlainKernel;
