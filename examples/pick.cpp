@@ -16,7 +16,9 @@ constexpr double kEndless = std::numeric_limits<double>::infinity();
 int count_hits(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
   quoin::RayPacket rays;
   for (int lane = 0; lane < quoin::RayPacket::kSize; ++lane) {
-    rays.set(lane, quoin::ray_through(camera, 158.5 + lane % 4, 118.5 + lane / 4, 320, 240), kEndless);
+    const int column = 158 + lane % 4;
+    const int row = 118 + lane / 4;
+    rays.set(lane, quoin::ray_through(camera, column + 0.5, row + 0.5, 320, 240), kEndless);
   }
   quoin::PacketHits hits;
   quoin::first_hits(tree, rays, hits);
