@@ -64,9 +64,7 @@ inline Mask find_voxels(const Lanes& lanes, VoxelWalk& walk, Mask walking, Cross
   const I step_x = code_step(lanes.x, kCodeX);
   const I step_y = code_step(lanes.y, kCodeY);
   const I step_z = code_step(lanes.z, kCodeZ);
-  const F one_x = select(lanes.x.forward, all(1.0F), all(-1.0F));
-  const F one_y = select(lanes.y.forward, all(1.0F), all(-1.0F));
-  const F one_z = select(lanes.z.forward, all(1.0F), all(-1.0F));
+  const Planes one = steps_of(lanes, 1.0F);
   Crossing last = crossing;
   Mask hit = mask_of(0);
   for (;;) {
@@ -80,9 +78,7 @@ inline Mask find_voxels(const Lanes& lanes, VoxelWalk& walk, Mask walking, Cross
     walking = walking & ~met;
     const Planes t = crossings(lanes, walk.planes);
     first_of(t, last);
-    walk.planes.x = add_if(last.x, walk.planes.x, one_x);
-    walk.planes.y = add_if(last.y, walk.planes.y, one_y);
-    walk.planes.z = add_if(last.z, walk.planes.z, one_z);
+    step_over(last, one, walk.planes);
     walk.code = add_if(last.z, add_if(last.y, add_if(last.x, walk.code, step_x), step_y), step_z);
     walking = walking & ~test(walk.code, all(kLeft));
     if (!any(walking)) return hit;
@@ -140,16 +136,12 @@ inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, M
   const I step_x = code_step(lanes.x, tree.cell_strides.x);
   const I step_y = code_step(lanes.y, tree.cell_strides.y);
   const I step_z = code_step(lanes.z, tree.cell_strides.z);
-  const F four_x = select(lanes.x.forward, all(4.0F), all(-4.0F));
-  const F four_y = select(lanes.y.forward, all(4.0F), all(-4.0F));
-  const F four_z = select(lanes.z.forward, all(4.0F), all(-4.0F));
+  const Planes four = steps_of(lanes, 4.0F);
   CellWalk walk = at;
   Mask found_any = mask_of(0);
   while (any(walking)) {
     walk.t = first_of(crossings(lanes, walk.planes), walk.crossing);
-    walk.planes.x = add_if(walk.crossing.x, walk.planes.x, four_x);
-    walk.planes.y = add_if(walk.crossing.y, walk.planes.y, four_y);
-    walk.planes.z = add_if(walk.crossing.z, walk.planes.z, four_z);
+    step_over(walk.crossing, four, walk.planes);
     walk.index =
         add_if(walk.crossing.z, add_if(walk.crossing.y, add_if(walk.crossing.x, walk.index, step_x), step_y), step_z);
     walking = walking & (walk.t <= lanes.exit_t);

@@ -41,6 +41,25 @@ inline Planes crossings(const Lanes& lanes, const Planes& planes) {
   return {crossing_t(lanes.x, planes.x), crossing_t(lanes.y, planes.y), crossing_t(lanes.z, planes.z)};
 }
 
+// Steps of this size along each axis, forward or back.
+inline Planes steps_of(const Lanes& lanes, float size) {
+  return {select(lanes.x.forward, all(size), all(-size)), select(lanes.y.forward, all(size), all(-size)),
+          select(lanes.z.forward, all(size), all(-size))};
+}
+
+// Moves on the planes that were crossed.
+inline void step_over(const Crossing& crossing, const Planes& steps, Planes& planes) {
+  planes.x = add_if(crossing.x, planes.x, steps.x);
+  planes.y = add_if(crossing.y, planes.y, steps.y);
+  planes.z = add_if(crossing.z, planes.z, steps.z);
+}
+
+// Each lane's number of the axis that it crossed.
+template <class Number>
+inline Number crossed(const Crossing& crossing, Number x, Number y, Number z) {
+  return select(crossing.x, x, select(crossing.y, y, z));
+}
+
 // The least of three, and which it is: the first axis at a tie.
 inline F first_of(const Planes& t, Crossing& which) {
   const F least = min(min(t.x, t.y), t.z);

@@ -58,18 +58,14 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
   const SpreadStep sx = spread_step<0>(lanes.x);
   const SpreadStep sy = spread_step<2>(lanes.y);
   const SpreadStep sz = spread_step<4>(lanes.z);
-  const F one_x = select(lanes.x.forward, all(1.0F), all(-1.0F));
-  const F one_y = select(lanes.y.forward, all(1.0F), all(-1.0F));
-  const F one_z = select(lanes.z.forward, all(1.0F), all(-1.0F));
+  const Planes one = steps_of(lanes, 1.0F);
   // Crossings up to here are surely within reach.
   const F sure_x = max_t - all(0.01F) * abs(lanes.x.inverse);
   const F sure_y = max_t - all(0.01F) * abs(lanes.y.inverse);
   const F sure_z = max_t - all(0.01F) * abs(lanes.z.inverse);
   Mask walking = lanes.live;
   ShortRays out{mask_of(0), mask_of(0)};
-  const auto is_unsure = [&](const Crossing& last, F at) {
-    return select(last.x, sure_x, select(last.y, sure_y, sure_z)) < at;
-  };
+  const auto is_unsure = [&](const Crossing& last, F at) { return crossed(last, sure_x, sure_y, sure_z) < at; };
   Mask unsure = (entered.x | entered.y | entered.z) & is_unsure(entered, t);
   for (;;) {
     const I half = shift_left<7>(window.brick(shift_right<12>(code))) + (shift_right<5>(code) & all(127));
@@ -79,15 +75,13 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
     walking = walking & ~met;
     Crossing crossing;
     const F now = first_of(crossings(lanes, planes), crossing);
-    planes.x = add_if(crossing.x, planes.x, one_x);
-    planes.y = add_if(crossing.y, planes.y, one_y);
-    planes.z = add_if(crossing.z, planes.z, one_z);
-    const auto choose = [&](I x, I y, I z) { return select(crossing.x, x, select(crossing.y, y, z)); };
-    const I bits_of_axis = choose(all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
-    const I moved = or_of(code & bits_of_axis, choose(sx.fill, sy.fill, sz.fill)) + choose(sx.add, sy.add, sz.add);
+    step_over(crossing, one, planes);
+    const I bits_of_axis = crossed(crossing, all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
+    const I filled = or_of(code & bits_of_axis, crossed(crossing, sx.fill, sy.fill, sz.fill));
+    const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
     code = merge(bits_of_axis, moved, code);
     unsure = is_unsure(crossing, now);
-    walking = walking & (now < select(crossing.x, lanes.x.far_t, select(crossing.y, lanes.y.far_t, lanes.z.far_t)));
+    walking = walking & (now < crossed(crossing, lanes.x.far_t, lanes.y.far_t, lanes.z.far_t));
     if (!any(walking)) return out;
   }
 }

@@ -60,15 +60,7 @@ class Walk {
     bounds_ = bounds;
     t_ = enter_t;
     axis_ = enter_axis;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (axis == enter_axis) {
-        voxel_[axis] = direction_[axis] > 0.0 ? bounds.min[axis] : bounds.max[axis] - 1;
-      } else if (enter_axis < 0) {
-        voxel_[axis] = static_cast<int>(std::floor(origin_[axis]));
-      } else {
-        voxel_[axis] = coordinate_after(axis, bounds.min[axis], bounds.max[axis] - 1);
-      }
-    }
+    for (int axis = 0; axis < 3; ++axis) voxel_[axis] = coordinate_at_start(axis);
     return true;
   }
 
@@ -93,6 +85,14 @@ class Walk {
   [[nodiscard]] int axis() const { return axis_; }
 
  private:
+  // Where the ray stands on `axis` when it has entered its bounds, or starts within.
+  [[nodiscard]] int coordinate_at_start(int axis) const {
+    if (axis_ < 0) return static_cast<int>(std::floor(origin_[axis]));
+    const int last = bounds_.max[axis] - 1;
+    if (axis == axis_) return direction_[axis] > 0.0 ? bounds_.min[axis] : last;
+    return coordinate_after(axis, bounds_.min[axis], last);
+  }
+
   // Where the ray is on `axis` just after the current crossing, between `low` and `high`.
   [[nodiscard]] int coordinate_after(int axis, int low, int high) const {
     const double d = direction_[axis];

@@ -47,6 +47,14 @@ struct SingleRay {
 
 enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
 
+// Cuts a ray's box to the voxels that it can come to.
+inline void limit_reach(SingleRay& ray, float max_t, float furthest) {
+  const F4 end = ray.origin + std::min(max_t, furthest) * ray.direction;
+  ray.low = max4(ray.low, floor4(min4(ray.origin, end) - kSlack));
+  ray.high = min4(ray.high, floor4(max4(ray.origin, end) + kSlack) + 1.0F);
+  ray.is_cut = furthest < max_t;
+}
+
 // The box of the ray's way, and where it enters and leaves it.
 inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, float greatest, int moved) {
   const F4 f = ray.origin;
@@ -58,13 +66,7 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
   ray.high = high_bound;
   ray.is_cut = false;
   // Endless rays leave a small world before they reach further than they may.
-  if (!(tree.is_small && max_t > kReach / 0x1p-20F)) {
-    const float furthest = kReach / greatest;
-    const F4 end = f + std::min(max_t, furthest) * ray.direction;
-    ray.low = max4(low_bound, floor4(min4(f, end) - kSlack));
-    ray.high = min4(high_bound, floor4(max4(f, end) + kSlack) + 1.0F);
-    ray.is_cut = furthest < max_t;
-  }
+  if (!(tree.is_small && max_t > kReach / 0x1p-20F)) limit_reach(ray, max_t, kReach / greatest);
   const F4 far = ray.forward ? ray.high : ray.low;
   const I4 is_low = f < ray.low;
   const I4 is_high = ray.high <= f;
