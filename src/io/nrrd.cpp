@@ -28,11 +28,6 @@ tl::unexpected<Error> unsupported(std::string message, std::size_t at) {
   return fail(ErrorCode::Unsupported, std::move(message), {}, at);
 }
 
-std::string quoted(std::string_view text) {
-  constexpr std::size_t kMost = 40;
-  return "\"" + printable(text.substr(0, kMost)) + (text.size() > kMost ? "..." : "") + "\"";
-}
-
 /// The names that the format gives each type.
 std::optional<ScalarType> scalar_type(std::string_view name) {
   using Names = std::pair<std::string_view, ScalarType>;
@@ -48,7 +43,8 @@ std::optional<ScalarType> scalar_type(std::string_view name) {
       {"|float|", ScalarType::Float32},
       {"|double|", ScalarType::Float64},
   }};
-  const std::string wanted = "|" + normalised(name) + "|";
+  std::string wanted = "|";
+  wanted.append(normalised(name)).append("|");
   if (wanted.find('|', 1) != wanted.size() - 1) return std::nullopt;
   for (const auto& [names, type] : kNames) {
     if (names.find(wanted) != std::string_view::npos) return type;

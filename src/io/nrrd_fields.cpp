@@ -28,22 +28,16 @@ tl::unexpected<Error> bad(std::string message, std::size_t at) {
   return fail(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
-/// The beginning of a line, to be shown.
-std::string shown(std::string_view line) {
-  constexpr std::size_t kMost = 40;
-  return "\"" + printable(line.substr(0, kMost)) + (line.size() > kMost ? "..." : "") + "\"";
-}
-
 Status add_line(std::string_view line, std::size_t at, Fields& fields) {
   if (line.front() == '#') return {};
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos || colon + 1 == line.size()) {
-    return bad("the line " + shown(line) + " is no field of a NRRD header", at);
+    return bad("the line " + quoted(line) + " is no field of a NRRD header", at);
   }
   if (line[colon + 1] == '=') return {};
   const Field field{trimmed(line.substr(colon + 1)), at};
   if (fields.all.emplace(key_of(line.substr(0, colon)), field).second) return {};
-  return bad("the field " + shown(line.substr(0, colon)) + " is there twice", at);
+  return bad("the field " + quoted(line.substr(0, colon)) + " is there twice", at);
 }
 
 }  // namespace
@@ -51,6 +45,15 @@ Status add_line(std::string_view line, std::size_t at, Fields& fields) {
 const Field* Fields::find(std::string_view name) const {
   const auto found = all.find(name);
   return found == all.end() ? nullptr : &found->second;
+}
+
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  // Appended piece by piece: GCC 12 warns of what it makes of operator+ here.
+  std::string shown = "\"";
+  shown.append(printable(text.substr(0, kMost)));
+  if (text.size() > kMost) shown.append("...");
+  return shown.append("\"");
 }
 
 Result<Fields> split_header(std::string_view bytes) {

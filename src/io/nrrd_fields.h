@@ -32,6 +32,8 @@ struct Fields {
 /// Errors: BadFormat for lines that are neither, and for fields that are there twice.
 [[nodiscard]] Result<Fields> split_header(std::string_view bytes);
 
+/// `text`, or as much of it as a message can hold, on one line between quotation marks.
+[[nodiscard]] std::string quoted(std::string_view text);
 /// `text` without blanks at its ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 /// In lower case, with one blank between words.
