@@ -24,7 +24,7 @@ DVec3 spacing_of(const Fields& fields, std::vector<std::string>& warnings) {
   bool is_amiss = false;
   for (int axis = 0; axis < 3; ++axis) {
     const double said = std::abs(fields.real(kPixdim, static_cast<std::size_t>(axis) + 1));
-    const bool is_good = std::isfinite(said) && said > 0.0;
+    const bool is_good = is_distance(said);
     if (is_good) spacing[axis] = said;
     // Axes that have one sample need no spacing.
     is_amiss |= !is_good && axis < fields.dim(0);

@@ -164,6 +164,10 @@ TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
   volume = placed(file);
   EXPECT_TRUE(warns(volume, "pixdim"));
   EXPECT_EQ(volume.spacing, DVec3(1));
+  // Found by changing single bytes: too small for its square.
+  NiftiFile second{.is_second = true};
+  second.pixdim[1] = 1e-200;
+  EXPECT_EQ(placed(second).spacing, DVec3(1));
 }
 
 TEST(Nifti, OfMoreThanThreeDimensionsTheFirstVolumeIsTaken) {

@@ -100,7 +100,7 @@ Status read_spacings(const Field& field, std::size_t dimensions, Volume& volume)
     const auto number = parse_number(words[static_cast<std::size_t>(axis)]);
     if (!number) return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
     const double spacing = std::abs(*number);
-    const bool is_good = std::isfinite(spacing) && spacing > 0.0;
+    const bool is_good = is_distance(spacing);
     volume.spacing[axis] = is_good ? spacing : 1.0;
     is_amiss |= !is_good;
   }

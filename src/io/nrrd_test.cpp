@@ -137,9 +137,9 @@ TEST(Nrrd, ValuesBeyondThreeDimensionsAreLeftOut) {
   EXPECT_EQ(volume.values, kTwelveFloats);
   ASSERT_EQ(volume.warnings.size(), 1U);
   EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nkinds: RGB-color domain domain domain\n\n", data)),
-            "byte 65: axis 1 is of kind \"RGB-color\"; the first three must be space");
+            "byte 63: axis 1 is of kind \"RGB-color\"; the first three must be space");
   EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n\n", data)),
-            "byte 65: axis 1 has no direction; the first three must be space");
+            "byte 63: axis 1 has no direction; the first three must be space");
 }
 
 TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
@@ -158,16 +158,16 @@ TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
             "byte 9: a detached header, whose values are in a file of their own (\"../../secret\")");
   EXPECT_EQ(error_of(file_of("NRRD0009\n\n", {})), "byte 0: a NRRD of version 9; 1 to 5 are read");
   const auto field = [](const std::string& lines) { return error_of(tiny(lines)); };
-  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0)\n"), "byte 79: the space directions are not 3 vectors");
-  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (1,1,0)\n"), "byte 79: the space directions do not span a space");
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0)\n"), "byte 73: the space directions are not 3 vectors");
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (1,1,0)\n"), "byte 73: the space directions do not span a space");
   EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (0,nan,0)\n"),
-            "byte 79: a space direction is no vector of 3 finite numbers");
-  EXPECT_EQ(field("space origin: (1,2\n"), "byte 79: the space origin is no vector of 3 finite numbers");
-  EXPECT_EQ(field("spacings: 1 2 x\n"), "byte 79: the spacings are not 3 numbers");
+            "byte 73: a space direction is no vector of 3 finite numbers");
+  EXPECT_EQ(field("space origin: (1,2\n"), "byte 73: the space origin is no vector of 3 finite numbers");
+  EXPECT_EQ(field("spacings: 1 2 x\n"), "byte 73: the spacings are not 3 numbers");
   EXPECT_EQ(field("space: scanner-xyz-time\n"),
-            "byte 79: the space is \"scanner-xyz-time\", which is none of three dimensions");
-  EXPECT_EQ(field("byte skip: -2\n"), "byte 79: the byteskip is \"-2\"");
-  EXPECT_EQ(error_of(tiny("", {})), "byte 80: 3 x 2 x 2 values of uint8 take 12 bytes, but there are 0");
+            "byte 73: the space is \"scanner-xyz-time\", which is none of three dimensions");
+  EXPECT_EQ(field("byte skip: -2\n"), "byte 73: the byteskip is \"-2\"");
+  EXPECT_EQ(error_of(tiny("", {})), "byte 74: 3 x 2 x 2 values of uint8 take 12 bytes, but there are 0");
 }
 
 TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
@@ -177,7 +177,7 @@ TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
   EXPECT_EQ(error_of(file_of(header + "type: block\nencoding: raw\n\n", {})),
             "byte 35: the values are blocks, not numbers");
   EXPECT_EQ(error_of(file_of(header + "type: int16\nencoding: raw\n\n", {})),
-            "byte 61: the header has no field \"endian\"");
+            "byte 62: the header has no field \"endian\"");
   EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: gzip\n\n12345", {})),
             "byte 63: the encoding is gzip, but the data are not");
 }

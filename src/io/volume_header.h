@@ -38,6 +38,13 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 [[nodiscard]] Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions& options,
                               std::optional<std::uint64_t> byte_offset, Volume& volume);
 
+/// Whether a file may mean this by a distance: positive, and neither so small nor so large that products overflow.
+[[nodiscard]] inline bool is_distance(double distance) {
+  constexpr double kSmallest = 1e-30;
+  constexpr double kLargest = 1e30;
+  return distance >= kSmallest && distance <= kLargest;
+}
+
 /// "64 x 33 x 32".
 [[nodiscard]] std::string text_of_size(IVec3 size);
 

@@ -107,7 +107,7 @@ struct NiftiFile {
   int sform_code = 0;
   std::array<double, 6> quaternion{};  ///< b, c, d, and the offset
   std::array<double, 12> srow{};
-  std::string magic;  ///< "n+1" or "n+2" when empty
+  std::string magic{};  ///< "n+1" or "n+2" when empty
 
   [[nodiscard]] Bytes bytes(const Bytes& values) const {
     Bytes out(is_second ? 544 : 352);
