@@ -40,6 +40,27 @@ TEST_F(Tool, info_says_what_is_in_a_file) {
   EXPECT_EQ(object["warnings"], Json::array());
 }
 
+TEST_F(Tool, info_says_what_is_in_a_volume) {
+  std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
+      << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\nspacings: 0.5 1 2\n\nabcdef";
+  const ToolRun text = run("info a.nrrd");
+  EXPECT_EQ(text.status, 0) << text.err;
+  EXPECT_NE(text.out.find("Values: 2 x 3 x 1 = 6 of type uint8\nRange: 97 to 102\n"), std::string::npos) << text.out;
+  const ToolRun json = run("info a.nrrd --json");
+  ASSERT_EQ(json.status, 0) << json.err;
+  const Json object = Json::parse(json.out);
+  EXPECT_EQ(object["format"], "nrrd");
+  EXPECT_EQ(object["type"], "uint8");
+  EXPECT_EQ(object["size"], Json({2, 3, 1}));
+  EXPECT_EQ(object["spacing"], Json({0.5, 1.0, 2.0}));
+  EXPECT_EQ(object["range"], Json({97.0, 102.0}));
+  EXPECT_EQ(object["warnings"], Json::array());
+  std::ofstream(folder_.file("b.nrrd")) << "NRRD0004\n\n";
+  const ToolRun bad = run("info b.nrrd");
+  EXPECT_EQ(bad.status, 1);
+  EXPECT_EQ(bad.err, "quoin: b.nrrd: byte 10: the header has no field \"dimension\"\n");
+}
+
 TEST_F(Tool, convert_writes_every_format_and_counts) {
   const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;

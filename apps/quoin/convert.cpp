@@ -54,6 +54,8 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
     case FileFormat::Obj:
       return write_obj(scene, meshes, path, progress);
     case FileFormat::Vox:
+    case FileFormat::Nifti:
+    case FileFormat::Nrrd:
       break;
   }
   return fail(ErrorCode::Unsupported, "not a mesh format", path.string());

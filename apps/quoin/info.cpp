@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "output.h"
+#include "volume_info.h"
 
 namespace quoin::tool {
 
@@ -139,6 +140,9 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded) {
 }
 
 int run_info(const CommonOptions& options) {
+  // Files that cannot be read fail below, in the words of the reader.
+  const auto format = recognise_file(options.input);
+  if (format && *format && format_info(**format).is_volume) return run_volume_info(options);
   const auto loaded = load_scene(options.input, options.load);
   if (!loaded) {
     print_error(loaded.error());
@@ -152,7 +156,8 @@ int run_info(const CommonOptions& options) {
 }  // namespace
 
 void add_info_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("info", "Say what is in a file: grids, sizes, voxels, types, transforms");
+  CLI::App* command = app.add_subcommand(
+      "info", "Say what is in a file: grids, sizes, voxels, types, transforms; of volumes their values");
   const auto options = std::make_shared<CommonOptions>();
   add_common_options(*command, *options);
   command->footer("Reads " + readable_endings() + ".\nExample: quoin info castle.vox");

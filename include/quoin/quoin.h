@@ -20,6 +20,7 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_meshes.h>
+#include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
 #include <quoin/mesh/blocky.h>

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdint>
@@ -85,9 +86,8 @@ void sync_folder(const std::filesystem::path& folder) {
   ::close(descriptor);
 }
 
-}  // namespace
-
-Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
+/// The whole of a file, or its first `most` bytes.
+Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path, std::optional<std::size_t> most) {
   // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return cannot_read(reason(errno), path);
@@ -96,10 +96,12 @@ Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
   if (::fstat(descriptor, &info) != 0) return cannot_read(reason(errno), path);
   if (S_ISDIR(info.st_mode)) return cannot_read("it is a folder", path);
   if (!S_ISREG(info.st_mode)) return cannot_read("it is not a regular file", path);
-  if (static_cast<std::uint64_t>(info.st_size) > kMaxFileBytes) {
-    return fail(ErrorCode::LimitExceeded, "the file has " + std::to_string(info.st_size) + " bytes", path.string());
+  const auto held = static_cast<std::uint64_t>(info.st_size);
+  const std::uint64_t wanted = std::min<std::uint64_t>(held, most.value_or(held));
+  if (wanted > kMaxFileBytes) {
+    return fail(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
   }
-  std::vector<std::byte> bytes(static_cast<std::size_t>(info.st_size));
+  std::vector<std::byte> bytes(static_cast<std::size_t>(wanted));
   std::size_t filled = 0;
   while (filled < bytes.size()) {
     const ssize_t count = ::read(descriptor, bytes.data() + filled, bytes.size() - filled);
@@ -110,6 +112,16 @@ Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
   }
   bytes.resize(filled);
   return bytes;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
+  return read_regular_file(path, std::nullopt);
+}
+
+Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t most) {
+  return read_regular_file(path, most);
 }
 
 Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {

@@ -5,15 +5,21 @@
 
 #include <quoin/io/file.h>
 
+#include "io/byte_stream.h"
+#include "io/nifti.h"
+#include "io/nrrd.h"
+
 namespace quoin {
 
 namespace {
 
 constexpr std::array kFormats = {
-    FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false},
-    FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true},
-    FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true},
-    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", false, true, true},
+    FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
+    FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
+    FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
+    FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
+    FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true, false},
+    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", false, true, true, false},
 };
 
 bool begins_with(std::span<const std::byte> bytes, std::string_view text) {
@@ -54,7 +60,12 @@ Error unrecognised(std::span<const std::byte> bytes) {
 
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                const LoadOptions& options) {
-  if (recognise(bytes) == FileFormat::Vox) return read_vox(bytes, options);
+  const auto format = recognise(bytes);
+  if (format == FileFormat::Vox) return read_vox(bytes, options);
+  if (format && format_info(*format).is_volume) {
+    return fail(ErrorCode::Unsupported,
+                "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
+  }
   const Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_ending(path) == ".vox";
@@ -76,9 +87,24 @@ std::string writable_endings() {
   return endings(&FormatInfo::writable);
 }
 
+const FormatInfo& format_info(FileFormat format) {
+  return *std::find_if(kFormats.begin(), kFormats.end(), [&](const FormatInfo& info) { return info.format == format; });
+}
+
 std::optional<FileFormat> recognise(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
+  const auto first = first_bytes(bytes, nifti::kMostHeaderBytes);
+  if (first && nifti::is_header(*first)) return FileFormat::Nifti;
+  if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
   return std::nullopt;
+}
+
+Result<std::optional<FileFormat>> recognise_file(const std::filesystem::path& path) {
+  // What decompresses to a header, with room for names and comments in gzip's own.
+  constexpr std::size_t kEnough = 1 << 16;
+  const auto bytes = read_file_beginning(path, kEnough);
+  if (!bytes) return tl::unexpected<Error>(bytes.error());
+  return recognise(*bytes);
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {

@@ -12,6 +12,9 @@ namespace quoin {
 /// The whole of a regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not there).
 [[nodiscard]] Result<std::vector<std::byte>> read_file(const std::filesystem::path& path);
 
+/// The first `most` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.
+[[nodiscard]] Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t most);
+
 /// A file that appears whole or not at all: bytes go to a temporary file beside `path`, `commit` syncs and renames it.
 /// Destroyed without a commit, it leaves nothing behind and the old file as it was.
 class AtomicFile {

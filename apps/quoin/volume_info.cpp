@@ -1,0 +1,96 @@
+#include "volume_info.h"
+
+#include <array>
+#include <cstdio>
+
+#include <quoin/io/volume.h>
+
+#include "output.h"
+
+namespace quoin::tool {
+
+namespace {
+
+/// The box of all samples in Quoin's axes.
+DBox bounds_of(const Volume& volume) {
+  DBox bounds;
+  const DVec3 last = DVec3(volume.size - 1);
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec4 sample((corner & 1) != 0 ? last.x : 0.0, (corner & 2) != 0 ? last.y : 0.0,
+                            (corner & 4) != 0 ? last.z : 0.0, 1.0);
+    bounds.extend(DVec3(volume.world_from_voxel * sample));
+  }
+  return bounds;
+}
+
+template <class V>
+Json triple(const V& v) {
+  return {v.x, v.y, v.z};
+}
+
+Json triple(const DVec3& v) {
+  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
+}
+
+Json matrix_json(const glm::dmat4& matrix) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    Json& entries = rows.emplace_back(Json::array());
+    for (int column = 0; column < 4; ++column) entries.push_back(matrix[column][row] + 0.0);
+  }
+  return rows;
+}
+
+Json volume_json(const Volume& volume) {
+  const DBox bounds = bounds_of(volume);
+  return {{"format", volume.format},
+          {"name", volume.name},
+          {"type", name_of(volume.type)},
+          {"size", triple(volume.size)},
+          {"spacing", triple(volume.spacing)},
+          {"units", volume.units},
+          {"range", {volume.min, volume.max}},
+          {"nan", volume.nan_count},
+          {"infinite", volume.infinite_count},
+          {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+          {"world_from_voxel", matrix_json(volume.world_from_voxel)},
+          {"warnings", volume.warnings}};
+}
+
+/// Six digits, however large or small: values may be of any scale.
+std::string value_text(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value + 0.0);
+  return text.data();
+}
+
+std::string three(const DVec3& v, const char* between) {
+  return value_text(v.x) + between + value_text(v.y) + between + value_text(v.z);
+}
+
+std::string volume_text(const CommonOptions& options, const Volume& volume) {
+  const std::int64_t count = static_cast<std::int64_t>(volume.size.x) * volume.size.y * volume.size.z;
+  const DBox bounds = bounds_of(volume);
+  const std::string units = volume.units.empty() ? "" : " " + volume.units;
+  return options.input.filename().string() + ": " + volume.format + " volume\n" +
+         "Values: " + std::to_string(volume.size.x) + " x " + std::to_string(volume.size.y) + " x " +
+         std::to_string(volume.size.z) + " = " + with_thousands(count) + " of type " +
+         std::string(name_of(volume.type)) + "\n" + "Range: " + value_text(volume.min) + " to " +
+         value_text(volume.max) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
+         "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + units + "\n";
+}
+
+}  // namespace
+
+int run_volume_info(const CommonOptions& options) {
+  const auto volume = read_volume(options.input);
+  if (!volume) {
+    print_error(volume.error());
+    return kFailed;
+  }
+  if (options.json) return print_json(volume_json(*volume));
+  print_warnings(volume->warnings);
+  return print(volume_text(options, *volume));
+}
+
+}  // namespace quoin::tool

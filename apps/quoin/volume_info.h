@@ -1,0 +1,10 @@
+#pragma once
+
+#include "commands.h"
+
+namespace quoin::tool {
+
+/// `quoin info` of a file that holds a volume; answers the exit status.
+[[nodiscard]] int run_volume_info(const CommonOptions& options);
+
+}  // namespace quoin::tool
