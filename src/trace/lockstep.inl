@@ -27,17 +27,18 @@ struct VoxelWalk {
   Planes planes;
 };
 
-inline F first_voxel(const Axis& axis, F t, F lower, Mask entered, Mask ties_before, Mask ties_after) {
-  const F upper = lower + all(3.0F);
+// The voxel at which an axis stands just after entering a box, whose first and last voxels these are.
+inline F first_voxel(const Axis& axis, F t, F lower, F upper, Mask entered, Mask ties_before, Mask ties_after) {
   const F at = coordinate_after<1>(axis, t, lower, upper, ties_before, ties_after);
   return select(entered, select(axis.forward, lower, upper), at);
 }
 
 inline VoxelWalk enter_cells(const TreeView& tree, const Lanes& lanes, Mask which, const Planes& lower, F t,
                              const Crossing& entered) {
-  const F vx = first_voxel(lanes.x, t, lower.x, entered.x, entered.y | entered.z, mask_of(0));
-  const F vy = first_voxel(lanes.y, t, lower.y, entered.y, entered.z, entered.x);
-  const F vz = first_voxel(lanes.z, t, lower.z, entered.z, mask_of(0), entered.x | entered.y);
+  const F last = all(3.0F);
+  const F vx = first_voxel(lanes.x, t, lower.x, lower.x + last, entered.x, entered.y | entered.z, mask_of(0));
+  const F vy = first_voxel(lanes.y, t, lower.y, lower.y + last, entered.y, entered.z, entered.x);
+  const F vz = first_voxel(lanes.z, t, lower.z, lower.z + last, entered.z, mask_of(0), entered.x | entered.y);
   VoxelWalk walk;
   walk.planes = {exit_plane(lanes.x, vx, 1.0F), exit_plane(lanes.y, vy, 1.0F), exit_plane(lanes.z, vz, 1.0F)};
   walk.code =

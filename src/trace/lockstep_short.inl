@@ -27,12 +27,6 @@ inline bool place_window(const Axis& axis, Mask live, int bricks, int& origin) {
   return !any(live & ((axis.low < from) | (from + all(static_cast<float>(kWindow)) < axis.high)));
 }
 
-inline F first_voxel_in_box(const Axis& axis, F t, Mask entered, Mask ties_before, Mask ties_after) {
-  const F upper = axis.high - all(1.0F);
-  const F at = coordinate_after<1>(axis, t, axis.low, upper, ties_before, ties_after);
-  return select(entered, select(axis.forward, axis.low, upper), at);
-}
-
 // How one axis steps through spread numbers.
 struct SpreadStep {
   I fill;
@@ -48,9 +42,12 @@ inline SpreadStep spread_step(const Axis& axis) {
 inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3& origin, F t, const Crossing& entered,
                            F max_t) {
   const BrickWindow window(tree, origin);
-  const F vx = first_voxel_in_box(lanes.x, t, entered.x, entered.y | entered.z, mask_of(0));
-  const F vy = first_voxel_in_box(lanes.y, t, entered.y, entered.z, entered.x);
-  const F vz = first_voxel_in_box(lanes.z, t, entered.z, mask_of(0), entered.x | entered.y);
+  const F one_voxel = all(1.0F);
+  const F vx =
+      first_voxel(lanes.x, t, lanes.x.low, lanes.x.high - one_voxel, entered.x, entered.y | entered.z, mask_of(0));
+  const F vy = first_voxel(lanes.y, t, lanes.y.low, lanes.y.high - one_voxel, entered.y, entered.z, entered.x);
+  const F vz =
+      first_voxel(lanes.z, t, lanes.z.low, lanes.z.high - one_voxel, entered.z, mask_of(0), entered.x | entered.y);
   Planes planes = {exit_plane(lanes.x, vx, 1.0F), exit_plane(lanes.y, vy, 1.0F), exit_plane(lanes.z, vz, 1.0F)};
   I code = spread(to_int(vx) + lanes.x.base - all(origin.x)) +
            shift_left<2>(spread(to_int(vy) + lanes.y.base - all(origin.y))) +

@@ -6,6 +6,7 @@
 #include "trace/walk.h"
 
 namespace quoin {
+
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits, InstructionSet instructions) {
   hits.hit = hits.starts_inside = 0;
   std::uint32_t unfinished = rays.active;
@@ -18,14 +19,8 @@ void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hi
   }
   for (; unfinished != 0; unfinished &= unfinished - 1) {
     const int lane = std::countr_zero(unfinished);
-    const auto i = static_cast<std::size_t>(lane);
-    const auto hit = trace::walk_to_first_hit(tree, rays.ray(lane), rays.max_t[i]);
-    if (!hit) continue;
-    hits.hit |= 1U << lane;
-    hits.starts_inside |= std::uint32_t{hit->starts_inside} << lane;
-    hits.x[i] = hit->voxel.x, hits.y[i] = hit->voxel.y, hits.z[i] = hit->voxel.z;
-    hits.t[i] = hit->t;
-    hits.face[i] = hit->face;
+    const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+    if (const auto hit = trace::walk_to_first_hit(tree, rays.ray(lane), max_t)) hits.set(lane, *hit);
   }
 }
 

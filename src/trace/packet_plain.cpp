@@ -27,16 +27,11 @@ void first_one_by_one(const TreeView& tree, const RayPacket& rays, PacketHits& h
   hits.hit = hits.starts_inside = unfinished = 0;
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
-    const auto i = static_cast<std::size_t>(lane);
     RayHit hit;
     bool is_unfinished = false;
-    const bool is_hit = first_single(tree, rays.ray(lane), rays.max_t[i], hit, is_unfinished);
+    const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+    if (first_single(tree, rays.ray(lane), max_t, hit, is_unfinished)) hits.set(lane, hit);
     unfinished |= std::uint32_t{is_unfinished} << lane;
-    hits.hit |= std::uint32_t{is_hit} << lane;
-    hits.starts_inside |= std::uint32_t{is_hit && hit.starts_inside} << lane;
-    hits.x[i] = hit.voxel.x, hits.y[i] = hit.voxel.y, hits.z[i] = hit.voxel.z;
-    hits.t[i] = hit.t;
-    hits.face[i] = hit.face;
   }
 }
 

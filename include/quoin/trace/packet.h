@@ -44,6 +44,15 @@ struct alignas(64) PacketHits {
   RayPacket::Lanes<double> t{};
   RayPacket::Lanes<Direction> face{};
 
+  /// Puts what a ray alone hit into its lane, which counts as hit.
+  void set(int lane, const RayHit& found) {
+    const auto i = static_cast<std::size_t>(lane);
+    hit |= 1U << lane;
+    starts_inside |= std::uint32_t{found.starts_inside} << lane;
+    x[i] = found.voxel.x, y[i] = found.voxel.y, z[i] = found.voxel.z;
+    t[i] = found.t;
+    face[i] = found.face;
+  }
   [[nodiscard]] RayHit operator[](int lane) const {
     const auto i = static_cast<std::size_t>(lane);
     return {{x[i], y[i], z[i]}, face[i], t[i], (starts_inside >> lane & 1U) != 0};
