@@ -2,7 +2,9 @@
 
 /// All of Quoin. Including one folder's headers instead builds faster.
 
+#include <quoin/core/buffer.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/half.h>
 #include <quoin/core/image.h>
 #include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
@@ -11,6 +13,8 @@
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
@@ -27,6 +31,8 @@
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/smooth.h>
+#include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>

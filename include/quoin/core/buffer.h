@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+namespace quoin {
+
+/// A growing array of plain values that never writes what nobody asked for: new elements are uninitialised. For output
+/// that is written by the hundred thousand and reused.
+template <class T>
+class Buffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+  [[nodiscard]] T* data() { return values_.get(); }
+  [[nodiscard]] const T* data() const { return values_.get(); }
+  [[nodiscard]] T& operator[](std::size_t i) { return values_[i]; }
+  [[nodiscard]] const T& operator[](std::size_t i) const { return values_[i]; }
+  [[nodiscard]] T* begin() { return values_.get(); }
+  [[nodiscard]] T* end() { return values_.get() + size_; }
+  [[nodiscard]] const T* begin() const { return values_.get(); }
+  [[nodiscard]] const T* end() const { return values_.get() + size_; }
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
+
+  void clear() { size_ = 0; }
+  /// Elements beyond the old size are uninitialised. Invalidates pointers when it grows beyond the capacity.
+  void resize(std::size_t size) {
+    reserve(size);
+    size_ = size;
+  }
+  void push_back(const T& value) {
+    const T copy = value;
+    resize(size_ + 1);
+    values_[size_ - 1] = copy;
+  }
+  /// Room for that many elements; at least half more than before when it has to grow.
+  void reserve(std::size_t capacity) {
+    if (capacity <= capacity_) return;
+    const std::size_t larger = capacity > capacity_ + capacity_ / 2 ? capacity : capacity_ + capacity_ / 2;
+    std::unique_ptr<T[]> grown(new T[larger]);
+    if (size_ != 0) std::memcpy(static_cast<void*>(grown.get()), values_.get(), size_ * sizeof(T));
+    values_ = std::move(grown);
+    capacity_ = larger;
+  }
+
+ private:
+  std::unique_ptr<T[]> values_;
+  std::size_t size_ = 0;
+  std::size_t capacity_ = 0;
+};
+
+}  // namespace quoin

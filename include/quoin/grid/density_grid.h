@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_chunk.h>
+
+namespace quoin {
+
+/// One sample as an edit sees it.
+struct DensitySample {
+  float density = 0.0F;  ///< negative is solid
+  VoxelType material = kAir;
+};
+
+/// A sparse, unbounded field of densities in chunks of 64^3 samples: negative is solid, 0 and above is air. What was
+/// never set is air, `band` from the surface.
+///
+/// Space:     sample (i, j, k) lies at the point (i, j, k); between samples the field is trilinear. Any int32
+///            coordinates, except the outermost chunk on each side, which stays air.
+/// Precision: half floats within `band` of 0, clamped beyond, so that rock and sky far from the surface cost nothing.
+///            Values are distances in samples wherever occlusion is to mean what it says. The sign that is given is
+///            kept, however small the value; NaN counts as far air, infinities as +-band.
+/// Edits:     an edit raises the version of every chunk in which a density or a material changed, and remembers where,
+///            so that `take_dirty` can tell which meshes it reaches. A chunk that is all far air is dropped.
+/// Threads:   any number may read at once; an edit needs the grid to itself.
+class DensityGrid {
+ public:
+  /// Requires: 0 < band <= 65,504.
+  explicit DensityGrid(float band = 8.0F);
+  DensityGrid(DensityGrid&&) noexcept;
+  DensityGrid& operator=(DensityGrid&&) noexcept;
+  ~DensityGrid();
+  [[nodiscard]] DensityGrid clone() const;
+
+  [[nodiscard]] float band() const;
+  [[nodiscard]] float density(IVec3 sample) const;
+  [[nodiscard]] VoxelType material(IVec3 sample) const;
+  /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, far air.
+  [[nodiscard]] float density_at(DVec3 point) const;
+  /// The gradient of the trilinear field, a one-sided one on the faces between cells: that of the cell above.
+  [[nodiscard]] DVec3 gradient_at(DVec3 point) const;
+
+  /// True when density or material was another before.
+  bool set(IVec3 sample, DensitySample value);
+
+  /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges): the least of both distances. Samples
+  /// that become solid take `material`. `blend` >= 0: the width, in samples, over which the two surfaces flow together
+  /// (0: a sharp crease). All answer how many samples changed; a negative or NaN size changes nothing.
+  std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0);
+  std::int64_t remove_sphere(DVec3 centre, double radius, double blend = 0.0);
+  std::int64_t add_box(DVec3 min, DVec3 max, VoxelType material, double rounding = 0.0, double blend = 0.0);
+  std::int64_t remove_box(DVec3 min, DVec3 max, double rounding = 0.0, double blend = 0.0);
+  /// Smooths the surface within a sphere: moves each density towards the mean of its 26 neighbours (as they were
+  /// before), `strength` (0 to 1) of the way at the centre, fading to nothing at the radius.
+  std::int64_t smooth(DVec3 centre, double radius, double strength);
+  /// Moves the surface within a sphere towards the plane through `point` with `normal` (pointing into the air; any
+  /// length but 0), `strength` as in `smooth`. Samples that become solid take `material`.
+  std::int64_t flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength, VoxelType material);
+  /// Asks `pick(sample, current)` for the new value of every sample of the box, x fastest, then y, then z within a
+  /// chunk, chunks likewise. Requires: `pick` leaves the grid alone.
+  std::int64_t edit(const IBox& box, const std::function<DensitySample(IVec3 sample, DensitySample current)>& pick);
+  /// Puts a whole chunk in place; counts as an edit of whatever differs. Requires: its densities are `stored_density`
+  /// of this band.
+  void put_chunk(IVec3 chunk, DensityChunk samples);
+  void clear();
+
+  /// Null where all is far air.
+  [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;
+  /// Coordinates of all chunks that are not far air, sorted by z, then y, then x.
+  [[nodiscard]] std::vector<IVec3> chunks() const;
+  [[nodiscard]] std::size_t chunk_count() const;
+  [[nodiscard]] DensityNeighbourhood neighbourhood(IVec3 chunk) const;
+  /// The smallest box around all solid samples; empty when there are none. Cost: O(chunks * 4096).
+  [[nodiscard]] IBox solid_bounds() const;
+  [[nodiscard]] std::int64_t solid_count() const;
+
+  /// Raised by every edit that changed a sample of this chunk; 0 for a chunk that is not there.
+  [[nodiscard]] std::uint64_t version(IVec3 chunk) const;
+  /// Raised by every edit that changed anything.
+  [[nodiscard]] std::uint64_t version() const;
+  /// The chunks whose mesh may have changed since the last call: those that read a changed sample at most `reach`
+  /// samples away from a sample of theirs. `reach` is what the mesher says (`reach_of`, quoin/mesh/smooth.h). Sorted as
+  /// `chunks`, neighbours that do not exist (all far air) included, since a surface can end in them.
+  /// Requires: 0 <= reach <= 64.
+  std::vector<IVec3> take_dirty(int reach);
+
+  /// Bytes held.
+  [[nodiscard]] std::size_t bytes() const;
+  /// Gives back memory that edits left unused.
+  void compact();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/smooth.h>
+
+namespace quoin {
+
+/// Linear light, 16 bits a channel: 65,535 is 1. Eight bits would be visibly off in the darks.
+using LinearRgba16 = std::array<std::uint16_t, 4>;
+
+/// One welded surface. The vertex arrays have one entry a vertex.
+struct SmoothMesh {
+  std::vector<Vec3> positions;         ///< the field's coordinates, in samples
+  std::vector<Vec3> normals;           ///< unit, into the air
+  std::vector<float> openness;         ///< 0 (dark) to 1; empty without occlusion
+  std::vector<LinearRgba16> albedo;    ///< mean of the materials of the cell's solid samples, without occlusion
+  std::vector<VoxelType> types;        ///< the material of most of the cell's solid samples; of several, the least
+  std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from the air
+};
+
+struct SmoothMeshOptions {
+  SmoothOcclusionOptions occlusion;
+  bool split_sheets = true;  ///< as in SmoothOptions
+  /// The level of detail of a chunk, 0 to kCoarsestLevel; empty: 0 everywhere. Also asked for chunks that do not exist.
+  std::function<int(IVec3 chunk)> level_of;
+};
+
+/// Meshes a whole field, chunk by chunk, and welds the chunks' meshes.
+///
+/// Closed:  every edge has an even number of triangles (two, with `split_sheets` and one level), whatever the levels.
+/// Space:   the field's coordinates; beyond 2^24 samples from the origin floats lose whole samples.
+/// Order:   chunks as in DensityGrid::chunks; the same bytes at any thread count.
+/// Types:   materials that are not registered, and air, count as opaque white.
+/// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices.
+[[nodiscard]] Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
+                                                   const SmoothMeshOptions& options, Threads threads = {},
+                                                   const Progress& progress = {});
+
+}  // namespace quoin
