@@ -1,22 +1,68 @@
-// For the time being: every chunk by the plain mesher that the tests compare with.
-
 #include <quoin/mesh/smooth.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cassert>
 
-#include "mesh/smooth_oracle.h"
+#include "mesh/smooth_levels.h"
+#include "mesh/smooth_scratch.h"
 #include "mesh/smooth_split.h"
 #include "mesh/smooth_transition.h"
 
 namespace quoin {
 
-struct SmoothMesher::Scratch {};
+namespace {
 
-SmoothMesher::SmoothMesher(InstructionSet) : scratch_(std::make_unique<Scratch>()) {}
+using MeshKernel = void (*)(smooth::Work&, SmoothChunkMesh&);
+
+MeshKernel kernel_for(InstructionSet instructions) {
+  switch (resolve(instructions)) {
+#ifdef QUOIN_X86_KERNELS
+    case InstructionSet::Avx512:
+      return __builtin_cpu_supports("avx512vbmi2") != 0 ? smooth::mesh_avx512 : smooth::mesh_avx2;
+    case InstructionSet::Avx2:
+      return smooth::mesh_avx2;
+#endif
+    default:
+      return smooth::mesh_plain;
+  }
+}
+
+}  // namespace
+
+struct SmoothMesher::Scratch {
+  MeshKernel kernel = smooth::mesh_plain;
+  smooth::Work work;
+
+  // Replaces `out` by the surface of some cells of the centre chunk.
+  void mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, smooth::CellRange cells,
+            SmoothChunkMesh& out) {
+    out.clear();
+    work.level = options.levels[13];
+    assert(work.level <= kCoarsestLevel);
+    work.n = kChunkEdge >> work.level;
+    work.cells = cells;
+    work.occlusion = smooth::within_limits(options.occlusion, work.level);
+    if (smooth::gather(chunks, work)) kernel(work, out);
+  }
+};
+
+SmoothMesher::SmoothMesher(InstructionSet instructions) : scratch_(std::make_unique<Scratch>()) {
+  scratch_->kernel = kernel_for(instructions);
+}
 SmoothMesher::SmoothMesher(SmoothMesher&&) noexcept = default;
 SmoothMesher& SmoothMesher::operator=(SmoothMesher&&) noexcept = default;
 SmoothMesher::~SmoothMesher() = default;
+
+void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out) {
+  const int n = kChunkEdge >> options.levels[13];
+  const bool is_open = options.border == SmoothBorder::Open;
+  if (!is_open && !smooth::ChunkLevels(options.levels).all_same()) {
+    const auto own_cells = [&](SmoothChunkMesh& mesh) { scratch_->mesh(chunks, options, {0, n}, mesh); };
+    return smooth::mesh_with_transitions(chunks, options, own_cells, out);
+  }
+  scratch_->mesh(chunks, options, is_open ? smooth::CellRange{0, n - 1} : smooth::CellRange{-1, n}, out);
+  if (options.split_sheets) smooth::split_sheets(chunks, options, out.indices.size(), out);
+}
 
 void SmoothChunkMesh::clear() {
   positions.clear();
@@ -24,25 +70,6 @@ void SmoothChunkMesh::clear() {
   openness.clear();
   cells.clear();
   indices.clear();
-}
-
-int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
-  const float cells =
-      occlusion.form == SmoothOcclusion::None ? 1.0F : 2.0F + std::ceil(occlusion.spread * 2.75F + 0.1F);
-  return static_cast<int>(cells) << coarsest_level;
-}
-
-void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out) {
-  const bool one_level = smooth::ChunkLevels(options.levels).all_same();
-  if (options.border == SmoothBorder::Open || one_level) {
-    oracle::smooth_mesh(chunks, options, out);
-    if (options.split_sheets) smooth::split_sheets(chunks, options, out.indices.size(), out);
-    return;
-  }
-  const auto own = [&](SmoothChunkMesh& mesh) {
-    oracle::SmoothOracle(oracle::lattice_density(chunks, options.levels[13]), oracle::own_part(options)).mesh(mesh);
-  };
-  smooth::mesh_with_transitions(chunks, options, own, out);
 }
 
 }  // namespace quoin

@@ -2,31 +2,21 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <tuple>
 
 #include "core/progress_steps.h"
+#include "grid/chunk_order.h"
 #include "mesh/smooth_material.h"
 
 namespace quoin {
 namespace {
 
-bool comes_before(IVec3 a, IVec3 b) {
-  return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x);
-}
-
-void sort_and_make_unique(std::vector<IVec3>& chunks) {
-  std::sort(chunks.begin(), chunks.end(), comes_before);
-  chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
-}
-
 // The place of a chunk in a sorted list; the list's size when it is not there.
 std::size_t place_in(const std::vector<IVec3>& chunks, IVec3 chunk) {
-  const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk, comes_before);
+  const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk, by_zyx);
   return static_cast<std::size_t>((found != chunks.end() && *found == chunk ? found : chunks.end()) - chunks.begin());
 }
 
@@ -40,21 +30,8 @@ std::vector<IVec3> with_neighbours(const std::vector<IVec3>& chunks, int first, 
       }
     }
   }
-  sort_and_make_unique(all);
+  sort_and_unite(all);
   return all;
-}
-
-Status check(const SmoothOcclusionOptions& options) {
-  if (options.form == SmoothOcclusion::None) return {};
-  const auto refuse = [](const char* what, float value, const char* range) {
-    return fail(ErrorCode::InvalidArgument,
-                std::string("occlusion ") + what + " " + std::to_string(value) + " is not " + range);
-  };
-  if (!(options.spread > 0.0F && options.spread <= 8.0F)) return refuse("spread", options.spread, "over 0 and up to 8");
-  if (options.form == SmoothOcclusion::Openness) return {};
-  if (!(options.offset >= 0.0F && options.offset < 1.0F)) return refuse("offset", options.offset, "0 to below 1");
-  if (!(options.power > 0.0F && std::isfinite(options.power))) return refuse("power", options.power, "over 0");
-  return {};
 }
 
 // The levels of detail of all chunks that are meshed and of their neighbours, each asked for once.
@@ -290,7 +267,6 @@ class Builder {
 
 Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                      const SmoothMeshOptions& options, Threads threads, const Progress& progress) {
-  if (Status checked = check(options.occlusion); !checked) return tl::unexpected(checked.error());
   return Builder(field, options, threads, progress).build(types);
 }
 

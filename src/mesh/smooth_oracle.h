@@ -13,9 +13,9 @@
 #include <quoin/mesh/smooth.h>
 
 #include "mesh/smooth_cell.h"
-#include "mesh/smooth_levels.h"
-#include "mesh/smooth_openness.h"
+#include "mesh/smooth_cell_occlusion.h"
 #include "mesh/smooth_quad.h"
+#include "mesh/smooth_scratch.h"
 
 namespace quoin::oracle {
 
@@ -89,14 +89,15 @@ class SmoothOracle {
     const IVec3 offset{cell.x < 0, cell.y < 0, cell.z < 0};
     out.cells.push_back(smooth::cell_name(cell & IVec3{n - 1}, offset));
     if (part_.occlusion.form == SmoothOcclusion::None) return;
-    const auto from_cell = [&](IVec3 p) { return density_(cell + p); };
-    out.openness.push_back(smooth::openness_at(from_cell, vertex.fraction, vertex.normal, part_.occlusion));
+    const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}); };
+    const SmoothOcclusionOptions occlusion = smooth::within_limits(part_.occlusion, part_.level);
+    out.openness.push_back(smooth::vertex_openness(vertex.fraction, vertex.normal, occlusion, from_cell));
   }
 
   [[nodiscard]] std::optional<smooth::QuadCorner> corner(IVec3 cell, const SmoothChunkMesh& out) const {
     const auto found = vertices_.find({cell.x, cell.y, cell.z});
     if (found == vertices_.end()) return std::nullopt;
-    return smooth::QuadCorner{found->second, part_.level, smooth::place_of(out.positions[found->second], part_.level)};
+    return smooth::quad_corner(found->second, out.positions[found->second], cell * (1 << part_.level), part_.level);
   }
 
   void add_quad(IVec3 p, int axis, SmoothChunkMesh& out) {

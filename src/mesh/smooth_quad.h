@@ -2,8 +2,8 @@
 
 // The rules by which quads are ordered and split, for all that emits quads outside of the fast kernels.
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 #include <quoin/core/buffer.h>
@@ -29,22 +29,24 @@ inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
   return {bits};
 }
 
-/// Vertices are compared at places in 1/64 of their cell, so that positions are told apart by whole numbers. In 1/64 of
-/// a sample: `position` is a mesh's, `level` that of the vertex's cell.
-inline IVec3 place_of(Vec3 position, int level) {
-  const float scale = std::ldexp(64.0F, -level);
-  IVec3 place;
-  for (int axis = 0; axis < 3; ++axis) {
-    place[axis] = static_cast<int>(std::floor(position[axis] * scale)) * (1 << level);
-  }
-  return place;
-}
-
+/// A corner of a quad. Corners are compared at places in 1/64 of their cells, so that lengths are told apart by whole
+/// numbers.
 struct QuadCorner {
   std::uint32_t vertex;
   int level;    ///< of its cell
-  IVec3 place;  ///< as place_of gives it
+  IVec3 place;  ///< in 1/64 of a sample
 };
+
+/// A vertex in the cell that starts at the sample `first` and is 2^level wide.
+inline QuadCorner quad_corner(std::uint32_t vertex, Vec3 position, IVec3 first, int level) {
+  const auto size = static_cast<float>(1 << level);
+  QuadCorner corner{vertex, level, first * 64};
+  for (int axis = 0; axis < 3; ++axis) {
+    const float fraction = (position[axis] - static_cast<float>(first[axis])) / size;
+    corner.place[axis] += std::min(static_cast<int>(fraction * 64.0F), 63) * (1 << level);
+  }
+  return corner;
+}
 
 inline bool quad_is_split_at_first(const std::array<QuadCorner, 4>& q) {
   const auto is_finest = [&](std::size_t i) {

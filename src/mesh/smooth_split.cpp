@@ -241,7 +241,7 @@ class Splitter {
     std::array<QuadCorner, 4> corners;
     for (std::size_t i = 0; i < 4; ++i) {
       const std::uint32_t vertex = sheet_vertex(cycle[i], cells[i], start, axis);
-      corners[i] = {vertex, cells[i].level, place_of(out_.positions[vertex], cells[i].level)};
+      corners[i] = quad_corner(vertex, out_.positions[vertex], cells[i].first, cells[i].level);
     }
     const std::array<std::uint32_t, 6> triangles = triangles_of(corners);
     std::copy(triangles.begin(), triangles.end(), quad);

@@ -77,7 +77,7 @@ class Transitions {
       if (!(mended_[quad[0]] || mended_[quad[1]] || mended_[quad[2]] || mended_[quad[5]])) continue;
       std::array<QuadCorner, 4> corners;
       const std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, out_);
-      for (std::size_t c = 0; c < 4; ++c) corners[c] = corner(cycle[c], levels_.of_chunk(IVec3{0}));
+      for (std::size_t c = 0; c < 4; ++c) corners[c] = corner(cycle[c], levels_.cell_of(out_.cells[cycle[c]]));
       const std::array<std::uint32_t, 6> triangles = triangles_of(corners);
       std::copy(triangles.begin(), triangles.end(), quad);
     }
@@ -152,7 +152,7 @@ class Transitions {
       const LevelCell cell = levels_.cell_at(samples[solid_first ? i : (4 - i) % 4]);
       const std::uint32_t vertex = vertex_of(cell);
       if (count > 0 && corners[count - 1].vertex == vertex) continue;
-      corners[count++] = corner(vertex, cell.level);
+      corners[count++] = corner(vertex, cell);
     }
     if (corners[count - 1].vertex == corners[0].vertex) --count;
     assert(count >= 3);
@@ -163,8 +163,8 @@ class Transitions {
     }
   }
 
-  [[nodiscard]] QuadCorner corner(std::uint32_t vertex, int level) const {
-    return {vertex, level, place_of(out_.positions[vertex], level)};
+  [[nodiscard]] QuadCorner corner(std::uint32_t vertex, const LevelCell& cell) const {
+    return quad_corner(vertex, out_.positions[vertex], cell.first, cell.level);
   }
 
   // The vertex of a cell that has one, made if need be.

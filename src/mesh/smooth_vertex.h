@@ -6,8 +6,9 @@
 #include <quoin/mesh/smooth.h>
 
 #include "mesh/smooth_cell.h"
+#include "mesh/smooth_cell_occlusion.h"
 #include "mesh/smooth_levels.h"
-#include "mesh/smooth_openness.h"
+#include "mesh/smooth_scratch.h"
 
 namespace quoin::smooth {
 
@@ -17,8 +18,10 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
   out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());
   out.normals[index] = vertex.normal;
   if (occlusion.form == SmoothOcclusion::None) return;
-  const auto density = [&](IVec3 p) { return float_from_half(chunks.get(cell.first + p * cell.size())); };
-  out.openness[index] = openness_at(density, vertex.fraction, vertex.normal, occlusion);
+  const auto density = [&](int x, int y, int z) {
+    return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size()));
+  };
+  out.openness[index] = vertex_openness(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
 }
 
 /// The index of a new vertex.
