@@ -63,15 +63,23 @@ inline Field waves(unsigned seed, double wavelength, double offset = 0.0) {
   };
 }
 
+/// A number that looks random, of a seed and a place.
+inline std::uint64_t hash_of(unsigned seed, IVec3 p) {
+  std::uint64_t h = seed;
+  for (int axis = 0; axis < 3; ++axis) {
+    h = (h ^ static_cast<std::uint32_t>(p[axis])) * 0x9E37'79B9'7F4A'7C15U;
+    h ^= h >> 29;
+  }
+  h *= 0xBF58'476D'1CE4'E5B9U;
+  return h ^ h >> 32;
+}
+
 /// Every sample at random, of its own.
 inline Field scatter(unsigned seed, double solid_share = 0.5) {
   return [=](DVec3 p) {
-    std::seed_seq seeds{seed, static_cast<unsigned>(static_cast<int>(p.x)),
-                        static_cast<unsigned>(static_cast<int>(p.y)), static_cast<unsigned>(static_cast<int>(p.z))};
-    std::array<std::uint32_t, 2> values{};
-    seeds.generate(values.begin(), values.end());
-    const double size = 0.05 + 3.0 * values[0] / 4294967296.0;
-    return values[1] / 4294967296.0 < solid_share ? -size : size;
+    const std::uint64_t random = hash_of(seed, IVec3(p));
+    const double size = 0.05 + 3.0 * static_cast<double>(random & 0xFFFFU) / 65536.0;
+    return static_cast<double>(random >> 40) / 16777216.0 < solid_share ? -size : size;
   };
 }
 
