@@ -11,7 +11,7 @@
 
 #include "mesh/smooth_levels.h"
 #include "mesh/smooth_oracle.h"
-#include "mesh/smooth_test_support.h"
+#include "mesh/smooth_surface_check.h"
 
 namespace quoin {
 namespace {
