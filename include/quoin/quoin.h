@@ -32,6 +32,7 @@
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
