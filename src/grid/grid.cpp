@@ -7,24 +7,12 @@
 
 #include <tsl/robin_map.h>
 
+#include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
 #include "grid/long_box.h"
 #include "grid/reach.h"
 
 namespace quoin {
-namespace {
-
-bool by_zyx(IVec3 a, IVec3 b) {
-  if (a.z != b.z) return a.z < b.z;
-  return a.y != b.y ? a.y < b.y : a.x < b.x;
-}
-
-void sort_and_unite(std::vector<IVec3>& chunks) {
-  std::sort(chunks.begin(), chunks.end(), by_zyx);
-  chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
-}
-
-}  // namespace
 
 struct Grid::Impl {
   struct Entry {
@@ -92,12 +80,8 @@ struct Grid::Impl {
 template <class Change>
 std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& change) {
   const LongBox box = clipped(wanted);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (box.max[axis] <= box.min[axis]) return 0;
-  }
-  const auto chunk_at = [](std::int64_t voxel) { return static_cast<int>(voxel >> kChunkShift); };
-  const IVec3 first{chunk_at(box.min[0]), chunk_at(box.min[1]), chunk_at(box.min[2])};
-  const IVec3 last{chunk_at(box.max[0] - 1), chunk_at(box.max[1] - 1), chunk_at(box.max[2] - 1)};
+  if (is_empty(box)) return 0;
+  const IBox chunks = chunks_of(box);
   ++version;
   std::int64_t changed = 0;
   const auto edit_chunk = [&](IVec3 chunk, Entry& entry) {
@@ -113,14 +97,13 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
     finish_edit(chunk, entry, reach);
   };
   if (create) {
-    for (int z = first.z; z <= last.z; ++z) {
-      for (int y = first.y; y <= last.y; ++y) {
-        for (int x = first.x; x <= last.x; ++x) edit_chunk({x, y, z}, find_or_create({x, y, z}));
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) edit_chunk({x, y, z}, find_or_create({x, y, z}));
       }
     }
   } else {
     std::vector<IVec3> present;
-    const IBox chunks{first, last + 1};
     for (const auto& [at, entry] : entries) {
       if (chunks.contains(at)) present.push_back(at);
     }
@@ -168,11 +151,7 @@ bool Grid::set(IVec3 voxel, VoxelType type) {
 }
 
 std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
-  LongBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.min[static_cast<std::size_t>(axis)] = std::min(first[axis], last[axis]);
-    box.max[static_cast<std::size_t>(axis)] = std::int64_t{std::max(first[axis], last[axis])} + 1;
-  }
+  const LongBox box = box_from(glm::min(first, last), glm::max(first, last));
   return impl_->edit_box(box, type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, Reach& reach) {
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { reach.add(y, z, changed); });
   });
@@ -207,12 +186,7 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
 }
 
 std::int64_t Grid::edit(const IBox& wanted, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick) {
-  LongBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.min[static_cast<std::size_t>(axis)] = wanted.min[axis];
-    box.max[static_cast<std::size_t>(axis)] = wanted.max[axis];
-  }
-  return impl_->edit_box(box, true, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
+  return impl_->edit_box(box_from(wanted), true, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
     std::array<VoxelType, kChunkEdge> row{};
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {

@@ -25,6 +25,40 @@ struct LongBox {
   std::array<std::int64_t, 3> max{};
 };
 
+/// From `first` to `last`, both included.
+inline LongBox box_from(IVec3 first, IVec3 last) {
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[static_cast<std::size_t>(axis)] = first[axis];
+    box.max[static_cast<std::size_t>(axis)] = std::int64_t{last[axis]} + 1;
+  }
+  return box;
+}
+
+inline LongBox box_from(const IBox& box) {
+  LongBox result;
+  for (int axis = 0; axis < 3; ++axis) {
+    result.min[static_cast<std::size_t>(axis)] = box.min[axis];
+    result.max[static_cast<std::size_t>(axis)] = box.max[axis];
+  }
+  return result;
+}
+
+inline bool is_empty(const LongBox& box) {
+  return box.max[0] <= box.min[0] || box.max[1] <= box.min[1] || box.max[2] <= box.min[2];
+}
+
+/// The chunks that a box meets. Requires: it is not empty and lies within the int32 range.
+inline IBox chunks_of(const LongBox& box) {
+  IBox chunks;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    chunks.min[axis] = static_cast<int>(box.min[i] >> kChunkShift);
+    chunks.max[axis] = static_cast<int>((box.max[i] - 1) >> kChunkShift) + 1;
+  }
+  return chunks;
+}
+
 /// The part of a box that lies in a chunk, in the chunk's coordinates.
 inline IBox part_of(const LongBox& box, IVec3 chunk) {
   IBox part;

@@ -15,7 +15,9 @@
 namespace quoin {
 
 /// The stored form of a density: never NaN, never -0, at most `band` from 0, and of the sign that was given, however
-/// small. NaN counts as far outside (`band`). Requires: 0 < band.
+/// small: 0 alone is stored as 0, the rest as 2^-14 at least, since smaller halves are slow on many processors. NaN
+/// counts as far outside (`band`). A band between two halves counts as the lesser, but as 2^-24 at least. Requires: 0 <
+/// band.
 [[nodiscard]] Half stored_density(float density, float band);
 
 /// 64^3 samples of a density (half floats, negative is solid, 0 is air) with a material each.
@@ -53,7 +55,7 @@ class DensityChunk {
   }
   void read_row(int y, int z, std::span<Half, kChunkEdge> out) const;
 
-  /// Answers which samples of the row had another density before. Slabs stay expanded until `compact`.
+  /// Answers which samples of the row had another density before. Slabs stay expanded until `unite_slabs`.
   std::uint64_t write_row(int y, int z, std::span<const Half, kChunkEdge> densities);
   /// Makes the whole chunk one density; materials stay.
   void fill(Half density);
@@ -61,7 +63,10 @@ class DensityChunk {
   [[nodiscard]] std::optional<Half> uniform() const {
     return mixed_ == nullptr ? std::optional(uniform_) : std::nullopt;
   }
-  /// Gives up the storage of slabs, and of a chunk, that hold one value.
+  /// Finds the slabs, and the chunk, that came to hold one density: they read as such then, and their room is reused.
+  /// Cost: reads one row of most slabs.
+  void unite_slabs();
+  /// `unite_slabs`, and gives back the memory that this and the materials no longer need.
   void compact();
 
   [[nodiscard]] const Chunk& materials() const { return materials_; }
@@ -87,6 +92,9 @@ class DensityChunk {
   [[nodiscard]] const Mixed* mixed() const { return mixed_.get(); }
 
  private:
+  void make_mixed();
+  std::uint32_t slot_for_writing(std::size_t slab);
+
   Half uniform_;
   Chunk materials_;
   std::unique_ptr<Mixed> mixed_;

@@ -23,12 +23,13 @@ enum class SmoothOcclusion : std::uint8_t {
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 1. Weighted forms:
-/// clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1).
+/// clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest end,
+/// NaN as the default.
 struct SmoothOcclusionOptions {
   SmoothOcclusion form = SmoothOcclusion::Openness;
-  float spread = 2.0F;  ///< over 0, at most 8; whole numbers are several times faster
-  float offset = 0.4F;  ///< of the weighted forms: 0 to below 1
-  float power = 2.0F;   ///< of the weighted forms: over 0
+  float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2; 1 and 2 are several times faster than others
+  float offset = 0.4F;  ///< of the weighted forms: 0 to 0.99
+  float power = 2.0F;   ///< of the weighted forms: 1/16 to 64
 };
 
 /// How far, in samples of level 0, a vertex may read: an edit that is farther than this from a chunk leaves its mesh as

@@ -1,0 +1,161 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <tsl/robin_map.h>
+
+#include <quoin/grid/density_grid.h>
+
+#include "grid/change_reach.h"
+#include "grid/chunk_order.h"
+#include "grid/coordinate_hash.h"
+#include "grid/long_box.h"
+
+namespace quoin {
+
+/// The samples of one row as edits see and change them.
+struct SampleRow {
+  std::array<float, kChunkEdge> densities{};
+  std::array<VoxelType, kChunkEdge> materials{};  ///< air where the density is far air
+};
+
+/// What an edit does to a chunk.
+enum class ChunkEdit : std::uint8_t {
+  Nothing,
+  Rows,   ///< it must look at the samples
+  Solid,  ///< all samples become solid, as far from the surface as can be
+};
+
+/// The chunks of a density grid with the bookkeeping of edits.
+class DensityStore {
+ public:
+  struct Entry {
+    DensityChunk samples;
+    std::uint64_t version = 0;
+  };
+
+  explicit DensityStore(float band);
+  DensityStore(const DensityStore& other);
+  DensityStore& operator=(const DensityStore&) = delete;
+
+  [[nodiscard]] Half far() const { return far_; }
+  [[nodiscard]] float band() const { return float_from_half(far_); }
+  [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] const auto& entries() const { return entries_; }
+  [[nodiscard]] const Entry* find(IVec3 chunk) const {
+    const auto it = entries_.find(chunk);
+    return it == entries_.end() ? nullptr : it->second.get();
+  }
+  [[nodiscard]] Half get(IVec3 sample) const {
+    const Entry* entry = find(chunk_of(sample));
+    if (entry == nullptr) return far_;
+    const IVec3 local = local_of(sample);
+    return entry->samples.get(local.x, local.y, local.z);
+  }
+  /// Air where the density is far air, whatever is stored there.
+  [[nodiscard]] VoxelType material(IVec3 sample) const;
+
+  /// Edits the samples of a box, clipped to the world, chunk by chunk in the order of z, y, x. Answers how many
+  /// changed.
+  ///
+  /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
+  /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
+  /// `change(sample, first, end, row)` changes part of a row; `sample` is the row's first (local x = 0).
+  template <class ChooseChunk, class ChangeRow>
+  std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change);
+
+  void put(IVec3 chunk, DensityChunk samples);
+  void clear();
+  std::vector<IVec3> take_dirty(int reach);
+  [[nodiscard]] std::vector<IVec3> chunks() const;
+  [[nodiscard]] std::size_t bytes() const;
+  void compact();
+
+ private:
+  void read_row(const DensityChunk& samples, int y, int z, SampleRow& out) const;
+  // All 64 densities of a row that is stored as such are equal.
+  static bool is_even(const Half* row) {
+    return row != nullptr && std::memcmp(row, row + 1, sizeof(Half) * (kChunkEdge - 1)) == 0;
+  }
+  // Answers which samples changed.
+  std::uint64_t write_row(DensityChunk& samples, int y, int z, int first, int end, const SampleRow& row) const;
+  [[nodiscard]] ChangeReach differences(const DensityChunk* before, const DensityChunk* after) const;
+  Entry& find_or_create(IVec3 chunk);
+  // Books an edit of one chunk, and drops it where it is all far air. `has_even_row`: an edited row came to hold one
+  // density, so that slabs may have to be united.
+  void finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row);
+  template <class ChangeRow>
+  std::int64_t edit_rows(IVec3 chunk, const IBox& part, ChangeRow& change);
+  std::int64_t make_solid(IVec3 chunk, VoxelType material);
+
+  Half far_;
+  tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries_;
+  tsl::robin_map<IVec3, ChangeReach, CoordinateHash> changes_;  // since they were last taken
+  std::uint64_t version_ = 0;
+};
+
+template <class ChangeRow>
+std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& change) {
+  Entry& entry = find_or_create(chunk);
+  ChangeReach changes;
+  SampleRow row;
+  bool has_even_row = false;
+  try {
+    for (int z = part.min.z; z < part.max.z; ++z) {
+      for (int y = part.min.y; y < part.max.y; ++y) {
+        read_row(entry.samples, y, z, row);
+        change(chunk * kChunkEdge + IVec3{0, y, z}, part.min.x, part.max.x, row);
+        changes.add(y, z, write_row(entry.samples, y, z, part.min.x, part.max.x, row));
+        has_even_row = has_even_row || is_even(entry.samples.row(y, z));
+      }
+    }
+  } catch (...) {
+    changes.add_all();
+    finish_edit(chunk, entry, changes, true);
+    throw;
+  }
+  finish_edit(chunk, entry, changes, has_even_row);
+  return changes.samples;
+}
+
+template <class ChooseChunk, class ChangeRow>
+std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType material, ChooseChunk&& chunk_edit,
+                                ChangeRow&& change) {
+  const LongBox box = clipped(wanted);
+  if (is_empty(box)) return 0;
+  const IBox chunks = chunks_of(box);
+  ++version_;
+  std::int64_t changed = 0;
+  const auto visit = [&](IVec3 chunk) {
+    const ChunkEdit wish = chunk_edit(chunk);
+    if (wish == ChunkEdit::Nothing) return;
+    if (wish == ChunkEdit::Solid && find(chunk) == nullptr) {
+      changed += make_solid(chunk, material);
+    } else {
+      changed += edit_rows(chunk, part_of(box, chunk), change);
+    }
+  };
+  if (creates) {
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) visit({x, y, z});
+      }
+    }
+  } else {
+    std::vector<IVec3> present;
+    for (const auto& [at, entry] : entries_) {
+      if (chunks.contains(at)) present.push_back(at);
+    }
+    std::sort(present.begin(), present.end(), by_zyx);
+    for (const IVec3 at : present) visit(at);
+  }
+  if (changed == 0) --version_;
+  return changed;
+}
+
+}  // namespace quoin

@@ -1,0 +1,52 @@
+// The Surface Nets kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "mesh/smooth_cell.h"
+#include "mesh/smooth_cell_occlusion.h"
+#include "mesh/smooth_scratch.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include <immintrin.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2,bmi,bmi2,popcnt"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,bmi,bmi2,popcnt")
+#endif
+
+namespace quoin::smooth {
+namespace {
+
+#include "mesh/smooth_lanes_avx2.h"
+
+#include "mesh/smooth_scalar.inl"
+
+#include "mesh/smooth_bits.inl"
+#include "mesh/smooth_vectors.inl"
+
+#include "mesh/smooth_occlusion.inl"
+
+#include "mesh/smooth_slices.inl"
+
+}  // namespace
+
+void mesh_avx2(Work& work, SmoothChunkMesh& out) {
+  mesh_slices(work, out);
+}
+
+}  // namespace quoin::smooth
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+#endif

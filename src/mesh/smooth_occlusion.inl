@@ -1,0 +1,165 @@
+// Occlusion with whole-number spreads, as many vertices at a time as a register holds eight lanes. All 27 samples share
+// one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn. Included
+// within a namespace, after the lanes.
+
+constexpr int kSliceMask = kDecodedSlices - 1;
+// Points below and above a cell's own that occlusion of the widest spread here reads.
+constexpr int kBelow = 5;
+constexpr int kAbove = 6;
+
+inline float* decoded_row(Work& work, int y, int z) {
+  return work.decoded.data() + (z & kSliceMask) * kDecodedSlice + (y + kWidestApron) * kDecodedStride + kPointX;
+}
+
+inline void decode_slice(Work& work, int z) {
+  const RowSet& needed = work.needed_rows[static_cast<std::size_t>(z + kWidestApron)];
+  if (needed.empty()) return;
+  for (int y = -kBelow - 1; y <= work.n + kBelow; ++y) {
+    if (!needed.has(y)) continue;
+    const Half* const from = work.row(y, z);
+    float* const to = decoded_row(work, y, z);
+    for (int x = -kPointX; x < work.n + kPointX; x += kWidth) store(to + x, load_halves(from + x));
+  }
+}
+
+void begin_occlusion(Work& work) {
+  if (!is_whole_spread(work.occlusion)) return;
+  if (work.decoded.empty()) work.decoded.resize(std::size_t{kDecodedSlices} * kDecodedSlice + 64);
+  work.next_decoded = work.cells.first - kBelow;
+}
+
+// Where each vertex of a slice is sampled: the lowest point that it reads, and the fractions that its samples share.
+struct Centres {
+  alignas(64) std::int32_t offset[kWidth];
+  alignas(64) std::int32_t z[kWidth];
+  alignas(64) float fx[kWidth];
+  alignas(64) float fy[kWidth];
+  alignas(64) float fz[kWidth];
+};
+
+inline Centres find_centres(const Work& work, const Slice& slice, std::size_t first) {
+  const F spread = all(work.occlusion.spread);
+  const int whole = static_cast<int>(work.occlusion.spread);
+  F n[3];
+  for (int i = 0; i < 3; ++i) n[i] = load(work.normals[i] + first);
+  const F lift = spread * ((abs(n[0]) + abs(n[1])) + abs(n[2])) + all(kLift);
+  I base[3];
+  F fraction[3];
+  for (int i = 0; i < 3; ++i) {
+    const F centre = load(work.fractions[i] + first) + n[i] * lift;
+    const F below = floor(centre);
+    fraction[i] = centre - below;
+    base[i] = to_int(below) - all(whole);
+  }
+  const I place = load_words(work.places + first) & all(kPlaceMask);
+  const I x = (place & all(kPlaceStride - 1)) + base[0];
+  const I y = shift_right<kPlaceShift>(place) + base[1];
+  Centres centres;
+  store(centres.offset, (y + all(kWidestApron - 1)) * all(kDecodedStride) + x + all(kPointX - 1));
+  store(centres.z, base[2] + all(slice.z));
+  store(centres.fx, fraction[0]);
+  store(centres.fy, fraction[1]);
+  store(centres.fz, fraction[2]);
+  return centres;
+}
+
+// The nine rows along x that are left after interpolating along z and y, and one of zeros.
+struct NineRows {
+  F v[10];
+};
+
+inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane, int spread) {
+  const float* slices[6][kVerticesAtOnce];
+  for (int k = 0; k < 6; ++k) {
+    for (int i = 0; i < kVerticesAtOnce; ++i) {
+      const std::size_t at = lane + static_cast<std::size_t>(i);
+      const int z = (centres.z[at] + (k >> 1) * spread + (k & 1)) & kSliceMask;
+      slices[k][i] = work.decoded.data() + z * kDecodedSlice + centres.offset[at];
+    }
+  }
+  const F fy = spread_out(centres.fy + lane);
+  const F fz = spread_out(centres.fz + lane);
+  NineRows rows;
+  for (int k = 0; k < 3; ++k) {
+    F along_z[6];
+    for (int j = 0; j < 6; ++j) {
+      const int offset = ((j >> 1) * spread + (j & 1)) * kDecodedStride;
+      const F low = load_rows(slices[2 * k], offset);
+      along_z[j] = low + fz * (load_rows(slices[2 * k + 1], offset) - low);
+    }
+    for (int j = 0; j < 3; ++j) {
+      rows.v[3 * k + j] = along_z[2 * j] + fy * (along_z[2 * j + 1] - along_z[2 * j]);
+    }
+  }
+  rows.v[9] = all(0.0F);
+  return rows;
+}
+
+// Two rows' samples in the lowest six lanes of each vertex.
+struct Samples {
+  F v[5];
+};
+
+inline Samples samples_of(const NineRows& rows, F fx, const Thirds& low_lanes, const Thirds& high_lanes) {
+  Samples samples;
+  for (int i = 0; i < 5; ++i) {
+    const F low = low_lanes(rows.v[2 * i], rows.v[2 * i + 1]);
+    samples.v[i] = low + fx * (high_lanes(rows.v[2 * i], rows.v[2 * i + 1]) - low);
+  }
+  return samples;
+}
+
+inline void store_openness(const Samples& samples, float* out) {
+  std::uint64_t open = 0;
+  for (int i = 0; i < 4; ++i) open |= std::uint64_t{open_bits(samples.v[i])} << (16 * i);
+  const std::uint32_t last = open_bits(samples.v[4]);
+  for (int i = 0; i < kVerticesAtOnce; ++i) {
+    const int count = std::popcount(open >> (8 * i) & 0x003F'003F'003F'003FU) + std::popcount(last >> (8 * i) & 0x07U);
+    out[i] = static_cast<float>(count) * (1.0F / 27.0F);
+  }
+}
+
+inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions& options, float* out) {
+  const F zero = all(0.0F);
+  F sum = zero;
+  F least = zero;
+  for (int i = 0; i < 5; ++i) {
+    const F depth = min(samples.v[i], zero);
+    sum = sum + depth;
+    least = min(least, depth);
+  }
+  alignas(64) float sums[kWidth];
+  alignas(64) float leasts[kWidth];
+  store(sums, sum);
+  store(leasts, least);
+  for (int i = 0; i < kVerticesAtOnce; ++i) {
+    const float* const s = sums + 8 * i;
+    const float* const l = leasts + 8 * i;
+    const float deepest = std::min({l[0], l[1], l[2], l[3], l[4], l[5]});
+    out[i] = weighted_openness(((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]), deepest, options);
+  }
+}
+
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
+  if (count == 0) return;
+  for (int z = std::max(work.next_decoded, slice.z - kBelow); z <= slice.z + kAbove; ++z) decode_slice(work, z);
+  work.next_decoded = slice.z + kAbove + 1;
+  const int spread = static_cast<int>(work.occlusion.spread);
+  const Thirds low_lanes(spread, 0);
+  const Thirds high_lanes(spread, 1);
+  const bool is_counted = work.occlusion.form == SmoothOcclusion::Openness;
+  for (std::size_t first = 0; first < count; first += kWidth) {
+    const Centres centres = find_centres(work, slice, first);
+    const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);
+    for (std::size_t lane = 0; lane < lanes; lane += kVerticesAtOnce) {
+      const NineRows rows = rows_around(work, centres, lane, spread);
+      const Samples samples = samples_of(rows, spread_out(centres.fx + lane), low_lanes, high_lanes);
+      if (is_counted) {
+        store_openness(samples, openness + first + lane);
+      } else {
+        store_weighted(samples, work.occlusion, openness + first + lane);
+      }
+    }
+  }
+}

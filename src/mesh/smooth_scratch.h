@@ -1,0 +1,133 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/density_chunk.h>
+#include <quoin/mesh/smooth.h>
+
+namespace quoin::smooth {
+
+// What is meshed lies on a lattice: every 2^level-th sample of the chunk and its neighbours. Lattice points of the
+// chunk are 0 to n - 1 on each axis (n = 64 >> level), cell c spans lattice points c and c + 1. Within a slice of cells
+// or points, (x, y) has the place (y + 1) * 128 + x + 1: x and y begin at -1.
+
+inline constexpr int kPlaceShift = 7;
+inline constexpr int kPlaceStride = 1 << kPlaceShift;
+inline constexpr int kSlicePlaces = 66 * kPlaceStride;
+
+constexpr int place_of(int x, int y) {
+  return (y + 1) * kPlaceStride + x + 1;
+}
+
+// The widest apron of lattice points around the chunk: occlusion of spread 4.
+inline constexpr int kWidestApron = 12;
+// Rows of points lie at x = -16 to 111, y and z from -kWidestApron to 63 + kWidestApron + 1.
+inline constexpr int kPointX = 16;
+inline constexpr int kPointRows = 64 + 2 * kWidestApron + 2;
+inline constexpr int kPointSlice = kPointRows * kPlaceStride;
+
+// Words of signs: rows -1 to 64 of a slice.
+inline constexpr int kSignRows = 72;
+
+// The range of cells that a mesh covers, the same on each axis: [first, last).
+struct CellRange {
+  int first = -1;
+  int last = 64;
+
+  // Where edges start that lie along an axis: [first_edge, last) on it, [first + 1, last) on the others.
+  [[nodiscard]] int first_edge() const { return first < 0 ? 0 : first; }
+};
+
+// A bit for each row of a slice of points, row y at bit y + 16.
+struct RowSet {
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+
+  void add(int y) {
+    const int bit = y + 16;
+    (bit < 64 ? low : high) |= std::uint64_t{1} << (bit & 63);
+  }
+  [[nodiscard]] bool has(int y) const {
+    const int bit = y + 16;
+    return ((bit < 64 ? low : high) >> (bit & 63) & 1U) != 0;
+  }
+  [[nodiscard]] bool empty() const { return (low | high) == 0; }
+  void unite(const RowSet& other) {
+    low |= other.low;
+    high |= other.high;
+  }
+  // Towards larger rows.
+  [[nodiscard]] RowSet raised() const { return {low << 1, high << 1 | low >> 63}; }
+  [[nodiscard]] RowSet lowered() const { return {low >> 1 | high << 63, high >> 1}; }
+};
+
+// What the kernels read and write. Points are addressed by `point`.
+struct Work {
+  int level = 0;
+  int n = 64;
+  CellRange cells;
+  SmoothOcclusionOptions occlusion;
+
+  // Signs of the points of each row: bit x, and those of points -1 and n in words of their own (bit 0).
+  std::uint64_t solid[66][kSignRows];
+  std::uint64_t before[66][kSignRows];
+  std::uint64_t after[66][kSignRows];
+  // Of each row of cells, [z + 1][y + 1]: cells 0 to n - 1, and cell -1 in bit 0 of a word of its own.
+  std::uint64_t active[65][kSignRows];
+  std::uint64_t active_before[65][kSignRows];
+  // Which rows of cells have an active one, by slice [z + 1].
+  std::array<RowSet, 66> active_rows;
+  // Which rows of points are needed and gathered, by slice [z + kWidestApron].
+  std::array<RowSet, kPointRows> needed_rows;
+
+  std::vector<Half> points = std::vector<Half>(std::size_t{kPointRows} * kPointSlice + 64);
+
+  // Places of the active cells of a slice, and of crossed edges, those that start at a solid point with bit 15 set.
+  alignas(64) std::uint16_t places[kSlicePlaces + 64];
+  // What a place of the two last slices holds: the vertex, counted from the slice's first, in 13 bits, and its
+  // fractions in 64ths, 6 bits each.
+  alignas(64) std::uint32_t vertices[2][kSlicePlaces + 64];
+  // Of the slice's vertices, for occlusion.
+  alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
+  alignas(64) float normals[3][kSlicePlaces / 2 + 64];
+
+  // Points as floats, the last 16 slices: [z % 16][y + kWidestApron][x + kPointX]. Only with occlusion.
+  std::vector<float> decoded;
+  int next_decoded = 0;  // the first slice that is not there yet
+
+  // The row of points (y, z): x = 0 is at its begin.
+  [[nodiscard]] Half* row(int y, int z) {
+    return points.data() + static_cast<std::ptrdiff_t>(z + kWidestApron) * kPointSlice +
+           (y + kWidestApron) * kPlaceStride + kPointX;
+  }
+};
+
+inline constexpr int kDecodedStride = 96;
+inline constexpr int kDecodedSlices = 16;
+inline constexpr int kDecodedSlice = kPointRows * kDecodedStride;
+
+inline constexpr int kVertexBits = 13;
+
+// Lattice points beyond its cell's that a vertex may read, for occlusion.
+[[nodiscard]] int apron_of(const SmoothOcclusionOptions& occlusion);
+
+// The options with every number brought into its range.
+[[nodiscard]] SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level);
+
+// Whether the vector kernels serve this occlusion.
+[[nodiscard]] inline bool is_whole_spread(const SmoothOcclusionOptions& occlusion) {
+  return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
+}
+
+// Fills in the signs, the active cells and the points that are needed; false when no cell is active.
+[[nodiscard]] bool gather(const DensityNeighbourhood& chunks, Work& work);
+
+void mesh_plain(Work& work, SmoothChunkMesh& out);
+void mesh_avx2(Work& work, SmoothChunkMesh& out);
+void mesh_avx512(Work& work, SmoothChunkMesh& out);
+
+}  // namespace quoin::smooth
