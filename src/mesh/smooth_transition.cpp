@@ -186,11 +186,12 @@ class Transitions {
   }
 
   [[nodiscard]] std::optional<std::uint32_t> kernel_vertex(SmoothCell name) const {
-    const SmoothCell* end = out_.cells.begin() + kernel_vertices_;
+    const SmoothCell* begin = out_.cells.data();
+    const SmoothCell* end = begin + kernel_vertices_;
     const SmoothCell* found =
-        std::lower_bound(out_.cells.begin(), end, name, [](SmoothCell a, SmoothCell b) { return a.bits < b.bits; });
+        std::lower_bound(begin, end, name, [](SmoothCell a, SmoothCell b) { return a.bits < b.bits; });
     if (found == end || !(*found == name)) return std::nullopt;
-    return static_cast<std::uint32_t>(found - out_.cells.begin());
+    return static_cast<std::uint32_t>(found - begin);
   }
 
   const DensityNeighbourhood& chunks_;
