@@ -29,7 +29,8 @@ Half nearest_half(float value) {
     (value_of(middle) <= magnitude ? low : high) = middle;
   }
   const double below = magnitude - value_of(low);
-  const double above = std::ldexp(1024.0 + (high & 1023), (high >> 10) - 25) - magnitude;
+  const double next = high == 0x7C00 ? 65'536.0 : value_of(high);
+  const double above = next - magnitude;
   const bool is_high = above < below || (above == below && (high & 1) == 0);
   return static_cast<Half>((is_high ? high : low) | (std::signbit(value) ? 0x8000 : 0));
 }

@@ -165,7 +165,7 @@ TEST(DensityEdits, AgreeWithAPlainFieldAndTellOfEveryChunkThatTheyReach) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     DensityGrid grid(kBand);
-    PlainField plain({IVec3(-70), IVec3(90)}, kBand);
+    PlainField plain({IVec3(-54), IVec3(70)}, kBand);
     for (int round = 0; round < 12; ++round) {
       SCOPED_TRACE(round);
       const std::uint64_t version = grid.version();
@@ -274,7 +274,7 @@ TEST(DensityEdits, FarPlacesAndHugeRemovalsCostOnlyWhatIsThere) {
   EXPECT_EQ(grid.add_sphere({1e300, 0, 0}, 5.0, 1), 0);
   EXPECT_EQ(grid.add_box({1e300, 1e300, 1e300}, {1.7e308, 1.7e308, 1.7e308}, 1), 0);
   EXPECT_GT(grid.add_sphere({1e9, -1e9, 1e9}, 5.0, 1), 0);
-  EXPECT_EQ(grid.smooth({0, 0, 0}, 1e300, 1e-9), 0);
+  EXPECT_GT(grid.smooth({0, 0, 0}, 1e300, 0.5), 0);
   EXPECT_GT(grid.remove_sphere({0, 0, 0}, 1e300), 0);
   EXPECT_EQ(grid.chunk_count(), 0U);
   EXPECT_EQ(grid.remove_box({-1.7e308, -1.7e308, -1.7e308}, {1.7e308, 1.7e308, 1.7e308}), 0);
@@ -308,8 +308,9 @@ TEST(DensityEdits, SmoothingTowardsTheMeanLowersATip) {
 TEST(DensityEdits, FlatteningAtFullStrengthPutsTheSurfaceOnThePlane) {
   DensityGrid grid;
   grid.add_box({-30, -30, -30}, {30, 0, 30}, 4);
-  grid.flatten({0, 0, 0}, 20.0, {0, 3, 0}, {0, 1e300, 0}, 1.0, 5);
-  EXPECT_NEAR(grid.density_at({0, 3, 0}), 0.0F, 0.1F);
+  grid.flatten({0, 3, 0}, 20.0, {0, 3, 0}, {0, 1e300, 0}, 1.0, 5);
+  EXPECT_EQ(grid.density({0, 3, 0}), 0.0F);
+  EXPECT_NEAR(grid.density({4, 3, 4}), 3.0F - 3.0F * std::pow(1.0F - 32.0F / 400.0F, 2.0F), 0.01F);
   EXPECT_LT(grid.density({0, 2, 0}), 0.0F);
   EXPECT_EQ(grid.material({0, 2, 0}), 5);
   EXPECT_EQ(grid.material({0, -2, 0}), 4);

@@ -91,7 +91,8 @@ TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
   for (int z = -30; z < 90; ++z) {
     for (int y = -30; y < 90; ++y) {
       for (int x = -30; x < 90; ++x) {
-        if (grid.get({x, y, z}) == kAir) ASSERT_GT(field.density({x, y, z}), 0.19F);
+        const bool is_air = grid.get({x, y, z}) == kAir;
+        ASSERT_EQ(is_air, field.density({x, y, z}) > 0.19F);
       }
     }
   }
@@ -101,7 +102,11 @@ TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   Grid grid;
   grid.fill_box({-100, -100, -40}, {100, 9, 40}, 3);
   const DensityGrid field = field_from_grid(grid);
-  for (int y = 0; y < 30; ++y) EXPECT_NEAR(field.density({0, y, 0}), std::clamp(y - 9.5, -8.0, 8.0), 0.01) << y;
+  for (int y = 0; y < 30; ++y) {
+    // The smoothing sees no more than 8.5, so it bends the last values a little.
+    const double distance = y - 9.5;
+    EXPECT_NEAR(field.density({0, y, 0}), std::clamp(distance, -8.0, 8.0), std::abs(distance) < 6.6 ? 0.01 : 0.07) << y;
+  }
 }
 
 TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
