@@ -17,6 +17,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
