@@ -7,7 +7,7 @@
 
 #include <quoin/mesh/smooth_mesh.h>
 
-#include "mesh/smooth_test_support.h"
+#include "mesh/smooth_surface_check.h"
 
 namespace quoin {
 namespace {
