@@ -53,6 +53,7 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
       return write_gltf(scene, meshes, path, progress);
     case FileFormat::Obj:
       return write_obj(scene, meshes, path, progress);
+    case FileFormat::Ply:
     case FileFormat::Vox:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:

@@ -17,6 +17,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
@@ -24,6 +25,7 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_meshes.h>
+#include <quoin/io/smooth_files.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
@@ -31,6 +33,7 @@
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
