@@ -39,7 +39,7 @@ constexpr float kUncavedLayers = 12.0F;
 
 constexpr float kSteepNormal = 0.62F;
 constexpr float kSoilDepth = 3.5F;
-constexpr float kTurfDepth = 1.3F;
+constexpr float kTurfDepth = 2.2F;
 
 double smooth_step(double low, double high, double x) {
   const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
