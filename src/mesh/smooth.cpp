@@ -47,7 +47,7 @@ void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions&
   work.cells =
       options.border == SmoothBorder::Shared ? smooth::CellRange{-1, work.n} : smooth::CellRange{0, work.n - 1};
   work.occlusion = smooth::within_limits(options.occlusion, work.level);
-  if (smooth::gather(chunks, work)) scratch_->kernel(work, out);
+  if (smooth::prepare(chunks, work)) scratch_->kernel(work, out);
 }
 
 void SmoothChunkMesh::clear() {
