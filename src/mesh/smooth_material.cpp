@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <utility>
 
 #include "core/srgb.h"
+#include "mesh/smooth_levels.h"
 
 namespace quoin {
 namespace {
@@ -15,6 +18,25 @@ std::uint16_t linear16(std::uint8_t encoded) {
   return static_cast<std::uint16_t>(std::lround(linear_from_srgb(encoded) * 65'535.0F));
 }
 
+bool is_solid(const DensityNeighbourhood& chunks, IVec3 sample) {
+  return DensityChunk::is_solid(chunks.get(sample));
+}
+
+VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
+  const IVec3 offset = chunk_of(sample);
+  const DensityChunk* chunk = chunks.at(offset.x, offset.y, offset.z);
+  return chunk == nullptr ? kAir : chunk->materials().get(local_of(sample));
+}
+
+std::size_t materials_of_corners(const DensityNeighbourhood& chunks, IVec3 first, VoxelType* out) {
+  std::size_t found = 0;
+  for (std::uint32_t solid = smooth::solid_corners_of(chunks, {IVec3{0}, first, 0}); solid != 0; solid &= solid - 1) {
+    const int corner = std::countr_zero(solid);
+    out[found++] = material_at(chunks, first + IVec3{corner & 1, corner >> 1 & 1, corner >> 2});
+  }
+  return found;
+}
+
 // The materials of the solid samples of the closed box from `first`, `count` a side and `step` apart.
 std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int count, int step, VoxelType* out) {
   std::size_t found = 0;
@@ -22,14 +44,31 @@ std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int
     for (int y = 0; y < count; ++y) {
       for (int x = 0; x < count; ++x) {
         const IVec3 sample = first + IVec3{x, y, z} * step;
-        const IVec3 offset = chunk_of(sample);
-        const DensityChunk* chunk = chunks.at(offset.x, offset.y, offset.z);
-        if (chunk == nullptr) continue;
-        const IVec3 local = local_of(sample);
-        if ((chunk->solid_row(local.y, local.z) >> local.x & 1U) == 0) continue;
-        out[found++] = chunk->materials().get(local);
+        if (is_solid(chunks, sample)) out[found++] = material_at(chunks, sample);
       }
     }
+  }
+  return found;
+}
+
+// The materials of the solid samples nearest to the surface along the crossed edges of a cell that is `size` wide: what
+// lies on the ground, where the corners lie well below it.
+std::size_t materials_under_crossings(const DensityNeighbourhood& chunks, IVec3 first, int size, VoxelType* out) {
+  std::size_t found = 0;
+  for (int edge = 0; edge < 12; ++edge) {
+    const int axis = edge / 4;
+    IVec3 solid = first;
+    solid[(axis + 1) % 3] += (edge & 1) * size;
+    solid[(axis + 2) % 3] += (edge >> 1 & 1) * size;
+    IVec3 air = solid;
+    air[axis] += size;
+    if (is_solid(chunks, solid) == is_solid(chunks, air)) continue;
+    if (is_solid(chunks, air)) std::swap(solid, air);
+    for (int width = size / 2; width >= 1; width /= 2) {
+      const IVec3 middle = (solid + air) / 2;
+      (is_solid(chunks, middle) ? solid : air) = middle;
+    }
+    out[found++] = material_at(chunks, solid);
   }
   return found;
 }
@@ -50,6 +89,9 @@ LinearRgba16 SurfaceMaterials::albedo(VoxelType type) const {
 }
 
 SurfaceMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
+  if (std::all_of(solid.begin(), solid.end(), [&](VoxelType type) { return type == solid[0]; })) {
+    return {albedo(solid[0]), solid[0]};
+  }
   std::sort(solid.begin(), solid.end());
   std::array<std::uint32_t, 4> sum{};
   SurfaceMaterial blended;
@@ -79,6 +121,9 @@ SurfaceMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IV
     if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
   }
   std::array<VoxelType, 729> solid;
+  const std::size_t near_surface = level == 0 ? materials_of_corners(chunks, first, solid.data())
+                                              : materials_under_crossings(chunks, first, size, solid.data());
+  if (near_surface != 0) return blend({solid.data(), near_surface});
   for (int step = size; step >= 1; step /= 2) {
     const std::size_t found = solid_materials(chunks, first, size / step + 1, step, solid.data());
     if (found != 0) return blend({solid.data(), found});
