@@ -6,8 +6,8 @@
 #include <functional>
 #include <limits>
 
+#include "core/srgb.h"
 #include "io/smooth_files_fixture.h"
-#include "light/srgb.h"
 
 namespace quoin {
 

@@ -6,7 +6,7 @@
 
 #include <glm/matrix.hpp>
 
-#include "light/srgb.h"
+#include "core/srgb.h"
 
 namespace quoin {
 
