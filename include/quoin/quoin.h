@@ -27,6 +27,7 @@
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/smooth_files.h>
 #include <quoin/io/volume.h>
+#include <quoin/io/volume_field.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
 #include <quoin/mesh/blocky.h>
@@ -42,6 +43,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/noise.h>
+#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>

@@ -51,8 +51,9 @@ std::int64_t apply_shape(DensityStore& store, const Shape& shape, bool adds, Vox
     return adds && distance + kChunkRadius <= -band ? ChunkEdit::Solid : ChunkEdit::Rows;
   };
   const auto change = [&](IVec3 start, int first, int end, SampleRow& row) {
-    if (shape.distance(DVec3(start) + DVec3{kMiddle, 0.0, 0.0}) - kRowRadius >= band) return;
+    if (shape.distance(DVec3(start) + DVec3{kMiddle, 0.0, 0.0}) - kRowRadius >= band) return false;
     combine_row(shape, start, first, end, material, row, combine);
+    return true;
   };
   return store.edit(box_around(shape.min() - band, shape.max() + band), adds, material, choose, change);
 }
@@ -78,6 +79,7 @@ bool DensityGrid::set(IVec3 sample, DensitySample value) {
     const auto i = static_cast<std::size_t>(sample.x - start.x);
     row.densities[i] = value.density;
     row.materials[i] = value.material;
+    return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
   return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace) != 0;
@@ -92,6 +94,7 @@ std::int64_t DensityGrid::edit(const IBox& box,
       row.densities[i] = picked.density;
       row.materials[i] = picked.material;
     }
+    return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
   return impl_->store.edit(box_from(box), true, kAir, rows, change);
@@ -137,6 +140,7 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec
       if (!(density < 0.0F) && moved < 0.0F) row.materials[static_cast<std::size_t>(x)] = material;
       density = moved;
     }
+    return true;
   };
   return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, material, choose, change);
 }

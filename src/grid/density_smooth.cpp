@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/buffer.h>
+
 #include "grid/density_grid_impl.h"
 #include "grid/density_shapes.h"
 
@@ -31,7 +33,10 @@ bool is_one_value(const DensityNeighbourhood& around) {
 /// The densities of a part of a chunk and one sample around it.
 class Window {
  public:
-  Window() : values_(kSide * kSide * kSide), row_sums_(values_.size()) {}
+  Window() {
+    values_.resize(std::size_t{kSide} * kSide * kSide);
+    row_sums_.resize(values_.size());
+  }
 
   void read(const DensityNeighbourhood& around, const IBox& part) {
     part_ = part;
@@ -60,8 +65,8 @@ class Window {
   }
 
   IBox part_;
-  std::vector<double> values_;
-  std::vector<double> row_sums_;
+  Buffer<double> values_;
+  Buffer<double> row_sums_;
 };
 
 // The material of most solid samples among the 26 neighbours; of several, the least.
@@ -152,6 +157,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
         row.materials[i] = solids[next_solid++].second;
       }
     }
+    return true;
   });
 }
 

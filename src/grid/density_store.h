@@ -71,7 +71,8 @@ class DensityStore {
   ///
   /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
   /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
-  /// `change(sample, first, end, row)` changes part of a row; `sample` is the row's first (local x = 0).
+  /// `change(sample, first, end, row)` changes part of a row, and answers false when it did not; `sample` is the row's
+  /// first (local x = 0).
   template <class ChooseChunk, class ChangeRow>
   std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change);
 
@@ -119,7 +120,7 @@ std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& c
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
         read_row(entry.samples, y, z, row);
-        change(chunk * kChunkEdge + IVec3{0, y, z}, part.min.x, part.max.x, row);
+        if (!change(chunk * kChunkEdge + IVec3{0, y, z}, part.min.x, part.max.x, row)) continue;
         changes.add(y, z, write_row(entry.samples, y, z, part.min.x, part.max.x, row));
         has_even_row = has_even_row || is_even(entry.samples.row(y, z));
       }

@@ -24,7 +24,7 @@ constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples whose distance is 
 constexpr int kMargin = kReach + kBlur;
 constexpr int kRegion = kChunkEdge + 2 * kMargin;  // voxels that are looked at, along an edge
 constexpr int kPitch = 80;                         // kSmoothed, rounded up to whole vectors
-constexpr float kLeastDensity = 0.2F;
+constexpr float kLeastDensity = 0.1F;
 constexpr float kBand = 8.0F;
 
 using ByteRow = std::array<std::uint8_t, kPitch>;

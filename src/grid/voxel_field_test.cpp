@@ -26,7 +26,7 @@ class PlainVoxelField {
       }
     }
     const double smoothed = std::clamp(sum / 4096.0, -8.0, 8.0);
-    return grid_.get(p) != kAir ? std::min(smoothed, -0.2) : std::max(smoothed, 0.2);
+    return grid_.get(p) != kAir ? std::min(smoothed, -0.1) : std::max(smoothed, 0.1);
   }
 
  private:
@@ -85,14 +85,14 @@ TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
   EXPECT_EQ(field.solid_count(), grid.voxel_count());
   EXPECT_EQ(field.solid_bounds(), grid.bounds());
   grid.for_each([&](IVec3 p, VoxelType type) {
-    ASSERT_LT(field.density(p), -0.19F);
+    ASSERT_LT(field.density(p), -0.099F);
     ASSERT_EQ(field.material(p), type);
   });
   for (int z = -30; z < 90; ++z) {
     for (int y = -30; y < 90; ++y) {
       for (int x = -30; x < 90; ++x) {
         const bool is_air = grid.get({x, y, z}) == kAir;
-        ASSERT_EQ(is_air, field.density({x, y, z}) > 0.19F);
+        ASSERT_EQ(is_air, field.density({x, y, z}) > 0.099F);
       }
     }
   }

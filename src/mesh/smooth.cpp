@@ -42,7 +42,7 @@ struct SmoothMesher::Scratch {
     work.n = kChunkEdge >> work.level;
     work.cells = cells;
     work.occlusion = smooth::within_limits(options.occlusion, work.level);
-    if (smooth::gather(chunks, work)) kernel(work, out);
+    if (smooth::prepare(chunks, work)) kernel(work, out);
   }
 };
 

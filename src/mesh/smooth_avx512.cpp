@@ -32,6 +32,12 @@ namespace {
 
 #include "mesh/smooth_vectors.inl"
 
+void decode_row(const Half* from, float* to, int count) {
+  for (int i = 0; i < count; i += kWidth) store(to + i, load_halves(from + i));
+}
+
+#include "mesh/smooth_points.inl"
+
 #include "mesh/smooth_occlusion.inl"
 
 #include "mesh/smooth_slices.inl"

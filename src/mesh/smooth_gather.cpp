@@ -37,11 +37,35 @@ std::uint64_t solid_row(const DensityChunk* chunk, Half outside, ChunkCoordinate
   return chunk->solid_row(y.sample, z.sample);
 }
 
+// The signs of 64 rows of one chunk column at once, as they lie in storage.
+void copy_signs(const DensityChunk* chunk, Half outside, int z, std::uint64_t* to) {
+  if (chunk != nullptr && chunk->mixed() != nullptr) {
+    std::memcpy(to, chunk->mixed()->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
+                kChunkEdge * sizeof(std::uint64_t));
+    return;
+  }
+  const Half value = chunk == nullptr ? outside : *chunk->uniform();
+  std::fill_n(to, kChunkEdge, DensityChunk::is_solid(value) ? kAllSolid : 0);
+}
+
+// Rows 0 to 63 of slice z at level 0.
+void gather_inner_signs(const DensityNeighbourhood& chunks, int z, Work& work) {
+  const ChunkCoordinate cz = chunk_coordinate(z, 0);
+  copy_signs(chunks.at(0, 0, cz.chunk), chunks.outside, cz.sample, work.solid[z + 1] + 1);
+  copy_signs(chunks.at(-1, 0, cz.chunk), chunks.outside, cz.sample, work.before[z + 1] + 1);
+  copy_signs(chunks.at(1, 0, cz.chunk), chunks.outside, cz.sample, work.after[z + 1] + 1);
+  for (int y = 1; y <= kChunkEdge; ++y) work.before[z + 1][y] >>= kChunkEdge - 1;
+  for (int y = 1; y <= kChunkEdge; ++y) work.after[z + 1][y] &= 1U;
+}
+
 void gather_signs(const DensityNeighbourhood& chunks, Work& work) {
   const int last = work.cells.last;  // the last point
   for (int z = work.cells.first; z <= last; ++z) {
     const ChunkCoordinate cz = chunk_coordinate(z, work.level);
+    if (work.level == 0) gather_inner_signs(chunks, z, work);
     for (int y = work.cells.first; y <= last; ++y) {
+      if (work.level == 0 && y == 0) y = kChunkEdge;
+      if (y > last) break;
       const ChunkCoordinate cy = chunk_coordinate(y, work.level);
       const auto row = [&](int dx) { return solid_row(chunks.at(dx, cy.chunk, cz.chunk), chunks.outside, cy, cz); };
       work.solid[z + 1][y + 1] = thinned(row(0), work.level);
@@ -85,64 +109,51 @@ void find_active(Work& work) {
   }
 }
 
-// Rows of points within `apron` of an active cell's; 0: those of its corners only.
-bool find_needed(int apron, Work& work) {
-  work.needed_rows.fill({});
+// Rows of points that are corners of an active cell, and those within the apron of one.
+bool find_needed(Work& work) {
+  work.corner_rows.fill({});
+  work.occlusion_rows.fill({});
   bool is_any = false;
   for (int z = work.cells.first; z < work.cells.last; ++z) {
     RowSet rows = work.active_rows[static_cast<std::size_t>(z + 1)];
     if (rows.empty()) continue;
     is_any = true;
     rows.unite(rows.raised());
-    for (int i = 0; i < apron; ++i) {
+    const auto slice = [z](auto& sets, int dz) -> RowSet& {
+      return sets[static_cast<std::size_t>(z + dz + kWidestApron)];
+    };
+    for (int dz = 0; dz <= 1; ++dz) slice(work.corner_rows, dz).unite(rows);
+    if (work.occlusion.form == SmoothOcclusion::None) continue;
+    for (int i = 0; i < work.apron; ++i) {
       const RowSet raised = rows.raised();
       rows.unite(rows.lowered());
       rows.unite(raised);
     }
-    for (int dz = -apron; dz <= apron + 1; ++dz) {
-      work.needed_rows[static_cast<std::size_t>(z + dz + kWidestApron)].unite(rows);
-    }
+    for (int dz = -work.apron; dz <= work.apron + 1; ++dz) slice(work.occlusion_rows, dz).unite(rows);
   }
   return is_any;
 }
 
-void fill(Half* to, int count, Half value) {
-  std::fill_n(to, count, value);
+// `kCount` points of a row of one chunk at level 0, from `first` on.
+template <int kCount>
+void copy_points(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int first, Half* to) {
+  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
+  if (from != nullptr) {
+    std::memcpy(to, from + first, kCount * sizeof(Half));
+  } else {
+    std::fill_n(to, kCount, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
+  }
 }
 
-// Points [first, first + count) of a row of one chunk, counted in that chunk.
-void copy_points(const DensityChunk* chunk, Half outside, int y, int z, int level, int first, int count, Half* to) {
-  if (chunk == nullptr) return fill(to, count, outside);
-  const Half* const from = chunk->row(y, z);
-  if (from == nullptr) return fill(to, count, chunk->get(0, y, z));
-  if (level == 0) {
-    std::memcpy(to, from + first, static_cast<std::size_t>(count) * sizeof(Half));
+// All points of a row of one chunk at a coarser level.
+void copy_thinned(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int level, Half* to) {
+  const int n = kChunkEdge >> level;
+  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
+  if (from == nullptr) {
+    std::fill_n(to, n, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
     return;
   }
-  for (int i = 0; i < count; ++i) to[i] = from[(first + i) << level];
-}
-
-void gather_points(const DensityNeighbourhood& chunks, int apron, Work& work) {
-  const int n = work.n;
-  // Sixteen points at a time on both sides, which is quicker than a few.
-  const int side = work.level <= 2 ? 16 : n;
-  for (int z = -apron - 1; z <= n + apron; ++z) {
-    const RowSet& needed = work.needed_rows[static_cast<std::size_t>(z + kWidestApron)];
-    if (needed.empty()) continue;
-    const ChunkCoordinate cz = chunk_coordinate(z, work.level);
-    for (int y = -apron - 1; y <= n + apron; ++y) {
-      if (!needed.has(y)) continue;
-      const ChunkCoordinate cy = chunk_coordinate(y, work.level);
-      Half* const row = work.row(y, z);
-      const auto copy = [&](int dx, int first, int count, Half* to) {
-        copy_points(chunks.at(dx, cy.chunk, cz.chunk), chunks.outside, cy.sample, cz.sample, work.level, first, count,
-                    to);
-      };
-      copy(-1, n - side, side, row - side);
-      copy(0, 0, n, row);
-      copy(1, 0, side, row + n);
-    }
-  }
+  for (int i = 0; i < n; ++i) to[i] = from[i << level];
 }
 
 // Nothing to mesh where the chunk and all that its cells touch are of one sign throughout.
@@ -177,14 +188,33 @@ SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level
   return occlusion;
 }
 
-bool gather(const DensityNeighbourhood& chunks, Work& work) {
+bool prepare(const DensityNeighbourhood& chunks, Work& work) {
   if (is_of_one_sign(chunks)) return false;
+  work.chunks = &chunks;
+  work.apron = apron_of(work.occlusion);
   gather_signs(chunks, work);
   find_active(work);
-  const int apron = apron_of(work.occlusion);
-  if (!find_needed(apron, work)) return false;
-  gather_points(chunks, apron, work);
-  return true;
+  return find_needed(work);
+}
+
+void gather_row(const Work& work, int y, int z, Half* row) {
+  const ChunkCoordinate cy = chunk_coordinate(y, work.level);
+  const ChunkCoordinate cz = chunk_coordinate(z, work.level);
+  const DensityNeighbourhood& chunks = *work.chunks;
+  const DensityChunk* const three[3] = {chunks.at(-1, cy.chunk, cz.chunk), chunks.at(0, cy.chunk, cz.chunk),
+                                        chunks.at(1, cy.chunk, cz.chunk)};
+  if (work.level == 0) {
+    copy_points<kPointX>(three[0], chunks.outside, cy, cz, kChunkEdge - kPointX, row - kPointX);
+    copy_points<kChunkEdge>(three[1], chunks.outside, cy, cz, 0, row);
+    copy_points<kPointX>(three[2], chunks.outside, cy, cz, 0, row + kChunkEdge);
+    return;
+  }
+  std::array<Half, kChunkEdge> before{};
+  copy_thinned(three[0], chunks.outside, cy, cz, work.level, before.data());
+  const int side = std::min(work.n, kPointX);
+  std::copy_n(before.data() + work.n - side, side, row - side);
+  copy_thinned(three[1], chunks.outside, cy, cz, work.level, row);
+  copy_thinned(three[2], chunks.outside, cy, cz, work.level, row + work.n);
 }
 
 }  // namespace quoin::smooth
@@ -193,7 +223,8 @@ namespace quoin {
 
 int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
   const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, coarsest_level);
-  return (smooth::apron_of(limited) + 1) << coarsest_level;
+  // Without occlusion, splitting sheets looks at the cells beside its own.
+  return (std::max(smooth::apron_of(limited), 1) + 1) << coarsest_level;
 }
 
 }  // namespace quoin

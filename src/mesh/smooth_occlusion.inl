@@ -2,32 +2,6 @@
 // one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn. Included
 // within a namespace, after the lanes.
 
-constexpr int kSliceMask = kDecodedSlices - 1;
-// Points below and above a cell's own that occlusion of the widest spread here reads.
-constexpr int kBelow = 5;
-constexpr int kAbove = 6;
-
-inline float* decoded_row(Work& work, int y, int z) {
-  return work.decoded.data() + (z & kSliceMask) * kDecodedSlice + (y + kWidestApron) * kDecodedStride + kPointX;
-}
-
-inline void decode_slice(Work& work, int z) {
-  const RowSet& needed = work.needed_rows[static_cast<std::size_t>(z + kWidestApron)];
-  if (needed.empty()) return;
-  for (int y = -kBelow - 1; y <= work.n + kBelow; ++y) {
-    if (!needed.has(y)) continue;
-    const Half* const from = work.row(y, z);
-    float* const to = decoded_row(work, y, z);
-    for (int x = -kPointX; x < work.n + kPointX; x += kWidth) store(to + x, load_halves(from + x));
-  }
-}
-
-void begin_occlusion(Work& work) {
-  if (!is_whole_spread(work.occlusion)) return;
-  if (work.decoded.empty()) work.decoded.resize(std::size_t{kDecodedSlices} * kDecodedSlice + 64);
-  work.next_decoded = work.cells.first - kBelow;
-}
-
 // Where each vertex of a slice is sampled: the lowest point that it reads, and the fractions that its samples share.
 struct Centres {
   alignas(64) std::int32_t offset[kWidth];
@@ -73,7 +47,7 @@ inline NineRows rows_around(const Work& work, const Centres& centres, std::size_
   for (int k = 0; k < 6; ++k) {
     for (int i = 0; i < kVerticesAtOnce; ++i) {
       const std::size_t at = lane + static_cast<std::size_t>(i);
-      const int z = (centres.z[at] + (k >> 1) * spread + (k & 1)) & kSliceMask;
+      const int z = (centres.z[at] + (k >> 1) * spread + (k & 1)) & work.decoded_mask;
       slices[k][i] = work.decoded.data() + z * kDecodedSlice + centres.offset[at];
     }
   }
@@ -141,10 +115,9 @@ inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions&
 }
 
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
-  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
   if (count == 0) return;
-  for (int z = std::max(work.next_decoded, slice.z - kBelow); z <= slice.z + kAbove; ++z) decode_slice(work, z);
-  work.next_decoded = slice.z + kAbove + 1;
+  decode_around(work, slice.z);
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
   const int spread = static_cast<int>(work.occlusion.spread);
   const Thirds low_lanes(spread, 0);
   const Thirds high_lanes(spread, 1);

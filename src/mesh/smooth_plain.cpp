@@ -17,8 +17,13 @@ namespace {
 
 #include "mesh/smooth_bits.inl"
 
-Corners corners_at(const Half* low) {
-  const Half* const high = low + kPointSlice;
+void decode_row(const Half* from, float* to, int count) {
+  for (int i = 0; i < count; ++i) to[i] = float_from_half(from[i]);
+}
+
+#include "mesh/smooth_points.inl"
+
+Corners corners_at(const Half* low, const Half* high) {
   return {float_from_half(low[0]),
           float_from_half(low[1]),
           float_from_half(low[kPlaceStride]),
@@ -42,7 +47,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
     const int place = work.places[i];
     const int x = column_of(place);
     const int y = row_of(place);
-    const CellVertex vertex = cell_vertex(corners_at(work.row(y, slice.z) + x));
+    const CellVertex vertex = cell_vertex(corners_at(work.row(y, slice.z) + x, work.row(y, slice.z + 1) + x));
     const std::size_t at = slice.first_vertex + i;
     out.positions.data()[at] = (Vec3(x, y, slice.z) + vertex.snapped) * scale;
     out.normals.data()[at] = vertex.normal;
@@ -52,9 +57,8 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   }
 }
 
-void begin_occlusion(Work& /*work*/) {}
-
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+  decode_around(work, slice.z);
   occlusion_one_by_one(work, slice, count, out, openness);
 }
 

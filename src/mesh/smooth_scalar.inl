@@ -57,14 +57,3 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
   along[Around<kAxis>::v] = v_sign;
   return along;
 }
-
-void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out,
-                          float* openness) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const Half* const corner = work.row(row_of(work.places[i]), slice.z) + column_of(work.places[i]);
-    const Vec3 fraction(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
-    openness[i] = vertex_openness(
-        fraction, out.normals.data()[slice.first_vertex + i], work.occlusion,
-        [&](int x, int y, int z) { return float_from_half(corner[x + y * kPlaceStride + z * kPointSlice]); });
-  }
-}

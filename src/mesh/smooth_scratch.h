@@ -25,10 +25,14 @@ constexpr int place_of(int x, int y) {
 
 // The widest apron of lattice points around the chunk: occlusion of spread 4.
 inline constexpr int kWidestApron = 12;
-// Rows of points lie at x = -16 to 111, y and z from -kWidestApron to 63 + kWidestApron + 1.
+// A row of points is 128 long, point x at x + 16.
 inline constexpr int kPointX = 16;
-inline constexpr int kPointRows = 64 + 2 * kWidestApron + 2;
-inline constexpr int kPointSlice = kPointRows * kPlaceStride;
+// Slices of points that occlusion may read begin at row -kWidestApron.
+inline constexpr int kApronRows = 64 + 2 * kWidestApron + 2;
+
+inline constexpr int kPointSlice = 66 * kPlaceStride;
+inline constexpr int kDecodedStride = 96;
+inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
 
 // Words of signs: rows -1 to 64 of a slice.
 inline constexpr int kSignRows = 72;
@@ -81,10 +85,13 @@ struct Work {
   std::uint64_t active_before[65][kSignRows];
   // Which rows of cells have an active one, by slice [z + 1].
   std::array<RowSet, 66> active_rows;
-  // Which rows of points are needed and gathered, by slice [z + kWidestApron].
-  std::array<RowSet, kPointRows> needed_rows;
+  // Which rows of points the cells' corners are, and which occlusion reads besides, by slice [z + kWidestApron].
+  std::array<RowSet, kApronRows> corner_rows;
+  std::array<RowSet, kApronRows> occlusion_rows;
 
-  std::vector<Half> points = std::vector<Half>(std::size_t{kPointRows} * kPointSlice + 64);
+  const DensityNeighbourhood* chunks = nullptr;
+  // The points of the two slices that are at work: [z & 1], rows -1 to 64.
+  std::vector<Half> points = std::vector<Half>(std::size_t{2} * kPointSlice + 64);
 
   // Places of the active cells of a slice, and of crossed edges, those that start at a solid point with bit 15 set.
   alignas(64) std::uint16_t places[kSlicePlaces + 64];
@@ -95,20 +102,21 @@ struct Work {
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // Points as floats, the last 16 slices: [z % 16][y + kWidestApron][x + kPointX]. Only with occlusion.
+  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX].
   std::vector<float> decoded;
+  int decoded_mask = 0;
   int next_decoded = 0;  // the first slice that is not there yet
+  int apron = 0;         // how many points below and above a cell's own occlusion reads
 
   // The row of points (y, z): x = 0 is at its begin.
   [[nodiscard]] Half* row(int y, int z) {
-    return points.data() + static_cast<std::ptrdiff_t>(z + kWidestApron) * kPointSlice +
-           (y + kWidestApron) * kPlaceStride + kPointX;
+    return points.data() + static_cast<std::ptrdiff_t>(z & 1) * kPointSlice + (y + 1) * kPlaceStride + kPointX;
+  }
+  [[nodiscard]] float* decoded_row(int y, int z) {
+    return decoded.data() + static_cast<std::ptrdiff_t>(z & decoded_mask) * kDecodedSlice +
+           (y + kWidestApron) * kDecodedStride + kPointX;
   }
 };
-
-inline constexpr int kDecodedStride = 96;
-inline constexpr int kDecodedSlices = 16;
-inline constexpr int kDecodedSlice = kPointRows * kDecodedStride;
 
 inline constexpr int kVertexBits = 13;
 
@@ -123,8 +131,11 @@ inline constexpr int kVertexBits = 13;
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }
 
-// Fills in the signs, the active cells and the points that are needed; false when no cell is active.
-[[nodiscard]] bool gather(const DensityNeighbourhood& chunks, Work& work);
+// Fills in the signs, the active cells and which points are needed; false when no cell is active.
+[[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
+// Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
+// where x = 0 is.
+void gather_row(const Work& work, int y, int z, Half* row);
 
 void mesh_plain(Work& work, SmoothChunkMesh& out);
 void mesh_avx2(Work& work, SmoothChunkMesh& out);

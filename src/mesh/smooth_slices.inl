@@ -64,11 +64,13 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
   const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
   Slice slice;
   if (has_occlusion) begin_occlusion(work);
+  gather_slice(work, work.cells.first);
   for (slice.z = work.cells.first; slice.z < work.cells.last; ++slice.z) {
     slice.first_vertex_of_last = slice.first_vertex;
     slice.first_vertex = static_cast<std::uint32_t>(out.positions.size());
     const std::size_t count = list_cells(work, slice.z);
     const std::size_t vertices = slice.first_vertex + count;
+    gather_slice(work, slice.z + 1);
     out.positions.reserve(vertices + kSlack);
     out.normals.reserve(vertices + kSlack);
     out.cells.reserve(vertices + kSlack);

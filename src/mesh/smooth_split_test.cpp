@@ -191,5 +191,37 @@ TEST(SmoothSheets, VerticesLieInTheirCells) {
   }
 }
 
+// How many of the samples of a layer below the chunk change its mesh when they change their sign.
+int edits_that_matter(DensityGrid& grid, int z) {
+  SmoothMesher mesher;
+  SmoothChunkMesh before;
+  SmoothChunkMesh after;
+  SmoothOptions options;
+  options.split_sheets = true;
+  options.occlusion.form = SmoothOcclusion::None;
+  mesher.mesh(grid.neighbourhood(IVec3{0}), options, before);
+  int changed = 0;
+  for (int i = 0; i < 20 * 20; ++i) {
+    const IVec3 sample{i % 20, i / 20, z};
+    const DensitySample old{grid.density(sample), grid.material(sample)};
+    grid.set(sample, {-old.density, 1});
+    mesher.mesh(grid.neighbourhood(IVec3{0}), options, after);
+    changed += before.positions.size() != after.positions.size() ||
+               !std::equal(before.indices.begin(), before.indices.end(), after.indices.begin(), after.indices.end()) ||
+               std::memcmp(before.positions.data(), after.positions.data(), 12 * before.positions.size()) != 0;
+    grid.set(sample, old);
+  }
+  return changed;
+}
+
+// A sheet's vertex depends on the cells beside its own, one further than the kernel reads.
+TEST(SmoothSheets, AnEditReachesTwoSamplesWithoutOcclusion) {
+  const SmoothOcclusionOptions none{SmoothOcclusion::None, 2.0F, 0.4F, 2.0F};
+  ASSERT_EQ(reach_of(none), 2);
+  DensityGrid grid = grid_of({{-1, -1, -5}, {22, 22, 3}}, oracle::scatter(21));
+  EXPECT_GT(edits_that_matter(grid, -2), 0);
+  EXPECT_EQ(edits_that_matter(grid, -3), 0);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -60,7 +60,9 @@ TEST_P(MixedLevels, ScatteredSamplesHaveNoOpenEdge) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", solid share " << share);
     const DensityGrid grid = grid_of(box, oracle::scatter(GetParam(), share));
     for (const bool split : {false, true}) {
-      oracle::expect_closed(count_surface(mesh_of(grid, options_with(random_levels(GetParam()), split))));
+      const SurfaceCount count = count_surface(mesh_of(grid, options_with(random_levels(GetParam()), split)));
+      oracle::expect_closed(count);
+      EXPECT_EQ(count.doubled_triangles, 0) << count;
     }
   }
 }
@@ -255,6 +257,57 @@ TEST(SmoothLevels, MeshesThatKnowNothingOfTheirNeighboursLevelsDoNotMeet) {
     return count_surface({mesh.indices.data(), mesh.indices.size()}, mesh.positions.size()).odd_edges;
   };
   EXPECT_GT(open_edges(fine), 2 * open_edges(coarse));
+}
+
+// How far a sample lies from the samples of chunk (0, 0, 0), as the farthest axis has it.
+int distance_from_chunk(IVec3 sample) {
+  const IVec3 outside = glm::max(glm::max(-sample, sample - (kChunkEdge - 1)), IVec3{0});
+  return std::max({outside.x, outside.y, outside.z});
+}
+
+std::vector<VertexBits> all_bits(const SmoothChunkMesh& mesh) {
+  std::vector<VertexBits> all;
+  for (std::size_t v = 0; v < mesh.cells.size(); ++v) all.push_back(bits_of(mesh, v));
+  return all;
+}
+
+TEST(SmoothLevels, AnEditBeyondTheReachChangesNothingWhateverTheLevels) {
+  SmoothMesher mesher;
+  SmoothChunkMesh before;
+  SmoothChunkMesh after;
+  int changed_within = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    DensityGrid grid = grid_of({IVec3{-14}, IVec3{14}}, oracle::scatter(seed));
+    SmoothOptions options;
+    options.split_sheets = true;
+    options.occlusion.form = seed % 2 == 0 ? SmoothOcclusion::None : SmoothOcclusion::Weighted;
+    const int coarsest = static_cast<int>(seed % 3);
+    for (std::size_t k = 0; k < 27; ++k) {
+      const auto chunk = static_cast<int>(k);
+      options.levels[k] =
+          static_cast<std::uint8_t>(oracle::hash_of(seed, {chunk, 0, 0}) % static_cast<std::uint64_t>(coarsest + 1));
+    }
+    options.levels[0] = static_cast<std::uint8_t>(coarsest);
+    const int reach = reach_of(options.occlusion, coarsest);
+    mesher.mesh(grid.neighbourhood(IVec3{0}), options, before);
+    for (int i = 0; i < 60; ++i) {
+      const std::uint64_t random = oracle::hash_of(seed, {i, 1, 2});
+      IVec3 sample{static_cast<int>(random % 28) - 14, static_cast<int>(random / 28 % 28) - 14, 0};
+      sample.z = -reach - 1 + (i % 2) * reach;
+      const DensitySample old{grid.density(sample), grid.material(sample)};
+      grid.set(sample, {old.density < 0.0F ? 1.5F : -1.5F, 1});
+      mesher.mesh(grid.neighbourhood(IVec3{0}), options, after);
+      const bool same = all_bits(before) == all_bits(after) &&
+                        std::equal(before.indices.begin(), before.indices.end(), after.indices.begin());
+      if (distance_from_chunk(sample) > reach) {
+        EXPECT_TRUE(same) << "seed " << seed << ": " << sample.x << " " << sample.y << " " << sample.z;
+      } else {
+        changed_within += same ? 0 : 1;
+      }
+      grid.set(sample, old);
+    }
+  }
+  EXPECT_GT(changed_within, 20) << "the edits reach nothing";
 }
 
 TEST(SmoothLevels, CellsAwayFromOtherLevelsAreThoseOfTheKernel) {

@@ -37,9 +37,9 @@ inline F high_half(I pair) {
   return as_float(shift_right_signed<3>(pair) & all(static_cast<int>(0x8FFFE000U))) * all(0x1p112F);
 }
 
-inline CornerLanes load_corners(const Half* low, I place) {
-  const I pairs[4] = {gather_pairs(low, place), gather_pairs(low + kPlaceStride, place),
-                      gather_pairs(low + kPointSlice, place), gather_pairs(low + kPointSlice + kPlaceStride, place)};
+inline CornerLanes load_corners(const Half* low, const Half* high, I place) {
+  const I pairs[4] = {gather_pairs(low, place), gather_pairs(low + kPlaceStride, place), gather_pairs(high, place),
+                      gather_pairs(high + kPlaceStride, place)};
   CornerLanes corners;
   for (int i = 0; i < 4; ++i) {
     corners.d[2 * i] = low_half(pairs[i]);
@@ -151,10 +151,11 @@ inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3 fraction, L
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out) {
   const F scale = all(static_cast<float>(1 << work.level));
   const Half* const low = work.row(0, slice.z) - place_of(0, 0);
+  const Half* const high = work.row(0, slice.z + 1) - place_of(0, 0);
   const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const I place = load_words(work.places + first) & all(kPlaceMask);
-    const CornerLanes corners = load_corners(low, place);
+    const CornerLanes corners = load_corners(low, high, place);
     const Lanes3 fraction = mean_of_crossings(corners);
     const Lanes3 normal = normals_at(corners.d, fraction);
     const Lanes3 at = {snapped(fraction.x), snapped(fraction.y), snapped(fraction.z)};

@@ -29,8 +29,9 @@ export async function parseGlb(buffer) {
     images.push(await decodePng(new Uint8Array(buffer, start + byteOffset, byteLength)));
   }
   const read = ({ attributes, indices, material }) => {
-    const texture = json.materials[material].pbrMetallicRoughness.baseColorTexture.index;
-    const image = images[json.textures[texture].source];
+    // Smooth surfaces have colours at their vertices and no texture.
+    const texture = json.materials[material].pbrMetallicRoughness.baseColorTexture;
+    const image = texture && images[json.textures[texture.index].source];
     const coordinates = accessor(attributes.TEXCOORD_0);
     const texelOf = (vertex) => {
       const x = Math.floor(coordinates[vertex * 2] * image.width);

@@ -11,7 +11,7 @@ namespace quoin {
 /// Space:     sample (i, j, k) stands for the centre of voxel (i, j, k): point p of the field is point p + 0.5 of the
 ///            grid.
 /// Shape:     the distance to the nearest voxel centre of the other kind, less one half, smoothed by a 1 4 6 4 1 kernel
-///            along each axis; at least 0.2 from 0 and of its voxel's sign everywhere, so that the surface runs between
+///            along each axis; at least 0.1 from 0 and of its voxel's sign everywhere, so that the surface runs between
 ///            the voxels that it ran between before, and nothing thin is lost. Within a band of 8 samples.
 /// Materials: the voxels' types.
 /// Order:     the same densities at any thread count.

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
+
+namespace quoin {
+
+/// How an instance is drawn.
+enum class Detail : std::uint8_t {
+  Near,  ///< every voxel
+  Mid,   ///< coarser cells, none of them larger than a pixel or two
+  Far,   ///< an impostor
+};
+
+/// The sphere around a grid's content: about the centre of the tight box of its voxels, through that box's corners.
+struct ContentSphere {
+  DVec3 centre{0.0};    ///< grid coordinates
+  double radius = 0.0;  ///< voxels; 0 for an empty grid
+};
+
+/// Cost: O(chunks).
+[[nodiscard]] ContentSphere content_sphere(const Grid& grid);
+
+/// Which detail is chosen.
+struct DetailPolicy {
+  enum class Rule : std::uint8_t {
+    ByRadius,  ///< by the distance from the content's centre, in radii of the content: stateless
+    ByPixels,  ///< by what a voxel and the whole grid span in the picture
+  };
+  Rule rule = Rule::ByPixels;
+  double near_radii = 1.0;    ///< ByRadius: Near up to and including
+  double mid_radii = 10.0;    ///< ByRadius: Mid up to and including
+  double voxel_pixels = 1.0;  ///< ByPixels: Mid once a voxel projects to less than this
+  int far_pixels = 128;       ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
+  /// A level is left only once the measure is beyond its threshold by this share. 0: no memory of the last choice.
+  double hysteresis = 0.1;
+};
+
+/// By the distance between camera and content centre, in the units of `radius`. R = 0: Near at distance 0, else Far;
+/// NaN is Far.
+[[nodiscard]] Detail detail_by_radius(double distance, double radius, const DetailPolicy& policy = {});
+
+/// What `ByPixels` decides on.
+struct ScreenSize {
+  double voxel_pixels = 0.0;     ///< that one voxel spans at the content's nearest point
+  double diameter_pixels = 0.0;  ///< that the whole content spans at its centre's distance
+};
+/// Not finite counts as nothing to see: Far.
+[[nodiscard]] Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy = {});
+
+/// One instance that may be in the picture.
+struct SelectedInstance {
+  InstanceHandle instance;
+  Detail detail = Detail::Near;
+  /// Mid: how often the grid is halved (1: cells of 2^3 voxels), 1 to kCoarsestHalving; else 0.
+  int halvings = 0;
+  double distance = 0.0;  ///< from the camera to the content's centre, world units
+};
+
+/// Grids are halved at most this often.
+inline constexpr int kCoarsestHalving = 4;
+
+/// Chooses what is drawn, and how; remembers the last choice of each instance (hysteresis) and each grid's content.
+class DetailSelector {
+ public:
+  DetailSelector();
+  DetailSelector(DetailSelector&&) noexcept;
+  DetailSelector& operator=(DetailSelector&&) noexcept;
+  ~DetailSelector();
+
+  /// Replaces `out` by the visible instances whose content sphere meets the camera's frustum, in the order of their
+  /// handles.
+  ///
+  /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when its version has changed.
+  void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
+              std::vector<SelectedInstance>& out);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin
