@@ -26,6 +26,7 @@
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/smooth_files.h>
+#include <quoin/io/smooth_scene.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/volume_field.h>
 #include <quoin/io/vox.h>
