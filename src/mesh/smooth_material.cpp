@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <utility>
 
 #include "core/srgb.h"
-#include "mesh/smooth_levels.h"
 
 namespace quoin {
 namespace {
@@ -28,11 +26,23 @@ VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
   return chunk == nullptr ? kAir : chunk->materials().get(local_of(sample));
 }
 
-std::size_t materials_of_corners(const DensityNeighbourhood& chunks, IVec3 first, VoxelType* out) {
+// The materials of the solid corners of a cell that lies within a chunk, row by row.
+std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
+  const Chunk::Mixed* mixed = chunk.materials().mixed();
   std::size_t found = 0;
-  for (std::uint32_t solid = smooth::solid_corners_of(chunks, {IVec3{0}, first, 0}); solid != 0; solid &= solid - 1) {
-    const int corner = std::countr_zero(solid);
-    out[found++] = material_at(chunks, first + IVec3{corner & 1, corner >> 1 & 1, corner >> 2});
+  for (int row = 0; row < 4; ++row) {
+    const int y = first.y + (row & 1);
+    const int z = first.z + (row >> 1);
+    const auto solid = static_cast<std::uint32_t>(chunk.solid_row(y, z) >> first.x & 3U);
+    if (solid == 0) continue;
+    const std::uint32_t slab = mixed->slabs[Chunk::slab_index(y, z)];
+    const bool is_uniform = (slab & Chunk::kUniformSlab) != 0;
+    for (int x = 0; x < 2; ++x) {
+      if ((solid >> x & 1U) == 0) continue;
+      const std::uint32_t index =
+          is_uniform ? slab & ~Chunk::kUniformSlab : mixed->read(slab, Chunk::row_in_slab(y, z), first.x + x);
+      out[found++] = mixed->direct() ? static_cast<VoxelType>(index) : mixed->palette[index];
+    }
   }
   return found;
 }
@@ -115,17 +125,17 @@ SurfaceMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
 SurfaceMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const {
   const int size = 1 << level;
   const IVec3 first = cell * size;
-  const int last = std::max({first.x, first.y, first.z}) + size;
-  const DensityChunk* centre = chunks.centre();
-  if (last < kChunkEdge && centre != nullptr) {
-    if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
-  }
   std::array<VoxelType, 729> solid;
-  const std::size_t near_surface = level == 0 ? materials_of_corners(chunks, first, solid.data())
-                                              : materials_under_crossings(chunks, first, size, solid.data());
-  if (near_surface != 0) return blend({solid.data(), near_surface});
+  std::size_t found = 0;
+  const DensityChunk* centre = chunks.centre();
+  if (centre != nullptr && std::max({first.x, first.y, first.z}) + size < kChunkEdge) {
+    if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
+    if (level == 0) found = materials_of_corners(*centre, first, solid.data());
+  }
+  if (level > 0) found = materials_under_crossings(chunks, first, size, solid.data());
+  if (found != 0) return blend({solid.data(), found});
   for (int step = size; step >= 1; step /= 2) {
-    const std::size_t found = solid_materials(chunks, first, size / step + 1, step, solid.data());
+    found = solid_materials(chunks, first, size / step + 1, step, solid.data());
     if (found != 0) return blend({solid.data(), found});
   }
   return {kWhite, kAir};
