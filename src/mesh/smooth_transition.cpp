@@ -209,6 +209,7 @@ class Transitions {
 
 void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out) {
+  assert(std::all_of(options.levels.begin(), options.levels.end(), [](int level) { return level <= kCoarsestLevel; }));
   Transitions(chunks, options, out).run(mesh_own_cells);
 }
 
