@@ -1,14 +1,16 @@
+#include "convert.h"
+
+#include <bit>
+#include <cmath>
 #include <memory>
 
 #include <quoin/io/file.h>
-#include <quoin/io/formats.h>
 #include <quoin/io/gltf.h>
 #include <quoin/io/obj.h>
-#include <quoin/io/scene_meshes.h>
 
-#include "commands.h"
 #include "interrupt.h"
 #include "output.h"
+#include "parse.h"
 #include "progress_bar.h"
 #include "scene_warnings.h"
 #include "stopwatch.h"
@@ -16,33 +18,6 @@
 namespace quoin::tool {
 
 namespace {
-
-struct ConvertOptions {
-  CommonOptions common;
-  std::filesystem::path output;
-  std::string mesher = "greedy";
-  bool occlusion_off = false;
-  bool watertight = false;
-  double iso = 0.5;
-  double simplify = 0.0;
-  bool smooth_only = false;  ///< --iso or --simplify was given
-  bool mesh_only = false;    ///< any option that only meshes heed was given
-};
-
-struct Seconds {
-  double read = 0;
-  double mesh = 0;
-  double write = 0;
-};
-
-struct Outcome {
-  std::int64_t voxels = 0;
-  SceneMeshes meshes;
-  std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
-  Seconds seconds;
-  std::vector<std::string> warnings;
-};
 
 Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes, const FormatInfo& format,
                                    const std::filesystem::path& path, const Progress& progress) {
@@ -53,6 +28,7 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
       return write_gltf(scene, meshes, path, progress);
     case FileFormat::Obj:
       return write_obj(scene, meshes, path, progress);
+    case FileFormat::Ply:
     case FileFormat::Vox:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
@@ -68,18 +44,6 @@ std::vector<std::filesystem::path> files_of(const SceneMeshes& meshes, const For
   return {path};
 }
 
-/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
-Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
-  for (const auto& file : files) {
-    std::error_code missing;
-    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
-    return fail(ErrorCode::InvalidArgument,
-                "the input, which " + options.output.string() + " would replace with its companion of this name",
-                file.string());
-  }
-  return {};
-}
-
 Result<std::uint64_t> write_voxels(const Scene& scene, const std::filesystem::path& path,
                                    std::vector<std::string>& warnings) {
   auto bytes = write_vox(scene, warnings);
@@ -91,28 +55,38 @@ Result<std::uint64_t> write_voxels(const Scene& scene, const std::filesystem::pa
   return bytes->size();
 }
 
+void count(const SceneMeshes& meshes, Outcome& outcome) {
+  outcome.faces_visible = meshes.faces_visible;
+  outcome.faces_total = meshes.faces_total;
+  outcome.quads = meshes.quads;
+  outcome.triangles = meshes.triangles;
+  outcome.vertices = meshes.vertices;
+}
+
 /// Meshes the scene and writes it, filling in `outcome`.
 Status mesh_and_write(const Scene& scene, const ConvertOptions& options, const FormatInfo& format, Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar;
-  const BlockyMeshOptions mesh_options{options.mesher == "greedy", !options.occlusion_off, options.watertight};
+  const std::string mesher = options.mesher.empty() ? "greedy" : options.mesher;
+  const BlockyMeshOptions mesh_options{mesher == "greedy", !options.occlusion_off, options.watertight};
   auto meshes =
       mesh_scene(scene, mesh_options, options.common.load.hidden, options.common.threads, bar.listener("meshing"));
   if (!meshes) return tl::unexpected<Error>(meshes.error());
-  outcome.meshes = std::move(*meshes);
+  count(*meshes, outcome);
+  outcome.mesher = mesher;
   outcome.seconds.mesh = watch.lap();
-  warn_of_left_out(scene, outcome.meshes.hidden, outcome.warnings);
-  if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
-  outcome.files = files_of(outcome.meshes, format, options.output);
+  warn_of_left_out(scene, meshes->hidden, outcome.warnings);
+  if (outcome.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
+  outcome.files = files_of(*meshes, format, options.output);
   if (auto sound = check_companions(outcome.files, options); !sound) return sound;
-  const auto bytes = write_meshes(scene, outcome.meshes, format, options.output, bar.listener("writing"));
+  const auto bytes = write_meshes(scene, *meshes, format, options.output, bar.listener("writing"));
   if (!bytes) return tl::unexpected<Error>(bytes.error());
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
   return {};
 }
 
-Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format) {
+Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
   auto loaded = load_scene(options.common.input, options.common.load);
   if (!loaded) return tl::unexpected<Error>(loaded.error());
@@ -122,9 +96,8 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format)
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   if (format.is_mesh) {
-    if (auto done = mesh_and_write(loaded->scene, options, format, outcome); !done) {
-      return tl::unexpected<Error>(done.error());
-    }
+    const auto mesh = options.mesher == "smooth" ? convert_smoothly : mesh_and_write;
+    if (auto done = mesh(loaded->scene, options, format, outcome); !done) return tl::unexpected<Error>(done.error());
     return outcome;
   }
   outcome.files = {options.output};
@@ -140,34 +113,96 @@ Json outcome_json(const Outcome& outcome) {
   for (const auto& file : outcome.files) files.push_back(file.string());
   return {
       {"voxels", outcome.voxels},
-      {"faces_visible", outcome.meshes.faces_visible},
-      {"faces_total", outcome.meshes.faces_total},
-      {"quads", outcome.meshes.quads},
-      {"triangles", outcome.meshes.triangles},
-      {"vertices", outcome.meshes.vertices},
+      {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
+      {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
+      {"faces_visible", outcome.faces_visible},
+      {"faces_total", outcome.faces_total},
+      {"quads", outcome.quads},
+      {"triangles", outcome.triangles},
+      {"vertices", outcome.vertices},
+      {"simplify_error", outcome.simplify_error},
       {"bytes", outcome.bytes},
       {"files", files},
       {"seconds", {{"read", outcome.seconds.read}, {"mesh", outcome.seconds.mesh}, {"write", outcome.seconds.write}}},
       {"warnings", outcome.warnings}};
 }
 
-std::string outcome_text(const FormatInfo& format, const Outcome& outcome) {
-  std::string text = "Voxels: " + with_thousands(outcome.voxels) + "\n";
-  if (format.is_mesh) {
-    const SceneMeshes& meshes = outcome.meshes;
-    text += "Faces: " + with_thousands(meshes.faces_visible) + " visible of " + with_thousands(meshes.faces_total) +
-            " total\n";
-    text += "Mesh: " + with_thousands(meshes.quads) + " quads, " + with_thousands(meshes.triangles) + " triangles, " +
-            with_thousands(meshes.vertices) + " vertices\n";
+std::string mesh_text(const Outcome& outcome) {
+  const std::string size =
+      with_thousands(outcome.triangles) + " triangles, " + with_thousands(outcome.vertices) + " vertices\n";
+  if (outcome.mesher == "smooth") return "Mesh: " + size;
+  return "Faces: " + with_thousands(outcome.faces_visible) + " visible of " + with_thousands(outcome.faces_total) +
+         " total\nMesh: " + with_thousands(outcome.quads) + " quads, " + size;
+}
+
+std::string outcome_text(const Outcome& outcome) {
+  std::string text = (outcome.is_volume ? "Solid samples: " : "Voxels: ") + with_thousands(outcome.voxels) + "\n";
+  if (outcome.iso) {
+    text += "Iso: " + digits_for_people(*outcome.iso) +
+            (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
   }
+  if (!outcome.mesher.empty()) text += mesh_text(outcome);
+  if (outcome.simplify_error > 0)
+    text += "Simplified: off by " + digits_for_people(outcome.simplify_error) + " voxels\n";
   const double seconds = outcome.seconds.read + outcome.seconds.mesh + outcome.seconds.write;
   text += "Wrote ";
   for (const auto& file : outcome.files) text += file.string() + ", ";
   return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
-/// The exit status of options that contradict each other or the output's format; kDone when they do not.
-int check_usage(const ConvertOptions& options, const Result<FormatInfo>& format) {
+/// What contradicts itself or the kind of input; empty when nothing does.
+std::string fault_of_usage(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
+  const bool is_smooth = options.mesher == "smooth";
+  if (is_volume && !options.mesher.empty() && !is_smooth) {
+    return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
+  }
+  if (is_volume) return "";
+  if (options.iso) return "--iso is for volumes, and the input holds voxels";
+  if (is_smooth) return "";
+  if (options.simplify) return "--simplify needs --mesher smooth";
+  return format.format == FileFormat::Ply ? "--mesher smooth writes .ply; culled and greedy do not" : "";
+}
+
+/// Whether the input is read by read_volume. Errors: CannotRead.
+Result<bool> holds_volume(const ConvertOptions& options) {
+  if (options.raw) return true;
+  const auto format = recognise_file(options.common.input);
+  if (!format) return tl::unexpected<Error>(format.error());
+  return *format && format_info(**format).is_volume;
+}
+
+Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
+  if (is_volume && !format.is_mesh) {
+    return fail(ErrorCode::Unsupported,
+                "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.ending),
+                options.common.input.string());
+  }
+  return is_volume ? convert_volume(options, format) : convert_scene(options, format);
+}
+
+int run_checked(const ConvertOptions& options, const FormatInfo& format) {
+  const auto is_volume = holds_volume(options);
+  if (!is_volume) {
+    print_error(is_volume.error());
+    return kFailed;
+  }
+  if (const std::string fault = fault_of_usage(options, format, *is_volume); !fault.empty()) {
+    print_error(fault);
+    return kWrongUsage;
+  }
+  const auto outcome = convert(options, format, *is_volume);
+  if (!outcome) {
+    die_if_interrupted();
+    print_error(outcome.error());
+    return kFailed;
+  }
+  if (options.common.json) return print_json(outcome_json(*outcome));
+  print_warnings(outcome->warnings);
+  return print(outcome_text(*outcome));
+}
+
+int run_convert(const ConvertOptions& options) {
+  const auto format = format_for_writing(options.output);
   if (!format) {
     print_error(format.error());
     return kWrongUsage;
@@ -177,60 +212,111 @@ int check_usage(const ConvertOptions& options, const Result<FormatInfo>& format)
                 options.output.string() + " is none");
     return kWrongUsage;
   }
-  if (options.mesher != "smooth" && options.smooth_only) {
-    print_error("--iso and --simplify need --mesher smooth");
-    return kWrongUsage;
-  }
-  if (format->is_mesh && options.mesher == "smooth") {
-    print_error("--mesher smooth is not supported by this version; culled and greedy are");
-    return kFailed;
-  }
-  return kDone;
-}
-
-int run_convert(const ConvertOptions& options) {
-  const auto format = format_for_writing(options.output);
-  if (const int status = check_usage(options, format); status != kDone) return status;
-  const auto outcome = convert(options, *format);
-  if (!outcome) {
-    die_if_interrupted();
-    print_error(outcome.error());
-    return kFailed;
-  }
-  if (options.common.json) return print_json(outcome_json(*outcome));
-  print_warnings(outcome->warnings);
-  return print(outcome_text(*format, *outcome));
+  return run_checked(options, *format);
 }
 
 void add_mesh_options(CLI::App& command, ConvertOptions& options) {
   command
       .add_option("--mesher", options.mesher,
-                  "How to mesh: culled or greedy (default greedy); smooth is not in this version")
+                  "How to mesh: culled or greedy for blocks, smooth for rounded surfaces (default greedy; of volumes "
+                  "smooth, which is all they can be)")
       ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
   command.add_flag("--no-ao", options.occlusion_off, "Leave ambient occlusion out");
-  command.add_flag("--watertight", options.watertight, "No T-junctions: every edge meets its neighbours' corners");
-  command.add_option("--iso", options.iso, "Surface value of volumes (smooth only: not in this version)");
-  command
-      .add_option("--simplify", options.simplify, "Error allowed when simplifying (smooth only: not in this version)")
+  command.add_flag("--watertight", options.watertight,
+                   "No T-junctions: every edge meets its neighbours' corners (smooth meshes always are)");
+  command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
+}
+
+/// Texts to CLI11, which are read once all are there.
+struct VolumeTexts {
+  std::string iso;
+  std::string raw_size;
+  std::string raw_type = "uint8";
+  std::string raw_order = "little";
+};
+
+void add_volume_options(CLI::App& command, VolumeTexts& texts) {
+  command.add_option("--iso", texts.iso,
+                     "Surface value of a volume; what is above is solid (default: between its two groups of values)");
+  command.add_option("--raw-size", texts.raw_size,
+                     "XxYxZ: IN is a file of values alone, x fastest, that many along each axis");
+  command.add_option("--raw-type", texts.raw_type, "Of its values: uint8 to int64, float32 or float64 (default uint8)");
+  command.add_option("--raw-order", texts.raw_order, "Byte order of its values: little or big (default little)")
+      ->check(CLI::IsMember({"little", "big"}));
+}
+
+std::optional<ScalarType> scalar_type(const std::string& name) {
+  for (int i = 0; i <= static_cast<int>(ScalarType::Float64); ++i) {
+    if (name_of(static_cast<ScalarType>(i)) == name) return static_cast<ScalarType>(i);
+  }
+  return std::nullopt;
+}
+
+/// Reads the options of volumes; answers what is wrong with them, or "".
+std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
+  if (command.count("--iso") > 0) {
+    options.iso = parse_number(texts.iso);
+    const bool is_float = options.iso && std::isfinite(static_cast<float>(*options.iso));
+    if (!is_float) return "--iso: must be a number, not \"" + texts.iso + "\"";
+  }
+  if (command.count("--raw-size") == 0) {
+    const bool is_lone = command.count("--raw-type") + command.count("--raw-order") > 0;
+    return is_lone ? "--raw-type and --raw-order need --raw-size" : "";
+  }
+  const auto size = parse_box_size(texts.raw_size);
+  if (!size || size->x < 1 || size->y < 1 || size->z < 1) {
+    return "--raw-size: must be like 256x256x128, not \"" + texts.raw_size + "\"";
+  }
+  const auto type = scalar_type(texts.raw_type);
+  if (!type) {
+    return "--raw-type: must be uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, not \"" +
+           texts.raw_type + "\"";
+  }
+  options.raw = RawVolume{*size, *type, texts.raw_order == "big" ? std::endian::big : std::endian::little};
+  return "";
 }
 
 }  // namespace
 
+Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
+  for (const auto& file : files) {
+    std::error_code missing;
+    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
+    return fail(ErrorCode::InvalidArgument,
+                "the input, which " + options.output.string() + " would replace with its companion of this name",
+                file.string());
+  }
+  return {};
+}
+
 void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Turn a file into another format, by OUT's ending");
   const auto options = std::make_shared<ConvertOptions>();
+  const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, options->common);
   command->add_option("OUT", options->output, "File to write: " + writable_endings())->required()->check(file_name());
   add_mesh_options(*command, *options);
+  add_volume_options(*command, *texts);
   command->footer(
       "Reads " + readable_endings() + "; writes " + writable_endings() +
       ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
-      "NAME_emissive.png. They replace files of these names.\nExample: quoin convert castle.vox castle.glb");
-  command->callback([command, options, &status] {
-    options->smooth_only = command->count("--iso") + command->count("--simplify") > 0;
-    options->mesh_only = options->smooth_only ||
-                         command->count("--mesher") + command->count("--no-ao") + command->count("--watertight") > 0;
+      "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
+      "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
+      "Example: quoin convert castle.vox castle.glb\n"
+      "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
+      "Example: quoin convert scan.nii.gz scan.glb --iso 300");
+  command->callback([command, options, texts, &status] {
+    std::size_t given = 0;
+    for (const char* name : {"--mesher", "--no-ao", "--watertight", "--iso", "--simplify"}) {
+      given += command->count(name);
+    }
+    options->mesh_only = given > 0;
+    if (const std::string fault = read_texts(*command, *texts, *options); !fault.empty()) {
+      print_error(fault + " (try --help)");
+      status = kWrongUsage;
+      return;
+    }
     status = run_convert(*options);
   });
 }

@@ -39,6 +39,12 @@ std::string number_for_people(double value) {
   return digits == "-0" ? "0" : digits;
 }
 
+std::string digits_for_people(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value + 0.0);
+  return text.data();
+}
+
 std::string bytes_for_people(std::uint64_t bytes) {
   constexpr std::array units = {"kB", "MB", "GB", "TB"};
   if (bytes < 1000) return std::to_string(bytes) + " B";

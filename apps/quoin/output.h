@@ -21,6 +21,9 @@ using Json = nlohmann::ordered_json;
 /// At most four digits after the point, none when they are zeros.
 [[nodiscard]] std::string number_for_people(double value);
 
+/// Six digits, however large or small.
+[[nodiscard]] std::string digits_for_people(double value);
+
 /// Prints "quoin: MESSAGE" on standard error, as one line whatever the message holds.
 void print_error(std::string_view message);
 void print_error(const Error& error);

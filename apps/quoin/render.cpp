@@ -59,11 +59,21 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
   return {};
 }
 
+/// Volumes are not drawn. Files that cannot be read fail later, in the words of the reader.
+Status check_input(const std::filesystem::path& path) {
+  const auto format = recognise_file(path);
+  if (!format || !*format || !format_info(**format).is_volume) return {};
+  return fail(ErrorCode::Unsupported,
+              "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
+              path.string());
+}
+
 Result<Outcome> render(const RenderArguments& arguments) {
   const bool hidden = arguments.common.load.hidden;
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable)
     return tl::unexpected<Error>(writable.error());
+  if (auto drawable = check_input(arguments.common.input); !drawable) return tl::unexpected<Error>(drawable.error());
   auto loaded = load_scene(arguments.common.input, arguments.common.load);
   if (!loaded) return tl::unexpected<Error>(loaded.error());
   const Scene& scene = loaded->scene;

@@ -1,8 +1,5 @@
 #include "volume_info.h"
 
-#include <array>
-#include <cstdio>
-
 #include <quoin/io/volume.h>
 
 #include "output.h"
@@ -57,15 +54,8 @@ Json volume_json(const Volume& volume) {
           {"warnings", volume.warnings}};
 }
 
-/// Six digits, however large or small: values may be of any scale.
-std::string value_text(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value + 0.0);
-  return text.data();
-}
-
 std::string three(const DVec3& v, const char* between) {
-  return value_text(v.x) + between + value_text(v.y) + between + value_text(v.z);
+  return digits_for_people(v.x) + between + digits_for_people(v.y) + between + digits_for_people(v.z);
 }
 
 std::string volume_text(const CommonOptions& options, const Volume& volume) {
@@ -75,8 +65,8 @@ std::string volume_text(const CommonOptions& options, const Volume& volume) {
   return options.input.filename().string() + ": " + volume.format + " volume\n" +
          "Values: " + std::to_string(volume.size.x) + " x " + std::to_string(volume.size.y) + " x " +
          std::to_string(volume.size.z) + " = " + with_thousands(count) + " of type " +
-         std::string(name_of(volume.type)) + "\n" + "Range: " + value_text(volume.min) + " to " +
-         value_text(volume.max) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
+         std::string(name_of(volume.type)) + "\n" + "Range: " + digits_for_people(volume.min) + " to " +
+         digits_for_people(volume.max) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
          "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + units + "\n";
 }
 

@@ -17,6 +17,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
@@ -24,13 +25,17 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_meshes.h>
+#include <quoin/io/smooth_files.h>
+#include <quoin/io/smooth_scene.h>
 #include <quoin/io/volume.h>
+#include <quoin/io/volume_field.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
@@ -39,6 +44,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/noise.h>
+#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>

@@ -31,6 +31,12 @@ enum class ChunkEdit : std::uint8_t {
   Solid,  ///< all samples become solid, as far from the surface as can be
 };
 
+/// Some samples of a chunk; `box` is in the chunk's coordinates.
+struct ChunkPart {
+  IVec3 chunk{0};
+  IBox box;
+};
+
 /// The chunks of a density grid with the bookkeeping of edits.
 class DensityStore {
  public:
@@ -65,9 +71,14 @@ class DensityStore {
   ///
   /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
   /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
-  /// `change(sample, first, end, row)` changes part of a row; `sample` is the row's first (local x = 0).
+  /// `change(sample, first, end, row)` changes part of a row, and answers false when it did not; `sample` is the row's
+  /// first (local x = 0).
   template <class ChooseChunk, class ChangeRow>
   std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change);
+
+  /// Edits rows of parts of chunks that lie within the world.
+  template <class ChangeRow>
+  std::int64_t edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change);
 
   void put(IVec3 chunk, DensityChunk samples);
   void clear();
@@ -109,7 +120,7 @@ std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& c
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
         read_row(entry.samples, y, z, row);
-        change(chunk * kChunkEdge + IVec3{0, y, z}, part.min.x, part.max.x, row);
+        if (!change(chunk * kChunkEdge + IVec3{0, y, z}, part.min.x, part.max.x, row)) continue;
         changes.add(y, z, write_row(entry.samples, y, z, part.min.x, part.max.x, row));
         has_even_row = has_even_row || is_even(entry.samples.row(y, z));
       }
@@ -121,6 +132,15 @@ std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& c
   }
   finish_edit(chunk, entry, changes, has_even_row);
   return changes.samples;
+}
+
+template <class ChangeRow>
+std::int64_t DensityStore::edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change) {
+  ++version_;
+  std::int64_t changed = 0;
+  for (const ChunkPart& part : parts) changed += edit_rows(part.chunk, part.box, change);
+  if (changed == 0) --version_;
+  return changed;
 }
 
 template <class ChooseChunk, class ChangeRow>

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <set>
 
 #include <tsl/robin_map.h>
@@ -158,15 +157,8 @@ std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
-  constexpr double kLimit = 2'147'483'648.0;
-  LongBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(radius >= 0.0) || !std::isfinite(centre[axis])) return 0;
-    const double low = std::clamp(centre[axis] - radius - 1.0, -kLimit, kLimit);
-    const double high = std::clamp(centre[axis] + radius + 1.0, -kLimit, kLimit);
-    box.min[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(low));
-    box.max[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::ceil(high));
-  }
+  if (!(radius >= 0.0) || !is_finite(centre)) return 0;
+  const LongBox box = box_around(centre - radius, centre + radius);
   return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
     const DVec3 local_centre = centre - DVec3(at) * double{kChunkEdge} - 0.5;
     for (int z = part.min.z; z < part.max.z; ++z) {

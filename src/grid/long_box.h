@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -42,6 +43,18 @@ inline LongBox box_from(const IBox& box) {
     result.max[static_cast<std::size_t>(axis)] = box.max[axis];
   }
   return result;
+}
+
+/// The whole points between two corners, and some beyond.
+inline LongBox box_around(DVec3 min, DVec3 max) {
+  constexpr double kLimit = 2'147'483'648.0;
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    box.min[i] = static_cast<std::int64_t>(std::floor(std::clamp(min[axis] - 1.0, -kLimit, kLimit)));
+    box.max[i] = static_cast<std::int64_t>(std::ceil(std::clamp(max[axis] + 1.0, -kLimit, kLimit)));
+  }
+  return box;
 }
 
 inline bool is_empty(const LongBox& box) {

@@ -20,6 +20,7 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
     FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true, false},
     FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", false, true, true, false},
+    FormatInfo{FileFormat::Ply, "ply", ".ply", "Polygon File Format, binary", false, true, true, false},
 };
 
 bool begins_with(std::span<const std::byte> bytes, std::string_view text) {

@@ -32,12 +32,14 @@ TEST(Formats, names_decide_what_is_written) {
   EXPECT_EQ(format_for_writing("a/b.GLB")->format, FileFormat::Glb);
   EXPECT_EQ(format_for_writing("b.gltf")->format, FileFormat::Gltf);
   EXPECT_EQ(format_for_writing("b.obj")->format, FileFormat::Obj);
+  EXPECT_EQ(format_for_writing("b.ply")->format, FileFormat::Ply);
   EXPECT_EQ(format_for_writing("b.c.vox")->format, FileFormat::Vox);
   for (const char* name : {"b", "b.", "glb", ".glb", "b.glb.bak", "b.glbx"}) {
     const auto format = format_for_writing(name);
     ASSERT_FALSE(format) << name;
     EXPECT_EQ(format.error().code, ErrorCode::Unsupported);
-    EXPECT_NE(format.error().message.find(".glb, .gltf, .obj, .vox"), std::string::npos) << format.error().message;
+    EXPECT_NE(format.error().message.find(".glb, .gltf, .obj, .ply, .vox"), std::string::npos)
+        << format.error().message;
   }
 }
 

@@ -1,50 +1,20 @@
 #include "io/gltf_document.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
+#include "io/gltf_arrays.h"
 #include "io/placement.h"
 
 namespace quoin {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using namespace gltf;
 
-// glTF 2.0's numbers for what it borrows from OpenGL.
-constexpr int kUnsignedByte = 5121;
-constexpr int kUnsignedShort = 5123;
-constexpr int kUnsignedInt = 5125;
-constexpr int kFloat = 5126;
-constexpr int kArrayBuffer = 34962;
-constexpr int kElementArrayBuffer = 34963;
 constexpr int kNearest = 9728;
 constexpr int kClampToEdge = 33071;
 
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
-
-/// Collects buffer views and accessors, which refer to each other by number.
-struct Arrays {
-  Json views = Json::array();
-  Json accessors = Json::array();
-
-  std::size_t add_view(const GltfView& view, int target) {
-    Json entry = {{"buffer", 0}, {"byteOffset", view.offset}, {"byteLength", view.bytes}};
-    if (target != 0) entry["target"] = target;
-    views.push_back(std::move(entry));
-    return views.size() - 1;
-  }
-
-  std::size_t add(const GltfView& view, int target, int component, const char* type, std::uint64_t count) {
-    accessors.push_back(
-        {{"bufferView", add_view(view, target)}, {"componentType", component}, {"count", count}, {"type", type}});
-    return accessors.size() - 1;
-  }
-};
-
-Json json_from(const Vec3& v) {
-  return {v.x, v.y, v.z};
-}
 
 Json primitive_json(const GltfPrimitive& primitive, Arrays& arrays) {
   const std::uint64_t vertices = primitive.vertex_count();
@@ -119,11 +89,9 @@ Json node_json(const Instance& instance, const SceneGrid& grid, const GltfLayout
   if (!name.empty()) node["name"] = name;
   const auto mesh = layout.mesh_of.find({instance.grid, instance.mirrored});
   if (mesh != layout.mesh_of.end()) node["mesh"] = mesh->second;
-  // Adding zero turns -0 into 0.
-  const DVec3 position = instance.position + 0.0;
-  if (position != DVec3(0.0)) node["translation"] = {position.x, position.y, position.z};
+  if (instance.position != DVec3(0.0)) node["translation"] = json_from(instance.position);
   const DQuat q = glm::normalize(instance.rotation);
-  if (q != DQuat(1, 0, 0, 0)) node["rotation"] = {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0};
+  if (q != DQuat(1, 0, 0, 0)) node["rotation"] = json_from(q);
   const double size = instance.voxel_size;
   if (size != 1.0) node["scale"] = {size, size, size};
   if (mesh == layout.mesh_of.end()) node["extras"] = {{"voxels", 0}};
@@ -140,26 +108,12 @@ Json nodes_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout&
   return nodes;
 }
 
-Json scene_json(const Json& nodes) {
-  Json entry = Json::object();
-  if (!nodes.empty()) {
-    entry["nodes"] = Json::array();
-    for (std::size_t i = 0; i < nodes.size(); ++i) entry["nodes"].push_back(i);
-  }
-  return Json::array({std::move(entry)});
-}
-
 void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& document) {
   Arrays arrays;
   document["meshes"] = meshes_json(layout, arrays);
   document["materials"] = materials_json(layout.palette);
   add_textures(layout, arrays, document);
-  document["accessors"] = std::move(arrays.accessors);
-  document["bufferViews"] = std::move(arrays.views);
-  Json buffer = Json::object();
-  if (!buffer_uri.empty()) buffer["uri"] = buffer_uri;
-  buffer["byteLength"] = layout.buffer_bytes;
-  document["buffers"] = Json::array({std::move(buffer)});
+  add_buffer(std::move(arrays), layout.buffer_bytes, buffer_uri, document);
 }
 
 }  // namespace
@@ -167,32 +121,11 @@ void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& doc
 Result<std::string> gltf_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout& layout,
                               std::string_view buffer_uri) {
   if (auto sound = check_placements(scene, meshes.hidden); !sound) return tl::unexpected<Error>(sound.error());
-  Json nodes = nodes_json(scene, meshes, layout);
-  Json document;
-  document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
-  if (layout.palette.has_emission()) document["extensionsUsed"] = {kEmissiveStrength};
-  document["scene"] = 0;
-  document["scenes"] = scene_json(nodes);
-  if (!nodes.empty()) document["nodes"] = std::move(nodes);
+  std::vector<const char*> extensions;
+  if (layout.palette.has_emission()) extensions.push_back(kEmissiveStrength);
+  Json document = document_of(nodes_json(scene, meshes, layout), extensions);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
-  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string percent_encoded(std::string_view name) {
-  constexpr std::string_view unreserved = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
-  constexpr std::string_view digits = "0123456789ABCDEF";
-  std::string encoded;
-  for (const char c : name) {
-    if (unreserved.find(c) != std::string_view::npos) {
-      encoded += c;
-      continue;
-    }
-    const auto byte = static_cast<unsigned char>(c);
-    encoded += '%';
-    encoded += digits[byte >> 4];
-    encoded += digits[byte & 15];
-  }
-  return encoded;
+  return text_of(document);
 }
 
 }  // namespace quoin

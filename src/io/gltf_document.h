@@ -17,7 +17,4 @@ namespace quoin {
 [[nodiscard]] Result<std::string> gltf_json(const Scene& scene, const SceneMeshes& meshes, const GltfLayout& layout,
                                             std::string_view buffer_uri);
 
-/// A file name as a relative URI reference (RFC 3986): everything but unreserved characters percent-encoded.
-[[nodiscard]] std::string percent_encoded(std::string_view name);
-
 }  // namespace quoin

@@ -1,22 +1,10 @@
 #include "io/gltf_layout.h"
 
-#include <limits>
 #include <set>
 
 namespace quoin {
 
 namespace {
-
-constexpr std::uint64_t kAlignment = 4;
-/// 65,535 restarts a strip, so the largest 16-bit index is 65,534; one less for clients that count it among the
-/// vertices.
-constexpr std::uint64_t kShortIndexVertices = 65'535;
-
-GltfView reserve(std::uint64_t bytes, std::uint64_t& end) {
-  const GltfView view{end, bytes};
-  end += (bytes + kAlignment - 1) / kAlignment * kAlignment;
-  return view;
-}
 
 void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
   const auto& positions = primitive.triangles->positions;
@@ -34,12 +22,12 @@ GltfPrimitive lay_out_primitive(const GltfMesh& mesh, const SurfacePart& part, b
   primitive.material = part.material;
   measure(mesh, primitive);
   const std::uint64_t vertices = primitive.vertex_count();
-  primitive.wide_indices = vertices >= kShortIndexVertices;
-  primitive.positions = reserve(vertices * 12, end);
-  primitive.normals = reserve(vertices * 12, end);
-  primitive.texture_coordinates = reserve(vertices * 8, end);
-  if (occlusion) primitive.colours = reserve(vertices * 4, end);
-  primitive.indices = reserve(part.triangles->indices.size() * (primitive.wide_indices ? 4 : 2), end);
+  primitive.wide_indices = needs_wide_indices(vertices);
+  primitive.positions = reserve_view(vertices * 12, end);
+  primitive.normals = reserve_view(vertices * 12, end);
+  primitive.texture_coordinates = reserve_view(vertices * 8, end);
+  if (occlusion) primitive.colours = reserve_view(vertices * 4, end);
+  primitive.indices = reserve_view(part.triangles->indices.size() * (primitive.wide_indices ? 4 : 2), end);
   return primitive;
 }
 
@@ -51,7 +39,7 @@ Status add_images(GltfLayout& layout) {
   for (auto& [name, image] : images) {
     auto png = encode_png(image);
     if (!png) return tl::unexpected<Error>(png.error());
-    const GltfView view = reserve(png->size(), layout.buffer_bytes);
+    const GltfView view = reserve_view(png->size(), layout.buffer_bytes);
     layout.images.push_back({name, std::move(*png), view});
   }
   return {};
@@ -95,18 +83,6 @@ Result<GltfLayout> lay_out_gltf(const Scene& scene, const SceneMeshes& meshes) {
     if (auto added = add_images(layout); !added) return tl::unexpected<Error>(added.error());
   }
   return layout;
-}
-
-Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes) {
-  constexpr std::uint64_t kHeaderBytes = 12;
-  constexpr std::uint64_t kChunkHeaderBytes = 8;
-  std::uint64_t total = kHeaderBytes + kChunkHeaderBytes + json_bytes;
-  if (buffer_bytes > 0) total += kChunkHeaderBytes + buffer_bytes;
-  if (total > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::LimitExceeded,
-                "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
-  }
-  return total;
 }
 
 }  // namespace quoin

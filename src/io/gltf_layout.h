@@ -11,16 +11,11 @@
 #include <quoin/io/scene_meshes.h>
 #include <quoin/scene/scene.h>
 
+#include "io/gltf_views.h"
 #include "io/material_palette.h"
 #include "io/surface_parts.h"
 
 namespace quoin {
-
-/// A stretch of the buffer; `offset` and `bytes` are multiples of four but for images and short indices.
-struct GltfView {
-  std::uint64_t offset = 0;
-  std::uint64_t bytes = 0;
-};
 
 /// One primitive's arrays and where they lie, in the order in which they are written.
 struct GltfPrimitive {
@@ -72,8 +67,5 @@ struct GltfLayout {
 
 /// Requires: `scene` and `meshes` outlive the layout. Errors: LimitExceeded from the PNG encoder.
 [[nodiscard]] Result<GltfLayout> lay_out_gltf(const Scene& scene, const SceneMeshes& meshes);
-
-/// The size of a GLB with chunks of these sizes. Errors: LimitExceeded when it does not fit the header's 32 bits.
-[[nodiscard]] Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes);
 
 }  // namespace quoin

@@ -7,8 +7,8 @@
 #include <set>
 #include <string>
 
+#include "io/gltf_container.h"
 #include "io/gltf_fixture.h"
-#include "io/gltf_layout.h"
 
 namespace quoin {
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
-#include <set>
 #include <vector>
 
 #include <quoin/io/file.h>
@@ -13,6 +11,7 @@
 #include "io/block_writer.h"
 #include "io/material_palette.h"
 #include "io/mtl.h"
+#include "io/obj_lines.h"
 #include "io/placement.h"
 #include "io/surface_parts.h"
 
@@ -20,20 +19,11 @@ namespace quoin {
 
 namespace {
 
-/// Names in a line-based format: control characters and spaces become '_'.
-std::string one_word(const std::string& name) {
-  std::string word = name;
-  for (char& c : word) {
-    if (static_cast<unsigned char>(c) <= ' ' || c == '\x7F') c = '_';
-  }
-  return word;
-}
-
 /// Writes the lines of one OBJ file, counting from 1 as OBJ does across all objects.
 class ObjText {
  public:
   ObjText(const Scene& scene, const SceneMeshes& meshes, BlockWriter& out)
-      : scene_(scene), meshes_(meshes), out_(out), palette_(scene.types, meshes) {}
+      : scene_(scene), meshes_(meshes), lines_(out), out_(out), palette_(scene.types, meshes) {}
 
   void write(const std::string& material_file) {
     out_.put_text("# Quoin " QUOIN_VERSION "\nmtllib " + material_file + "\n");
@@ -45,27 +35,6 @@ class ObjText {
   }
 
  private:
-  void number(double value) {
-    std::array<char, 40> text{};
-    const double rounded = std::round(value * 1e6) / 1e6 + 0.0;
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), rounded).ptr;
-    out_.put_text({text.data(), end});
-  }
-
-  void index(std::uint64_t value) {
-    std::array<char, 24> text{};
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-    out_.put_text({text.data(), end});
-  }
-
-  void line(std::string_view keyword, const DVec3& v) {
-    out_.put_text(keyword);
-    for (int axis = 0; axis < 3; ++axis) {
-      out_.put(' ');
-      number(v[axis]);
-    }
-  }
-
   /// One texture coordinate a type, so that type t is number t.
   void write_texture_coordinates() {
     for (std::size_t type = 1; type < scene_.types.size(); ++type) {
@@ -81,21 +50,13 @@ class ObjText {
     }
   }
 
-  std::string unique_name(const Instance& instance, const SceneGrid& grid) {
-    std::string name = one_word(instance.name.empty() ? grid.name : instance.name);
-    if (name.empty()) name = "object";
-    std::string unique = name;
-    for (int n = 2; !names_.insert(unique).second; ++n) unique = name + "_" + std::to_string(n);
-    return unique;
-  }
-
   void write_object(const Instance& instance) {
     const BlockyMesh* mesh = meshes_.find(instance.grid);
     if (mesh == nullptr) return;
     const SceneGrid& grid = scene_.grids()[instance.grid];
     const SurfaceParts parts(*mesh, palette_);
     if (parts.parts().empty()) return;
-    out_.put_text("o " + unique_name(instance, grid) + "\n");
+    lines_.object(instance.name.empty() ? grid.name : instance.name);
     write_normals(instance);
     for (const SurfacePart& part : parts.parts()) {
       write_vertices(instance, grid, *part.triangles);
@@ -110,17 +71,17 @@ class ObjText {
     for (const Direction direction : kDirections) {
       DVec3 normal(normal_of(direction));
       if (instance.mirrored) normal.x = -normal.x;
-      line("vn", glm::normalize(instance.rotation) * normal);
+      lines_.triple("vn", glm::normalize(instance.rotation) * normal);
       out_.put('\n');
     }
   }
 
   void write_vertices(const Instance& instance, const SceneGrid& grid, const BlockyTriangles& triangles) {
     for (std::size_t i = 0; i < triangles.positions.size() && !out_.failed(); ++i) {
-      line("v", world_from_grid(instance, grid, DVec3(triangles.positions[i])));
+      lines_.triple("v", world_from_grid(instance, grid, DVec3(triangles.positions[i])));
       if (meshes_.occlusion) {
         const double grey = occlusion_brightness(triangles.levels[i]);
-        line("", DVec3(grey));
+        lines_.triple("", DVec3(grey));
       }
       out_.put('\n');
     }
@@ -139,18 +100,18 @@ class ObjText {
 
   void write_corner(const BlockyTriangles& triangles, std::uint32_t vertex) {
     out_.put(' ');
-    index(vertices_ + vertex + 1);
+    lines_.index(vertices_ + vertex + 1);
     out_.put('/');
-    index(triangles.types[vertex]);
+    lines_.index(triangles.types[vertex]);
     out_.put('/');
-    index(normals_ + static_cast<std::uint64_t>(triangles.directions[vertex]) + 1);
+    lines_.index(normals_ + static_cast<std::uint64_t>(triangles.directions[vertex]) + 1);
   }
 
   const Scene& scene_;
   const SceneMeshes& meshes_;
+  ObjLines lines_;
   BlockWriter& out_;
   MaterialPalette palette_;
-  std::set<std::string> names_;
   std::uint64_t vertices_ = 0;
   std::uint64_t normals_ = 0;
 };

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "light/srgb.h"
+#include "core/srgb.h"
 
 namespace quoin {
 namespace {

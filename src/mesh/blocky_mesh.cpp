@@ -1,13 +1,12 @@
 #include <quoin/mesh/blocky_mesh.h>
 
 #include <algorithm>
-#include <atomic>
 #include <limits>
 #include <memory>
-#include <mutex>
 
 #include <quoin/mesh/blocky.h>
 
+#include "core/progress_steps.h"
 #include "mesh/watertight.h"
 
 namespace quoin {
@@ -37,26 +36,6 @@ void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoi
   triangulate_outline(outline, quad.flipped(), base, out.indices);
 }
 
-// Tells `progress` how many of `total` steps are done; remembers when it asked to stop.
-class Reporter {
- public:
-  Reporter(const Progress& progress, std::size_t total) : progress_(&progress), total_(total) {}
-  void step() {
-    if (!*progress_) return;
-    const std::lock_guard lock(mutex_);
-    ++done_;
-    if (!cancelled_ && !(*progress_)(static_cast<double>(done_) / static_cast<double>(total_))) cancelled_ = true;
-  }
-  [[nodiscard]] bool cancelled() const { return cancelled_; }
-
- private:
-  const Progress* progress_;
-  std::size_t total_;
-  std::size_t done_ = 0;
-  std::mutex mutex_;
-  std::atomic<bool> cancelled_{false};
-};
-
 }  // namespace
 
 SurfaceClass surface_class(const VoxelProperties& properties) {
@@ -83,7 +62,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
   std::vector<QuadBuffer> parts(chunks.size());
   // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
-  Reporter reporter(progress, 2 * chunks.size());
+  ProgressSteps reporter(progress, 2 * chunks.size());
   parallel_for(tasks, threads, [&](std::size_t task) {
     BlockyMesher mesher;
     QuadOptions quad_options;

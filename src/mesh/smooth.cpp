@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cassert>
 
+#include "mesh/smooth_levels.h"
 #include "mesh/smooth_scratch.h"
+#include "mesh/smooth_split.h"
+#include "mesh/smooth_transition.h"
 
 namespace quoin {
 
@@ -29,6 +32,18 @@ MeshKernel kernel_for(InstructionSet instructions) {
 struct SmoothMesher::Scratch {
   MeshKernel kernel = smooth::mesh_plain;
   smooth::Work work;
+
+  // Replaces `out` by the surface of some cells of the centre chunk.
+  void mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, smooth::CellRange cells,
+            SmoothChunkMesh& out) {
+    out.clear();
+    work.level = options.levels[13];
+    assert(work.level <= kCoarsestLevel);
+    work.n = kChunkEdge >> work.level;
+    work.cells = cells;
+    work.occlusion = smooth::within_limits(options.occlusion, work.level);
+    if (smooth::prepare(chunks, work)) kernel(work, out);
+  }
 };
 
 SmoothMesher::SmoothMesher(InstructionSet instructions) : scratch_(std::make_unique<Scratch>()) {
@@ -39,15 +54,14 @@ SmoothMesher& SmoothMesher::operator=(SmoothMesher&&) noexcept = default;
 SmoothMesher::~SmoothMesher() = default;
 
 void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out) {
-  out.clear();
-  smooth::Work& work = scratch_->work;
-  work.level = options.levels[13];
-  assert(work.level <= kCoarsestLevel);
-  work.n = kChunkEdge >> work.level;
-  work.cells =
-      options.border == SmoothBorder::Shared ? smooth::CellRange{-1, work.n} : smooth::CellRange{0, work.n - 1};
-  work.occlusion = smooth::within_limits(options.occlusion, work.level);
-  if (smooth::prepare(chunks, work)) scratch_->kernel(work, out);
+  const int n = kChunkEdge >> options.levels[13];
+  const bool is_open = options.border == SmoothBorder::Open;
+  if (!is_open && !smooth::ChunkLevels(options.levels).all_same()) {
+    const auto own_cells = [&](SmoothChunkMesh& mesh) { scratch_->mesh(chunks, options, {0, n}, mesh); };
+    return smooth::mesh_with_transitions(chunks, options, own_cells, out);
+  }
+  scratch_->mesh(chunks, options, is_open ? smooth::CellRange{0, n - 1} : smooth::CellRange{-1, n}, out);
+  if (options.split_sheets) smooth::split_sheets(chunks, options, out.indices.size(), out);
 }
 
 void SmoothChunkMesh::clear() {

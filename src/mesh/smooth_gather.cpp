@@ -223,7 +223,8 @@ namespace quoin {
 
 int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
   const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, coarsest_level);
-  return (smooth::apron_of(limited) + 1) << coarsest_level;
+  // Without occlusion, splitting sheets looks at the cells beside its own.
+  return (std::max(smooth::apron_of(limited), 1) + 1) << coarsest_level;
 }
 
 }  // namespace quoin

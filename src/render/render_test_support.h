@@ -13,7 +13,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 
-#include "light/srgb.h"
+#include "core/srgb.h"
 
 namespace quoin::render_test {
 

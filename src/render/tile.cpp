@@ -8,7 +8,7 @@
 #include <glm/common.hpp>
 
 #include "light/sky.h"
-#include "light/srgb.h"
+#include "core/srgb.h"
 
 namespace quoin {
 namespace {

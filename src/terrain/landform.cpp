@@ -64,10 +64,14 @@ double Landform::elevation(double x, double z) const {
   return compress(bed + (land - bed) * valley);
 }
 
-int Landform::height(int x, int z) const {
+double Landform::rise(int x, int z) const {
   const int headroom = std::min(10, top_ / 6);
   const double level = elevation(static_cast<double>(x), static_cast<double>(z));
-  return 1 + static_cast<int>(level * static_cast<double>(top_ - 2 - headroom));
+  return level * static_cast<double>(top_ - 2 - headroom);
+}
+
+int Landform::height(int x, int z) const {
+  return 1 + static_cast<int>(rise(x, z));
 }
 
 Column Landform::describe(int x, int z, const int* heights, std::size_t stride) const {

@@ -11,7 +11,8 @@ async function decodePng(bytes) {
 const arrayTypes = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
-/** {meshes: [{primitives: [{positions, normals, colours, indices, texelOf(vertex)}]}]} */
+/** {meshes: [{primitives: [{positions, normals, indices, textured, texelOf(vertex), lightOf(vertex)}]}]}; the texel is
+ *  white where there is no texture, the light (of COLOR_0, from 0 to 1 a channel) where there are no colours. */
 export async function parseGlb(buffer) {
   const header = new DataView(buffer);
   const jsonBytes = header.getUint32(12, true);
@@ -29,16 +30,20 @@ export async function parseGlb(buffer) {
     images.push(await decodePng(new Uint8Array(buffer, start + byteOffset, byteLength)));
   }
   const read = ({ attributes, indices, material }) => {
-    const texture = json.materials[material].pbrMetallicRoughness.baseColorTexture.index;
-    const image = images[json.textures[texture].source];
+    const texture = json.materials[material].pbrMetallicRoughness.baseColorTexture?.index;
+    const image = images[json.textures?.[texture]?.source];
     const coordinates = accessor(attributes.TEXCOORD_0);
+    const colours = accessor(attributes.COLOR_0);
     const texelOf = (vertex) => {
+      if (!image) return [255, 255, 255, 255];
       const x = Math.floor(coordinates[vertex * 2] * image.width);
       const y = Math.floor(coordinates[vertex * 2 + 1] * image.height);
       return [...image.data.slice((y * image.width + x) * 4, (y * image.width + x) * 4 + 4)];
     };
+    const full = colours instanceof Uint16Array ? 65535 : 255;
+    const lightOf = (vertex) => [0, 1, 2].map((channel) => (colours ? colours[vertex * 4 + channel] / full : 1));
     return { positions: accessor(attributes.POSITION), normals: accessor(attributes.NORMAL),
-             colours: accessor(attributes.COLOR_0), indices: accessor(indices), texelOf };
+             indices: accessor(indices), textured: image !== undefined, texelOf, lightOf };
   };
   return { meshes: (json.meshes ?? []).map(({ primitives }) => ({ primitives: primitives.map(read) })) };
 }

@@ -1,5 +1,5 @@
 // Loads GLB files in three.js in a headless Chromium, unlit, and checks that sampled pixels are the palette's colour
-// times the occlusion: node pixels.mjs [--vox FOLDER] [--occluded] FILE.glb...
+// times the vertices' (the occlusion of blocks; the whole colour of smooth surfaces, which have no palette): node pixels.mjs [--vox FOLDER] [--occluded] FILE.glb...
 //
 // With --vox, a GLB whose .vox of the same name lies in FOLDER and is a single plain model is compared with colours and
 // occlusion computed anew from those voxels, instead of with what the GLB says itself.

@@ -117,11 +117,14 @@ function hitAt(raycaster, x, y) {
   const local = hit.object.worldToLocal(hit.point.clone());
   const points = corners.map((index) => new THREE.Vector3().fromArray(primitive.positions, index * 3));
   const weights = THREE.Triangle.getBarycoord(local, ...points, new THREE.Vector3());
-  const brightness = primitive.colours
-    ? corners.reduce((sum, index, corner) => sum + weights.getComponent(corner) * primitive.colours[index * 4] / 255, 0)
-    : 1;
-  const normal = new THREE.Vector3().fromArray(primitive.normals, corners[0] * 3).transformDirection(hit.object.matrixWorld);
-  return { texel: primitive.texelOf(corners[0]), brightness, point: hit.point, normal, inward: normal.dot(raycaster.ray.direction) };
+  const lights = corners.map(primitive.lightOf);
+  const light = [0, 1, 2].map((channel) => lights.reduce((sum, of, corner) => sum + weights.getComponent(corner) * of[channel], 0));
+  const normal = new THREE.Vector3();
+  for (const index of corners) normal.add(new THREE.Vector3().fromArray(primitive.normals, index * 3));
+  normal.transformDirection(hit.object.matrixWorld);
+  // Smooth normals may lean away from a viewer who sees the triangle edge-on.
+  const inside_out = normal.dot(raycaster.ray.direction) > (primitive.textured ? 0 : 0.5);
+  return { texel: primitive.texelOf(corners[0]), light, point: hit.point, normal, inside_out };
 }
 
 /** Compares up to `count` pixels with palette times occlusion; pixels near an edge of colours are passed over. */
@@ -142,15 +145,16 @@ function checkPixels(count, seed) {
     const offsets = [[0, 0], [1, 0], [0, 1], [1, 1], [-1, -1], [2, -1], [-1, 2], [2, 2]];
     const around = offsets.map(([dx, dy]) => hitAt(raycaster, x + dx, y + dy));
     const alike = (other) => other && String(other.texel) === String(hit.texel) && other.normal.dot(hit.normal) > 0.99 &&
-      Math.abs(other.brightness - hit.brightness) < 0.03;
+      other.light.every((value, channel) => Math.abs(value - hit.light[channel]) < 0.03);
     if (!around.every(alike)) continue;
     const at = ((height - 1 - y) * width + x) * 4;
-    const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3), brightness: hit.brightness };
-    const expected = told ? told.colour.map((byte) => encoded(linear(byte) * told.brightness)) : ['air', 'air', 'air'];
+    const told = truth ? truthAt(truth, hit.point.toArray(), hit.normal.toArray()) : { colour: hit.texel.slice(0, 3) };
+    const lightOf = (channel) => told.brightness ?? hit.light[channel];
+    const expected = told ? told.colour.map((byte, channel) => encoded(linear(byte) * lightOf(channel))) : ['air', 'air', 'air'];
     const actual = [...pixels.slice(at, at + 3)];
     ++result.checked;
-    if (hit.inward > 0) ++result.inside_out;
-    if (hit.brightness < 0.95) ++result.darkened;
+    if (hit.inside_out) ++result.inside_out;
+    if (Math.min(...hit.light) < 0.95) ++result.darkened;
     if (expected.some((value, channel) => !(Math.abs(value - actual[channel]) <= 4))) result.wrong.push({ x, y, expected, actual });
   }
   return result;

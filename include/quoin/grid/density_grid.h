@@ -24,12 +24,14 @@ struct DensitySample {
 /// Precision: half floats within `band` of 0, clamped beyond, so that rock and sky far from the surface cost nothing.
 ///            Values are distances in samples wherever occlusion is to mean what it says. The sign that is given is
 ///            kept, however small the value; NaN counts as far air, infinities as +-band.
+/// Materials: that of an air sample has no effect on any mesh. Far air has none: it reads as kAir.
 /// Edits:     an edit raises the version of every chunk in which a density or a material changed, and remembers where,
-///            so that `take_dirty` can tell which meshes it reaches. A chunk that is all far air is dropped.
+///            so that `take_dirty` can tell which meshes it reaches. A chunk that is all far air is dropped. When an
+///            edit throws (bad_alloc, or what a callback threw), what it did until then stays done and booked.
 /// Threads:   any number may read at once; an edit needs the grid to itself.
 class DensityGrid {
  public:
-  /// Requires: 0 < band <= 65,504.
+  /// Requires: 0 < band <= 65,504. A band that is no half counts as the next lesser one.
   explicit DensityGrid(float band = 8.0F);
   DensityGrid(DensityGrid&&) noexcept;
   DensityGrid& operator=(DensityGrid&&) noexcept;
@@ -39,32 +41,47 @@ class DensityGrid {
   [[nodiscard]] float band() const;
   [[nodiscard]] float density(IVec3 sample) const;
   [[nodiscard]] VoxelType material(IVec3 sample) const;
-  /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, far air.
+  /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, and at NaN, far
+  /// air.
   [[nodiscard]] float density_at(DVec3 point) const;
   /// The gradient of the trilinear field, a one-sided one on the faces between cells: that of the cell above.
+  /// 0 outside the int32 range, and at NaN.
   [[nodiscard]] DVec3 gradient_at(DVec3 point) const;
 
   /// True when density or material was another before.
   bool set(IVec3 sample, DensitySample value);
 
-  /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges): the least of both distances. Samples
-  /// that become solid take `material`. `blend` >= 0: the width, in samples, over which the two surfaces flow together
-  /// (0: a sharp crease). All answer how many samples changed; a negative or NaN size changes nothing.
+  /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges, at most until its shortest side is
+  /// round): the least of both distances; or takes it away: the greater of the density and minus the distance. Samples
+  /// that become solid take `material`; others, those that become air too, keep theirs.
+  ///
+  /// Blend:   `blend` >= 0 is the width k, in samples, over which the two surfaces flow together (0: a sharp crease):
+  ///          min(a, b) - max(k - |a - b|, 0)^2 / (4 k). Since densities end at the band, k is at most
+  ///          band - max(a, b).
+  /// Answers: how many samples changed.
+  /// Errors:  a negative, infinite or NaN size or place, or a box whose `max` is less than its `min`, changes nothing.
+  /// Cost:    adding: O(chunks of the shape's box), and O(samples) in those that its surface comes near or that exist;
+  ///          each chunk inside becomes a uniform one of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
+  ///          them: it cannot be cancelled. Removing: only chunks that exist.
   std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0);
   std::int64_t remove_sphere(DVec3 centre, double radius, double blend = 0.0);
   std::int64_t add_box(DVec3 min, DVec3 max, VoxelType material, double rounding = 0.0, double blend = 0.0);
   std::int64_t remove_box(DVec3 min, DVec3 max, double rounding = 0.0, double blend = 0.0);
   /// Smooths the surface within a sphere: moves each density towards the mean of its 26 neighbours (as they were
-  /// before), `strength` (0 to 1) of the way at the centre, fading to nothing at the radius.
+  /// before), strength * (1 - (distance / radius)^2)^2 of the way. Samples that become solid take the material of most
+  /// of their solid neighbours. A strength above 1 counts as 1; sizes, places and strengths that are not above 0,
+  /// infinite or NaN change nothing. Cost: O(samples of the sphere's box in chunks that exist, or are beside one).
   std::int64_t smooth(DVec3 centre, double radius, double strength);
   /// Moves the surface within a sphere towards the plane through `point` with `normal` (pointing into the air; any
   /// length but 0), `strength` as in `smooth`. Samples that become solid take `material`.
+  /// Cost: as adding a sphere.
   std::int64_t flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength, VoxelType material);
   /// Asks `pick(sample, current)` for the new value of every sample of the box, x fastest, then y, then z within a
   /// chunk, chunks likewise. Requires: `pick` leaves the grid alone.
+  /// Cost: O(samples of the box), far air too.
   std::int64_t edit(const IBox& box, const std::function<DensitySample(IVec3 sample, DensitySample current)>& pick);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Requires: its densities are `stored_density`
-  /// of this band.
+  /// of this band. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, DensityChunk samples);
   void clear();
 
@@ -85,6 +102,8 @@ class DensityGrid {
   /// The chunks whose mesh may have changed since the last call: those that read a changed sample at most `reach`
   /// samples away from a sample of theirs. `reach` is what the mesher says (`reach_of`, quoin/mesh/smooth.h). Sorted as
   /// `chunks`, neighbours that do not exist (all far air) included, since a surface can end in them.
+  /// Exact: a chunk is told of if, and only if, a sample changed within its 64^3 samples grown by `reach` on each side.
+  /// Memory: that of 27 bytes for each chunk that changed, until they are taken.
   /// Requires: 0 <= reach <= 64.
   std::vector<IVec3> take_dirty(int reach);
 

@@ -13,7 +13,7 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Nifti, Nrrd, Glb, Gltf, Obj };
+enum class FileFormat : std::uint8_t { Vox, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
 
 /// What Quoin can do with a file format.
 struct FormatInfo {
@@ -30,7 +30,7 @@ struct FormatInfo {
 /// All formats, those that can be read first.
 [[nodiscard]] std::span<const FormatInfo> file_formats();
 
-/// The endings of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .vox".
+/// The endings of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .ply, .vox".
 [[nodiscard]] std::string readable_endings();
 [[nodiscard]] std::string writable_endings();
 

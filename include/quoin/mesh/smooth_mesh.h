@@ -31,7 +31,8 @@ struct SmoothMesh {
 struct SmoothMeshOptions {
   SmoothOcclusionOptions occlusion;
   bool split_sheets = true;  ///< as in SmoothOptions
-  /// The level of detail of a chunk, 0 to kCoarsestLevel; empty: 0 everywhere. Also asked for chunks that do not exist.
+  /// The level of detail of a chunk, 0 to kCoarsestLevel; empty: 0 everywhere. Asked once a chunk, from the calling
+  /// thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of;
 };
 
@@ -41,7 +42,8 @@ struct SmoothMeshOptions {
 /// Space:   the field's coordinates; beyond 2^24 samples from the origin floats lose whole samples.
 /// Order:   chunks as in DensityGrid::chunks; the same bytes at any thread count.
 /// Types:   materials that are not registered, and air, count as opaque white.
-/// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices.
+/// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices; InvalidArgument for a level out of
+/// range.
 [[nodiscard]] Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                                    const SmoothMeshOptions& options, Threads threads = {},
                                                    const Progress& progress = {});

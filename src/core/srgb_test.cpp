@@ -1,4 +1,4 @@
-#include "light/srgb.h"
+#include "core/srgb.h"
 
 #include <cmath>
 #include <limits>

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/io/formats.h>
+#include <quoin/io/scene_meshes.h>
+#include <quoin/io/volume.h>
+
+#include "commands.h"
+
+namespace quoin::tool {
+
+/// What `quoin convert` was asked for.
+struct ConvertOptions {
+  CommonOptions common;
+  std::filesystem::path output;
+  std::string mesher;  ///< empty: greedy for voxels, smooth for volumes
+  bool occlusion_off = false;
+  bool watertight = false;
+  std::optional<double> iso;
+  std::optional<double> simplify;
+  std::optional<RawVolume> raw;  ///< the input is a file of values alone
+  bool mesh_only = false;        ///< any option that only meshes heed was given
+};
+
+struct Seconds {
+  double read = 0;
+  double mesh = 0;
+  double write = 0;
+};
+
+/// What came of it.
+struct Outcome {
+  bool is_volume = false;
+  std::int64_t voxels = 0;  ///< of a volume: solid samples
+  std::string mesher;       ///< empty: nothing was meshed
+  std::int64_t faces_visible = 0;
+  std::int64_t faces_total = 0;
+  std::int64_t quads = 0;
+  std::int64_t triangles = 0;
+  std::int64_t vertices = 0;
+  std::optional<double> iso;  ///< of volumes
+  bool is_iso_found = false;  ///< from the values rather than given
+  double simplify_error = 0;  ///< reached
+  std::uint64_t bytes = 0;
+  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  Seconds seconds;
+  std::vector<std::string> warnings;
+};
+
+/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
+[[nodiscard]] Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options);
+
+/// Meshes a scene smoothly and writes it, filling in `outcome`.
+[[nodiscard]] Status convert_smoothly(const Scene& scene, const ConvertOptions& options, const FormatInfo& format,
+                                      Outcome& outcome);
+
+/// Reads a volume, meshes it and writes it.
+[[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);
+
+}  // namespace quoin::tool

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <quoin/core/parallel.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/grid.h>
+
+namespace quoin {
+
+/// The density of a voxel model, rounded: what a smooth mesh of it is made from. Every voxel but air is solid.
+///
+/// Space:     sample (i, j, k) stands for the centre of voxel (i, j, k): point p of the field is point p + 0.5 of the
+///            grid.
+/// Shape:     the distance to the nearest voxel centre of the other kind, less one half, smoothed by a 1 4 6 4 1 kernel
+///            along each axis; at least 0.1 from 0 and of its voxel's sign everywhere, so that the surface runs between
+///            the voxels that it ran between before, and nothing thin is lost. Within a band of 8 samples.
+/// Materials: the voxels' types.
+/// Order:     the same densities at any thread count.
+/// Cost:      about 10 ms a chunk that the surface comes near, on each thread; little for the others.
+[[nodiscard]] DensityGrid field_from_grid(const Grid& grid, Threads threads = {});
+
+}  // namespace quoin

@@ -1,0 +1,116 @@
+#include <quoin/grid/density_grid.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Every value is an exact half.
+double linear(DVec3 p) {
+  return 0.25 * p.x - 0.5 * p.y + 0.125 * p.z + 0.75;
+}
+
+DensityGrid linear_field() {
+  DensityGrid grid(kLargestHalf);
+  grid.edit({IVec3(-8), IVec3(8)}, [](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(linear(DVec3(p))), 1};
+  });
+  grid.edit({{60, -4, -68}, {68, 4, -60}}, [](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(linear(DVec3(p))), 1};
+  });
+  return grid;
+}
+
+TEST(DensityAt, IsExactOnLinearFieldsAcrossChunkBorders) {
+  const DensityGrid grid = linear_field();
+  std::mt19937 random(31);
+  const auto in = [&](double low, double high) { return low + (high - low) * (random() / 4294967296.0); };
+  for (int round = 0; round < 2'000; ++round) {
+    const DVec3 near{in(-8, 7), in(-8, 7), in(-8, 7)};
+    const DVec3 far{in(60, 67), in(-4, 3), in(-68, -61)};
+    for (const DVec3 p : {near, far}) {
+      EXPECT_NEAR(grid.density_at(p), linear(p), 1e-6);
+      const DVec3 gradient = grid.gradient_at(p);
+      EXPECT_NEAR(gradient.x, 0.25, 1e-6);
+      EXPECT_NEAR(gradient.y, -0.5, 1e-6);
+      EXPECT_NEAR(gradient.z, 0.125, 1e-6);
+    }
+  }
+}
+
+TEST(DensityAt, EqualsTheSamplesAtTheSamples) {
+  DensityGrid grid;
+  grid.add_sphere({0.3, -0.7, 63.1}, 6.0, 1);
+  for (int z = 50; z < 75; ++z) {
+    for (int y = -12; y < 10; ++y) {
+      for (int x = -12; x < 10; ++x) EXPECT_EQ(grid.density_at({x, y, z}), grid.density({x, y, z}));
+    }
+  }
+}
+
+TEST(DensityAt, AgreesWithTheSumOverTheCornersInARandomField) {
+  constexpr unsigned kSeed = 37;
+  SCOPED_TRACE(kSeed);
+  std::mt19937 random(kSeed);
+  DensityGrid grid;
+  grid.edit({IVec3(-4), IVec3(4)}, [&](IVec3, DensitySample) {
+    return DensitySample{static_cast<float>(random() % 1000) / 100.0F - 5.0F, 1};
+  });
+  const auto value = [&](DVec3 p) {
+    double sum = 0.0;
+    const DVec3 low = glm::floor(p);
+    for (int i = 0; i < 8; ++i) {
+      const DVec3 corner = low + DVec3(i & 1, i >> 1 & 1, i >> 2);
+      const DVec3 weight = 1.0 - glm::abs(p - corner);
+      sum += grid.density(IVec3(corner)) * weight.x * weight.y * weight.z;
+    }
+    return sum;
+  };
+  for (int round = 0; round < 2'000; ++round) {
+    DVec3 p{0.0};
+    for (int axis = 0; axis < 3; ++axis) p[axis] = -6.0 + 12.0 * (random() / 4294967296.0);
+    EXPECT_NEAR(grid.density_at(p), value(p), 1e-5);
+    for (int axis = 0; axis < 3; ++axis) {
+      DVec3 before = p;
+      before[axis] = std::floor(p[axis]);
+      DVec3 after = before;
+      after[axis] += 1.0;
+      // Along an axis the field is linear within a cell.
+      const double at_end = value(after - DVec3(axis == 0, axis == 1, axis == 2) * 1e-9);
+      EXPECT_NEAR(grid.gradient_at(p)[axis], at_end - value(before), 1e-5);
+    }
+  }
+}
+
+TEST(DensityAt, TheGradientOnAFaceIsThatOfTheCellAbove) {
+  DensityGrid grid;
+  grid.set({-1, 0, 0}, {-1.0F, 1});
+  grid.set({0, 0, 0}, {1.0F, 1});
+  grid.set({1, 0, 0}, {4.0F, 1});
+  EXPECT_EQ(grid.gradient_at({0, 0, 0}).x, 3.0);
+  EXPECT_EQ(grid.gradient_at({-0.25, 0, 0}).x, 2.0);
+}
+
+TEST(DensityAt, NowhereIsFarAirWithoutAGradient) {
+  DensityGrid grid;
+  grid.add_sphere({0, 0, 0}, 5.0, 1);
+  for (const double bad : {kNan, kInfinity, -kInfinity, 1e300, -1e300, 2147483647.0, 2147483648.0, -2147483649.0}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      DVec3 p{0.0};
+      p[axis] = bad;
+      EXPECT_EQ(grid.density_at(p), 8.0F);
+      EXPECT_EQ(grid.gradient_at(p), DVec3(0.0));
+    }
+  }
+  EXPECT_EQ(grid.density_at({-2147483648.0, 2147483646.5, 0.0}), 8.0F);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,173 @@
+#include <quoin/grid/density_chunk.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+constexpr Half kFar = 0x4800;   // 8
+constexpr Half kDeep = 0xC800;  // -8
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+TEST(StoredDensity, KeepsTheSignHoweverSmallAndNothingButZeroIsZero) {
+  for (const float small : {1e-45F, 1e-30F, 1e-8F, 3e-8F, 1e-6F, 6e-5F}) {
+    EXPECT_TRUE(DensityChunk::is_solid(stored_density(-small, 8.0F))) << small;
+    EXPECT_GT(float_from_half(stored_density(small, 8.0F)), 0.0F) << small;
+    EXPECT_GE(float_from_half(stored_density(small, 8.0F)), 1.0F / 16384.0F) << small;
+  }
+  EXPECT_EQ(stored_density(0.0F, 8.0F), 0);
+  EXPECT_EQ(stored_density(-0.0F, 8.0F), 0);
+}
+
+TEST(StoredDensity, EndsAtTheBandAndReadsNanAsFarAir) {
+  EXPECT_EQ(stored_density(100.0F, 8.0F), kFar);
+  EXPECT_EQ(stored_density(-100.0F, 8.0F), kDeep);
+  EXPECT_EQ(stored_density(kInfinity, 8.0F), kFar);
+  EXPECT_EQ(stored_density(-kInfinity, 8.0F), kDeep);
+  EXPECT_EQ(stored_density(std::nanf(""), 8.0F), kFar);
+  EXPECT_EQ(stored_density(-std::nanf(""), 8.0F), kFar);
+  EXPECT_EQ(float_from_half(stored_density(1e9F, kLargestHalf)), kLargestHalf);
+}
+
+TEST(StoredDensity, ABandBetweenTwoHalvesIsNeverExceeded) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 1'000; ++round) {
+    const float band =
+        std::ldexp(1.0F + static_cast<float>(random() % 10'000) / 10'000.0F, static_cast<int>(random() % 28) - 13);
+    const float most = float_from_half(stored_density(kInfinity, band));
+    EXPECT_LE(most, band);
+    EXPECT_GE(most, band * (1.0F - 1.0F / 1024.0F));
+  }
+  EXPECT_GT(float_from_half(stored_density(1.0F, 1e-30F)), 0.0F);
+}
+
+TEST(StoredDensity, IsWithinOnePartIn2048) {
+  std::mt19937 random(5);
+  for (int round = 0; round < 10'000; ++round) {
+    const float value = (static_cast<float>(random()) / 4294967296.0F - 0.5F) * 16.0F;
+    if (std::abs(value) < 1e-4F) continue;
+    EXPECT_NEAR(float_from_half(stored_density(value, 8.0F)), value, std::abs(value) / 2048.0F);
+  }
+}
+
+// Every sample, and the row that is its sign.
+class PlainChunk {
+ public:
+  explicit PlainChunk(Half density) : values_(kChunkVoxels, density) {}
+  [[nodiscard]] Half* row(int y, int z) { return values_.data() + (z * kChunkEdge + y) * kChunkEdge; }
+
+ private:
+  std::vector<Half> values_;
+};
+
+void expect_equal(const DensityChunk& chunk, PlainChunk& plain) {
+  std::array<Half, kChunkEdge> row;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      chunk.read_row(y, z, row);
+      std::uint64_t solid = 0;
+      for (int x = 0; x < kChunkEdge; ++x) {
+        const Half expected = plain.row(y, z)[x];
+        ASSERT_EQ(row[static_cast<std::size_t>(x)], expected);
+        ASSERT_EQ(chunk.get(x, y, z), expected);
+        solid |= std::uint64_t{float_from_half(expected) < 0.0F} << x;
+      }
+      ASSERT_EQ(chunk.solid_row(y, z), solid);
+      if (chunk.row(y, z) != nullptr) {
+        ASSERT_EQ(chunk.row(y, z)[17], plain.row(y, z)[17]);
+      }
+    }
+  }
+}
+
+TEST(DensityChunk, AgreesWithAPlainArrayUnderRandomWrites) {
+  constexpr unsigned kSeed = 19;
+  SCOPED_TRACE(kSeed);
+  std::mt19937 random(kSeed);
+  DensityChunk chunk(kFar, 4);
+  PlainChunk plain(kFar);
+  std::array<Half, kChunkEdge> row;
+  for (int round = 0; round < 6'000; ++round) {
+    const int y = static_cast<int>(random() % 64);
+    const int z = static_cast<int>(random() % 64);
+    chunk.read_row(y, z, row);
+    const unsigned kind = random() % 4;
+    for (Half& value : row) {
+      if (kind == 0) value = kDeep;
+      if (kind == 1) value = kFar;
+      if (kind == 2 && random() % 4 == 0) value = stored_density(static_cast<float>(random() % 100) - 50.0F, 8.0F);
+    }
+    std::uint64_t changed = 0;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{row[x] != plain.row(y, z)[x]} << x;
+    ASSERT_EQ(chunk.write_row(y, z, row), changed);
+    std::copy(row.begin(), row.end(), plain.row(y, z));
+    if (round % 1'500 == 700) chunk.unite_slabs();
+    if (round % 1'500 == 1'400) chunk.compact();
+    if (round % 1'500 == 1'499) expect_equal(chunk, plain);
+  }
+  const DensityChunk copy = chunk;
+  chunk.fill(kFar);
+  expect_equal(copy, plain);
+  EXPECT_EQ(copy.materials().uniform(), std::optional<VoxelType>(4));
+}
+
+TEST(DensityChunk, GivesBackWhatCameToHoldOneValue) {
+  DensityChunk chunk(kFar, 2);
+  const std::size_t empty = chunk.bytes();
+  EXPECT_EQ(chunk.uniform(), std::optional<Half>(kFar));
+  EXPECT_EQ(chunk.solid_row(3, 3), 0U);
+  EXPECT_EQ(chunk.row(3, 3), nullptr);
+  std::array<Half, kChunkEdge> row;
+  row.fill(kDeep);
+  for (int z = 4; z < 8; ++z) {
+    for (int y = 8; y < 12; ++y) EXPECT_EQ(chunk.write_row(y, z, row), ~std::uint64_t{0});
+  }
+  EXPECT_NE(chunk.row(8, 4), nullptr);
+  chunk.unite_slabs();
+  EXPECT_EQ(chunk.row(8, 4), nullptr);
+  EXPECT_EQ(chunk.get(5, 11, 7), kDeep);
+  EXPECT_EQ(chunk.solid_row(11, 7), ~std::uint64_t{0});
+  EXPECT_EQ(chunk.uniform(), std::nullopt);
+  row.fill(kFar);
+  for (int z = 4; z < 8; ++z) {
+    for (int y = 8; y < 12; ++y) chunk.write_row(y, z, row);
+  }
+  chunk.compact();
+  EXPECT_EQ(chunk.uniform(), std::optional<Half>(kFar));
+  EXPECT_EQ(chunk.bytes(), empty);
+}
+
+TEST(DensityChunk, HoldsOnlyTheSlabsThatDiffer) {
+  DensityChunk chunk(kFar);
+  std::array<Half, kChunkEdge> row;
+  row.fill(kFar);
+  row[5] = 0;
+  for (int i = 0; i < 10; ++i) chunk.write_row(4 * i, 0, row);
+  row.fill(kFar);
+  for (int i = 1; i < 10; ++i) chunk.write_row(4 * i, 0, row);
+  chunk.compact();
+  EXPECT_EQ(chunk.get(5, 0, 0), 0);
+  EXPECT_EQ(chunk.solid_row(0, 0), 0U);
+  EXPECT_LT(chunk.bytes(), sizeof(DensityChunk) + sizeof(DensityChunk::Mixed) + 2 * 2 * 16 * 64);
+}
+
+TEST(DensityNeighbourhood, ReadsAcrossChunksAndOutside) {
+  const DensityChunk centre(kDeep);
+  const DensityChunk next(Half{0});
+  DensityNeighbourhood around;
+  around.chunks[13] = &centre;
+  around.chunks[14] = &next;
+  EXPECT_EQ(around.get({63, 0, 0}), kDeep);
+  EXPECT_EQ(around.get({64, 63, 0}), 0);
+  EXPECT_EQ(around.get({-1, 0, 0}), kFar);
+  EXPECT_EQ(around.get({127, 0, 127}), kFar);
+}
+
+}  // namespace
+}  // namespace quoin

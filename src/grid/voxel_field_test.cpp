@@ -1,0 +1,139 @@
+#include <quoin/grid/voxel_field.h>
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+// Slow and obvious: looks at every voxel within 8, then smooths with 125 weights.
+class PlainVoxelField {
+ public:
+  explicit PlainVoxelField(const Grid& grid) : grid_(grid) {}
+
+  [[nodiscard]] double density(IVec3 p) const {
+    constexpr std::array<double, 5> kWeights = {1, 4, 6, 4, 1};
+    double sum = 0.0;
+    for (int z = 0; z < 5; ++z) {
+      for (int y = 0; y < 5; ++y) {
+        for (int x = 0; x < 5; ++x) {
+          const double weight = kWeights[static_cast<std::size_t>(x)] * kWeights[static_cast<std::size_t>(y)] *
+                                kWeights[static_cast<std::size_t>(z)];
+          sum += weight * distance(p + IVec3{x, y, z} - 2);
+        }
+      }
+    }
+    const double smoothed = std::clamp(sum / 4096.0, -8.0, 8.0);
+    return grid_.get(p) != kAir ? std::min(smoothed, -0.1) : std::max(smoothed, 0.1);
+  }
+
+ private:
+  [[nodiscard]] double distance(IVec3 p) const {
+    const bool is_solid = grid_.get(p) != kAir;
+    int least = 81;
+    for (int z = -8; z <= 8; ++z) {
+      for (int y = -8; y <= 8; ++y) {
+        for (int x = -8; x <= 8; ++x) {
+          const int squared = x * x + y * y + z * z;
+          if (squared < least && (grid_.get(p + IVec3{x, y, z}) != kAir) != is_solid) least = squared;
+        }
+      }
+    }
+    const double length = std::sqrt(static_cast<double>(least)) - 0.5;
+    return is_solid ? -length : length;
+  }
+
+  const Grid& grid_;
+};
+
+Grid random_model(unsigned seed) {
+  std::mt19937 random(seed);
+  Grid grid;
+  const auto place = [&] { return static_cast<int>(random() % 90) - 20; };
+  for (int i = 0; i < 6; ++i) {
+    grid.fill_sphere({place(), place(), place()}, static_cast<double>(random() % 20), static_cast<VoxelType>(i + 1));
+    const IVec3 first{place(), place(), place()};
+    grid.fill_box(first, first + IVec3(random() % 40, random() % 3, random() % 40), 9);
+    grid.set({place(), place(), place()}, 7);
+  }
+  return grid;
+}
+
+TEST(VoxelField, AgreesWithTheSlowWay) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    SCOPED_TRACE(seed);
+    const Grid grid = random_model(seed);
+    const DensityGrid field = field_from_grid(grid, Threads{2});
+    const PlainVoxelField plain(grid);
+    std::mt19937 random(seed);
+    for (int round = 0; round < 40; ++round) {
+      const IVec3 p = IVec3(random() % 110, random() % 110, random() % 110) - 30;
+      const double expected = plain.density(p);
+      EXPECT_NEAR(field.density(p), expected, std::abs(expected) / 1024.0 + 1e-4);
+    }
+    for (const IVec3 p : {IVec3(-1, -1, -1), IVec3(0, 0, 0), IVec3(63, 64, 63), IVec3(64, 10, 0)}) {
+      EXPECT_NEAR(field.density(p), plain.density(p), std::abs(plain.density(p)) / 1024.0 + 1e-4);
+    }
+  }
+}
+
+TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
+  const Grid grid = random_model(5);
+  const DensityGrid field = field_from_grid(grid);
+  EXPECT_EQ(field.solid_count(), grid.voxel_count());
+  EXPECT_EQ(field.solid_bounds(), grid.bounds());
+  grid.for_each([&](IVec3 p, VoxelType type) {
+    ASSERT_LT(field.density(p), -0.099F);
+    ASSERT_EQ(field.material(p), type);
+  });
+  for (int z = -30; z < 90; ++z) {
+    for (int y = -30; y < 90; ++y) {
+      for (int x = -30; x < 90; ++x) {
+        const bool is_air = grid.get({x, y, z}) == kAir;
+        ASSERT_EQ(is_air, field.density({x, y, z}) > 0.099F);
+      }
+    }
+  }
+}
+
+TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
+  Grid grid;
+  grid.fill_box({-100, -100, -40}, {100, 9, 40}, 3);
+  const DensityGrid field = field_from_grid(grid);
+  for (int y = 0; y < 30; ++y) {
+    // The smoothing sees no more than 8.5, so it bends the last values a little.
+    const double distance = y - 9.5;
+    EXPECT_NEAR(field.density({0, y, 0}), std::clamp(distance, -8.0, 8.0), std::abs(distance) < 6.6 ? 0.01 : 0.07) << y;
+  }
+}
+
+TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
+  const Grid grid = random_model(8);
+  const DensityGrid one = field_from_grid(grid, Threads{1});
+  const DensityGrid four = field_from_grid(grid, Threads{4});
+  ASSERT_EQ(one.chunks(), four.chunks());
+  for (const IVec3 at : one.chunks()) {
+    for (int i = 0; i < kChunkEdge * kChunkEdge; ++i) {
+      std::array<Half, kChunkEdge> a;
+      std::array<Half, kChunkEdge> b;
+      one.find_chunk(at)->read_row(i % 64, i / 64, a);
+      four.find_chunk(at)->read_row(i % 64, i / 64, b);
+      ASSERT_EQ(a, b);
+    }
+  }
+  EXPECT_EQ(field_from_grid(Grid()).chunk_count(), 0U);
+}
+
+TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {64 * 5 - 1, 64 * 5 - 1, 64 * 5 - 1}, 3);
+  const DensityGrid field = field_from_grid(grid);
+  EXPECT_TRUE(field.find_chunk({2, 2, 2})->uniform().has_value());
+  EXPECT_TRUE(field.find_chunk({1, 1, 1})->uniform().has_value());
+  EXPECT_FALSE(field.find_chunk({0, 2, 2})->uniform().has_value());
+}
+
+}  // namespace
+}  // namespace quoin

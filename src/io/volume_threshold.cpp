@@ -1,0 +1,65 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <quoin/io/smooth_scene.h>
+
+namespace quoin {
+
+namespace {
+
+constexpr std::size_t kBins = 1024;
+
+using Histogram = std::array<double, kBins>;
+
+Histogram histogram_of(const Volume& volume) {
+  const double min = volume.min;
+  const double bins_per_value = kBins / (static_cast<double>(volume.max) - min);
+  Histogram counts{};
+  for (const float value : volume.values) {
+    if (!std::isfinite(value)) continue;
+    const double bin = (static_cast<double>(value) - min) * bins_per_value;
+    counts[std::min(kBins - 1, static_cast<std::size_t>(std::max(bin, 0.0)))] += 1.0;
+  }
+  return counts;
+}
+
+/// The variance between the values in bins up to each and those in the bins after it, but for a constant factor.
+std::array<double, kBins> variance_between(const Histogram& counts) {
+  double all = 0.0;
+  double moment = 0.0;
+  for (std::size_t i = 0; i < kBins; ++i) {
+    all += counts[i];
+    moment += counts[i] * static_cast<double>(i);
+  }
+  std::array<double, kBins> variance{};
+  double below = 0.0;
+  double moment_below = 0.0;
+  for (std::size_t i = 0; i + 1 < kBins; ++i) {
+    below += counts[i];
+    moment_below += counts[i] * static_cast<double>(i);
+    const double above = all - below;
+    if (below == 0.0 || above == 0.0) continue;
+    const double difference = moment_below / below - (moment - moment_below) / above;
+    variance[i] = below * above * difference * difference;
+  }
+  return variance;
+}
+
+}  // namespace
+
+float volume_threshold(const Volume& volume) {
+  if (!(volume.min < volume.max)) return volume.min;
+  const auto variance = variance_between(histogram_of(volume));
+  const auto* const first = std::max_element(variance.begin(), variance.end());
+  // Bins that hold nothing leave the variance as it is: the threshold goes amid them.
+  const auto* last = first;
+  while (last + 1 != variance.end() && *(last + 1) == *first) ++last;
+  const double bins =
+      (static_cast<double>(first - variance.begin()) + static_cast<double>(last - variance.begin())) / 2;
+  const double min = volume.min;
+  return static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
+}
+
+}  // namespace quoin

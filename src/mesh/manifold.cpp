@@ -1,0 +1,151 @@
+#include "mesh/manifold.h"
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+#include <vector>
+
+namespace quoin {
+
+namespace {
+
+/// A triangle as one of its vertices sees it: it leads from one neighbour round to the next.
+struct Arc {
+  std::uint32_t from = 0;
+  std::uint32_t to = 0;
+  std::uint32_t triangle = 0;
+};
+
+/// Which triangles each vertex has.
+class Corners {
+ public:
+  explicit Corners(const SmoothMesh& mesh) : first_(mesh.positions.size() + 1), triangles_(mesh.indices.size()) {
+    for (const std::uint32_t index : mesh.indices) ++first_[index + std::size_t{1}];
+    std::partial_sum(first_.begin(), first_.end(), first_.begin());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+      triangles_[next[mesh.indices[i]]++] = static_cast<std::uint32_t>(i / 3);
+    }
+  }
+
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t vertex) const {
+    return std::span(triangles_).subspan(first_[vertex], first_[vertex + std::size_t{1}] - first_[vertex]);
+  }
+
+ private:
+  std::vector<std::uint32_t> first_;
+  std::vector<std::uint32_t> triangles_;
+};
+
+/// Replaces `arcs` by those around a vertex, by where they start.
+void arcs_around(const SmoothMesh& mesh, const Corners& corners, std::uint32_t vertex, std::vector<Arc>& arcs) {
+  arcs.clear();
+  for (const std::uint32_t triangle : corners.of(vertex)) {
+    const std::uint32_t* at = mesh.indices.data() + std::size_t{3} * triangle;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (at[k] == vertex) arcs.push_back({at[(k + 1) % 3], at[(k + 2) % 3], triangle});
+    }
+  }
+  std::sort(arcs.begin(), arcs.end(),
+            [](const Arc& a, const Arc& b) { return a.from != b.from ? a.from < b.from : a.triangle < b.triangle; });
+}
+
+void remove_back_to_back(SmoothMesh& mesh) {
+  const Corners corners(mesh);
+  std::vector<bool> is_removed(mesh.indices.size() / 3);
+  std::vector<Arc> arcs;
+  for (std::uint32_t vertex = 0; vertex < mesh.positions.size(); ++vertex) {
+    arcs_around(mesh, corners, vertex, arcs);
+    for (const Arc& arc : arcs) {
+      if (vertex > std::min(arc.from, arc.to) || arc.from > arc.to || is_removed[arc.triangle]) continue;
+      const auto opposite = std::find_if(arcs.begin(), arcs.end(), [&](const Arc& other) {
+        return other.from == arc.to && other.to == arc.from && !is_removed[other.triangle];
+      });
+      if (opposite == arcs.end()) continue;
+      is_removed[arc.triangle] = is_removed[opposite->triangle] = true;
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < is_removed.size(); ++i) {
+    if (is_removed[i]) continue;
+    for (std::size_t k = 0; k < 3; ++k) mesh.indices[kept++] = mesh.indices[3 * i + k];
+  }
+  mesh.indices.resize(kept);
+}
+
+/// Takes arcs apart into rings that pass no neighbour twice; answers the number of each arc's ring, from 0. Arcs that
+/// belong to none are in ring 0.
+std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
+  std::vector<std::uint32_t> ring(arcs.size(), 0);
+  std::vector<bool> is_used(arcs.size());
+  std::vector<std::size_t> path;
+  std::uint32_t rings = 0;
+  for (std::size_t start = 0; start < arcs.size(); ++start) {
+    if (is_used[start]) continue;
+    path.assign(1, start);
+    is_used[start] = true;
+    while (!path.empty()) {
+      const std::uint32_t at = arcs[path.back()].to;
+      // A neighbour that the path has passed closes a ring, which leaves the path.
+      const auto begin = std::find_if(path.begin(), path.end(), [&](std::size_t i) { return arcs[i].from == at; });
+      if (begin != path.end()) {
+        std::for_each(begin, path.end(), [&](std::size_t i) { ring[i] = rings; });
+        path.erase(begin, path.end());
+        ++rings;
+        continue;
+      }
+      std::size_t next = static_cast<std::size_t>(
+          std::lower_bound(arcs.begin(), arcs.end(), at, [](const Arc& a, std::uint32_t v) { return a.from < v; }) -
+          arcs.begin());
+      while (next < arcs.size() && arcs[next].from == at && is_used[next]) ++next;
+      if (next == arcs.size() || arcs[next].from != at) break;
+      is_used[next] = true;
+      path.push_back(next);
+    }
+  }
+  return ring;
+}
+
+/// Appends a copy of a vertex and answers its number.
+std::uint32_t add_copy(SmoothMesh& mesh, std::uint32_t vertex) {
+  const auto copy = static_cast<std::uint32_t>(mesh.positions.size());
+  const auto append = [vertex](auto& values) {
+    if (values.empty()) return;
+    const auto value = values[vertex];
+    values.push_back(value);
+  };
+  append(mesh.positions);
+  append(mesh.normals);
+  append(mesh.openness);
+  append(mesh.albedo);
+  append(mesh.types);
+  return copy;
+}
+
+void split(SmoothMesh& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs) {
+  const std::vector<std::uint32_t> ring = rings_of(arcs);
+  std::vector<std::uint32_t> vertex_of(*std::max_element(ring.begin(), ring.end()) + std::size_t{1}, vertex);
+  for (std::size_t i = 1; i < vertex_of.size(); ++i) vertex_of[i] = add_copy(mesh, vertex);
+  for (std::size_t i = 0; i < arcs.size(); ++i) {
+    std::uint32_t* at = mesh.indices.data() + std::size_t{3} * arcs[i].triangle;
+    *std::find(at, at + 3, vertex) = vertex_of[ring[i]];
+  }
+}
+
+}  // namespace
+
+void make_manifold(SmoothMesh& mesh) {
+  remove_back_to_back(mesh);
+  const Corners corners(mesh);
+  const auto count = static_cast<std::uint32_t>(mesh.positions.size());
+  std::vector<Arc> arcs;
+  for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
+    arcs_around(mesh, corners, vertex, arcs);
+    const bool is_crowded = std::adjacent_find(arcs.begin(), arcs.end(), [](const Arc& a, const Arc& b) {
+                              return a.from == b.from;
+                            }) != arcs.end();
+    if (is_crowded) split(mesh, vertex, arcs);
+  }
+}
+
+}  // namespace quoin

@@ -1,0 +1,248 @@
+#include <quoin/mesh/simplify.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <random>
+#include <string>
+
+#include "mesh/manifold.h"
+#include "mesh/smooth_cell.h"
+
+namespace quoin {
+
+namespace {
+
+using Field = std::function<float(Vec3)>;
+
+/// Surface Nets over the cells of a cube of `edge` samples, a vertex a cell; openness, albedo and types tell the
+/// vertices apart.
+SmoothMesh surface_of(const Field& field, int edge) {
+  SmoothMesh mesh;
+  std::map<std::array<int, 3>, std::uint32_t> vertex_of;
+  const auto at = [&](IVec3 p) { return field(Vec3(p)); };
+  for (int i = 0; i < edge * edge * edge; ++i) {
+    const IVec3 cell{i % edge, i / edge % edge, i / (edge * edge)};
+    smooth::Corners corners{};
+    for (int c = 0; c < 8; ++c) corners[static_cast<std::size_t>(c)] = at(cell + IVec3(c & 1, c >> 1 & 1, c >> 2));
+    const std::uint32_t solid = smooth::solid_corners(corners);
+    if (solid == 0 || solid == 255) continue;
+    const smooth::CellVertex vertex = smooth::cell_vertex(corners);
+    const auto number = static_cast<std::uint32_t>(mesh.positions.size());
+    vertex_of[{cell.x, cell.y, cell.z}] = number;
+    mesh.positions.push_back(Vec3(cell) + vertex.snapped);
+    mesh.normals.push_back(vertex.normal);
+    mesh.openness.push_back(static_cast<float>(number % 1000) / 1000.0F);
+    mesh.albedo.push_back({static_cast<std::uint16_t>(number), static_cast<std::uint16_t>(number >> 16), 0, 65'535});
+    mesh.types.push_back(static_cast<VoxelType>(number % 7 + 1));
+  }
+  for (int i = 0; i < edge * edge * edge * 3; ++i) {
+    const int axis = i % 3;
+    const IVec3 p{i / 3 % edge, i / 3 / edge % edge, i / 3 / (edge * edge)};
+    IVec3 step(0), u(0), v(0);
+    step[axis] = u[(axis + 1) % 3] = v[(axis + 2) % 3] = 1;
+    const bool inside = at(p) < 0.0F;
+    if (inside == (at(p + step) < 0.0F)) continue;
+    std::array<std::uint32_t, 4> quad{};
+    const std::array<IVec3, 4> cells = {p - u - v, p - v, p, p - u};
+    for (std::size_t k = 0; k < 4; ++k) quad[k] = vertex_of.at({cells[k].x, cells[k].y, cells[k].z});
+    if (!inside) std::swap(quad[1], quad[3]);
+    for (const std::size_t k : {0, 1, 2, 0, 2, 3}) mesh.indices.push_back(quad[k]);
+  }
+  return mesh;
+}
+
+/// Edges that have not exactly one triangle on each side.
+std::size_t open_edges(const SmoothMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    ++uses[{mesh.indices[i], mesh.indices[i / 3 * 3 + (i + 1) % 3]}];
+  }
+  std::size_t open = 0;
+  for (const auto& [edge, count] : uses) {
+    const auto back = uses.find({edge.second, edge.first});
+    open += count == 1 && back != uses.end() && back->second == 1 && edge.first != edge.second ? 0 : 1;
+  }
+  return open;
+}
+
+double volume(const SmoothMesh& mesh) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const DVec3 a(mesh.positions[mesh.indices[i]]);
+    const DVec3 b(mesh.positions[mesh.indices[i + 1]]);
+    const DVec3 c(mesh.positions[mesh.indices[i + 2]]);
+    sum += glm::dot(a, glm::cross(b, c)) / 6.0;
+  }
+  return sum;
+}
+
+float sphere(Vec3 p) {
+  return glm::length(p - Vec3(20.3F, 20.1F, 19.8F)) - 15.7F;
+}
+
+/// Several balls that flow together.
+Field blob(std::mt19937& random) {
+  std::uniform_real_distribution<float> place(10.0F, 30.0F);
+  std::uniform_real_distribution<float> radius(3.0F, 6.0F);
+  std::vector<std::pair<Vec3, float>> balls;
+  for (int i = 0; i < 6; ++i) balls.push_back({{place(random), place(random), place(random)}, radius(random)});
+  return [balls](Vec3 p) {
+    float sum = 0.0F;
+    for (const auto& [centre, size] : balls) sum += size * size / (glm::dot(p - centre, p - centre) + 0.01F);
+    return 1.0F - sum;
+  };
+}
+
+class Simplify : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
+  }
+};
+
+TEST_F(Simplify, a_sphere_stays_closed_and_within_the_error) {
+  for (const float error : {0.01F, 0.03F, 0.1F, 0.3F, 1.0F}) {
+    SmoothMesh mesh = surface_of(sphere, 41);
+    ASSERT_EQ(open_edges(mesh), 0U);
+    const std::size_t before = mesh.indices.size();
+    const auto reached = simplify_smooth_mesh(mesh, error);
+    ASSERT_TRUE(reached);
+    EXPECT_LE(*reached, error);
+    EXPECT_GT(*reached, 0.0F);
+    EXPECT_EQ(open_edges(mesh), 0U) << error;
+    EXPECT_LT(mesh.indices.size(), error > 0.02F ? before / 2 : before) << error;
+    float farthest = 0.0F;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const Vec3 centre = (mesh.positions[mesh.indices[i]] + mesh.positions[mesh.indices[i + 1]] +
+                           mesh.positions[mesh.indices[i + 2]]) /
+                          3.0F;
+      farthest = std::max(farthest, std::abs(sphere(centre)));
+    }
+    EXPECT_LT(farthest, 0.05F + 3.0F * error) << "the mesh itself is off by some 0.04";
+  }
+}
+
+TEST_F(Simplify, random_blobs_stay_closed) {
+  const std::uint32_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  int tried = 0;
+  for (int i = 0; i < 20; ++i) {
+    const SmoothMesh whole = surface_of(blob(random), 41);
+    if (open_edges(whole) != 0) continue;  // two sheets in a cell
+    ++tried;
+    for (const float error : {0.02F, 0.2F, 1.0F, 5.0F}) {
+      SmoothMesh mesh = whole;
+      ASSERT_TRUE(simplify_smooth_mesh(mesh, error));
+      EXPECT_EQ(open_edges(mesh), 0U) << "blob " << i << " error " << error << " triangles " << mesh.indices.size() / 3;
+    }
+  }
+  EXPECT_GT(tried, 5);
+}
+
+TEST_F(Simplify, what_stays_keeps_all_that_it_had) {
+  const SmoothMesh whole = surface_of(sphere, 41);
+  SmoothMesh mesh = whole;
+  ASSERT_TRUE(simplify_smooth_mesh(mesh, 0.1F));
+  ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+  std::vector<bool> used(mesh.positions.size());
+  for (const std::uint32_t index : mesh.indices) used[index] = true;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    EXPECT_TRUE(used[i]) << "no vertex is left that nothing uses";
+    const std::size_t source = mesh.albedo[i][0] | std::size_t{mesh.albedo[i][1]} << 16;
+    EXPECT_EQ(mesh.positions[i], whole.positions[source]);
+    EXPECT_EQ(mesh.normals[i], whole.normals[source]);
+    EXPECT_EQ(mesh.openness[i], whole.openness[source]);
+    EXPECT_EQ(mesh.types[i], whole.types[source]);
+  }
+}
+
+TEST_F(Simplify, without_an_error_only_flat_places_lose_triangles) {
+  const SmoothMesh whole = surface_of(sphere, 41);
+  SmoothMesh mesh = whole;
+  mesh.openness.clear();
+  const auto reached = simplify_smooth_mesh(mesh, 0.0F);
+  ASSERT_TRUE(reached);
+  EXPECT_EQ(*reached, 0.0F);
+  EXPECT_GT(mesh.indices.size(), whole.indices.size() * 9 / 10);
+  EXPECT_EQ(open_edges(mesh), 0U);
+  EXPECT_NEAR(volume(mesh), volume(whole), 1e-3 * volume(whole));
+  EXPECT_TRUE(mesh.openness.empty());
+}
+
+TEST(Manifold, sheets_that_share_an_edge_are_separated) {
+  SmoothMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}, {0, 0, -1}};
+  mesh.normals.resize(6, Vec3(0, 1, 0));
+  mesh.albedo.resize(6);
+  mesh.types.resize(6, 3);
+  // Two tetrahedra on the edge 0-1, and a pair of triangles back to back.
+  mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3, 0, 4, 1, 0, 1, 5, 0, 5, 4, 1, 4, 5, 2, 3, 4, 4, 3, 2};
+  EXPECT_GT(open_edges(mesh), 0U);
+  const double before = volume(mesh);
+  make_manifold(mesh);
+  EXPECT_EQ(open_edges(mesh), 0U);
+  EXPECT_EQ(mesh.indices.size(), 24U);
+  EXPECT_EQ(mesh.positions.size(), 7U) << "one vertex of the edge twice is enough";
+  EXPECT_EQ(mesh.types.size(), 7U);
+  EXPECT_TRUE(mesh.openness.empty());
+  EXPECT_EQ(volume(mesh), before);
+}
+
+TEST(Manifold, sound_meshes_stay_as_they_are) {
+  SmoothMesh mesh = surface_of(sphere, 41);
+  const SmoothMesh whole = mesh;
+  make_manifold(mesh);
+  EXPECT_EQ(mesh.indices, whole.indices);
+  EXPECT_EQ(mesh.positions, whole.positions);
+  mesh.indices.resize(3000);  // open now
+  const std::vector<std::uint32_t> open = mesh.indices;
+  make_manifold(mesh);
+  EXPECT_EQ(mesh.indices, open);
+}
+
+TEST(Manifold, surfaces_that_touch_in_many_edges_become_closed_ones) {
+  const std::uint32_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    // Noise, a vertex a cell: every kind of cell with several sheets.
+    const Field noise = [&](Vec3 p) {
+      const bool is_inside = std::min({p.x, p.y, p.z}) > 0.5F && std::max({p.x, p.y, p.z}) < 13.5F;
+      std::mt19937 random(seed + i + static_cast<std::uint32_t>(p.x + 100.0F * p.y + 10'000.0F * p.z));
+      return is_inside ? std::uniform_real_distribution<float>(-1.0F, 1.0F)(random) : 1.0F;
+    };
+    SmoothMesh mesh = surface_of(noise, 16);
+    EXPECT_GT(open_edges(mesh), 100U);
+    const double before = volume(mesh);
+    make_manifold(mesh);
+    EXPECT_EQ(open_edges(mesh), 0U);
+    EXPECT_NEAR(volume(mesh), before, 1e-6 * before);
+  }
+}
+
+TEST(SimplifyErrors, what_cannot_be_leaves_the_mesh) {
+  SmoothMesh mesh = surface_of(sphere, 41);
+  const std::size_t before = mesh.indices.size();
+  for (const float error : {-1.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    const auto refused = simplify_smooth_mesh(mesh, error);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+  }
+  const auto done = simplify_smooth_mesh(mesh, 0.5F);
+  EXPECT_EQ(done.has_value(), can_simplify());
+  if (!done) {
+    EXPECT_EQ(done.error().code, ErrorCode::Unsupported);
+    EXPECT_NE(done.error().message.find("libmeshoptimizer-dev"), std::string::npos);
+    EXPECT_EQ(mesh.indices.size(), before);
+  }
+  SmoothMesh empty;
+  EXPECT_EQ(simplify_smooth_mesh(empty, 1.0F).value_or(-1.0F), can_simplify() ? 0.0F : -1.0F);
+}
+
+}  // namespace
+
+}  // namespace quoin

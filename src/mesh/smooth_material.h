@@ -1,0 +1,33 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <quoin/grid/density_chunk.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/smooth_mesh.h>
+
+namespace quoin {
+
+struct SurfaceMaterial {
+  LinearRgba16 albedo{};
+  VoxelType type = kAir;
+};
+
+/// What the surface of a cell is made of: the materials of its solid samples.
+class SurfaceMaterials {
+ public:
+  explicit SurfaceMaterials(const VoxelRegistry& types);
+
+  /// Of a cell of the centre chunk, in cells of `level`: by the solid ones of its corners; if none of them is solid,
+  /// by the solid samples of the coarsest lattice within the cell that has any. All air gives air, white.
+  [[nodiscard]] SurfaceMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
+
+ private:
+  [[nodiscard]] LinearRgba16 albedo(VoxelType type) const;
+  [[nodiscard]] SurfaceMaterial blend(std::span<VoxelType> solid) const;
+
+  std::vector<LinearRgba16> albedo_;  // by type
+};
+
+}  // namespace quoin

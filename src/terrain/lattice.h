@@ -1,0 +1,84 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
+
+namespace quoin::terrain {
+
+/// A slow noise is taken at every fourth sample and interpolated.
+inline constexpr int kLatticeStep = 4;
+/// From -4 to 68 in samples of a chunk.
+inline constexpr int kLatticeEdge = kChunkEdge / kLatticeStep + 3;
+/// From -1 to 64 in samples of a chunk: what gradients need.
+inline constexpr int kFieldEdge = kChunkEdge + 2;
+
+/// Values at every fourth sample of a chunk and around it.
+class Lattice {
+ public:
+  Lattice() : values_(std::size_t{kLatticeEdge} * kLatticeEdge * kLatticeEdge) {}
+
+  /// `value(sample, column)` gives the value at a sample of the world; `column` is its [z][x] in the lattice.
+  template <class Value>
+  void fill(IVec3 corner, Value&& value) {
+    std::size_t i = 0;
+    for (int z = 0; z < kLatticeEdge; ++z) {
+      for (int y = 0; y < kLatticeEdge; ++y) {
+        for (int x = 0; x < kLatticeEdge; ++x) {
+          const IVec3 sample = corner + (IVec3{x, y, z} - 1) * kLatticeStep;
+          values_[i++] = static_cast<float>(value(sample, static_cast<std::size_t>(z * kLatticeEdge + x)));
+        }
+      }
+    }
+  }
+  /// False when no interpolated value can be as near to 0.
+  [[nodiscard]] bool comes_within(double reach) const {
+    const auto [least, greatest] = std::minmax_element(values_.begin(), values_.end());
+    return *least<reach&& * greatest> - reach;
+  }
+  [[nodiscard]] const float* row(int y, int z) const { return values_.data() + (z * kLatticeEdge + y) * kLatticeEdge; }
+
+ private:
+  std::vector<float> values_;
+};
+
+/// How a field changes at a sample.
+struct Slope {
+  float length = 0.0F;
+  float up = 0.0F;
+};
+
+/// Values at the samples of a chunk and those beside it.
+class Field {
+ public:
+  Field() : values_(std::size_t{kFieldEdge} * kFieldEdge * kFieldEdge) {}
+
+  void fill(float value) { std::fill(values_.begin(), values_.end(), value); }
+  void upsample(const Lattice& lattice);
+
+  /// Of samples -1 and on; `y` and `z` count from there, too.
+  [[nodiscard]] float* row(int y, int z) { return values_.data() + (z * kFieldEdge + y) * kFieldEdge; }
+  /// Requires: 0 <= x, y, z < 64.
+  [[nodiscard]] float at(int x, int y, int z) const { return values_[index(x, y, z)]; }
+  [[nodiscard]] Slope slope(int x, int y, int z) const {
+    const float* here = values_.data() + index(x, y, z);
+    constexpr int kPlane = kFieldEdge * kFieldEdge;
+    const float dx = 0.5F * (here[1] - here[-1]);
+    const float dy = 0.5F * (here[kFieldEdge] - here[-kFieldEdge]);
+    const float dz = 0.5F * (here[kPlane] - here[-kPlane]);
+    return {std::sqrt((dx * dx + dy * dy) + dz * dz), dy};
+  }
+
+ private:
+  static std::size_t index(int x, int y, int z) {
+    return static_cast<std::size_t>(((z + 1) * kFieldEdge + y + 1) * kFieldEdge + x + 1);
+  }
+
+  std::vector<float> values_;
+};
+
+}  // namespace quoin::terrain

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/terrain/smooth_terrain.h>
+
+#include "terrain/landform.h"
+
+namespace quoin::terrain {
+
+/// The heights of one column of chunks, and whatever else its chunks share. Makes one of them after the other.
+class SmoothColumn {
+ public:
+  /// `world`: the samples that the world has.
+  SmoothColumn(const Landform& land, const SmoothTerrainOptions& options, const IBox& world, int chunk_x, int chunk_z);
+  ~SmoothColumn();
+
+  [[nodiscard]] DensityChunk make(const TerrainTypes& types, int chunk_y);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin::terrain

@@ -1,0 +1,283 @@
+// `quoin convert` to smooth meshes, of voxels and of volumes.
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/mesh/simplify.h>
+
+#include "io/smooth_files_fixture.h"
+#include "io/volume_test_support.h"
+#include "tests/tool_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+using Json = nlohmann::json;
+
+class ToolSmooth : public ToolTest {
+ protected:
+  /// Converts and answers the JSON object.
+  Json converted(const std::string& arguments) {
+    const ToolRun result = run("convert " + arguments + " --json");
+    EXPECT_EQ(result.status, 0) << arguments << ": " << result.err;
+    return result.status == 0 ? Json::parse(result.out) : Json();
+  }
+
+  WorldMesh read(const std::string& name) {
+    const auto bytes = read_file(folder_.file(name)).value_or(std::vector<std::byte>{});
+    if (name.ends_with(".ply")) return world_of_ply(bytes);
+    return name.ends_with(".obj") ? world_of_obj(bytes) : world_of(parse_glb(bytes));
+  }
+
+  void write(const std::string& name, const std::vector<std::byte>& bytes) {
+    ASSERT_TRUE(write_file(folder_.file(name), bytes));
+  }
+};
+
+/// The values of a ball, x fastest: positive inside.
+std::vector<double> ball(IVec3 size, DVec3 centre, double radius) {
+  std::vector<double> values;
+  for (int i = 0; i < size.x * size.y * size.z; ++i) {
+    const DVec3 p(i % size.x, i / size.x % size.y, i / (size.x * size.y));
+    values.push_back(radius - glm::length(p - centre));
+  }
+  return values;
+}
+
+/// Edges without exactly one triangle on each side.
+std::size_t open_edges(const WorldMesh& mesh) {
+  std::map<std::pair<std::size_t, std::size_t>, int> balance;
+  std::map<std::pair<std::size_t, std::size_t>, int> uses;
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    const std::size_t a = mesh.indices[i];
+    const std::size_t b = mesh.indices[i / 3 * 3 + (i + 1) % 3];
+    balance[std::minmax(a, b)] += a < b ? 1 : -1;
+    ++uses[std::minmax(a, b)];
+  }
+  std::size_t open = 0;
+  for (const auto& [edge, count] : uses) open += count == 2 && balance[edge] == 0 ? 0 : 1;
+  return open;
+}
+
+TEST_F(ToolSmooth, voxels_become_a_closed_surface_in_every_format) {
+  for (const std::string name : {"out.ply", "out.obj", "out.glb"}) {
+    const Json said = converted("tiny.vox " + name + " --mesher smooth --watertight --threads 2");
+    EXPECT_EQ(said["mesher"], "smooth");
+    EXPECT_EQ(said["voxels"], 4);
+    EXPECT_EQ(said["iso"], nullptr);
+    EXPECT_EQ(said["simplify_error"], 0.0);
+    for (const char* key : {"faces_visible", "faces_total", "quads"}) EXPECT_EQ(said[key], 0) << key;
+    EXPECT_EQ(said["files"], Json({name}));
+    EXPECT_EQ(said["bytes"].get<std::size_t>(), std::filesystem::file_size(folder_.file(name)));
+    const WorldMesh mesh = read(name);
+    EXPECT_EQ(said["vertices"].get<std::size_t>(), mesh.positions.size());
+    EXPECT_EQ(said["triangles"].get<std::size_t>(), mesh.indices.size() / 3);
+    EXPECT_GT(mesh.positions.size(), 8U);
+    EXPECT_EQ(open_edges(mesh), 0U);
+    EXPECT_GT(mesh.volume(), 0.05);
+    EXPECT_LT(mesh.volume(), 4.0);
+  }
+  EXPECT_EQ(converted("tiny.vox out.gltf --mesher smooth")["files"], Json({"out.gltf", "out.bin"}));
+}
+
+TEST_F(ToolSmooth, voxels_keep_their_places_and_colours) {
+  std::ofstream(folder_.file("bar.vox"), std::ios::binary) << vox_file({9, 1, 1}, std::string("\0\0\0\1"
+                                                                                              "\1\0\0\1"
+                                                                                              "\2\0\0\1"
+                                                                                              "\3\0\0\1"
+                                                                                              "\4\0\0\1"
+                                                                                              "\5\0\0\2"
+                                                                                              "\6\0\0\2"
+                                                                                              "\7\0\0\2"
+                                                                                              "\10\0\0\2",
+                                                                                              36));
+  const Json info = Json::parse(run("info bar.vox --json").out);
+  const double left = info["bounds"]["min"][0];
+  converted("bar.vox out.ply --mesher smooth --no-ao");
+  const WorldMesh mesh = read("out.ply");
+  ASSERT_FALSE(mesh.positions.empty());
+  DBox box;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const DVec3& p = mesh.positions[i];
+    box.extend(p);
+    const bool is_first = p.x < left + 4.5;
+    const bool is_second = p.x > left + 5.5;
+    if (is_first) EXPECT_EQ(mesh.colours[i], (std::array{0xCC / 255.0, 0x66 / 255.0, 0x33 / 255.0}));
+    if (is_second) EXPECT_EQ(mesh.colours[i], (std::array{0x33 / 255.0, 0x22 / 255.0, 0x11 / 255.0}));
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const double min = info["bounds"]["min"][static_cast<std::size_t>(axis)];
+    const double max = info["bounds"]["max"][static_cast<std::size_t>(axis)];
+    EXPECT_NEAR((box.min[axis] + box.max[axis]) / 2.0, (min + max) / 2.0, 1e-5) << "centred on the voxels";
+    EXPECT_GT(box.min[axis], min - 0.5);
+    EXPECT_LT(box.max[axis], max + 0.5);
+  }
+}
+
+TEST_F(ToolSmooth, occlusion_darkens_hollows_unless_it_is_left_out) {
+  std::string voxels;  // a floor and a wall
+  for (int x = 0; x < 16; ++x) {
+    for (int y = 0; y < 16; ++y) {
+      for (int z = 0; z < (x < 4 ? 12 : 4); ++z) {
+        for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
+      }
+    }
+  }
+  std::ofstream(folder_.file("corner.vox"), std::ios::binary) << vox_file({16, 16, 16}, voxels);
+  const auto darkest = [&](const std::string& flags) {
+    converted("corner.vox out.glb --mesher smooth " + flags);
+    double least = 1.0;
+    for (const auto& colour : read("out.glb").colours) least = std::min(least, colour[0]);
+    return least;
+  };
+  const double plain = darkest("--no-ao");
+  EXPECT_LT(darkest(""), plain * 0.8);
+  EXPECT_NEAR(plain, 0.6038, 1e-3) << "0xCC in linear light";
+}
+
+TEST_F(ToolSmooth, hidden_instances_and_nothing_to_draw_are_said) {
+  std::ofstream(folder_.file("two.vox"), std::ios::binary) << vox_with_hidden(2);
+  const Json said = converted("two.vox out.glb --mesher smooth");
+  EXPECT_EQ(said["warnings"], Json({"2 hidden instances left out; --hidden includes them", "nothing to draw"}));
+  EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["asset"]["version"], "2.0");
+  EXPECT_EQ(converted("two.vox out.glb --mesher smooth --hidden")["warnings"], Json::array());
+  EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["nodes"].size(), 2U);
+}
+
+TEST_F(ToolSmooth, a_raw_volume_becomes_its_surface) {
+  const IVec3 size{40, 36, 38};
+  const DVec3 centre(21.3, 18.1, 17.6);
+  for (const auto& [type, name] :
+       {std::pair(ScalarType::Float32, "float32"), std::pair(ScalarType::Float64, "float64")}) {
+    for (const auto order : {std::endian::little, std::endian::big}) {
+      write("ball.raw", volume_test::encode(ball(size, centre, 12.0), type, order));
+      const Json said = converted("ball.raw out.ply --raw-size 40x36x38 --raw-type " + std::string(name) +
+                                  " --raw-order " + (order == std::endian::big ? "big" : "little") + " --iso -2.5");
+      EXPECT_EQ(said["iso"], -2.5);
+      EXPECT_EQ(said["mesher"], "smooth") << "the default of volumes";
+      const WorldMesh mesh = read("out.ply");
+      ASSERT_GT(mesh.positions.size(), 1000U);
+      EXPECT_EQ(open_edges(mesh), 0U);
+      EXPECT_EQ(mesh.inward_normals(), 0U);
+      for (const DVec3& p : mesh.positions) {
+        // (x, y, z) becomes (x, z, -y).
+        EXPECT_NEAR(glm::length(DVec3(p.x, -p.z, p.y) - centre), 14.5, 0.06);
+      }
+      const double volume = 4.0 / 3.0 * 3.14159265 * std::pow(14.5, 3);
+      EXPECT_NEAR(mesh.volume(), volume, 0.01 * volume);
+      EXPECT_NEAR(said["voxels"].get<double>(), volume, 0.02 * volume);
+    }
+  }
+  EXPECT_EQ(run("convert ball.raw out.ply --raw-size 40x36x39 --raw-type float64").status, 1);
+}
+
+TEST_F(ToolSmooth, the_surface_value_is_found_and_said) {
+  std::vector<double> values = ball({24, 24, 24}, DVec3(11.5), 8.0);
+  for (double& value : values) value = value > 0.0 ? 200.0 : 40.0;
+  write("ball.raw", volume_test::encode(values, ScalarType::UInt8));
+  const Json said = converted("ball.raw out.ply --raw-size 24x24x24");
+  EXPECT_NEAR(said["iso"].get<double>(), 120.0, 1.0);
+  const ToolRun text = run("convert ball.raw out.ply --raw-size 24x24x24");
+  EXPECT_NE(text.out.find("\nIso: "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("--iso sets another"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("Solid samples: "), std::string::npos) << text.out;
+}
+
+TEST_F(ToolSmooth, millimetres_are_metres_in_gltf_alone) {
+  volume_test::NiftiFile file;
+  file.dim = {3, 20, 20, 20, 1, 1, 1, 1};
+  file.datatype = 16;
+  file.bitpix = 32;
+  file.sform_code = 1;
+  for (const double x_axis : {2.0, -2.0}) {
+    file.srow = {x_axis, 0, 0, 100, 0, 3, 0, 0, 0, 0, 4, 0};
+    write("ball.nii", file.bytes(volume_test::encode(ball({20, 20, 20}, DVec3(9.0), 6.0), ScalarType::Float32)));
+    const double volume = 24.0 * 905.0;
+    for (const std::string name : {"out.ply", "out.obj", "out.glb", "out.gltf"}) {
+      converted("ball.nii " + name + " --iso 0");
+      if (name == "out.gltf") continue;
+      const double unit = name == "out.glb" ? 1e-3 : 1.0;
+      const WorldMesh mesh = read(name);
+      EXPECT_NEAR(mesh.volume(), volume * std::pow(unit, 3), 0.05 * volume * std::pow(unit, 3)) << name;
+      for (const DVec3& p : mesh.positions) {
+        // The file's right, front and head are Quoin's -x, z and y.
+        const DVec3 in_voxels((-p.x / unit - 100.0) / x_axis, p.z / unit / 3.0, p.y / unit / 4.0);
+        EXPECT_NEAR(glm::length(in_voxels - DVec3(9.0)), 6.0, 0.1) << name;
+      }
+    }
+    const Json document = parse_glb(read_file(folder_.file("out.glb")).value()).document;
+    ASSERT_EQ(document["nodes"].size(), 1U);
+    EXPECT_NEAR(document["nodes"][0]["scale"][0].get<double>(), 2e-3, 1e-12);
+  }
+}
+
+TEST_F(ToolSmooth, volumes_without_a_surface_are_empty_files) {
+  for (const double value : {0.0, 255.0}) {
+    write("flat.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::UInt8));
+    const Json said = converted("flat.raw out.glb --raw-size 10x10x10");
+    EXPECT_EQ(said["warnings"], Json({"nothing to draw"}));
+    EXPECT_EQ(said["triangles"], 0);
+    EXPECT_FALSE(parse_glb(read_file(folder_.file("out.glb")).value()).document.contains("meshes"));
+  }
+  const Json solid = converted("flat.raw out.glb --raw-size 10x10x10 --iso 100");
+  EXPECT_EQ(solid["warnings"], Json::array()) << "a solid block has the faces of the volume";
+  EXPECT_GT(read("out.glb").volume(), 0.0);
+}
+
+TEST_F(ToolSmooth, simplifying_says_how_far_it_went) {
+  if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
+  write("ball.raw", volume_test::encode(ball({40, 40, 40}, DVec3(20.0), 15.0), ScalarType::Float32));
+  const std::string arguments = "ball.raw out.ply --raw-size 40x40x40 --raw-type float32 --iso 0";
+  const Json whole = converted(arguments);
+  const Json simple = converted(arguments + " --simplify 0.1");
+  EXPECT_EQ(whole["simplify_error"], 0.0);
+  EXPECT_GT(simple["simplify_error"], 0.0);
+  EXPECT_LE(simple["simplify_error"], 0.1);
+  EXPECT_LT(simple["triangles"].get<int>(), whole["triangles"].get<int>() / 2);
+  EXPECT_EQ(open_edges(read("out.ply")), 0U);
+  EXPECT_NE(run("convert " + arguments + " --simplify 0.1").out.find("Simplified: "), std::string::npos);
+}
+
+TEST_F(ToolSmooth, volumes_become_meshes_only) {
+  write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
+  const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
+  EXPECT_EQ(voxels.status, 1);
+  expect_one_error_line(voxels);
+  std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
+      << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\n\nabcdef";
+  EXPECT_EQ(run("convert a.nrrd out.vox").status, 1);
+  const ToolRun greedy = run("convert a.nrrd out.glb --mesher greedy");
+  EXPECT_EQ(greedy.status, 2);
+  EXPECT_NE(greedy.err.find("smooth meshes it"), std::string::npos) << greedy.err;
+  const ToolRun picture = run("render a.nrrd -o out.png");
+  EXPECT_EQ(picture.status, 1);
+  expect_one_error_line(picture);
+  EXPECT_NE(picture.err.find("`quoin convert`"), std::string::npos) << picture.err;
+  EXPECT_NE(picture.err.find("--mesher smooth"), std::string::npos) << picture.err;
+  EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out.png"));
+  EXPECT_EQ(run("convert a.nrrd out.glb").status, 0);
+}
+
+TEST_F(ToolSmooth, failures_are_one_line_status_1_and_no_file) {
+  for (const std::string arguments :
+       {"missing.nii out.glb", "tiny.vox none/out.ply --mesher smooth", "tiny.vox none/out.gltf --mesher smooth",
+        "missing.raw out.glb --raw-size 1x1x1", "tiny.vox out.glb --raw-size 900000000x900000000x900000000"}) {
+    const ToolRun result = run("convert " + arguments);
+    EXPECT_EQ(result.status, 1) << arguments;
+    expect_one_error_line(result);
+    EXPECT_FALSE(exists("out.glb"));
+  }
+  const ToolRun companion = shell("cp tiny.vox foo.bin; '" QUOIN_TOOL "' convert foo.bin foo.gltf --mesher smooth");
+  EXPECT_EQ(companion.status, 1);
+  expect_one_error_line(companion);
+}
+
+}  // namespace
+
+}  // namespace quoin
