@@ -146,8 +146,8 @@ struct SheetTables {
 };
 
 const SheetTables& tables() {
-  static const SheetTables kTables;
-  return kTables;
+  static const SheetTables built;
+  return built;
 }
 
 // The mean of the crossings of one sheet.
