@@ -18,18 +18,25 @@ namespace {
 constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::Openness, SmoothOcclusion::Weighted,
                                       SmoothOcclusion::WeightedPublished};
 
-SmoothChunkMesh mesh_of(const std::function<double(IVec3)>& field, SmoothOcclusion form, float spread = 2.0F) {
-  // What no vertex reads is not computed.
-  const int reach = reach_of(with(form, 0, spread).occlusion);
-  const World world([&](IVec3 p) {
+/// A field as far as a vertex of the middle chunk may read; the rest is not computed.
+World world_of(const std::function<double(IVec3)>& field) {
+  const int reach = reach_of(SmoothOcclusionOptions{});
+  return World([&](IVec3 p) {
     const bool is_read =
         glm::all(glm::greaterThanEqual(p, IVec3(-reach))) && glm::all(glm::lessThan(p, IVec3(kChunkEdge + reach)));
     return is_read ? field(p) : kBand;
   });
+}
+
+SmoothChunkMesh mesh_of(const World& world, SmoothOcclusion form, float spread = 2.0F) {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   mesher.mesh(world.around(), with(form, 0, spread), mesh);
   return mesh;
+}
+
+SmoothChunkMesh mesh_of(const std::function<double(IVec3)>& field, SmoothOcclusion form) {
+  return mesh_of(world_of(field), form);
 }
 
 DVec3 random_direction(std::mt19937& random) {
@@ -43,9 +50,10 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
     const DVec3 n =
         i < 6 ? DVec3(IVec3(i % 3 == 0, i % 3 == 1, i % 3 == 2)) * (i < 3 ? 1.0 : -1.0) : random_direction(random);
     const double at = glm::dot(n, DVec3(31.3, 30.8, 33.1));
+    const World world = world_of([=](IVec3 p) { return glm::dot(n, DVec3(p)) - at; });
     for (const SmoothOcclusion form : kForms) {
       for (const float spread : {0.4F, 2.0F}) {
-        const SmoothChunkMesh mesh = mesh_of([=](IVec3 p) { return glm::dot(n, DVec3(p)) - at; }, form, spread);
+        const SmoothChunkMesh mesh = mesh_of(world, form, spread);
         ASSERT_GT(mesh.openness.size(), 1'000U);
         for (const float open : mesh.openness) {
           ASSERT_EQ(open, 1.0F) << n.x << " " << n.y << " " << n.z << " spread " << spread;
@@ -136,11 +144,13 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
   const std::vector<Symmetry> all = symmetries();
   ASSERT_EQ(all.size(), 48U);
   for (const SmoothOcclusion form : {SmoothOcclusion::Openness, SmoothOcclusion::Weighted}) {
+    // The sum is held to all 48, the count, which shares all but its last step, to every fifth.
+    const std::size_t step = form == SmoothOcclusion::Openness ? 5 : 1;
     const auto expected = openness_by_cell(all[0], form);
     int shared = 0;
     int jumps = 0;
-    for (const Symmetry& turn : all) {
-      for (const auto& [cell, open] : openness_by_cell(turn, form)) {
+    for (std::size_t i = 0; i < all.size(); i += step) {
+      for (const auto& [cell, open] : openness_by_cell(all[i], form)) {
         // Cells at x, y or z = 63 have their mirror images in cell -1, which the neighbour owns.
         const auto found = expected.find(cell);
         if (found == expected.end()) continue;
@@ -154,7 +164,7 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
         }
       }
     }
-    EXPECT_GT(shared, 48 * 5'000);
+    EXPECT_GT(shared, static_cast<int>(all.size() / step) * 5'000);
     EXPECT_LE(jumps, shared / 20'000);
   }
 }
