@@ -129,4 +129,32 @@ inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const 
   return solid;
 }
 
+/// Whether all samples within a cell and on its boundary are solid, or all air.
+inline bool is_of_one_sign(const DensityNeighbourhood& chunks, const LevelCell& cell) {
+  const int x = cell.first.x & (kChunkEdge - 1);
+  const bool ends_within = x + cell.size() < kChunkEdge;
+  const std::uint64_t samples = ((std::uint64_t{2} << cell.size()) - 1) << x;
+  std::uint64_t any = 0;
+  std::uint64_t all = samples;
+  for (int z = cell.first.z; z <= cell.first.z + cell.size(); ++z) {
+    for (int y = cell.first.y; y <= cell.first.y + cell.size(); ++y) {
+      const IVec3 chunk = chunk_of({cell.first.x, y, z});
+      const IVec3 local = local_of({0, y, z});
+      const auto row = [&](int chunk_x) {
+        const DensityChunk* found = chunks.at(chunk_x, chunk.y, chunk.z);
+        if (found != nullptr) return found->solid_row(local.y, local.z);
+        return DensityChunk::is_solid(chunks.outside) ? ~std::uint64_t{0} : 0;
+      };
+      any |= row(chunk.x) & samples;
+      all &= row(chunk.x);
+      // The last sample of the cell may be the next chunk's first; the bit beyond the word then stands for it.
+      if (ends_within) continue;
+      const bool last = (row(chunk.x + 1) & 1U) != 0;
+      any |= last ? std::uint64_t{1} << 63 : 0;
+      if (!last) all = 0;
+    }
+  }
+  return any == 0 || all == samples;
+}
+
 }  // namespace quoin::smooth

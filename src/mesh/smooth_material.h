@@ -19,8 +19,9 @@ class SurfaceMaterials {
  public:
   explicit SurfaceMaterials(const VoxelRegistry& types);
 
-  /// Of a cell of the centre chunk, in cells of `level`: by the solid ones of its corners; if none of them is solid,
-  /// by the solid samples of the coarsest lattice within the cell that has any. All air gives air, white.
+  /// Of a cell of the centre chunk, in cells of `level`. Level 0: by its solid corners. Coarser: by the solid samples
+  /// next to the surface along its crossed edges, since corners may lie well below it; when no edge of its own is
+  /// crossed, by the solid samples of the coarsest lattice within the cell that has any. All air gives air, white.
   [[nodiscard]] SurfaceMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
 
  private:

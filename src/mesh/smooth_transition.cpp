@@ -85,6 +85,7 @@ class Transitions {
 
   // The vertex of a cell that touches a finer chunk, if its boundary is crossed.
   [[nodiscard]] std::optional<CellVertex> transition_vertex(const LevelCell& cell) const {
+    if (is_of_one_sign(chunks_, cell)) return std::nullopt;
     Crossings crossings;
     const int step = 1 << levels_.around_cell(cell).finest;
     for (int axis = 0; axis < 3; ++axis) {

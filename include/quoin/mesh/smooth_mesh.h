@@ -23,8 +23,9 @@ struct SmoothMesh {
   std::vector<Vec3> positions;         ///< the field's coordinates, in samples
   std::vector<Vec3> normals;           ///< unit, into the air
   std::vector<float> openness;         ///< 0 (dark) to 1; empty without occlusion
-  std::vector<LinearRgba16> albedo;    ///< mean of the materials of the cell's solid samples, without occlusion
-  std::vector<VoxelType> types;        ///< the material of most of the cell's solid samples; of several, the least
+  std::vector<LinearRgba16> albedo;    ///< mean of the materials of the cell's solid samples (of coarse cells: of those
+                                       ///< next to the surface), without occlusion
+  std::vector<VoxelType> types;        ///< the material of most of these samples; of several, the least
   std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from the air
 };
 
