@@ -65,7 +65,7 @@ TEST_F(Tool, convert_writes_every_format_and_counts) {
   const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Faces: 18 visible of 24 total"), std::string::npos) << text.out;
-  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "out.vox"}) {
+  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "tiny.ply", "out.vox"}) {
     const ToolRun json = run("convert tiny.vox " + name + " --json --threads 2");
     ASSERT_EQ(json.status, 0) << json.err;
     const Json object = Json::parse(json.out);
@@ -265,6 +265,7 @@ TEST_F(Tool, wrong_usage_names_the_argument) {
       {"convert tiny.vox out.glb --raw-size 1x2", "quoin: --raw-size: must be like 256x256x128, not \"1x2\""},
       {"convert tiny.vox out.glb --raw-size 0x2x2", "quoin: --raw-size: must be like 256x256x128, not \"0x2x2\""},
       {"convert tiny.vox out.glb --raw-size 1x2x2 --raw-type half", "quoin: --raw-type: must be uint8, int8"},
+      {"convert tiny.vox out.glb --raw-size 1x1x1 --frame 2", "quoin: --hidden and --frame are for voxels"},
       {"convert tiny.vox out.glb --raw-order big", "quoin: --raw-type and --raw-order need --raw-size"},
       {"convert tiny.vox out.glb --raw-size 1x1x1 --mesher greedy", "quoin: --mesher greedy is for voxels"},
       {"", "quoin: no command; there are info, convert"},
@@ -288,7 +289,7 @@ TEST_F(Tool, wrong_usage_is_status_2) {
   for (const std::string arguments :
        {"", "frobnicate", "info", "info tiny.vox --frame -1", "convert tiny.vox", "convert tiny.vox out.xyz",
         "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
-        "convert tiny.vox out.vox --no-ao", "convert tiny.vox out.vox --mesher smooth", "convert tiny.vox out.ply",
+        "convert tiny.vox out.vox --no-ao", "convert tiny.vox out.vox --mesher smooth",
         "convert tiny.vox out.glb --mesher smooth --iso 1", "convert tiny.vox out.glb --simplify 1",
         "convert tiny.vox out.glb --raw-type int8", "info tiny.vox --threads 0", "info tiny.vox --unknown"}) {
     const ToolRun result = run(arguments);

@@ -7,6 +7,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/gltf.h>
 #include <quoin/io/obj.h>
+#include <quoin/io/ply.h>
 
 #include "interrupt.h"
 #include "output.h"
@@ -29,6 +30,7 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
     case FileFormat::Obj:
       return write_obj(scene, meshes, path, progress);
     case FileFormat::Ply:
+      return write_ply(scene, meshes, path, progress);
     case FileFormat::Vox:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
@@ -150,17 +152,15 @@ std::string outcome_text(const Outcome& outcome) {
   return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
-/// What contradicts itself or the kind of input; empty when nothing does.
-std::string fault_of_usage(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
-  const bool is_smooth = options.mesher == "smooth";
-  if (is_volume && !options.mesher.empty() && !is_smooth) {
+/// What contradicts the kind of input; empty when nothing does.
+std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
+  if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
   }
-  if (is_volume) return "";
+  const LoadOptions& load = options.common.load;
+  if (is_volume) return load.hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
   if (options.iso) return "--iso is for volumes, and the input holds voxels";
-  if (is_smooth) return "";
-  if (options.simplify) return "--simplify needs --mesher smooth";
-  return format.format == FileFormat::Ply ? "--mesher smooth writes .ply; culled and greedy do not" : "";
+  return options.simplify && options.mesher != "smooth" ? "--simplify needs --mesher smooth" : "";
 }
 
 /// Whether the input is read by read_volume. Errors: CannotRead.
@@ -186,7 +186,7 @@ int run_checked(const ConvertOptions& options, const FormatInfo& format) {
     print_error(is_volume.error());
     return kFailed;
   }
-  if (const std::string fault = fault_of_usage(options, format, *is_volume); !fault.empty()) {
+  if (const std::string fault = fault_of_usage(options, *is_volume); !fault.empty()) {
     print_error(fault);
     return kWrongUsage;
   }

@@ -4,6 +4,8 @@
 
 #include <quoin/io/scene_meshes.h>
 
+#include "scene/instance_axes.h"
+
 namespace quoin {
 
 namespace {
@@ -27,6 +29,12 @@ Status check_placements(const Scene& scene, bool hidden) {
     }
   }
   return {};
+}
+
+glm::dmat4 world_from_pivot(const Instance& instance) {
+  glm::dmat4 matrix(world_axes(instance) * instance.voxel_size);
+  matrix[3] = glm::dvec4(instance.position, 1.0);
+  return matrix;
 }
 
 }  // namespace quoin

@@ -11,7 +11,7 @@
 #include <quoin/io/volume_field.h>
 #include <quoin/mesh/simplify.h>
 
-#include "scene/instance_axes.h"
+#include "io/placement.h"
 
 namespace quoin {
 
@@ -35,19 +35,13 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
   return mesh;
 }
 
-glm::dmat4 world_from_mesh(const Instance& instance) {
-  glm::dmat4 matrix(world_axes(instance) * instance.voxel_size);
-  matrix[3] = glm::dvec4(instance.position, 1.0);
-  return matrix;
-}
-
 /// The placements of every grid that is drawn.
 std::map<GridHandle, std::vector<SmoothPlacement>> placements_of(const Scene& scene, bool hidden) {
   std::map<GridHandle, std::vector<SmoothPlacement>> placements;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     if (is_drawn(scene, instance, hidden)) {
-      placements[instance.grid].push_back({instance.name, world_from_mesh(instance)});
+      placements[instance.grid].push_back({instance.name, world_from_pivot(instance)});
     }
   }
   return placements;
@@ -57,6 +51,7 @@ std::map<GridHandle, std::vector<SmoothPlacement>> placements_of(const Scene& sc
 
 Result<SmoothScene> smooth_scene(const Scene& scene, const SmoothSceneOptions& options, Threads threads,
                                  const Progress& progress) {
+  if (auto sound = check_placements(scene, options.hidden); !sound) return tl::unexpected<Error>(sound.error());
   SmoothScene smooth;
   auto placements = placements_of(scene, options.hidden);
   const auto count = static_cast<double>(placements.size());
