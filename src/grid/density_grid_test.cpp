@@ -38,62 +38,65 @@ TEST(DensityGrid, WhatWasNeverSetIsFarAir) {
   EXPECT_EQ(DensityGrid(3.0001F).band(), 3.0F);
 }
 
+/// A random set, edit or whole chunk, done to both fields; answers what changed.
+std::vector<IVec3> change_both(std::mt19937& random, int round, DensityGrid& grid, PlainField& plain) {
+  const IVec3 at = IVec3(random() % 128, random() % 128, random() % 128) - 64;
+  const DensitySample value{static_cast<float>(random() % 21) - 10.0F, static_cast<VoxelType>(random() % 3)};
+  std::vector<IVec3> changed;
+  std::int64_t answered = 0;
+  if (round % 4 == 0) {
+    const IVec3 chunk = chunk_of(at);
+    const double height = static_cast<double>(random() % 120) - 25.0;
+    changed = plain.edit([&](IVec3 p, DensitySample old) {
+      const auto density = static_cast<float>(local_of(p).y - height);
+      return chunk_of(p) == chunk ? DensitySample{density, value.material} : old;
+    });
+    grid.put_chunk(chunk, chunk_of_plane(height, value.material));
+    answered = static_cast<std::int64_t>(changed.size());
+  } else if (round % 4 == 1) {
+    changed = plain.edit([&](IVec3 p, DensitySample old) { return p == at ? value : old; });
+    answered = grid.set(at, value) ? 1 : 0;
+  } else {
+    const IBox box = intersect({at, at + IVec3(1 + random() % 70, 1 + random() % 30, 1 + random() % 9)}, plain.box());
+    const auto pick = [&](IVec3 p, DensitySample old) {
+      return (p.x + p.y) % 5 == 0 ? old : DensitySample{value.density, static_cast<VoxelType>((p.z & 1) + 1)};
+    };
+    changed = plain.edit([&](IVec3 p, DensitySample old) { return box.contains(p) ? pick(p, old) : old; });
+    answered = grid.edit(box, pick);
+  }
+  EXPECT_EQ(answered, static_cast<std::int64_t>(changed.size()));
+  return changed;
+}
+
+void expect_equal(const DensityGrid& grid, PlainField& plain) {
+  IBox bounds;
+  std::int64_t count = 0;
+  int differing = 0;
+  plain.for_each([&](IVec3 p, const DensitySample& expected) {
+    if (grid.density(p) != expected.density || grid.material(p) != expected.material) ++differing;
+    if (expected.density >= 0.0F) return;
+    bounds = unite(bounds, {p, p + 1});
+    ++count;
+  });
+  ASSERT_EQ(differing, 0);
+  EXPECT_EQ(grid.solid_bounds(), bounds);
+  EXPECT_EQ(grid.solid_count(), count);
+}
+
 TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
   constexpr unsigned kSeed = 23;
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
   DensityGrid grid;
   PlainField plain({IVec3(-64), IVec3(64)}, 8.0F);
-  const auto sample = [&] {
-    return DensitySample{static_cast<float>(random() % 21) - 10.0F, static_cast<VoxelType>(random() % 3)};
-  };
-  const auto place = [&] { return IVec3(random() % 128, random() % 128, random() % 128) - 64; };
   for (int round = 0; round < 24; ++round) {
-    std::vector<IVec3> changed;
-    std::int64_t answered = 0;
-    if (round % 4 == 0) {
-      const IVec3 chunk = IVec3(random() % 2, random() % 2, random() % 2) - 1;
-      const double height = static_cast<double>(random() % 120) - 25.0;
-      const auto material = static_cast<VoxelType>(random() % 3);
-      changed = plain.edit([&](IVec3 p, DensitySample old) {
-        return chunk_of(p) == chunk ? DensitySample{static_cast<float>(local_of(p).y - height), material} : old;
-      });
-      grid.put_chunk(chunk, chunk_of_plane(height, material));
-      answered = static_cast<std::int64_t>(changed.size());
-    } else if (round % 4 == 1) {
-      const IVec3 at = place();
-      const DensitySample value = sample();
-      changed = plain.edit([&](IVec3 p, DensitySample old) { return p == at ? value : old; });
-      answered = grid.set(at, value) ? 1 : 0;
-    } else {
-      const IVec3 at = place();
-      const IBox box = intersect({at, at + IVec3(1 + random() % 70, 1 + random() % 30, 1 + random() % 9)}, plain.box());
-      const DensitySample value = sample();
-      const auto pick = [&](IVec3 p, DensitySample old) {
-        return (p.x + p.y) % 5 == 0 ? old : DensitySample{value.density, static_cast<VoxelType>((p.z & 1) + 1)};
-      };
-      changed = plain.edit([&](IVec3 p, DensitySample old) { return box.contains(p) ? pick(p, old) : old; });
-      answered = grid.edit(box, pick);
-    }
-    EXPECT_EQ(answered, static_cast<std::int64_t>(changed.size())) << round;
+    SCOPED_TRACE(round);
+    const std::vector<IVec3> changed = change_both(random, round, grid, plain);
     const int reach = static_cast<int>(random() % 65);
-    EXPECT_EQ(grid.take_dirty(reach), chunks_reached(changed, reach)) << round;
+    EXPECT_EQ(grid.take_dirty(reach), chunks_reached(changed, reach));
     if (round == 11) grid.compact();
-    int differing = 0;
-    plain.for_each([&](IVec3 p, const DensitySample& expected) {
-      if (grid.density(p) != expected.density || grid.material(p) != expected.material) ++differing;
-    });
-    ASSERT_EQ(differing, 0) << round;
+    ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
   }
-  IBox bounds;
-  std::int64_t count = 0;
-  plain.for_each([&](IVec3 p, const DensitySample& expected) {
-    if (expected.density >= 0.0F) return;
-    bounds = unite(bounds, {p, p + 1});
-    ++count;
-  });
-  EXPECT_EQ(grid.solid_bounds(), bounds);
-  EXPECT_EQ(grid.solid_count(), count);
 }
 
 TEST(DensityGrid, TheSameStoredValueIsNoChange) {

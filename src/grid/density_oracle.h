@@ -67,6 +67,7 @@ inline std::vector<IVec3> chunks_reached(const std::vector<IVec3>& samples, int 
     }
   }
   std::vector<IVec3> sorted;
+  sorted.reserve(chunks.size());
   for (const auto& [z, y, x] : chunks) sorted.emplace_back(x, y, z);
   return sorted;
 }

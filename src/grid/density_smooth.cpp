@@ -117,6 +117,7 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
   }
   sort_and_unite(chunks);
   std::vector<ChunkPart> parts;
+  parts.reserve(chunks.size());
   for (const IVec3 chunk : chunks) parts.push_back({chunk, part_of(box, chunk)});
   return parts;
 }

@@ -141,13 +141,13 @@ constexpr std::array<float, 5> kKernel = {1.0F / 16.0F, 4.0F / 16.0F, 6.0F / 16.
 
 // Smooths the signed distances along x.
 void blur_along_x(Scratch& scratch) {
-  static const std::array<float, kFarSquared + 1> kDistances = surface_distances();
+  static const std::array<float, kFarSquared + 1> distance_of = surface_distances();
   std::array<float, kSmoothed> signed_distances;
   for (std::size_t row = 0; row < kSmoothed * kSmoothed; ++row) {
     const ByteRow& to_solid = scratch.to_solid[row];
     const ByteRow& to_air = scratch.to_air[row];
     // One of the two is 0.
-    for (std::size_t x = 0; x < kSmoothed; ++x) signed_distances[x] = kDistances[to_solid[x]] - kDistances[to_air[x]];
+    for (std::size_t x = 0; x < kSmoothed; ++x) signed_distances[x] = distance_of[to_solid[x]] - distance_of[to_air[x]];
     float* out = scratch.blurred_x.data() + row * kChunkEdge;
     for (std::size_t x = 0; x < kChunkEdge; ++x) {
       const float* d = signed_distances.data() + x;

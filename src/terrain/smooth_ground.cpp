@@ -203,7 +203,7 @@ Cover SmoothColumn::Impl::cover(const TerrainTypes& types, int x, int world_y, i
 
 void SmoothColumn::Impl::write_row(const TerrainTypes& types, IVec3 corner, int y, int z, bool is_caved,
                                    DensityChunk& out) {
-  static const Half kFar = largest_within(kBand);
+  static const Half far = largest_within(kBand);
   std::array<Half, kChunkEdge> row;
   VoxelType* material = materials.data() + (z * kChunkEdge + y) * kChunkEdge;
   for (int x = 0; x < kChunkEdge; ++x) {
@@ -212,7 +212,7 @@ void SmoothColumn::Impl::write_row(const TerrainTypes& types, IVec3 corner, int 
     float density = ground;
     if (is_caved) density = std::max(density, cave(x, y, z, corner.y + y));
     density = std::max(density, outside_of_world(corner + IVec3{x, y, z}));
-    row[static_cast<std::size_t>(x)] = stored_within(density, kFar);
+    row[static_cast<std::size_t>(x)] = stored_within(density, far);
     material[x] = kAir;
     if (!(density < 0.0F)) continue;
     material[x] = types.stone;

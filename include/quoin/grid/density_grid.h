@@ -29,6 +29,7 @@ struct DensitySample {
 ///            so that `take_dirty` can tell which meshes it reaches. A chunk that is all far air is dropped. When an
 ///            edit throws (bad_alloc, or what a callback threw), what it did until then stays done and booked.
 /// Threads:   any number may read at once; an edit needs the grid to itself.
+/// Moving:    a grid that was moved from may only be assigned to or destroyed.
 class DensityGrid {
  public:
   /// Requires: 0 < band <= 65,504. A band that is no half counts as the next lesser one.
@@ -70,7 +71,8 @@ class DensityGrid {
   /// Smooths the surface within a sphere: moves each density towards the mean of its 26 neighbours (as they were
   /// before), strength * (1 - (distance / radius)^2)^2 of the way. Samples that become solid take the material of most
   /// of their solid neighbours. A strength above 1 counts as 1; sizes, places and strengths that are not above 0,
-  /// infinite or NaN change nothing. Cost: O(samples of the sphere's box in chunks that exist, or are beside one).
+  /// infinite or NaN change nothing. Cost: O(samples of the sphere's box in chunks that exist, or are beside one), and
+  /// 4 bytes of memory for each meanwhile.
   std::int64_t smooth(DVec3 centre, double radius, double strength);
   /// Moves the surface within a sphere towards the plane through `point` with `normal` (pointing into the air; any
   /// length but 0), `strength` as in `smooth`. Samples that become solid take `material`.

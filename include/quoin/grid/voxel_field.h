@@ -15,7 +15,7 @@ namespace quoin {
 ///            the voxels that it ran between before, and nothing thin is lost. Within a band of 8 samples.
 /// Materials: the voxels' types.
 /// Order:     the same densities at any thread count.
-/// Cost:      about 10 ms a chunk that the surface comes near, on each thread; little for the others.
+/// Cost:      about 5 ms a chunk that the surface comes near, on each thread; little for the others.
 [[nodiscard]] DensityGrid field_from_grid(const Grid& grid, Threads threads = {});
 
 }  // namespace quoin

@@ -33,7 +33,7 @@ struct SmoothTerrainOptions {
 ///           surface, and outside it is far air.
 /// Density:  about the distance in samples, within a band of 8.
 /// Bits:     the same on every machine, compiler and number of threads.
-/// Cost:     about 10 ms a chunk that the surface crosses, on each thread.
+/// Cost:     about 15 ms a chunk that holds ground or caves, on each thread.
 /// Errors:   InvalidArgument for sizes and places outside their ranges; Cancelled.
 /// Requires: `types` was filled by `add_terrain_types`.
 [[nodiscard]] Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options,
