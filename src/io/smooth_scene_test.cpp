@@ -86,6 +86,16 @@ TEST(UnitsOfLength, have_metres) {
   EXPECT_EQ(metres_of_unit("furlong"), std::nullopt);
 }
 
+/// To the nearest centre of a voxel of add_asymmetric_grid.
+double distance_from_voxels(const Instance& instance, const SceneGrid& grid, DVec3 point) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const IVec3 voxel : {IVec3(0, 0, 0), IVec3(0, 1, 0), IVec3(0, 2, 0), IVec3(0, 3, 0), IVec3(0, 4, 0),
+                            IVec3(1, 0, 0), IVec3(2, 0, 0), IVec3(3, 0, 0), IVec3(3, 1, 0), IVec3(0, 1, 1)}) {
+    nearest = std::min(nearest, glm::length(world_from_grid(instance, grid, DVec3(voxel) + 0.5) - point));
+  }
+  return nearest;
+}
+
 TEST(SmoothScene, surfaces_lie_around_the_voxels_of_every_instance) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
@@ -120,14 +130,8 @@ TEST(SmoothScene, surfaces_lie_around_the_voxels_of_every_instance) {
     const Instance& instance = scene.instances()[handle];
     if (!instance.visible) continue;
     for (std::size_t i = 0; i < vertices; ++i) {
-      // The surface runs between voxel centres, so within a voxel's size of one.
-      double nearest = std::numeric_limits<double>::infinity();
-      for (const IVec3 voxel : {IVec3(0, 0, 0), IVec3(0, 1, 0), IVec3(0, 2, 0), IVec3(0, 3, 0), IVec3(0, 4, 0),
-                                IVec3(1, 0, 0), IVec3(2, 0, 0), IVec3(3, 0, 0), IVec3(3, 1, 0), IVec3(0, 1, 1)}) {
-        const DVec3 centre = world_from_grid(instance, scene.grids()[grid], DVec3(voxel) + 0.5);
-        nearest = std::min(nearest, glm::length(centre - world.positions[at + i]));
-      }
-      EXPECT_LT(nearest, 1.0 * instance.voxel_size) << instance.name;
+      // The surface runs between voxel centres.
+      EXPECT_LT(distance_from_voxels(instance, scene.grids()[grid], world.positions[at + i]), instance.voxel_size);
     }
     at += vertices;
   }
