@@ -43,6 +43,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/smooth_terrain.h>

@@ -45,6 +45,7 @@ class SceneTracer {
 
  private:
   friend class SceneView;
+  friend class SceneQuery;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
