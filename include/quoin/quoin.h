@@ -45,6 +45,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/sweep.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>

@@ -8,34 +8,11 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "scene/scene_tracer_impl.h"
+#include "scene/query_support.h"
 
 namespace quoin {
 
-// What queries may see of a tracer.
-class SceneQuery {
- public:
-  static const InstanceTree& instances(const SceneTracer& tracer) { return tracer.impl_->instances; }
-};
-
 namespace {
-
-// A length below which two shapes touch rather than overlap, in voxels.
-constexpr double kTouch = 1e-9;
-
-// Into the space of a placed grid's voxels.
-struct ToGrid {
-  explicit ToGrid(const PlacedGrid& placed)
-      : axes(glm::transpose(placed.world_axes) / placed.voxel_size),
-        position(placed.position),
-        pivot(placed.grid->pivot) {}
-  // The difference of two far positions is taken first: it is small, and mostly exact.
-  [[nodiscard]] DVec3 point(DVec3 in_world) const { return axes * (in_world - position) + pivot; }
-
-  glm::dmat3 axes;
-  DVec3 position;
-  DVec3 pivot;
-};
 
 std::optional<RayHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
   std::optional<RayHit> hit = first_hit(*placed.opaque, ray, max_t);
@@ -62,54 +39,25 @@ class SphereInGrid {
 class BoxInGrid {
  public:
   // `half_axes`: the box's half edges.
-  BoxInGrid(DVec3 centre, const glm::dmat3& half_axes) : centre_(centre), half_axes_(half_axes) {
-    for (int i = 0; i < 3; ++i) separators_.at(static_cast<std::size_t>(i))[i] = 1.0;
-    std::size_t next = 3;
-    for (int i = 0; i < 3; ++i) {
-      separators_.at(next++) = glm::cross(half_axes_[(i + 1) % 3], half_axes_[(i + 2) % 3]);
-      for (int axis = 0; axis < 3; ++axis) {
-        DVec3 unit(0.0);
-        unit[axis] = 1.0;
-        separators_.at(next++) = glm::cross(half_axes_[i], unit);
-      }
-    }
-    for (DVec3& axis : separators_) {
-      const double length = glm::length(axis);
-      axis = length > 0.0 ? axis / length : DVec3(0.0);
-    }
-  }
+  BoxInGrid(DVec3 centre, const glm::dmat3& half_axes)
+      : centre_(centre), half_axes_(half_axes), separators_(separating_axes(half_axes)) {}
   [[nodiscard]] DBox bounds() const {
-    const DVec3 reach = glm::abs(half_axes_[0]) + glm::abs(half_axes_[1]) + glm::abs(half_axes_[2]);
+    const DVec3 reach = reach_of_axes(half_axes_);
     return {centre_ - reach, centre_ + reach};
   }
-  // Source: S. Gottschalk, M. Lin, D. Manocha, "OBBTree" (1996): two boxes are apart when one of 15 axes parts them.
   [[nodiscard]] bool meets(IVec3 voxel) const {
     const DVec3 between = DVec3(voxel) + 0.5 - centre_;
     return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
       if (axis == DVec3(0.0)) return true;  // of parallel edges: the other axes decide
-      double reach = 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
-      for (int i = 0; i < 3; ++i) reach += std::abs(glm::dot(half_axes_[i], axis));
-      return std::abs(glm::dot(between, axis)) < reach - kTouch;
+      return std::abs(glm::dot(between, axis)) < reach_along(axis, half_axes_) - kTouch;
     });
   }
 
  private:
   DVec3 centre_;
   glm::dmat3 half_axes_;
-  std::array<DVec3, 15> separators_{};
+  SeparatingAxes separators_;
 };
-
-// The whole voxels that a shape's bounds touch, within the grid's own.
-IBox voxels_within(const DBox& bounds, const IBox& tight) {
-  IBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.min[axis] =
-        static_cast<int>(std::clamp(std::floor(bounds.min[axis]), double(tight.min[axis]), double(tight.max[axis])));
-    box.max[axis] =
-        static_cast<int>(std::clamp(std::ceil(bounds.max[axis]), double(tight.min[axis]), double(tight.max[axis])));
-  }
-  return box;
-}
 
 template <class Shape>
 std::optional<IVec3> first_overlap(const Grid& grid, const VoxelRegistry& types, const Shape& shape) {
@@ -119,9 +67,7 @@ std::optional<IVec3> first_overlap(const Grid& grid, const VoxelRegistry& types,
     for (int y = box.min.y; y < box.max.y; ++y) {
       for (int x = box.min.x; x < box.max.x; ++x) {
         const IVec3 voxel(x, y, z);
-        const VoxelType type = reader.get(voxel);
-        if (type == kAir || (type < types.size() && !types[type].collides)) continue;
-        if (shape.meets(voxel)) return voxel;
+        if (collides(types, reader.get(voxel)) && shape.meets(voxel)) return voxel;
       }
     }
   }
@@ -142,11 +88,6 @@ std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegi
     if (voxel) found.push_back({placed.instance, *voxel});
   }
   return found;
-}
-
-DQuat unit_rotation(DQuat q) {
-  const double length = std::sqrt(glm::dot(q, q));
-  return length > 0.0 && std::isfinite(length) ? q / length : DQuat(1.0, 0.0, 0.0, 0.0);
 }
 
 }  // namespace
