@@ -25,6 +25,7 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/ply.h>
+#include <quoin/io/scene_file.h>
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/smooth_files.h>
 #include <quoin/io/smooth_scene.h>
