@@ -34,7 +34,7 @@ class Faults {
 };
 
 // A piece of the file in a message.
-std::string quoted(std::string_view text) {
+std::string excerpt(std::string_view text) {
   constexpr std::size_t kMost = 60;
   std::string out;
   out.append(1, '"').append(text.substr(0, kMost)).append(1, '"');
@@ -56,7 +56,7 @@ class Object {
     }
     for (const auto& [key, value] : json.items()) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        faults.add(place_, quoted(key) + " is not known here");
+        faults.add(place_, excerpt(key) + " is not known here");
       }
     }
   }
@@ -68,7 +68,7 @@ class Object {
   }
   [[nodiscard]] const Json* need(std::string_view key) const {
     const Json* found = find(key);
-    if (found == nullptr && json_.is_object()) faults_.add(place_, quoted(key) + " is missing");
+    if (found == nullptr && json_.is_object()) faults_.add(place_, excerpt(key) + " is missing");
     return found;
   }
   [[nodiscard]] std::string place_of(std::string_view key) const { return joined(place_, key); }
@@ -226,13 +226,13 @@ void check_ids(const SceneFile& scene, Faults& faults) {
   std::set<std::string_view> ids;
   for (std::size_t i = 0; i < scene.sources.size(); ++i) {
     if (!ids.insert(scene.sources[i].id).second) {
-      faults.add("files[" + std::to_string(i) + "].id", quoted(scene.sources[i].id) + " was given before");
+      faults.add("files[" + std::to_string(i) + "].id", excerpt(scene.sources[i].id) + " was given before");
     }
   }
   for (std::size_t i = 0; i < scene.placements.size(); ++i) {
     if (!ids.contains(scene.placements[i].source)) {
       faults.add("instances[" + std::to_string(i) + "].file",
-                 "no file has the id " + quoted(scene.placements[i].source));
+                 "no file has the id " + excerpt(scene.placements[i].source));
     }
   }
 }
