@@ -33,7 +33,8 @@ struct SmoothOcclusionOptions {
 };
 
 /// How far, in samples of level 0, a vertex may read: an edit that is farther than this from a chunk leaves its mesh as
-/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at.
+/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at, 0 to kCoarsestLevel; others
+/// count as the nearest of these.
 [[nodiscard]] int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level = 0);
 
 /// Where a mesh of one chunk ends.
@@ -52,7 +53,7 @@ struct SmoothOptions {
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
   bool split_sheets = false;
   /// Level of detail of the chunk and its neighbours, indexed as a neighbourhood: cells are 2^level samples wide, and
-  /// meshes of different levels meet without a gap. 0 to kCoarsestLevel.
+  /// meshes of different levels meet without a gap. 0 to kCoarsestLevel; more counts as that.
   std::array<std::uint8_t, 27> levels{};
 };
 
