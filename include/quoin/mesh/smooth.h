@@ -19,7 +19,8 @@ enum class SmoothOcclusion : std::uint8_t {
   WeightedPublished,  ///< against the deepest alone: jumps where a sample turns slightly solid
 };
 
-/// Settings of the occlusion; lengths in samples of the level that is meshed.
+/// Settings of the occlusion; lengths, and densities as depths, in samples of the level that is meshed: a field twice
+/// as large, one level coarser, is as dark.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 1. Weighted forms:
