@@ -39,12 +39,6 @@ inline SmoothPart part_of_chunk(const SmoothOptions& options) {
   return part;
 }
 
-/// The chunk's own cells, with the quads among them: what transitions start from.
-inline SmoothPart own_part(const SmoothOptions& options) {
-  const int n = kChunkEdge >> options.levels[13];
-  return {{IVec3{0}, IVec3{n}}, {IVec3{0}, IVec3{n}}, options.levels[13], options.occlusion};
-}
-
 inline smooth::Corners corners_of(const LatticeDensity& density, IVec3 cell) {
   smooth::Corners corners;
   for (int i = 0; i < 8; ++i) {
