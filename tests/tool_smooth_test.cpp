@@ -224,6 +224,9 @@ TEST_F(ToolSmooth, volumes_without_a_surface_are_empty_files) {
     EXPECT_EQ(said["warnings"], Json({"nothing to draw"}));
     EXPECT_EQ(said["triangles"], 0);
     EXPECT_FALSE(parse_glb(read_file(folder_.file("out.glb")).value()).document.contains("meshes"));
+    const std::string text = run("convert flat.raw out.glb --raw-size 10x10x10").out;
+    EXPECT_NE(text.find("\nIso: "), std::string::npos) << text;
+    EXPECT_EQ(text.find("groups"), std::string::npos) << "there is one group of values: " << text;
   }
   const Json solid = converted("flat.raw out.glb --raw-size 10x10x10 --iso 100");
   EXPECT_EQ(solid["warnings"], Json::array()) << "a solid block has the faces of the volume";

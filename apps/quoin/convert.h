@@ -43,7 +43,7 @@ struct Outcome {
   std::int64_t triangles = 0;
   std::int64_t vertices = 0;
   std::optional<double> iso;  ///< of volumes
-  bool is_iso_found = false;  ///< from the values rather than given
+  bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
   double simplify_error = 0;  ///< reached
   std::uint64_t bytes = 0;
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first

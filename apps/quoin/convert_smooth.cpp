@@ -126,7 +126,7 @@ Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& 
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   ProgressBar bar;
-  outcome.is_iso_found = !options.iso;
+  outcome.is_iso_found = !options.iso && volume->min < volume->max;
   outcome.iso = options.iso ? *options.iso : static_cast<double>(volume_threshold(*volume));
   SmoothVolumeOptions wanted;
   wanted.iso = static_cast<float>(*outcome.iso);

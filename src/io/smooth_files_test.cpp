@@ -245,6 +245,14 @@ TEST_F(SmoothFiles, unsound_input_is_refused_and_leaves_no_file) {
   add("a transform that is singular",
       [](SmoothPart& part) { part.placements[0].world_from_mesh[1] = part.placements[0].world_from_mesh[0]; });
   add("a transform that is not affine", [](SmoothPart& part) { part.placements[0].world_from_mesh[1].w = 0.1; });
+  add("a vertex farther away than a float can say",
+      [](SmoothPart& part) { part.placements[0].world_from_mesh[3].x = 1e39; });
+  add("a vertex farther away than a float can say",
+      [](SmoothPart& part) { part.placements[0].world_from_mesh[0].x = 2e38; });
+  add("a vertex farther away than a float can say", [](SmoothPart& part) {
+    part.pivot.z = 1e200;
+    part.placements[0].world_from_mesh[3].z = 1e200;
+  });
   add("a pivot that is not finite", [](SmoothPart& part) { part.pivot.y = kNan; });
   add("arrays of different lengths", [](SmoothPart& part) { part.mesh.normals.pop_back(); });
   add("arrays of different lengths", [](SmoothPart& part) { part.mesh.openness.pop_back(); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include <glm/matrix.hpp>
@@ -42,15 +43,44 @@ const char* fault_of(const glm::dmat4& matrix) {
   return is_sound ? nullptr : "a transform that is singular";
 }
 
+DBox bounds_of(const SmoothMesh& mesh) {
+  DBox box;
+  for (const Vec3& position : mesh.positions) box.extend(DVec3(position));
+  return box;
+}
+
+/// Whether floats reach every point of a box once it is moved. Affine images of a box lie between those of its corners.
+bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  for (int i = 0; i < 8; ++i) {
+    const DVec3 corner{(i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y, (i & 4 ? box.max : box.min).z};
+    const DVec3 moved(moved_from_box * glm::dvec4(corner, 1.0));
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(moved[axis]) <= kMost)) return false;
+    }
+  }
+  return true;
+}
+
+/// What is wrong with where a part lies. Requires: its mesh and pivot are sound.
+const char* fault_of_places(const SmoothPart& part) {
+  const DBox box = bounds_of(part.mesh);
+  const DBox from_pivot{box.min - part.pivot, box.max - part.pivot};
+  for (const SmoothPlacement& placement : part.placements) {
+    if (const char* fault = fault_of(placement.world_from_mesh); fault != nullptr) return fault;
+    const bool is_within = part.mesh.positions.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
+                                                           stays_within_floats(from_pivot, placement.world_from_mesh));
+    if (!is_within) return "a vertex farther away than a float can say";
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 Status check_parts(std::span<const SmoothPart> parts) {
   for (const SmoothPart& part : parts) {
     const char* fault = is_finite(part.pivot) ? fault_of(part.mesh) : "a pivot that is not finite";
-    for (auto placement = part.placements.begin(); fault == nullptr && placement != part.placements.end();
-         ++placement) {
-      fault = fault_of(placement->world_from_mesh);
-    }
+    if (fault == nullptr) fault = fault_of_places(part);
     if (fault != nullptr) return fail(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
   }
   return {};

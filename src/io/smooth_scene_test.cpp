@@ -68,6 +68,15 @@ TEST(VolumeThreshold, lies_amid_the_gap) {
   EXPECT_NEAR(volume_threshold(volume_of({2, 1, 1}, {-huge, huge})), 0.0F, huge * 1e-3F);
 }
 
+TEST(VolumeThreshold, parts_values_with_no_float_between_them) {
+  float low = 1.0F;
+  for (int i = 0; i < 4; ++i) {
+    const float high = std::nextafter(low, 2.0F);
+    EXPECT_EQ(volume_threshold(volume_of({2, 1, 1}, {low, high})), low) << "what is above is solid";
+    low = high;
+  }
+}
+
 TEST(VolumeThreshold, odd_volumes_have_one) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(volume_threshold(volume_of({3, 1, 1}, {7, 7, 7})), 7.0F);

@@ -59,7 +59,9 @@ float volume_threshold(const Volume& volume) {
   const double bins =
       (static_cast<double>(first - variance.begin()) + static_cast<double>(last - variance.begin())) / 2;
   const double min = volume.min;
-  return static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
+  const auto threshold = static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
+  // Amid two values that follow each other there is no float, and nothing is above the greater.
+  return std::min(threshold, std::nextafter(volume.max, volume.min));
 }
 
 }  // namespace quoin

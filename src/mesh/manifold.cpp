@@ -73,6 +73,25 @@ void remove_back_to_back(SmoothMesh& mesh) {
   mesh.indices.resize(kept);
 }
 
+/// The first of the arcs that start at a neighbour; the number of arcs when none does.
+std::size_t first_from(const std::vector<Arc>& arcs, std::uint32_t neighbour) {
+  const auto found = std::lower_bound(arcs.begin(), arcs.end(), neighbour,
+                                      [](const Arc& arc, std::uint32_t value) { return arc.from < value; });
+  if (found == arcs.end() || found->from != neighbour) return arcs.size();
+  return static_cast<std::size_t>(found - arcs.begin());
+}
+
+/// Whether following the arcs from the first leads back to it past all others.
+bool are_one_ring(const std::vector<Arc>& arcs) {
+  std::size_t at = 0;
+  for (std::size_t passed = 1; passed <= arcs.size(); ++passed) {
+    at = first_from(arcs, arcs[at].to);
+    if (at == 0) return passed == arcs.size();
+    if (at == arcs.size()) return false;
+  }
+  return arcs.empty();
+}
+
 /// Takes arcs apart into rings that pass no neighbour twice; answers the number of each arc's ring, from 0. Arcs that
 /// belong to none are in ring 0.
 std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
@@ -94,9 +113,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
         ++rings;
         continue;
       }
-      std::size_t next = static_cast<std::size_t>(
-          std::lower_bound(arcs.begin(), arcs.end(), at, [](const Arc& a, std::uint32_t v) { return a.from < v; }) -
-          arcs.begin());
+      std::size_t next = first_from(arcs, at);
       while (next < arcs.size() && arcs[next].from == at && is_used[next]) ++next;
       if (next == arcs.size() || arcs[next].from != at) break;
       is_used[next] = true;
@@ -141,10 +158,7 @@ void make_manifold(SmoothMesh& mesh) {
   std::vector<Arc> arcs;
   for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
     arcs_around(mesh, corners, vertex, arcs);
-    const bool is_crowded = std::adjacent_find(arcs.begin(), arcs.end(), [](const Arc& a, const Arc& b) {
-                              return a.from == b.from;
-                            }) != arcs.end();
-    if (is_crowded) split(mesh, vertex, arcs);
+    if (!are_one_ring(arcs)) split(mesh, vertex, arcs);
   }
 }
 

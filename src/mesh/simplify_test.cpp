@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -187,9 +188,29 @@ TEST(Manifold, sheets_that_share_an_edge_are_separated) {
   make_manifold(mesh);
   EXPECT_EQ(open_edges(mesh), 0U);
   EXPECT_EQ(mesh.indices.size(), 24U);
-  EXPECT_EQ(mesh.positions.size(), 7U) << "one vertex of the edge twice is enough";
-  EXPECT_EQ(mesh.types.size(), 7U);
+  EXPECT_EQ(mesh.positions.size(), 8U) << "both ends of the edge twice";
+  EXPECT_EQ(mesh.types.size(), 8U);
   EXPECT_TRUE(mesh.openness.empty());
+  EXPECT_EQ(volume(mesh), before);
+}
+
+TEST(Manifold, solids_that_share_a_vertex_are_separated) {
+  SmoothMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}, {9, 9, 9}};
+  mesh.normals.resize(8, Vec3(0, 1, 0));
+  mesh.albedo.resize(8);
+  mesh.types.resize(8);
+  // Two tetrahedra; the last vertex is of neither.
+  mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3, 0, 4, 5, 0, 6, 4, 0, 5, 6, 4, 6, 5};
+  ASSERT_EQ(open_edges(mesh), 0U);
+  const double before = volume(mesh);
+  make_manifold(mesh);
+  ASSERT_EQ(mesh.positions.size(), 9U) << "the common vertex twice";
+  EXPECT_EQ(mesh.positions[8], Vec3(0));
+  EXPECT_EQ(std::count(mesh.indices.begin(), mesh.indices.end(), 0U), 3);
+  EXPECT_EQ(std::count(mesh.indices.begin(), mesh.indices.end(), 8U), 3);
+  EXPECT_EQ(mesh.normals.size(), 9U);
+  EXPECT_EQ(open_edges(mesh), 0U);
   EXPECT_EQ(volume(mesh), before);
 }
 

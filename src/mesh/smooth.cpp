@@ -1,7 +1,6 @@
 #include <quoin/mesh/smooth.h>
 
 #include <algorithm>
-#include <cassert>
 
 #include "mesh/smooth_levels.h"
 #include "mesh/smooth_scratch.h"
@@ -38,7 +37,6 @@ struct SmoothMesher::Scratch {
             SmoothChunkMesh& out) {
     out.clear();
     work.level = options.levels[13];
-    assert(work.level <= kCoarsestLevel);
     work.n = kChunkEdge >> work.level;
     work.cells = cells;
     work.occlusion = smooth::within_limits(options.occlusion, work.level);
@@ -53,7 +51,9 @@ SmoothMesher::SmoothMesher(SmoothMesher&&) noexcept = default;
 SmoothMesher& SmoothMesher::operator=(SmoothMesher&&) noexcept = default;
 SmoothMesher::~SmoothMesher() = default;
 
-void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out) {
+void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& wanted, SmoothChunkMesh& out) {
+  SmoothOptions options = wanted;
+  for (std::uint8_t& level : options.levels) level = std::min<std::uint8_t>(level, kCoarsestLevel);
   const int n = kChunkEdge >> options.levels[13];
   const bool is_open = options.border == SmoothBorder::Open;
   if (!is_open && !smooth::ChunkLevels(options.levels).all_same()) {

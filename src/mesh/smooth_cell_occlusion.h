@@ -16,6 +16,11 @@ inline constexpr float kLift = 0.1F;
 /// The published form counts depths below this as none.
 inline constexpr float kLeastDepth = 0.001F;
 
+/// What densities are multiplied by, so that depths count in samples of the level, as the spread does.
+inline float depth_unit(int level) {
+  return 1.0F / static_cast<float>(1 << level);
+}
+
 /// Where a vertex is sampled about, relative to its cell's lowest corner.
 inline Vec3 occlusion_centre(Vec3 fraction, Vec3 n, float spread) {
   const float lift = spread * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z)) + kLift;
@@ -75,7 +80,8 @@ inline float openness_of(const std::array<float, 27>& samples, const SmoothOcclu
   return weighted_openness(sum, least, options);
 }
 
-/// The occlusion of a vertex; `density(x, y, z)` is the lattice point at that offset from the cell's lowest corner.
+/// The occlusion of a vertex; `density(x, y, z)` is the lattice point at that offset from the cell's lowest corner, in
+/// samples of the level.
 template <class Density>
 float vertex_openness(Vec3 fraction, Vec3 normal, const SmoothOcclusionOptions& options, Density density) {
   const Vec3 centre = occlusion_centre(fraction, normal, options.spread);

@@ -222,9 +222,10 @@ void gather_row(const Work& work, int y, int z, Half* row) {
 namespace quoin {
 
 int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
-  const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, coarsest_level);
+  const int level = std::clamp(coarsest_level, 0, kCoarsestLevel);
+  const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, level);
   // Without occlusion, splitting sheets looks at the cells beside its own.
-  return (std::max(smooth::apron_of(limited), 1) + 1) << coarsest_level;
+  return (std::max(smooth::apron_of(limited), 1) + 1) << level;
 }
 
 }  // namespace quoin

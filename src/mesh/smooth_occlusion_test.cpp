@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -125,6 +126,41 @@ std::vector<Symmetry> symmetries() {
     for (int s = 0; s < 8; ++s) all.push_back({axes, DVec3((s & 1) ? -1 : 1, (s & 2) ? -1 : 1, (s & 4) ? -1 : 1)});
   } while (std::next_permutation(axes.begin(), axes.end()));
   return all;
+}
+
+// A field that is as much larger as its cells are; air between its lattice points.
+World enlarged(const World& small, int level) {
+  const DensityNeighbourhood chunks = small.around();
+  const int size = 1 << level;
+  return World([&](IVec3 p) {
+    const bool is_on_lattice = (p & IVec3(size - 1)) == IVec3(0);
+    return is_on_lattice ? size * double{float_from_half(chunks.get(p / size))} : 0.0;
+  });
+}
+
+TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
+  // Within the band at every size.
+  const World small(
+      [](IVec3 p) { return 0.3 * (std::sin(0.7 * p.x) + std::sin(0.9 * p.y + 1.0) + std::cos(0.8 * p.z)); });
+  for (int level = 1; level <= kCoarsestLevel; ++level) {
+    const World large = enlarged(small, level);
+    for (const SmoothOcclusion form : kForms) {
+      for (const float spread : {0.7F, 2.0F}) {
+        const SmoothChunkMesh fine = mesh_of(small, form, spread);
+        std::map<std::uint32_t, float> openness;
+        for (std::size_t i = 0; i < fine.cells.size(); ++i) openness[fine.cells[i].bits] = fine.openness[i];
+        SmoothMesher mesher;
+        SmoothChunkMesh coarse;
+        mesher.mesh(large.around(), with(form, level, spread), coarse);
+        ASSERT_GT(coarse.cells.size(), 40U);
+        EXPECT_LT(*std::min_element(coarse.openness.begin(), coarse.openness.end()), 1.0F);
+        for (std::size_t i = 0; i < coarse.cells.size(); ++i) {
+          if (coarse.cells[i].chunk_offset() != IVec3(0)) continue;  // called by other names in the small field
+          ASSERT_EQ(coarse.openness[i], openness.at(coarse.cells[i].bits)) << "level " << level << " spread " << spread;
+        }
+      }
+    }
+  }
 }
 
 TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {

@@ -39,12 +39,6 @@ inline SmoothPart part_of_chunk(const SmoothOptions& options) {
   return part;
 }
 
-/// The chunk's own cells, with the quads among them: what transitions start from.
-inline SmoothPart own_part(const SmoothOptions& options) {
-  const int n = kChunkEdge >> options.levels[13];
-  return {{IVec3{0}, IVec3{n}}, {IVec3{0}, IVec3{n}}, options.levels[13], options.occlusion};
-}
-
 inline smooth::Corners corners_of(const LatticeDensity& density, IVec3 cell) {
   smooth::Corners corners;
   for (int i = 0; i < 8; ++i) {
@@ -89,7 +83,8 @@ class SmoothOracle {
     const IVec3 offset{cell.x < 0, cell.y < 0, cell.z < 0};
     out.cells.push_back(smooth::cell_name(cell & IVec3{n - 1}, offset));
     if (part_.occlusion.form == SmoothOcclusion::None) return;
-    const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}); };
+    // In samples of the level, as the spread is.
+    const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}) / size; };
     const SmoothOcclusionOptions occlusion = smooth::within_limits(part_.occlusion, part_.level);
     out.openness.push_back(smooth::vertex_openness(vertex.fraction, vertex.normal, occlusion, from_cell));
   }

@@ -15,7 +15,12 @@ void decode_slice(Work& work, int z) {
   for (int y = -work.apron - 1; y <= work.n + work.apron; ++y) {
     if (!needed.has(y)) continue;
     gather_row(work, y, z, halves + kPointX);
-    decode_row(halves, work.decoded_row(y, z) - kPointX, work.n + 2 * kPointX);
+    float* const decoded = work.decoded_row(y, z) - kPointX;
+    decode_row(halves, decoded, work.n + 2 * kPointX);
+    if (work.level == 0) continue;
+    // Exact: the unit is a power of two.
+    const float unit = depth_unit(work.level);
+    for (int i = 0; i < work.n + 2 * kPointX; ++i) decoded[i] *= unit;
   }
 }
 

@@ -134,6 +134,21 @@ TEST(SmoothMesher, SurvivesInfinitiesAndNaN) {
   }
 }
 
+TEST(SmoothMesher, LevelsBeyondTheCoarsestCountAsIt) {
+  const World world(sphere({31.2, 30.7, 31.9}, 25.0));
+  SmoothMesher mesher;
+  SmoothChunkMesh coarsest;
+  SmoothChunkMesh mesh;
+  mesher.mesh(world.around(), with(SmoothOcclusion::Openness, kCoarsestLevel), coarsest);
+  EXPECT_GT(coarsest.indices.size(), 0U);
+  for (const int level : {4, 6, 7, 64, 255}) {
+    mesher.mesh(world.around(), with(SmoothOcclusion::Openness, level), mesh);
+    expect_same(mesh, coarsest);
+  }
+  EXPECT_EQ(reach_of({}, 40), reach_of({}, kCoarsestLevel));
+  EXPECT_EQ(reach_of({}, -1), reach_of({}, 0));
+}
+
 TEST(SmoothMesher, SplitsQuadsAlongTheShorterDiagonal) {
   const World world(noise(3, 4.0));
   SmoothMesher mesher;

@@ -19,7 +19,7 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
   out.normals[index] = vertex.normal;
   if (occlusion.form == SmoothOcclusion::None) return;
   const auto density = [&](int x, int y, int z) {
-    return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size()));
+    return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
   };
   out.openness[index] = vertex_openness(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
 }

@@ -39,9 +39,9 @@ struct SmoothFileOptions {
 // Mirrored: placements of negative determinant have their triangles turned round, so that outside stays outside.
 // Answers:  the size of all that was written.
 // Order:    the same bytes on every run.
-// Errors:   CannotWrite; Cancelled; InvalidArgument when a transform is not finite, not affine or singular, or when a
-//           mesh contradicts itself (arrays of different lengths, indices of no vertex, numbers that are not
-//           finite). No file is left or replaced then.
+// Errors:   CannotWrite; Cancelled; InvalidArgument when a transform is not finite, not affine or singular, when a
+//           vertex comes to lie beyond the range of floats, or when a mesh contradicts itself (arrays of different
+//           lengths, indices of no vertex, numbers that are not finite). No file is left or replaced then.
 
 /// Writes smooth meshes as one binary glTF 2.0 file.
 ///

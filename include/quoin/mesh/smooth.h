@@ -19,7 +19,8 @@ enum class SmoothOcclusion : std::uint8_t {
   WeightedPublished,  ///< against the deepest alone: jumps where a sample turns slightly solid
 };
 
-/// Settings of the occlusion; lengths in samples of the level that is meshed.
+/// Settings of the occlusion; lengths, and densities as depths, in samples of the level that is meshed: a field twice
+/// as large, one level coarser, is as dark.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 1. Weighted forms:
@@ -33,7 +34,8 @@ struct SmoothOcclusionOptions {
 };
 
 /// How far, in samples of level 0, a vertex may read: an edit that is farther than this from a chunk leaves its mesh as
-/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at.
+/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at, 0 to kCoarsestLevel; others
+/// count as the nearest of these.
 [[nodiscard]] int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level = 0);
 
 /// Where a mesh of one chunk ends.
@@ -52,7 +54,7 @@ struct SmoothOptions {
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
   bool split_sheets = false;
   /// Level of detail of the chunk and its neighbours, indexed as a neighbourhood: cells are 2^level samples wide, and
-  /// meshes of different levels meet without a gap. 0 to kCoarsestLevel.
+  /// meshes of different levels meet without a gap. 0 to kCoarsestLevel; more counts as that.
   std::array<std::uint8_t, 27> levels{};
 };
 
