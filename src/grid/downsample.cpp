@@ -92,7 +92,7 @@ class ChunkHalver {
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (found[i] == kAir || (has_opaque && !types_->is_opaque(found[i]))) continue;
       const auto bits = static_cast<int>(i);
-      const int weight = 1 + 2 * masks_.exposed_faces(fine + IVec3{bits & 1, bits >> 1 & 1, bits >> 2});
+      const int weight = 1 + 8 * masks_.exposed_faces(fine + IVec3{bits & 1, bits >> 1 & 1, bits >> 2});
       const auto first = static_cast<std::size_t>(std::find(found.begin(), found.end(), found[i]) - found.begin());
       weights[first] += weight;
     }

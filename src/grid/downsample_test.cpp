@@ -70,7 +70,7 @@ class Oracle {
       if (type == kAir) continue;
       int& weight = (types_->is_opaque(type) ? opaque : transparent)[type];
       weight += 1;
-      for (const Direction face : kDirections) weight += grid_->get(at + normal_of(face)) == kAir ? 2 : 0;
+      for (const Direction face : kDirections) weight += grid_->get(at + normal_of(face)) == kAir ? 8 : 0;
     }
     std::pair<VoxelType, int> best{kAir, 0};
     for (const auto& each : opaque.empty() ? transparent : opaque) {

@@ -14,6 +14,14 @@ bool has_transparent_types(const Grid& grid, const VoxelRegistry& types) {
   return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
 }
 
+// Whether the voxels of a grid halved that often fill as much as those of the full one, but for an
+// eighth.
+bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
+  const auto cells = std::ldexp(static_cast<double>(coarse.voxel_count()), 3 * halvings);
+  const auto voxels = static_cast<double>(full.voxel_count());
+  return std::abs(cells - voxels) <= 0.125 * voxels;
+}
+
 }  // namespace
 
 OpticalTrees OpticalTrees::build(const Grid& grid, const VoxelRegistry& types) {
@@ -36,11 +44,17 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
 }
 
 void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
-  if (version != grid.version()) levels.clear();
+  if (version != grid.version()) {
+    levels.clear();
+    is_coarsest = false;
+  }
   version = grid.version();
-  if (static_cast<int>(levels.size()) >= halvings) return;
-  pyramid.update(grid, types, halvings, threads);
-  for (int level = static_cast<int>(levels.size()) + 1; level <= pyramid.levels(); ++level) {
+  const auto made = static_cast<int>(levels.size());
+  if (is_coarsest || made >= halvings) return;
+  for (int level = made + 1; level <= halvings; ++level) {
+    pyramid.update(grid, types, level, threads);
+    is_coarsest = pyramid.levels() < level || !has_volume_of(pyramid.level(level), level, grid);
+    if (is_coarsest) return;
     const Grid& voxels = pyramid.level(level);
     levels.push_back(std::make_unique<CoarseLevel>(CoarseLevel{&voxels, level, OpticalTrees::build(voxels, types)}));
   }

@@ -37,12 +37,14 @@ struct CoarseLevel {
 
 /// Halved grids with their trees, made when first asked for and kept; made anew for grids that were edited since.
 ///
-/// Threads: any number may call.
+/// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
+/// bridge's deck, becomes twice as thick, and shows. Threads: any number may call.
 class CoarseGrids {
   struct Entry {
     std::uint64_t version = 0;  // of the grid
     GridPyramid pyramid;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
+    bool is_coarsest = false;                          // there are no more levels that are like the grid
     void make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads);
   };
 
@@ -50,7 +52,8 @@ class CoarseGrids {
   /// What was made, to be looked at while nobody else makes more. Levels stay where they are until their grid changes.
   class Lock {
    public:
-    /// The grid halved that often, or less often where nothing would be left of it; null where that is not at all.
+    /// The grid halved that often, or less often where it would swell or shrink too much; null where that is not at
+    /// all.
     [[nodiscard]] const CoarseLevel* find(GridHandle grid, int halvings) const;
 
    private:

@@ -11,11 +11,11 @@
 namespace quoin {
 namespace {
 
-// Halvings until a cell spans at least `policy.voxel_pixels`.
+// As many as keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
   int halvings = 0;
-  double cell_pixels = voxel_pixels;
-  while (halvings < kCoarsestHalving && !(cell_pixels >= policy.voxel_pixels)) {
+  double cell_pixels = 2.0 * voxel_pixels;
+  while (halvings < kCoarsestHalving && cell_pixels <= policy.cell_pixels) {
     ++halvings;
     cell_pixels *= 2.0;
   }
@@ -46,11 +46,12 @@ class PixelScale {
 struct Choice {
   std::uint32_t generation = std::numeric_limits<std::uint32_t>::max();  // of the instance; none: nothing chosen yet
   std::uint8_t halvings = 0;
-  bool is_far = false;
+  Detail detail = Detail::Near;
 };
 
 bool is_far(const ScreenSize& size, const DetailPolicy& policy) {
-  return !(size.diameter_pixels > policy.far_pixels) || !std::isfinite(size.diameter_pixels);
+  return !std::isfinite(size.voxel_pixels) || !std::isfinite(size.diameter_pixels) ||
+         size.diameter_pixels <= policy.far_pixels;
 }
 
 ScreenSize scaled(const ScreenSize& size, double by) {
@@ -59,18 +60,18 @@ ScreenSize scaled(const ScreenSize& size, double by) {
 
 // The last choice stays while a size within the hysteresis of this one would give it.
 Choice chosen_by_pixels(const ScreenSize& size, const DetailPolicy& policy, const Choice* last) {
+  const double room = last != nullptr && policy.hysteresis > 0.0 ? 1.0 + policy.hysteresis : 1.0;
+  const ScreenSize larger = scaled(size, room);
+  const ScreenSize smaller = scaled(size, 1.0 / room);
   Choice choice;
-  if (last == nullptr || !(policy.hysteresis > 0.0)) {
-    choice.halvings = static_cast<std::uint8_t>(halvings_for(size.voxel_pixels, policy));
-    choice.is_far = is_far(size, policy);
-    return choice;
-  }
-  const ScreenSize larger = scaled(size, 1.0 + policy.hysteresis);
-  const ScreenSize smaller = scaled(size, 1.0 / (1.0 + policy.hysteresis));
+  choice.detail = detail_by_pixels(larger, policy);
   const int fewest = halvings_for(larger.voxel_pixels, policy);
-  const int most = halvings_for(smaller.voxel_pixels, policy);
-  choice.halvings = static_cast<std::uint8_t>(std::clamp<int>(last->halvings, fewest, most));
-  choice.is_far = last->is_far ? is_far(smaller, policy) : is_far(larger, policy);
+  int halvings = fewest;
+  if (last != nullptr) {
+    choice.detail = std::clamp(last->detail, choice.detail, detail_by_pixels(smaller, policy));
+    halvings = std::clamp<int>(last->halvings, fewest, halvings_for(smaller.voxel_pixels, policy));
+  }
+  choice.halvings = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   return choice;
 }
 
@@ -90,7 +91,7 @@ Detail detail_by_radius(double distance, double radius, const DetailPolicy& poli
 }
 
 Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy) {
-  if (!std::isfinite(size.voxel_pixels) || is_far(size, policy)) return Detail::Far;
+  if (is_far(size, policy)) return Detail::Far;
   return size.voxel_pixels < policy.voxel_pixels ? Detail::Mid : Detail::Near;
 }
 
@@ -129,10 +130,9 @@ Choice DetailSelector::Impl::choose(InstanceHandle handle, const ScreenSize& siz
   if (policy.rule == DetailPolicy::Rule::ByPixels) {
     choice = chosen_by_pixels(size, policy, last.generation == handle.generation ? &last : nullptr);
   } else {
-    const Detail detail = detail_by_radius(distance, radius, policy);
-    choice.is_far = detail == Detail::Far;
+    choice.detail = detail_by_radius(distance, radius, policy);
     const int halvings = std::max(halvings_for(size.voxel_pixels, policy), 1);
-    choice.halvings = static_cast<std::uint8_t>(detail == Detail::Near ? 0 : halvings);
+    choice.halvings = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   }
   choice.generation = handle.generation;
   last = choice;
@@ -165,8 +165,7 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
     const double distance = glm::length(centre);
     const ScreenSize size = pixels.of(distance, radius, instance.voxel_size);
     const Choice choice = impl_->choose(handle, size, distance, radius, policy);
-    const Detail detail = choice.is_far ? Detail::Far : choice.halvings > 0 ? Detail::Mid : Detail::Near;
-    out.push_back({handle, detail, choice.halvings, distance});
+    out.push_back({handle, choice.detail, choice.halvings, distance});
   }
 }
 

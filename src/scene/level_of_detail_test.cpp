@@ -1,6 +1,7 @@
 #include <quoin/scene/level_of_detail.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -123,7 +124,7 @@ TEST(LevelOfDetail, DistancesCountFromTheContentAndInTheInstancesSize) {
   }
 }
 
-TEST(LevelOfDetail, CellsSpanAPixelOrTwoAtMost) {
+TEST(LevelOfDetail, CellsSpanWhatThePolicyAllowsAndNotLessThanHalfOfIt) {
   const Scene scene = cubes(1, 600);
   const double radius = 300.0 * std::sqrt(3.0);
   DetailPolicy policy;
@@ -133,13 +134,14 @@ TEST(LevelOfDetail, CellsSpanAPixelOrTwoAtMost) {
   for (double distance = radius + 1.0; distance < 1e5; distance *= 1.03) {
     DetailSelector().select(scene, looking_at_origin(distance), 800, 600, policy, selected);
     ASSERT_EQ(selected.size(), 1U);
+    const SelectedInstance& chosen = selected[0];
     const double pixels = 300.0 / std::tan(std::numbers::pi / 8) / (distance - radius);
-    const double cell = pixels * std::ldexp(1.0, selected[0].halvings);
-    EXPECT_EQ(selected[0].detail, pixels < 1.0 ? Detail::Mid : Detail::Near);
-    if (selected[0].detail == Detail::Mid) EXPECT_LT(cell, 2.0);
-    if (selected[0].halvings < kCoarsestHalving) EXPECT_GE(cell, 1.0);
-    EXPECT_GE(selected[0].halvings, last);
-    last = selected[0].halvings;
+    const double cell = pixels * std::ldexp(1.0, chosen.halvings);
+    EXPECT_EQ(chosen.detail, pixels < 1.0 ? Detail::Mid : Detail::Near);
+    EXPECT_TRUE(chosen.halvings == 0 || cell <= policy.cell_pixels);
+    EXPECT_TRUE(chosen.halvings == kCoarsestHalving || 2.0 * cell > policy.cell_pixels);
+    EXPECT_GE(chosen.halvings, last);
+    last = chosen.halvings;
   }
   EXPECT_EQ(last, kCoarsestHalving);
 }
@@ -178,8 +180,10 @@ TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
   const double radius = 200.0 * std::sqrt(3.0);
   const double scale = 300.0 / std::tan(std::numbers::pi / 8);
   DetailPolicy policy;
-  // Near to Mid; one halving to two; Mid to Far.
-  const std::array<double, 3> thresholds = {radius + scale, radius + 2.0 * scale, 2.0 * radius * scale / 128.0};
+  policy.far_pixels = 40;
+  // Near to Mid; no halving to one; Mid to Far.
+  const std::array<double, 3> thresholds = {radius + scale, radius + 2.0 * scale / policy.cell_pixels,
+                                            2.0 * radius * scale / policy.far_pixels};
   for (const double threshold : thresholds) {
     for (const bool has_memory : {true, false}) {
       policy.hysteresis = has_memory ? 0.1 : 0.0;
@@ -195,8 +199,12 @@ TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
         changes += static_cast<int>(now != last);
         last = now;
       }
-      if (has_memory) EXPECT_LE(changes, 1) << threshold;
-      if (!has_memory) EXPECT_GT(changes, 30) << threshold;
+      if (has_memory) {
+        EXPECT_LE(changes, 1) << threshold;
+      }
+      if (!has_memory) {
+        EXPECT_GT(changes, 30) << threshold;
+      }
     }
   }
 }

@@ -16,8 +16,8 @@ namespace quoin {
 ///          least coordinates counts, so that a rod one or two voxels wide becomes a rod one cell wide. So a cell that
 ///          is added stands for at least 2 voxels, and none is added beside what is solid: the answer's volume is at
 ///          most 4 times the grid's.
-/// Type:    opaque types before transparent ones; of these the one with the greatest weight, a voxel weighing 1 and 2
-///          more for every face that meets air; of equal ones the lower.
+/// Type:    opaque types before transparent ones; of these the one with the greatest weight, a voxel weighing 1 and 8
+///          more for every face that meets air (tuned on pictures of terrains); of equal ones the lower.
 /// Threads: the same answer at any number.
 /// Cost:    under 100 microseconds a chunk of a terrain.
 [[nodiscard]] Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads = {});

@@ -14,7 +14,7 @@ namespace quoin {
 /// How an instance is drawn.
 enum class Detail : std::uint8_t {
   Near,  ///< every voxel
-  Mid,   ///< coarser cells, none of them larger than a pixel or two
+  Mid,   ///< coarser cells, where none of them is larger than a pixel
   Far,   ///< an impostor
 };
 
@@ -37,7 +37,10 @@ struct DetailPolicy {
   double near_radii = 1.0;    ///< ByRadius: Near up to and including
   double mid_radii = 10.0;    ///< ByRadius: Mid up to and including
   double voxel_pixels = 1.0;  ///< ByPixels: Mid once a voxel projects to less than this
-  int far_pixels = 128;       ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
+  /// Mid: a grid is halved as long as its cells project to at most this. Tuned on a ship and a terrain: at 0.5 pictures
+  /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9.
+  double cell_pixels = 0.4;
+  int far_pixels = 128;  ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
   /// ByPixels: a level is left only once the measure is beyond its threshold by this share. 0: no memory of the last
   /// choice.
   double hysteresis = 0.1;
@@ -60,8 +63,8 @@ struct ScreenSize {
 struct SelectedInstance {
   InstanceHandle instance;
   Detail detail = Detail::Near;
-  /// How often the grid is halved where it is traced (1: cells of 2^3 voxels): as often as makes a cell span a pixel or
-  /// two, at most kCoarsestHalving. Mid: 1 or more; Near: 0; Far: what stands in for the voxels in shadows and the
+  /// How often the grid is to be halved where it is traced (1: cells of 2^3 voxels), 0 to kCoarsestHalving. Near: 0.
+  /// Mid: by DetailPolicy::cell_pixels; ByRadius at least 1. Far: what stands in for the voxels in shadows and the
   /// like.
   int halvings = 0;
   double distance = 0.0;  ///< from the camera to the content's centre, world units

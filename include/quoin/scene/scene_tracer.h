@@ -49,8 +49,9 @@ class SceneTracer {
   SceneTracer& operator=(SceneTracer&&) noexcept;
   ~SceneTracer();
 
-  /// The same instances, those of `selected` in their detail: Mid and Far ones as halved grids. The others, which are
-  /// out of the picture but may cast shadows into it, stay as they are.
+  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, or less often
+  /// where that would change the volume of their voxels by more than an eighth. The others, which are out of the picture
+  /// but may cast shadows into it, stay as they are.
   ///
   /// This one must outlive the result. It keeps the halved grids, so that only the first picture pays for them.
   /// Threads: any number may call at once.
