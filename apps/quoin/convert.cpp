@@ -32,6 +32,7 @@ Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes
     case FileFormat::Ply:
       return write_ply(scene, meshes, path, progress);
     case FileFormat::Vox:
+    case FileFormat::Scene:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

@@ -42,6 +42,7 @@ Result<std::uint64_t> write_parts(std::span<const SmoothPart> parts, const Forma
     case FileFormat::Ply:
       return write_ply(parts, options.output, file, progress);
     case FileFormat::Vox:
+    case FileFormat::Scene:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

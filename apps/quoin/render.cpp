@@ -27,12 +27,13 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
-Result<Camera> camera_for(const Scene& scene, const RenderArguments& arguments) {
+Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& arguments) {
+  if (loaded.camera && !arguments.has_view && !arguments.position) return *loaded.camera;
   if (arguments.position) {
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
   }
   const double aspect = static_cast<double>(arguments.render.width) / arguments.render.height;
-  return frame_scene(scene, arguments.view, aspect, arguments.common.load.hidden);
+  return frame_scene(loaded.scene, arguments.view, aspect, arguments.common.load.hidden);
 }
 
 void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& picture,
@@ -81,14 +82,16 @@ Result<Outcome> render(const RenderArguments& arguments) {
   outcome.warnings = std::move(loaded->warnings);
   outcome.read = watch.lap();
   catch_interrupts();
-  const auto camera = camera_for(scene, arguments);
+  const auto camera = camera_for(*loaded, arguments);
   if (!camera) return tl::unexpected<Error>(camera.error());
   outcome.camera = *camera;
   const CpuRenderer renderer(scene, hidden, arguments.common.threads);
   outcome.build = watch.lap();
   {
     ProgressBar bar;
-    auto picture = renderer.render(*camera, arguments.render, bar.listener("tracing"));
+    RenderOptions options = arguments.render;
+    if (loaded->sun && !arguments.has_sun) options.light.sun = *loaded->sun;
+    auto picture = renderer.render(*camera, options, bar.listener("tracing"));
     if (!picture) return tl::unexpected<Error>(picture.error());
     outcome.picture = std::move(*picture);
   }

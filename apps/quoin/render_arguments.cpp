@@ -205,6 +205,8 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
         arguments.detail == "radius" ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
   arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
+  arguments.has_view = command.count("--view") > 0;
+  arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
   light.occlusion = arguments.occlusion == "vertex" ? OcclusionMode::Vertex : OcclusionMode::Rays;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;

@@ -22,6 +22,8 @@ struct RenderArguments {
   std::optional<DVec3> position;  ///< with `target`, instead of the view
   std::optional<DVec3> target;
   double fov_degrees = 45.0;
+  bool has_view = false;  ///< --view was given: a scene file's camera does not count
+  bool has_sun = false;   ///< likewise
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";

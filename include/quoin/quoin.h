@@ -26,6 +26,7 @@
 #include <quoin/io/obj.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/ply.h>
+#include <quoin/io/scene_file.h>
 #include <quoin/io/scene_meshes.h>
 #include <quoin/io/smooth_files.h>
 #include <quoin/io/smooth_scene.h>
@@ -45,7 +46,9 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/sweep.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>

@@ -4,6 +4,7 @@
 #include <array>
 
 #include <quoin/io/file.h>
+#include <quoin/io/scene_file.h>
 
 #include "io/byte_stream.h"
 #include "io/nifti.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
+    FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -94,6 +96,7 @@ const FormatInfo& format_info(FileFormat format) {
 
 std::optional<FileFormat> recognise(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
+  if (is_scene_file(bytes)) return FileFormat::Scene;
   const auto first = first_bytes(bytes, nifti::kMostHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
@@ -118,6 +121,7 @@ Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options) {
   auto bytes = read_file(path);
+  if (bytes && recognise(*bytes) == FileFormat::Scene) return read_scene_file(path, options);
   auto loaded = bytes ? read_bytes(path, *bytes, options) : Result<LoadedScene>(tl::unexpected<Error>(bytes.error()));
   if (!loaded && loaded.error().path.empty()) loaded.error().path = path.string();
   return loaded;

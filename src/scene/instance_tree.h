@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <glm/vector_relational.hpp>
 #include <span>
 #include <vector>
 
@@ -59,6 +60,30 @@ class InstanceTree {
       }
       for (std::size_t i = node.first; i < node.first + node.count; ++i) {
         if (may_meet(rays, boxes_[order_[i]]) && !visit(order_[i])) return;
+      }
+    }
+  }
+
+  /// Calls `visit(index)` for every box that touches `box`, in no order.
+  template <class Visit>
+  void visit_box(const DBox& box, Visit&& visit) const {
+    if (nodes_.empty()) return;
+    const auto touches = [&](const DBox& other) {
+      return glm::all(glm::lessThanEqual(box.min, other.max)) && glm::all(glm::lessThanEqual(other.min, box.max));
+    };
+    std::array<std::size_t, kMaxDepth> stack{};
+    std::size_t height = 0;
+    stack[height++] = 0;
+    while (height > 0) {
+      const Node& node = nodes_[stack[--height]];
+      if (!touches(node.box)) continue;
+      if (node.count == 0) {
+        stack[height++] = node.first;
+        stack[height++] = node.first - 1;
+        continue;
+      }
+      for (std::size_t i = node.first; i < node.first + node.count; ++i) {
+        if (touches(boxes_[order_[i]])) visit(order_[i]);
       }
     }
   }

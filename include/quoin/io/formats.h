@@ -13,7 +13,7 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
+enum class FileFormat : std::uint8_t { Vox, Scene, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
 
 /// What Quoin can do with a file format.
 struct FormatInfo {

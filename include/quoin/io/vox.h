@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
+#include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -18,6 +20,8 @@ struct LoadedScene {
   Scene scene;
   std::string format;                 ///< "vox", ...
   std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
+  std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
+  std::optional<Camera> camera;       ///< likewise
 };
 
 struct LoadOptions {

@@ -63,6 +63,7 @@ class SceneTracer {
 
  private:
   friend class SceneView;
+  friend class SceneQuery;
   struct Impl;
   explicit SceneTracer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene_tracer.h>
+
+namespace quoin {
+
+/// Where a ray meets a scene.
+struct SceneHit {
+  InstanceHandle instance;
+  IVec3 voxel{0};  ///< in the instance's grid
+  VoxelType type = kAir;
+  Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit
+  double distance = 0.0;             ///< in lengths of the ray's direction: world units for a unit one
+  DVec3 position{0.0};               ///< in the world
+  bool starts_inside = false;
+};
+
+/// The nearest voxel along a ray in the world, transparent ones too; of equally near ones that of the instance that
+/// comes first. Nothing when there is none, or when the ray is not finite or its direction is zero.
+///
+/// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
+///            itself.
+/// Cost:      O(log instances + grids on the ray).
+[[nodiscard]] std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world,
+                                                double max_distance = std::numeric_limits<double>::infinity());
+
+/// What is seen at a point of a picture; `x` and `y` in pixels from its upper left corner (a pixel's centre is at
+/// + 0.5). Requires: width and height are positive.
+[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, double x, double y,
+                                           int width, int height);
+
+/// The voxel that a pixel of a depth picture shows: the first one no nearer than `depth`, which is a float's rounding
+/// off at most. Nothing when there is none at that distance.
+[[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x,
+                                                     double y, int width, int height, float depth);
+
+/// A box anywhere in the world.
+struct OrientedBox {
+  DVec3 centre{0.0};
+  DVec3 half_size{0.5};
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; a zero one counts as no rotation
+};
+
+/// A voxel that collides (VoxelProperties::collides) and meets a shape.
+struct SceneOverlap {
+  InstanceHandle instance;
+  IVec3 voxel{0};
+};
+
+/// For each instance that has a colliding voxel within a sphere or a box, the first of these (z, then y, then x), in
+/// the order of the instances. To touch is not to overlap. Numbers that are not finite or negative meet nothing.
+///
+/// Cost: O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre,
+                                                 double radius);
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types,
+                                                 const OrientedBox& box);
+
+}  // namespace quoin

@@ -1,0 +1,174 @@
+#include <quoin/io/scene_file.h>
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+
+namespace quoin {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<SceneFile> parse(const std::string& text) {
+  return parse_scene_file(std::as_bytes(std::span(text)));
+}
+
+std::string file_with(const std::string& instance) {
+  return R"({"quoin_scene": 1, "files": [{"id": "a", "path": "a.vox"}], "instances": [)" + instance + "]}";
+}
+
+std::string fault_of(const std::string& text) {
+  const auto parsed = parse(text);
+  return parsed ? "none" : to_string(parsed.error());
+}
+
+TEST(SceneFile, ReadsEveryKey) {
+  std::ifstream in(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "scene_file" / "all.json");
+  const auto scene = parse(std::string(std::istreambuf_iterator<char>(in), {}));
+  ASSERT_TRUE(scene) << to_string(scene.error());
+  ASSERT_EQ(scene->placements.size(), 2U);
+  const SceneFile::Placement& first = scene->placements[0];
+  EXPECT_EQ(first.source, "a");
+  EXPECT_EQ(first.name, "n");
+  EXPECT_EQ(first.position, DVec3(1, 2, 3));
+  EXPECT_EQ(first.scale, 0.5);
+  EXPECT_TRUE(first.mirrored);
+  EXPECT_FALSE(first.visible);
+  EXPECT_NEAR(glm::length(first.rotation * DVec3(0, 0, 1) - DVec3(0.5, 0, std::sqrt(0.75))), 0.0, 1e-12);
+  EXPECT_NEAR(glm::length(*scene->sun - glm::normalize(DVec3(1, 2, 3))), 0.0, 1e-15);
+  EXPECT_EQ(scene->camera->position, DVec3(9));
+}
+
+TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
+  EXPECT_EQ(fault_of("{"), "byte 1: not valid JSON");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1, 2, 3]})")),
+            "instances[0].rotation: must be a list of 4 numbers");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [0, 0, 0, 0]})")),
+            "instances[0].rotation: must not be all 0");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a"}, {"file": "b"})")), "instances[1].file: no file has the id \"b\"");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "colour": 3})")), "instances[0]: \"colour\" is not known here");
+  EXPECT_EQ(fault_of(file_with(R"({"position": [1, 2, 3]})")), "instances[0]: \"file\" is missing");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "scale": 0})")), "instances[0].scale: must be more than 0");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "position": [1, "2", 3]})")),
+            "instances[0].position[1]: must be a number");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
+  EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "files": [], "instances": []})"),
+            "quoin_scene: version 2 is not known; 1 is");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
+            "files[0].path: must name a file");
+  EXPECT_EQ(
+      fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "x"}, {"id": "a", "path": "y"}], "instances": []})"),
+      "files[1].id: \"a\" was given before");
+}
+
+TEST(SceneFile, RefusesWhatWouldHurt) {
+  EXPECT_NE(fault_of(std::string(100'000, '[')), "none");
+  EXPECT_NE(fault_of(file_with(R"({"file": "a", "scale": 1e400})")), "none");
+  EXPECT_NE(fault_of(file_with(R"({"file": "a", "position": [NaN, 0, 0]})")), "none");
+  EXPECT_NE(fault_of(R"({"quoin_scene": 1, "files": [], "instances": [], "sun": [0, 0, 0]})"), "none");
+  EXPECT_NE(
+      fault_of(
+          R"({"quoin_scene": 1, "files": [], "instances": [], "camera": {"position": [1,1,1], "look_at": [1,1,1]}})"),
+      "none");
+  // As small and as large as numbers are.
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e-300, 0, 1e-308, 0]})")), "none");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e300, 1e300, 0, 0]})")), "none");
+}
+
+/// A folder with two .vox files that is removed at the end.
+class SceneFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("quoin_scene_file_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    write_model("red.vox", {200, 0, 0, 255});
+    write_model("blue.vox", {0, 0, 200, 255});
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void write_model(const std::string& name, Rgba8 colour) const {
+    Scene scene;
+    VoxelProperties properties;
+    properties.colour = colour;
+    const auto type = scene.types.add(properties);
+    ASSERT_TRUE(type);
+    SceneGrid grid;
+    grid.canvas = {IVec3(0), IVec3(4, 4, 4)};
+    grid.grid.set({0, 0, 0}, *type);
+    grid.grid.set({3, 1, 0}, *type);
+    Instance instance;
+    instance.grid = scene.add_grid(std::move(grid));
+    scene.add_instance(instance);
+    std::vector<std::string> warnings;
+    const auto bytes = write_vox(scene, warnings);
+    ASSERT_TRUE(bytes) << to_string(bytes.error());
+    ASSERT_TRUE(write_file(folder_ / name, *bytes));
+  }
+  fs::path write_text(const std::string& text) const {
+    const fs::path path = folder_ / "scene.json";
+    std::ofstream(path) << text;
+    return path;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
+  const auto loaded = load_scene(write_text(R"({"quoin_scene": 1,
+      "files": [{"id": "r", "path": "red.vox"}, {"id": "b", "path": "blue.vox"}],
+      "instances": [{"file": "r"}, {"file": "b", "name": "second", "position": [10, 0, 0], "scale": 2, "mirrored": true,
+                     "rotation": {"axis": [0, 1, 0], "degrees": 90}}, {"file": "r", "position": [0, 20, 0]}],
+      "sun": [0, 1, 0]})"));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->format, "scene");
+  const Scene& scene = loaded->scene;
+  EXPECT_EQ(scene.grids().size(), 2U);
+  ASSERT_EQ(scene.instances().size(), 3U);
+  EXPECT_EQ(*loaded->sun, DVec3(0, 1, 0));
+  const auto handles = scene.instances().handles();
+  // Both files call their colour type 1; here they differ.
+  const auto colour_of = [&](InstanceHandle handle) {
+    const Grid& grid = scene.grids()[scene.instances()[handle].grid].grid;
+    return scene.types[grid.types().at(0)].colour;
+  };
+  EXPECT_EQ(colour_of(handles[0]), (Rgba8{200, 0, 0, 255}));
+  EXPECT_EQ(colour_of(handles[1]), (Rgba8{0, 0, 200, 255}));
+  EXPECT_EQ(scene.instances()[handles[0]].grid, scene.instances()[handles[2]].grid);
+  const Instance& second = scene.instances()[handles[1]];
+  EXPECT_EQ(second.name, "second");
+  // Where a point comes to lie, by the definition: scale, mirror, then the rotation, then the position; on top of what
+  // the file itself says of it.
+  const auto alone = load_scene(folder_ / "blue.vox");
+  ASSERT_TRUE(alone);
+  const Instance& inner = alone->scene.instances()[alone->scene.instances().handles()[0]];
+  const SceneGrid& grid = alone->scene.grids()[inner.grid];
+  const DVec3 in_file = world_from_grid(inner, grid, DVec3(3, 1, 0));
+  const DVec3 mirrored(-in_file.x, in_file.y, in_file.z);
+  const DVec3 expected = DVec3(10, 0, 0) + glm::angleAxis(glm::radians(90.0), DVec3(0, 1, 0)) * (2.0 * mirrored);
+  EXPECT_LT(glm::length(world_from_grid(second, scene.grids()[second.grid], DVec3(3, 1, 0)) - expected), 1e-12);
+}
+
+TEST_F(SceneFiles, SayWhichFileIsWrong) {
+  const auto with_path = [&](const std::string& name) {
+    const auto loaded = load_scene(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ")" + name +
+                                              R"("}], "instances": [{"file": "a"}]})"));
+    return loaded ? std::string("none") : to_string(loaded.error());
+  };
+  EXPECT_EQ(with_path("red.vox"), "none");
+  EXPECT_NE(with_path("absent.vox").find("absent.vox"), std::string::npos);
+  EXPECT_NE(with_path("scene.json").find("a scene file within a scene file"), std::string::npos);
+  std::ofstream(folder_ / "noise.vox") << "not voxels";
+  EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace quoin
