@@ -218,6 +218,20 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   EXPECT_EQ(bytes("tiny.vox"), tiny_vox());
 }
 
+TEST_F(ToolRender, DetailAndItsColours) {
+  drawn("tiny.vox -o plain.png --size 64x48");
+  drawn("tiny.vox -o near.png --size 64x48 --detail near");
+  EXPECT_EQ(bytes("near.png"), bytes("plain.png")) << "near is the default";
+  drawn("tiny.vox -o colours.png --size 64x48 --lod-colours");
+  drawn("tiny.vox -o pixels.png --size 64x48 --lod-colours --detail pixels");
+  EXPECT_EQ(bytes("colours.png"), bytes("pixels.png")) << "colours alone are those of pixels";
+  drawn("tiny.vox -o green.png --size 64x48 --lod-colours --detail near");
+  EXPECT_NE(bytes("green.png"), bytes("colours.png"));
+  drawn("tiny.vox -o radius.png --size 64x48 --detail radius");
+  EXPECT_EQ(run("render tiny.vox -o out.png --detail far").status, 2);
+  EXPECT_FALSE(exists("out.png"));
+}
+
 TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::filesystem::create_directory(folder_.file("folder.png"));

@@ -1,6 +1,7 @@
 // Draws a fleet of voxel ships over a generated terrain: one picture in its own colours and one in those of its levels
 // of detail, into the .png files named on the command line.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -51,11 +52,17 @@ quoin::Status add_terrain(quoin::Scene& scene) {
 void add_fleet(quoin::Scene& scene, const std::vector<quoin::GridHandle>& ships) {
   Random random;
   for (int row = 0; row < 16; ++row) {
-    const double depth = 130.0 + 30.0 * row + 6.5 * row * row;
+    const double depth = 170.0 + 50.0 * row + 6.5 * row * row;
     for (int column = 0; column < 12; ++column) {
       const double across = (column - 5.5 + random.between(-0.3, 0.3)) / 5.5;
       const double share = random.between(0.0, 1.0);
-      const std::size_t design = share < 0.5 ? 0 : share < 0.8 ? 1 : share < 0.96 ? 2 : 3;
+      // The large ones keep back: there is no room for them among the first rows.
+      const std::size_t largest = row < 1 ? 1 : row < 4 ? 2 : 3;
+      const std::size_t design = std::min<std::size_t>(share < 0.5    ? 0
+                                                       : share < 0.8  ? 1
+                                                       : share < 0.94 ? 2
+                                                                      : 3,
+                                                       largest);
       quoin::Instance ship;
       ship.grid = ships[design];
       ship.name = "ship " + std::to_string(row * 12 + column);

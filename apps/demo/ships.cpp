@@ -32,8 +32,8 @@ quoin::Result<Paint> add_paint(quoin::Scene& scene, Rgba8 stripe) {
                                                {&paint.plate, Rgba8{150, 156, 166, 255}, 0.0F},
                                                {&paint.stripe, stripe, 0.0F},
                                                {&paint.dark, Rgba8{62, 66, 76, 255}, 0.0F},
-                                               {&paint.window, Rgba8{255, 226, 150, 255}, 0.9F},
-                                               {&paint.engine, Rgba8{110, 200, 255, 255}, 1.6F}}) {
+                                               {&paint.window, Rgba8{255, 226, 150, 255}, 0.6F},
+                                               {&paint.engine, Rgba8{110, 200, 255, 255}, 0.8F}}) {
     const auto added = add_type(scene, colour, emission);
     if (!added) return tl::unexpected<quoin::Error>(added.error());
     *type = *added;
