@@ -218,13 +218,26 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   EXPECT_EQ(bytes("tiny.vox"), tiny_vox());
 }
 
+TEST_F(ToolRender, DetailAndItsColours) {
+  drawn("tiny.vox -o plain.png --size 64x48");
+  drawn("tiny.vox -o near.png --size 64x48 --detail near");
+  EXPECT_EQ(bytes("near.png"), bytes("plain.png")) << "near is the default";
+  drawn("tiny.vox -o colours.png --size 64x48 --lod-colours");
+  drawn("tiny.vox -o pixels.png --size 64x48 --lod-colours --detail pixels");
+  EXPECT_EQ(bytes("colours.png"), bytes("pixels.png")) << "colours alone are those of pixels";
+  drawn("tiny.vox -o green.png --size 64x48 --lod-colours --detail near");
+  EXPECT_NE(bytes("green.png"), bytes("colours.png"));
+  drawn("tiny.vox -o radius.png --size 64x48 --detail radius");
+  EXPECT_EQ(run("render tiny.vox -o out.png --detail far").status, 2);
+  EXPECT_FALSE(exists("out.png"));
+}
+
 TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::filesystem::create_directory(folder_.file("folder.png"));
-  for (const std::string arguments :
-       {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png", "tiny.vox -o folder.png",
-        "tiny.vox -o out.png --depth none/out.pfm", "tiny.vox -o out.png --backend vulkan",
-        "tiny.vox -o out.png --device 0", "tiny.vox -o out.png --lod-colours"}) {
+  for (const std::string arguments : {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png",
+                                      "tiny.vox -o folder.png", "tiny.vox -o out.png --depth none/out.pfm",
+                                      "tiny.vox -o out.png --backend vulkan", "tiny.vox -o out.png --device 0"}) {
     const ToolRun result = run("render " + arguments);
     EXPECT_EQ(result.status, 1) << arguments;
     expect_one_error_line(result);

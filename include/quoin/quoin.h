@@ -15,6 +15,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/downsample.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_field.h>
@@ -43,6 +44,7 @@
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>

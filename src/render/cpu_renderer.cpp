@@ -4,6 +4,8 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <optional>
+#include <vector>
 
 #include <glm/geometric.hpp>
 
@@ -86,10 +88,20 @@ class ProgressOfTiles {
 }  // namespace
 
 struct CpuRenderer::Impl {
-  Impl(const Scene& of_scene, bool hidden, Threads threads)
-      : scene(&of_scene), tracer(of_scene, hidden, threads), surfaces(of_scene.types) {}
+  Impl(const Scene& of_scene, bool hidden_too, Threads threads)
+      : scene(&of_scene), hidden(hidden_too), tracer(of_scene, hidden_too, threads), surfaces(of_scene.types) {}
+
+  [[nodiscard]] std::vector<SelectedInstance> select(const Camera& camera, const RenderOptions& options) const {
+    std::vector<SelectedInstance> selected;
+    if (!options.detail) return selected;
+    DetailPolicy policy = *options.detail;
+    policy.hidden = hidden;
+    DetailSelector().select(*scene, camera, options.width, options.height, policy, selected);
+    return selected;
+  }
 
   const Scene* scene;
+  bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
 };
@@ -103,9 +115,12 @@ CpuRenderer::~CpuRenderer() = default;
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
-  const SceneView view(impl_->tracer, camera.position, options.instructions);
+  const std::vector<SelectedInstance> selected = impl_->select(camera, options);
+  std::optional<SceneTracer> detailed;
+  if (options.detail) detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
+  const SceneView view(detailed ? *detailed : impl_->tracer, camera.position, options.instructions);
   const CameraRays rays(camera, options.width, options.height);
-  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light);
+  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);
   const TileContext context{&view, &rays, &lighting, &options};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;

@@ -151,6 +151,37 @@ TEST(RenderScene, TheOrderOfInstancesDoesNotMatter) {
   EXPECT_GT(pictures[0].pixels_hit, 500);
 }
 
+TEST(RenderScene, AmongOthersOutOfSightAGridHasTheBytesOfTheGridAlone) {
+  World alone;
+  place(alone.scene, blobs(alone, 7));
+  World among;
+  place(among.scene, blobs(among, 9), {0, 0, 900});
+  place(among.scene, blobs(among, 7));
+  const Picture a = taken(alone.scene, kCamera, sized(64, 64));
+  const Picture b = taken(among.scene, kCamera, sized(64, 64));
+  EXPECT_EQ(a.colour.rgb, b.colour.rgb);
+  EXPECT_EQ(a.depth.values, b.depth.values);
+}
+
+TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
+  std::array<Pixel, 2> seen{};
+  for (const bool is_reversed : {false, true}) {
+    World world;
+    for (const int i : {0, 1}) {
+      Grid slab;
+      slab.fill_box({-3, 0, -3}, {3, 0, 3}, world.types.at(static_cast<std::size_t>(i) ^ (is_reversed ? 1U : 0U)));
+      place(world.scene, std::move(slab));
+    }
+    RenderOptions options = sized(8, 8);
+    options.light.lit = false;
+    const Picture picture = taken(world.scene, from_above(0.5, 9, 0.5, 4), options);
+    for (int i = 0; i < 64; ++i) EXPECT_EQ(pixel_at(picture, i % 8, i / 8), pixel_at(picture, 0, 0));
+    seen.at(is_reversed) = pixel_at(picture, 0, 0);
+  }
+  EXPECT_EQ(seen[0], (Pixel{200, 90, 60}));
+  EXPECT_EQ(seen[1], (Pixel{60, 160, 90}));
+}
+
 TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
   World large;
   World small;

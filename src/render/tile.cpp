@@ -7,8 +7,8 @@
 
 #include <glm/common.hpp>
 
-#include "light/sky.h"
 #include "core/srgb.h"
+#include "light/sky.h"
 
 namespace quoin {
 namespace {
@@ -141,7 +141,7 @@ void Tile::light_points() {
   for (SurfacePoint& point : points_) {
     if (point.placed != known) {
       known = point.placed;
-      reader.emplace(placed[static_cast<std::size_t>(known)].grid->grid);
+      reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
     point.type = reader->get(point.voxel);
   }

@@ -76,9 +76,9 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet ins
     // The difference of two far positions is taken first: it is small, and mostly exact.
     const DVec3 position = placed.position - origin;
     const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
-    impl_->grid_from_view.push_back({grid_axes, placed.grid->pivot - grid_axes * position});
+    impl_->grid_from_view.push_back({grid_axes, placed.pivot - grid_axes * position});
     const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
-    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.grid->pivot});
+    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
   }
   impl_->instances = tracer.impl_->instances.moved(-origin);
   impl_->is_alone = tracer.placed().size() == 1;

@@ -1,0 +1,330 @@
+// Pictures of coarser cells look like those of the voxels.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include <quoin/grid/downsample.h>
+#include <quoin/scene/scene_tracer.h>
+#include <quoin/terrain/terrain.h>
+
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr double kFov = std::numbers::pi / 6;
+constexpr int kEdge = 320;
+
+// A scene of one instance, turned a little so that nothing lies along the picture's rows.
+struct Model {
+  Scene scene;
+  InstanceHandle instance;
+
+  void place_turned(Grid grid) {
+    instance = place(scene, std::move(grid));
+    SceneGrid& placed = scene.grids()[scene.instances()[instance].grid];
+    placed.pivot = content_sphere(placed.grid).centre;
+    scene.instances()[instance].rotation = glm::angleAxis(0.7, glm::normalize(DVec3(0.3, 1.0, 0.1)));
+  }
+  [[nodiscard]] double radius() const {
+    return content_sphere(scene.grids()[scene.instances()[instance].grid].grid).radius;
+  }
+};
+
+Model ship() {
+  Model model;
+  const VoxelType wood = add_type(model.scene, {120, 80, 45, 255});
+  const VoxelType plank = add_type(model.scene, {165, 120, 70, 255});
+  const VoxelType sail = add_type(model.scene, {230, 225, 205, 255});
+  Grid grid;
+  for (int z = 0; z < 180; ++z) {
+    const double taper = z < 60 ? std::sqrt(z / 60.0) : 1.0;
+    for (int y = 0; y < 32; ++y) {
+      const int half = std::max(0, static_cast<int>(std::lround(27.0 * taper)) - std::max(0, 15 - y));
+      grid.fill_box({-half, y, z}, {half, y, z}, y % 7 == 5 ? plank : wood);
+      if (y > 24) grid.fill_box({-half + 3, y, z}, {half - 3, y, z}, kAir);
+    }
+  }
+  for (const int z : {60, 123}) {
+    grid.fill_box({-1, 20, z}, {1, 150, z + 2}, wood);
+    for (int y = 50; y <= 140; ++y) {
+      const int bulge = static_cast<int>(std::lround(13.0 * std::sin((y - 50) / 90.0 * std::numbers::pi)));
+      grid.fill_box({-37, y, z - 4 - bulge}, {37, y, z - 3 - bulge}, sail);
+    }
+  }
+  model.place_turned(std::move(grid));
+  return model;
+}
+
+Model terrain() {
+  Model model;
+  const auto types = add_terrain_types(model.scene.types);
+  const TerrainOptions options{.seed = 42, .size = {6, 2, 6}};
+  model.place_turned(generate_terrain(options, types.value()).value());
+  return model;
+}
+
+// A deck one voxel thick on piers, under cables of single voxels.
+Model bridge() {
+  Model model;
+  const VoxelType stone = add_type(model.scene, {150, 145, 135, 255});
+  const VoxelType steel = add_type(model.scene, {190, 60, 45, 255});
+  Grid grid;
+  grid.fill_box({-110, 41, -12}, {110, 41, 13}, stone);
+  for (const int x : {-81, 0, 83}) {
+    grid.fill_box({x, 0, -11}, {x + 7, 78, -5}, stone);
+    grid.fill_box({x, 0, 5}, {x + 7, 78, 11}, stone);
+  }
+  for (const int z : {-9, 9}) {
+    grid.fill_box({-110, 47, z}, {110, 47, z}, steel);
+    for (int x = -105; x <= 105; x += 15) grid.fill_box({x, 41, z}, {x, 47, z}, steel);
+  }
+  model.place_turned(std::move(grid));
+  return model;
+}
+
+struct Closeness {
+  double colour = 0.0;   // mean absolute difference of the channels, over the pixels of either
+  double overlap = 0.0;  // intersection over union of the silhouettes
+};
+
+Closeness closeness(const Picture& a, const Picture& b) {
+  double sum = 0.0;
+  int both = 0;
+  int either = 0;
+  for (std::size_t i = 0; i < a.depth.values.size(); ++i) {
+    const bool in_a = std::isfinite(a.depth.values[i]);
+    const bool in_b = std::isfinite(b.depth.values[i]);
+    both += static_cast<int>(in_a && in_b);
+    if (!in_a && !in_b) continue;
+    ++either;
+    for (std::size_t c = 0; c < 3; ++c) sum += std::abs(a.colour.rgb[3 * i + c] - b.colour.rgb[3 * i + c]);
+  }
+  return {sum / (3.0 * either), static_cast<double>(both) / either};
+}
+
+// A camera from which a voxel at the content's nearest point spans that many pixels.
+Camera camera_for(const Model& model, double voxel_pixels, DVec3 direction) {
+  const double scale = 0.5 * kEdge / std::tan(kFov / 2.0);
+  return towards(glm::normalize(direction) * (model.radius() + scale / voxel_pixels), {0, 0, 0}, kFov);
+}
+
+DetailPolicy without_impostors() {
+  DetailPolicy policy;
+  policy.far_pixels = 0;
+  return policy;
+}
+
+// Halvings of what is traced of a model's one instance.
+int halvings_traced(const Model& model, const Camera& camera, const DetailPolicy& policy) {
+  std::vector<SelectedInstance> selected;
+  DetailSelector().select(model.scene, camera, kEdge, kEdge, policy, selected);
+  const SceneTracer tracer(model.scene);
+  return tracer.with_detail(selected).placed().at(0).halvings;
+}
+
+// Of the pictures without detail and with it.
+Closeness closeness_at(const Model& model, const Camera& camera, const DetailPolicy& policy) {
+  RenderOptions options = sized(kEdge, kEdge);
+  options.samples = 64;
+  const CpuRenderer renderer(model.scene);
+  const Picture near = renderer.render(camera, options).value();
+  options.detail = policy;
+  return closeness(near, renderer.render(camera, options).value());
+}
+
+// Just beyond the thresholds at which a grid becomes Mid and at which it is halved.
+void expect_close(const Model& model, int halvings) {
+  const DetailPolicy policy = without_impostors();
+  for (const DVec3 direction : {DVec3(1, 0.6, 1.4), DVec3(-1.2, 0.3, 0.4)}) {
+    for (const double voxel_pixels : {0.999 * policy.voxel_pixels, 0.4999 * policy.cell_pixels}) {
+      const bool is_halved = voxel_pixels < 0.5 * policy.cell_pixels;
+      const Camera camera = camera_for(model, voxel_pixels, direction);
+      EXPECT_EQ(halvings_traced(model, camera, policy), is_halved ? halvings : 0);
+      const Closeness found = closeness_at(model, camera, policy);
+      EXPECT_LE(found.colour, 6.0) << "where a voxel spans " << voxel_pixels << " pixels";
+      EXPECT_GE(found.overlap, 0.97) << "where a voxel spans " << voxel_pixels << " pixels";
+      ::testing::Test::RecordProperty("difference", std::to_string(found.colour));
+      ::testing::Test::RecordProperty("overlap", std::to_string(found.overlap));
+    }
+  }
+}
+
+TEST(RenderDetail, AShipLooksTheSameInCoarserCells) {
+  expect_close(ship(), 1);
+}
+
+TEST(RenderDetail, ATerrainLooksTheSameInCoarserCells) {
+  expect_close(terrain(), 1);
+}
+
+TEST(RenderDetail, AThinBridgeStaysAsItIs) {
+  expect_close(bridge(), 0);
+}
+
+TEST(RenderDetail, TheMeasureOfClosenessTellsThingsApart) {
+  const Model model = terrain();
+  DetailPolicy coarse = without_impostors();
+  coarse.cell_pixels = 4.0;
+  const Closeness found = closeness_at(model, camera_for(model, 0.999, DVec3(1, 0.6, 1.4)), coarse);
+  EXPECT_GT(found.colour, 6.0);
+  EXPECT_LT(found.overlap, 0.999);
+}
+
+Model blobs(VoxelType* glass = nullptr) {
+  Model model;
+  std::array<VoxelType, 3> types = {add_type(model.scene, {200, 90, 60, 255}),
+                                    add_type(model.scene, {60, 160, 90, 255}),
+                                    add_type(model.scene, {90, 120, 220, 120}, Visibility::Transparent)};
+  if (glass != nullptr) *glass = types[2];
+  std::mt19937 random(31);
+  Grid grid;
+  for (int i = 0; i < 30; ++i) {
+    const auto coordinate = [&] { return 2 * (static_cast<int>(random() % 12) - 6); };
+    const IVec3 at{coordinate(), coordinate(), coordinate()};
+    grid.fill_box(at, at + IVec3(1 + 2 * static_cast<int>(random() % 4)), types.at(random() % 3));
+    const IVec3 speck{coordinate(), coordinate(), coordinate()};
+    if (grid.get(speck) == kAir) grid.set(speck, types[0]);
+  }
+  model.place_turned(std::move(grid));
+  return model;
+}
+
+RenderOptions always_mid() {
+  RenderOptions options = sized(64, 64);
+  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail->near_radii = 0.0;
+  options.detail->mid_radii = 1e9;
+  return options;
+}
+
+TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
+  const Model model = blobs();
+  const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
+  Scene coarse;
+  for (VoxelType type = 1; type < model.scene.types.size(); ++type) {
+    ASSERT_TRUE(coarse.types.add(model.scene.types[type]));
+  }
+  const Instance& full = model.scene.instances()[model.instance];
+  const SceneGrid& full_grid = model.scene.grids()[full.grid];
+  SceneGrid grid;
+  grid.grid = halved(full_grid.grid, coarse.types);
+  grid.pivot = full_grid.pivot / 2.0;
+  Instance instance = full;
+  instance.grid = coarse.add_grid(std::move(grid));
+  instance.voxel_size = 2.0;
+  coarse.add_instance(instance);
+  RenderOptions options = always_mid();
+  options.light.shadow_distance = 8.0;
+  const Picture mid = taken(model.scene, camera, options);
+  RenderOptions expected = sized(64, 64);
+  expected.light.occlusion_distance /= 2.0;
+  expected.light.shadow_distance = 4.0;
+  const Picture other = taken(coarse, camera, expected);
+  EXPECT_EQ(mid.depth.values, other.depth.values);
+  EXPECT_GT(mid.pixels_hit, 300);
+  const Picture near = taken(model.scene, camera, sized(64, 64));
+  EXPECT_NE(mid.depth.values, near.depth.values);
+}
+
+TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
+  VoxelType glass = kAir;
+  Model model = blobs(&glass);
+  Grid& voxels = model.scene.grids()[model.scene.instances()[model.instance].grid].grid;
+  voxels.edit(voxels.bounds(), [&](IVec3, VoxelType type) { return type == glass ? VoxelType{1} : type; });
+  Scene coarse;
+  for (VoxelType type = 1; type < model.scene.types.size(); ++type) {
+    ASSERT_TRUE(coarse.types.add(model.scene.types[type]));
+  }
+  Instance instance = model.scene.instances()[model.instance];
+  SceneGrid grid;
+  grid.pivot = model.scene.grids()[instance.grid].pivot / 2.0;
+  grid.grid = halved(voxels, coarse.types);
+  instance.grid = coarse.add_grid(std::move(grid));
+  instance.voxel_size = 2.0;
+  coarse.add_instance(instance);
+  RenderOptions expected = sized(64, 64);
+  expected.light.occlusion_distance /= 2.0;
+  const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
+  EXPECT_LE(count_different(taken(model.scene, camera, always_mid()), taken(coarse, camera, expected), 2), 8);
+}
+
+TEST(RenderDetail, NearIsThePictureWithoutDetailToTheByte) {
+  const Model model = blobs();
+  const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
+  RenderOptions options = sized(64, 64);
+  const Picture plain = taken(model.scene, camera, options);
+  options.detail.emplace().far_pixels = 0;
+  const Picture detailed = taken(model.scene, camera, options);
+  EXPECT_EQ(plain.colour.rgb, detailed.colour.rgb);
+  EXPECT_EQ(plain.depth.values, detailed.depth.values);
+}
+
+TEST(RenderDetail, TheSameBytesAtAnyNumberOfThreadsAndAgain) {
+  const Model model = blobs();
+  const CpuRenderer renderer(model.scene);
+  const Camera camera = towards({300, 250, 400}, {0, 0, 0}, 0.2);
+  RenderOptions options = sized(64, 64);
+  options.detail.emplace();
+  options.threads = {1};
+  const Picture one = renderer.render(camera, options).value();
+  options.threads = {4};
+  EXPECT_EQ(renderer.render(camera, options).value().colour.rgb, one.colour.rgb);
+  EXPECT_EQ(CpuRenderer(model.scene).render(camera, options).value().colour.rgb, one.colour.rgb);
+}
+
+TEST(RenderDetail, WhatIsOutOfThePictureStillCastsItsShadow) {
+  Scene scene;
+  const VoxelType type = add_type(scene, {200, 200, 200, 255});
+  Grid floor;
+  floor.fill_box({-40, -1, -40}, {40, -1, 40}, type);
+  place(scene, std::move(floor));
+  Grid roof;
+  roof.fill_box({-20, 0, -20}, {20, 0, 20}, type);
+  const InstanceHandle handle = place(scene, std::move(roof), {0, 90, 0});
+  RenderOptions options = sized(4, 4);
+  options.light.sun = {0, 1, 0};
+  options.detail.emplace().far_pixels = 0;
+  const Camera camera = from_above(0, 30, 0, 4);
+  const Pixel shadowed = pixel_at(taken(scene, camera, options), 1, 1);
+  scene.remove_instance(handle);
+  EXPECT_LT(shadowed[0], pixel_at(taken(scene, camera, options), 1, 1)[0] / 2);
+}
+
+TEST(RenderDetail, ColoursTellTheDetail) {
+  Scene scene;
+  const VoxelType type = add_type(scene, {200, 200, 200, 255});
+  Grid slab;
+  slab.fill_box({-208, -16, -208}, {207, -1, 207}, type);
+  place(scene, std::move(slab));
+  RenderOptions options = sized(4, 4);
+  options.detail_colours = true;
+  options.light.lit = false;
+  const auto colour_with = [&](const DetailPolicy& policy, double view_height) {
+    options.detail = policy;
+    return pixel_at(taken(scene, from_above(0.5, 10, 0.5, view_height), options), 1, 1);
+  };
+  DetailPolicy policy;
+  policy.far_pixels = 0;
+  const Pixel near = colour_with(policy, 2.0);
+  const Pixel once = colour_with(policy, 24.0);
+  const Pixel often = colour_with(policy, 300.0);
+  policy.far_pixels = 1'000'000;
+  const Pixel far = colour_with(policy, 100.0);
+  EXPECT_TRUE(near[1] > near[0] && near[1] > near[2]) << "green";
+  EXPECT_TRUE(once[0] > once[2] && once[1] > once[2]) << "yellow";
+  EXPECT_TRUE(often[0] > often[1] && often[1] < once[1]) << "orange";
+  EXPECT_TRUE(far[2] > far[0] && far[2] > far[1]) << "blue";
+}
+
+}  // namespace
+}  // namespace quoin
