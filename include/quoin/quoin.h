@@ -41,7 +41,9 @@
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/impostor.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/noise.h>

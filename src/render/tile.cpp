@@ -9,23 +9,12 @@
 
 #include "light/sky.h"
 #include "core/srgb.h"
+#include "render/on_face.h"
 
 namespace quoin {
 namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
-// Secondary rays start at least this far inside the face that was hit, in voxels, so that they start in front of it
-// whatever the rounding.
-constexpr double kRim = 1e-6;
-
-// Where a ray meets a face, in the grid.
-DVec3 on_face(DVec3 position, IVec3 voxel, Direction face) {
-  const FaceFrame& frame = frame_of(face);
-  const DVec3 low(voxel);
-  DVec3 point = glm::clamp(position, low + kRim, low + (1.0 - kRim));
-  point[frame.axis] = low[frame.axis] + (frame.sign > 0 ? 1.0 : 0.0);
-  return point;
-}
 
 }  // namespace
 
