@@ -177,7 +177,8 @@ Impostor::Impostor()
       faces_(kImpostorViews * kTexels, Direction::PosX),
       occlusion_(kImpostorViews * kTexels, 0),
       depth_(kImpostorViews * kTexels, std::numeric_limits<float>::infinity()),
-      clear_depth_(kImpostorViews * kTiles, std::numeric_limits<float>::infinity()) {
+      clear_depth_(kImpostorViews * kTiles, std::numeric_limits<float>::infinity()),
+      near_depth_(kImpostorViews * kPairs, std::numeric_limits<float>::infinity()) {
   for (int view = 0; view < kImpostorViews; ++view) {
     cameras_[static_cast<std::size_t>(view)] = snapshot_camera(content_, view, kEdge);
   }
@@ -201,25 +202,32 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, Instructi
   return build(grid, types, OccupancyTree::build(grid, types, Occupancy::Opaque), instructions);
 }
 
+void Impostor::spread_least(std::span<const float> depth, int tile, std::span<float> out) {
+  const int across = kEdge / tile;
+  std::vector<float> least(out.size(), std::numeric_limits<float>::infinity());
+  for (int y = 0; y < kEdge; ++y) {
+    float* row = least.data() + static_cast<std::ptrdiff_t>(y / tile * across);
+    const float* from = depth.data() + static_cast<std::ptrdiff_t>(y * kEdge);
+    for (int x = 0; x < kEdge; ++x) row[x / tile] = std::min(row[x / tile], from[x]);
+  }
+  // Along rows, then along columns.
+  std::vector<float> wide(out.size());
+  const auto spread = [across](const std::vector<float>& from, int i, int place, int stride) {
+    float value = from[static_cast<std::size_t>(i)];
+    if (place > 0) value = std::min(value, from[static_cast<std::size_t>(i - stride)]);
+    if (place + 1 < across) value = std::min(value, from[static_cast<std::size_t>(i + stride)]);
+    return value;
+  };
+  const int count = across * across;
+  for (int i = 0; i < count; ++i) wide[static_cast<std::size_t>(i)] = spread(least, i, i % across, 1);
+  for (int i = 0; i < count; ++i) out[static_cast<std::size_t>(i)] = spread(wide, i, i / across, across);
+}
+
 void Impostor::find_clear_depths(int view) {
-  constexpr int kAcross = kEdge / kTile;
-  const float* depth = depth_.data() + static_cast<std::size_t>(view) * kTexels;
-  std::array<float, kTiles> least{};
-  least.fill(std::numeric_limits<float>::infinity());
-  for (std::size_t i = 0; i < kTexels; ++i) {
-    const std::size_t tile = i / (kEdge * kTile) * kAcross + i % kEdge / kTile;
-    least[tile] = std::min(least[tile], depth[i]);
-  }
-  float* clear = clear_depth_.data() + static_cast<std::size_t>(view) * kTiles;
-  for (int tile = 0; tile < static_cast<int>(kTiles); ++tile) {
-    const int row = tile / kAcross;
-    const int column = tile % kAcross;
-    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, kAcross - 1); ++y) {
-      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, kAcross - 1); ++x) {
-        clear[tile] = std::min(clear[tile], least[static_cast<std::size_t>(y * kAcross + x)]);
-      }
-    }
-  }
+  const auto index = static_cast<std::size_t>(view);
+  const auto depth = std::span<const float>(depth_).subspan(index * kTexels, kTexels);
+  spread_least(depth, kTile, std::span(clear_depth_).subspan(index * kTiles, kTiles));
+  spread_least(depth, kPair, std::span(near_depth_).subspan(index * kPairs, kPairs));
 }
 
 Snapshot Impostor::snapshot(int view) const {
@@ -231,7 +239,7 @@ Snapshot Impostor::snapshot(int view) const {
 
 std::size_t Impostor::bytes() const {
   return types_.capacity() * sizeof(VoxelType) + faces_.capacity() * sizeof(Direction) + occlusion_.capacity() +
-         depth_.capacity() * sizeof(float) + clear_depth_.capacity() * sizeof(float);
+         (depth_.capacity() + clear_depth_.capacity() + near_depth_.capacity()) * sizeof(float);
 }
 
 }  // namespace quoin

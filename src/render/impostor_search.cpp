@@ -55,6 +55,7 @@ ImpostorSearch::ImpostorSearch(const Impostor& impostor, DVec3 towards_camera) :
     eye.camera = impostor.cameras_[view];
     eye.depth = impostor.depth_.data() + view * Impostor::kTexels;
     eye.clear_depth = impostor.clear_depth_.data() + view * Impostor::kTiles;
+    eye.near_depth = impostor.near_depth_.data() + view * Impostor::kPairs;
     eye.faces = impostor.faces_.data() + view * Impostor::kTexels;
   }
   texel_ = eyes_[0].camera.half_size() / kHalf;
@@ -91,9 +92,14 @@ ImpostorSearch::Look ImpostorSearch::look(const Eye& eye, const Line& line, doub
   const double distance = z * (1.0 + slope * (0.5 - 0.125 * slope));
   constexpr int kTile = Impostor::kTile;
   const int tile = texel_row / kTile * (kEdge / kTile) + texel_column / kTile;
+  constexpr int kPair = Impostor::kPair;
+  const int pair = texel_row / kPair * (kEdge / kPair) + texel_column / kPair;
   const double wide = static_cast<double>(eye.clear_depth[tile]) - distance;
+  const double about = static_cast<double>(eye.near_depth[pair]) - distance;
   const double narrow = static_cast<double>(eye.depth[found.texel]) - distance;
-  found.clear = std::max(std::min(wide, kTile * line.lateral), std::min(narrow, line.lateral));
+  found.is_near = !(about > 0.0);
+  found.clear = std::max({std::min(wide, kTile * line.lateral), std::min(about, kPair * line.lateral),
+                          std::min(narrow, line.lateral)});
   return found;
 }
 
@@ -138,21 +144,20 @@ bool ImpostorSearch::crosses(const March& march, const Eye& eye, std::int32_t te
   return at >= -kLeastStep * texel_ && at <= march.end + kLeastStep * texel_;
 }
 
-bool ImpostorSearch::crosses_nearby(const March& march, const std::array<Look, kViews>& looks, double room,
-                                    FoundTexel& found) const {
+bool ImpostorSearch::crosses_nearby(const March& march, const Eye& eye, std::int32_t texel, FoundTexel& found) const {
+  const double room = texel_ > 1.0 ? kRoom * texel_ : 0.0;
+  found.view = eye.view;
+  found.texel = texel;
+  if (crosses(march, eye, texel, room, found.t)) return true;
   double nearest = kInfinity;
-  for (std::size_t i = 0; i < kViews; ++i) {
-    if (looks[i].texel < 0) continue;
-    const int column = looks[i].texel % kEdge;
-    const int row = looks[i].texel / kEdge;
-    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, kEdge - 1); ++y) {
-      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, kEdge - 1); ++x) {
-        const std::int32_t texel = y * kEdge + x;
-        double at = 0.0;
-        if (!crosses(march, eyes_[i], texel, room, at) || at >= nearest) continue;
-        nearest = at;
-        found = {at, eyes_[i].view, texel};
-      }
+  const int column = texel % kEdge;
+  const int row = texel / kEdge;
+  for (int y = std::max(row - 1, 0); y <= std::min(row + 1, kEdge - 1); ++y) {
+    for (int x = std::max(column - 1, 0); x <= std::min(column + 1, kEdge - 1); ++x) {
+      double at = 0.0;
+      if (!crosses(march, eye, y * kEdge + x, room, at) || at >= nearest) continue;
+      nearest = found.t = at;
+      found.texel = y * kEdge + x;
     }
   }
   return nearest < kInfinity;
@@ -175,7 +180,6 @@ void ImpostorSearch::settle(const March& march, const std::array<Look, kViews>& 
 
 bool ImpostorSearch::walk(const March& march, FoundTexel& found) const {
   const double least_step = kLeastStep * texel_;
-  const double room = texel_ > 1.0 ? kRoom * texel_ : 0.0;
   const double deep = kDeepTexels * texel_ + kDeepVoxels;
   std::array<Look, kViews> looks;
   std::array<std::int32_t, kViews> tried;
@@ -184,20 +188,17 @@ bool ImpostorSearch::walk(const March& march, FoundTexel& found) const {
   double entered_at = -1.0;
   for (double at = 0.0; at <= march.end;) {
     double clear = 0.0;
-    for (std::size_t i = 0; i < kViews && clear <= 0.0; ++i) {
+    for (std::size_t i = 0; i < kViews; ++i) {
       looks[i] = look(eyes_[i], march.lines[i], at);
-      clear = looks[i].clear;
-      if (clear > 0.0 || looks[i].texel == tried[i]) continue;
+      clear = std::max(clear, looks[i].clear);
+      if (!looks[i].is_near) break;
+      if (looks[i].texel == tried[i]) continue;
       tried[i] = looks[i].texel;
-      if (!crosses(march, eyes_[i], tried[i], room, found.t)) continue;
-      found.view = eyes_[i].view;
-      found.texel = tried[i];
-      return true;
+      if (crosses_nearby(march, eyes_[i], tried[i], found)) return true;
     }
     if (clear > 0.0) {
       entered_at = -1.0;
     } else {
-      if (crosses_nearby(march, looks, room, found)) return true;
       if (entered_at < 0.0) entered_at = at, settle(march, looks, at, entered);
       if (at - entered_at > deep) return found = entered, true;
     }

@@ -26,7 +26,7 @@ struct FoundTexel {
 class ImpostorSearch {
  public:
   /// Views that are asked.
-  static constexpr std::size_t kViews = 3;
+  static constexpr std::size_t kViews = 5;
 
   /// `towards_camera`: in the grid's frame, of any length; not zero
   /// and finite. `impostor` must outlive it.
@@ -43,6 +43,7 @@ class ImpostorSearch {
     SnapshotCamera camera;
     const float* depth = nullptr;
     const float* clear_depth = nullptr;
+    const float* near_depth = nullptr;
     const Direction* faces = nullptr;
     std::int32_t view = 0;
   };
@@ -54,6 +55,7 @@ class ImpostorSearch {
   };
   struct Look {
     std::int32_t texel = -1;
+    bool is_near = false;  // a texel thereabouts saw something as near as this
     double clear = 0.0;  // how far the ray may go on through what the snapshot saw empty; not more than 0: it did not
   };
   struct March;
@@ -63,9 +65,8 @@ class ImpostorSearch {
   [[nodiscard]] bool clip(DVec3 origin, DVec3 unit, double& begin, double& end) const;
   // Whether the ray crosses the face that a texel saw, widened by `room` voxels, and where.
   [[nodiscard]] bool crosses(const March& march, const Eye& eye, std::int32_t texel, double room, double& at) const;
-  // The nearest crossing of the 3x3 texels about those that are looked at.
-  [[nodiscard]] bool crosses_nearby(const March& march, const std::array<Look, kViews>& looks, double room,
-                                    FoundTexel& found) const;
+  // The texel's own face, or else the nearest of those about it.
+  [[nodiscard]] bool crosses_nearby(const March& march, const Eye& eye, std::int32_t texel, FoundTexel& found) const;
   // Which texel's voxel to show where none is crossed.
   void settle(const March& march, const std::array<Look, kViews>& looks, double at, FoundTexel& found) const;
   [[nodiscard]] bool walk(const March& march, FoundTexel& found) const;

@@ -61,7 +61,7 @@ struct Snapshot {
 ///
 /// Holds types and not colours: what the registry says of a type counts when it is drawn. Transparent voxels are left
 /// out: whoever draws an impostor traces them besides.
-/// Memory: 8 bytes a texel; 3.4 MB with an edge of 128.
+/// Memory: 9 bytes a texel; 3.9 MB.
 /// Threads: any number may read at once.
 class Impostor {
  public:
@@ -92,11 +92,14 @@ class Impostor {
  private:
   friend class ImpostorSearch;
   friend class SnapshotTaker;
-  static constexpr int kTile = 8;  // texels
+  static constexpr int kTile = 8;   // texels
+  static constexpr int kPair = 2;
   static constexpr std::size_t kTexels = std::size_t{kEdge} * kEdge;
   static constexpr std::size_t kTiles = kTexels / (kTile * kTile);
+  static constexpr std::size_t kPairs = kTexels / (kPair * kPair);
 
   void find_clear_depths(int view);
+  static void spread_least(std::span<const float> depth, int tile, std::span<float> out);
 
   ContentSphere content_;
   IBox box_;
@@ -105,8 +108,9 @@ class Impostor {
   std::vector<Direction> faces_;
   std::vector<std::uint8_t> occlusion_;
   std::vector<float> depth_;
-  // Of each tile of 8x8 texels and its eight neighbours: the least depth.
+  // The least depth of each tile of 8x8 texels and its eight neighbours; and of each 2x2 texels, likewise.
   std::vector<float> clear_depth_;
+  std::vector<float> near_depth_;
 };
 
 /// An instance that is drawn by its grid's impostor.
