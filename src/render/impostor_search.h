@@ -56,17 +56,18 @@ class ImpostorSearch {
   struct Look {
     std::int32_t texel = -1;
     bool is_near = false;  // a texel thereabouts saw something as near as this
+    double distance = 0.0;
     double clear = 0.0;  // how far the ray may go on through what the snapshot saw empty; not more than 0: it did not
   };
   struct March;
 
   [[nodiscard]] static Line line_of(const Eye& eye, DVec3 origin, DVec3 unit);
   [[nodiscard]] static Look look(const Eye& eye, const Line& line, double at);
-  [[nodiscard]] bool clip(DVec3 origin, DVec3 unit, double& begin, double& end) const;
-  // Whether the ray crosses the face that a texel saw, widened by `room` voxels, and where.
-  [[nodiscard]] bool crosses(const March& march, const Eye& eye, std::int32_t texel, double room, double& at) const;
+  [[nodiscard]] bool clip(DVec3 origin, const March& march, double& begin, double& end) const;
+  // Whether the ray crosses the face that a texel saw, and where. Requires: it saw one.
+  [[nodiscard]] bool crosses(const March& march, const Eye& eye, std::int32_t texel, double& at) const;
   // The texel's own face, or else the nearest of those about it.
-  [[nodiscard]] bool crosses_nearby(const March& march, const Eye& eye, std::int32_t texel, FoundTexel& found) const;
+  [[nodiscard]] bool crosses_nearby(const March& march, const Eye& eye, const Look& look, FoundTexel& found) const;
   // Which texel's voxel to show where none is crossed.
   void settle(const March& march, const std::array<Look, kViews>& looks, double at, FoundTexel& found) const;
   [[nodiscard]] bool walk(const March& march, FoundTexel& found) const;
@@ -74,6 +75,8 @@ class ImpostorSearch {
   const Impostor* impostor_;
   std::array<Eye, kViews> eyes_;
   double texel_ = 1.0;  // its side at the content's centre, in voxels
+  double room_ = 0.0;   // how far from what a texel's ray met its face is taken to reach
+  double about_ = 0.0;
 };
 
 }  // namespace quoin
