@@ -221,10 +221,9 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
 TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::filesystem::create_directory(folder_.file("folder.png"));
-  for (const std::string arguments :
-       {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png", "tiny.vox -o folder.png",
-        "tiny.vox -o out.png --depth none/out.pfm", "tiny.vox -o out.png --backend vulkan",
-        "tiny.vox -o out.png --device 0", "tiny.vox -o out.png --lod-colours"}) {
+  for (const std::string arguments : {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png",
+                                      "tiny.vox -o folder.png", "tiny.vox -o out.png --depth none/out.pfm",
+                                      "tiny.vox -o out.png --backend vulkan", "tiny.vox -o out.png --device 0"}) {
     const ToolRun result = run("render " + arguments);
     EXPECT_EQ(result.status, 1) << arguments;
     expect_one_error_line(result);

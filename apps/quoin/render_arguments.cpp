@@ -85,10 +85,21 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
 }
 
+void add_detail_options(CLI::App& command, RenderArguments& arguments) {
+  command
+      .add_option(
+          "--detail", arguments.detail,
+          "Draw far models in coarser cells: near (never), radius (by distance in radii of the model) or pixels "
+          "(where a voxel spans less than one) (default near)")
+      ->check(CLI::IsMember({"near", "radius", "pixels"}));
+  command.add_flag("--lod-colours", arguments.render.detail_colours,
+                   "Colour models by their detail: near green, mid yellow to orange, far blue; alone, as with --detail "
+                   "pixels");
+}
+
 void add_missing_options(CLI::App& command, RenderArguments& arguments) {
   command.add_option("--backend", arguments.backend, "What draws: cpu (default); vulkan is not in this version")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
-  command.add_flag("--lod-colours", arguments.lod_colours, "Tint by level of detail (not in this version)");
   add_text_option(command, "--device", "N", "Which graphics device draws (not in this version)");
 }
 
@@ -178,6 +189,7 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   command.add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges (default 1)")
       ->check(CLI::Range(1, kMostSamples));
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
+  add_detail_options(command, arguments);
   add_missing_options(command, arguments);
 }
 
@@ -186,8 +198,11 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
                                    fault_of_camera(command, arguments), fault_of_light(command, arguments)}) {
     if (!fault.empty()) return fault;
   }
-  for (const char* option : {"--lod-colours", "--device"}) {
-    if (command.count(option) > 0) arguments.missing = option;
+  if (command.count("--device") > 0) arguments.missing = "--device";
+  if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";
+  if (arguments.detail != "near") {
+    arguments.render.detail.emplace().rule =
+        arguments.detail == "radius" ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
   arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
   LightOptions& light = arguments.render.light;

@@ -16,7 +16,7 @@ struct RenderArguments {
   CommonOptions common;
   std::filesystem::path output;
   std::filesystem::path depth;  ///< empty: none
-  RenderOptions render;         ///< size, samples and light
+  RenderOptions render;         ///< size, samples, light and detail
   std::string view_name = "iso";
   View view = View::Iso;
   std::optional<DVec3> position;  ///< with `target`, instead of the view
@@ -26,7 +26,7 @@ struct RenderArguments {
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";
   std::string backend = "cpu";
-  bool lod_colours = false;
+  std::string detail = "near";
   std::string missing;  ///< an option that this version does not have; empty when none was given
 };
 

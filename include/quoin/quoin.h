@@ -15,6 +15,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/downsample.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_field.h>

@@ -24,7 +24,9 @@ constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples whose distance is 
 constexpr int kMargin = kReach + kBlur;
 constexpr int kRegion = kChunkEdge + 2 * kMargin;  // voxels that are looked at, along an edge
 constexpr int kPitch = 80;                         // kSmoothed, rounded up to whole vectors
-constexpr float kLeastDensity = 0.1F;
+// Solid voxels keep more of their own distance of 0.5 than air does: what is one voxel thick would shrink to a wire.
+constexpr float kLeastSolid = 0.35F;
+constexpr float kLeastAir = 0.1F;
 constexpr float kBand = 8.0F;
 
 using ByteRow = std::array<std::uint8_t, kPitch>;
@@ -186,8 +188,7 @@ void write_densities(const Scratch& scratch, Half far, DensityChunk& out) {
       const ByteRow& to_solid = scratch.to_solid[(z + kBlur) * kSmoothed + y + kBlur];
       for (std::size_t x = 0; x < kChunkEdge; ++x) {
         const bool is_solid = to_solid[x + kBlur] == 0;
-        row[x] =
-            stored_within(is_solid ? std::min(smoothed[x], -kLeastDensity) : std::max(smoothed[x], kLeastDensity), far);
+        row[x] = stored_within(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), far);
       }
       out.write_row(static_cast<int>(y), static_cast<int>(z), row);
     }

@@ -49,12 +49,12 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
     const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(found.placed)];
     if (found.placed != last_placed) {
       clarity = 0.0;
-      voxels_of.emplace(placed.grid->grid);
+      voxels_of.emplace(*placed.voxels);
     }
     const VoxelSpan& span = found.span;
     const VoxelType type = voxels_of->get(span.voxel);
     const double t_exit = std::min(span.t_exit, max_t);
-    const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size;
+    const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size * placed.voxels_per_cell();
     if (!(voxels > 0.0)) return true;  // an edge that it only touches
     const GlassBody next{found.placed, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
     if (found.placed == last_placed && continues(out.back(), next)) {

@@ -24,6 +24,14 @@ std::size_t index_of(Direction face) {
   return static_cast<std::size_t>(face);
 }
 
+// Linear.
+Vec3 colour_of_detail(Detail detail, int halvings) {
+  if (detail == Detail::Near) return {0.10F, 0.55F, 0.12F};
+  if (detail == Detail::Far) return {0.08F, 0.20F, 0.75F};
+  const float share = static_cast<float>(halvings - 1) / static_cast<float>(kCoarsestHalving - 1);
+  return {0.85F, 0.70F - 0.50F * std::clamp(share, 0.0F, 1.0F), 0.03F};
+}
+
 void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
   rays.direction_x[lane] = direction.x;
   rays.direction_y[lane] = direction.y;
@@ -59,14 +67,15 @@ struct Lighting::Group {
   std::uint32_t unknown = 0;   // of these, those whose openness is to be found
   bool is_one_face = true;
 
-  void add(const SurfacePoint& point) {
+  // `lift`: in the voxels that are traced.
+  void add(const SurfacePoint& point, double lift) {
     if (point.kind == PointKind::Surface) {
       surfaces |= 1U << size;
       if (point.openness < 0.0F) unknown |= 1U << size;
     }
     const FaceFrame& frame = frame_of(point.face);
     DVec3 origin = point.position;
-    origin[frame.axis] += kLift * frame.sign;
+    origin[frame.axis] += lift * frame.sign;
     origins.origin_x[size] = origin.x;
     origins.origin_y[size] = origin.y;
     origins.origin_z[size] = origin.z;
@@ -78,12 +87,13 @@ struct Lighting::Group {
 };
 
 Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces,
-                   const LightOptions& options)
+                   const LightOptions& options, bool detail_colours)
     : view_(&view),
       types_(&types),
       surfaces_(&surfaces),
       options_(options),
       directions_(options.occlusion_rays),
+      detail_colours_(detail_colours),
       // Never infinite: that times black is not a number.
       exposure_(static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()))) {
   // Scaled first: the square of a very small or large number is 0 or infinite.
@@ -102,7 +112,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
 std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const {
   if (!options_.lit) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : (*surfaces_)[points[i].type].colour;
+      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
     }
     return 0;
   }
@@ -114,13 +124,17 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
     while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
       const SurfacePoint& next = points[order[begin + group.size]];
       if (group.size > 0 && next.placed != group.placed) break;
-      group.add(next);
+      group.add(next, kLift / voxels_per_cell(next.placed));
     }
     rays += light_group(group, lit);
     for (std::size_t i = 0; i < group.size; ++i) colours[order[begin + i]] = lit[i];
     begin += group.size;
   }
   return rays;
+}
+
+double Lighting::voxels_per_cell(std::int32_t placed) const {
+  return view_->tracer().placed()[static_cast<std::size_t>(placed)].voxels_per_cell();
 }
 
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
@@ -143,7 +157,7 @@ std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunligh
   rays.direction_x.fill(frame.to_sun.x);
   rays.direction_y.fill(frame.to_sun.y);
   rays.direction_z.fill(frame.to_sun.z);
-  rays.max_t.fill(options_.shadow_distance);
+  rays.max_t.fill(options_.shadow_distance / voxels_per_cell(group.placed));
   const std::int64_t count = std::popcount(rays.active);
   const std::uint32_t blocked = view_->any_hits(group.placed, rays);
   for (std::uint32_t left = blocked; left != 0; left &= left - 1) {
@@ -168,7 +182,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = std::max(group.points[i]->openness, 0.0F);
   if (group.unknown == 0) return 0;
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
-  GridReader reader(view_->tracer().placed()[static_cast<std::size_t>(group.placed)].grid->grid);
+  GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
   FaceLevels levels{};
   const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
@@ -187,7 +201,7 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
   rays.active = group.unknown;
-  rays.max_t.fill(options_.occlusion_distance);
+  rays.max_t.fill(options_.occlusion_distance / voxels_per_cell(group.placed));
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);
@@ -214,8 +228,17 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
+Surface Lighting::surface_at(const SurfacePoint& point) const {
+  const Surface& own = (*surfaces_)[point.type];
+  if (!detail_colours_) return own;
+  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
+  Surface surface;
+  surface.colour = colour_of_detail(placed.detail, placed.halvings);
+  return surface;
+}
+
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
-  const Surface& surface = (*surfaces_)[point.type];
+  const Surface surface = surface_at(point);
   if (point.kind == PointKind::Unlit) return surface.colour;
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {

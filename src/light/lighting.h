@@ -39,11 +39,13 @@ struct SurfacePoint {
 ///
 /// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way; without occlusion the ambient
 /// term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was
-/// hit.
+/// hit, of the full one also where a halved one is traced.
 class Lighting {
  public:
   /// `view` and `surfaces` must outlive it. Requires: `check` accepts the options.
-  Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options);
+  /// `detail_colours`: surfaces are of the colour of their grid's detail and emit nothing.
+  Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
+           bool detail_colours = false);
 
   /// Linear light of each point, not clamped; answers how many rays that took.
   ///
@@ -61,12 +63,14 @@ class Lighting {
   };
   struct Group;
   [[nodiscard]] std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points) const;
+  [[nodiscard]] double voxels_per_cell(std::int32_t placed) const;
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
   void tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
+  [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
 
   const SceneView* view_;
@@ -75,6 +79,7 @@ class Lighting {
   LightOptions options_;
   OcclusionDirections directions_;
   std::vector<Frame> frames_;
+  bool detail_colours_;
   float exposure_ = 1.0F;
 };
 

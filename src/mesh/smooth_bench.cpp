@@ -9,6 +9,8 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <quoin/mesh/smooth_mesh.h>
+#include <quoin/terrain/smooth_terrain.h>
 
 #include "bench/smooth_workload.h"
 
@@ -64,6 +66,40 @@ void run(benchmark::State& state, const Case& what) {
     next = next + 1 == chunks.size() ? 0 : next + 1;
   }
 }
+
+// A whole generated world, welded, with openness and materials.
+void world(benchmark::State& state) {
+  VoxelRegistry types;
+  const auto materials = add_terrain_types(types);
+  SmoothTerrainOptions terrain;
+  terrain.size = {4, 2, 4};
+  const auto field =
+      materials ? generate_smooth_terrain(terrain, *materials) : tl::unexpected<Error>(materials.error());
+  if (!field) {
+    std::fprintf(stderr, "smooth benchmark: %s\n", to_string(field.error()).c_str());
+    std::exit(1);
+  }
+  const Threads threads{static_cast<unsigned>(state.range(0))};
+  std::size_t triangles = 0;
+  std::size_t vertices = 0;
+  for (auto _ : state) {
+    const auto mesh = build_smooth_mesh(*field, types, {}, threads);
+    triangles = mesh ? mesh->indices.size() / 3 : 0;
+    vertices = mesh ? mesh->positions.size() : 0;
+  }
+  if (triangles == 0) std::exit(1);
+  state.counters["triangles"] = static_cast<double>(triangles);
+  state.counters["vertices"] = static_cast<double>(vertices);
+  state.counters["field_bytes"] = static_cast<double>(field->bytes());
+}
+BENCHMARK(world)
+    ->Name("smooth/world")
+    ->ArgName("threads")
+    ->Arg(1)
+    ->Arg(2)
+    ->Arg(4)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 [[maybe_unused]] const bool kRegistered = [] {
   const std::pair<SmoothOcclusion, const char*> kForms[] = {

@@ -12,6 +12,15 @@ namespace {
 
 constexpr int kBlock = 4;
 
+// Its index in SceneTracer::placed; -1 where it is not there.
+std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
+  const auto found = std::lower_bound(
+      placed.begin(), placed.end(), instance,
+      [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
+  if (found == placed.end() || found->instance != instance) return -1;
+  return static_cast<std::int32_t>(found - placed.begin());
+}
+
 // The pixels from the middle that a sphere of radius 1 at (across, deep) may reach to one side: never less than it
 // does. Requires: the sphere is in front of the camera's plane.
 double upper_tangent(double across, double deep, double radius) {
@@ -24,6 +33,15 @@ int clamped(double pixel, int size) {
 }
 
 }  // namespace
+
+std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far) {
+  std::vector<std::int32_t> indices;
+  for (const FarInstance& instance : far) {
+    const std::int32_t index = index_of(tracer.placed(), instance.instance);
+    if (index >= 0) indices.push_back(index);
+  }
+  return indices;
+}
 
 // The camera, with distances on the screen in pixels.
 struct ImpostorPass::Screen {
@@ -65,21 +83,19 @@ ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstanc
   const Screen screen(camera, width, height);
   const std::vector<PlacedGrid>& placed = tracer.placed();
   for (const FarInstance& instance : far) {
-    const auto found =
-        std::lower_bound(placed.begin(), placed.end(), instance.instance,
-                         [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
-    if (found == placed.end() || found->instance != instance.instance || instance.impostor == nullptr) continue;
-    add(screen, *found, static_cast<std::int32_t>(found - placed.begin()), *instance.impostor);
+    const std::int32_t index = index_of(placed, instance.instance);
+    if (index < 0 || instance.impostor == nullptr) continue;
+    add(screen, placed[static_cast<std::size_t>(index)], index, *instance.impostor);
   }
   std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.near_t < b.near_t; });
   fill_bins();
 }
 
 void ImpostorPass::add(const Screen& screen, const PlacedGrid& placed, std::int32_t index, const Impostor& impostor) {
-  if (impostor.is_empty()) return;
+  if (impostor.is_empty() || placed.halvings != 0) return;
   const ContentSphere& content = impostor.content();
   const DVec3 position = placed.position - screen.camera.position;
-  const DVec3 centre = position + placed.world_axes * (content.centre - placed.grid->pivot) * placed.voxel_size;
+  const DVec3 centre = position + placed.world_axes * (content.centre - placed.pivot) * placed.voxel_size;
   const double radius = content.radius * placed.voxel_size;
   Area area;
   if (!screen.find_area(centre, radius, area)) return;
@@ -89,7 +105,7 @@ void ImpostorPass::add(const Screen& screen, const PlacedGrid& placed, std::int3
   if (!is_finite(towards_camera) || towards_camera == DVec3(0.0)) return;
   const double distance = is_perspective ? glm::length(centre) : glm::dot(centre, screen.camera.forward);
   drawn_.push_back({index, &impostor, area, distance - radius * (1.0 + 1e-9), axes,
-                    placed.grid->pivot - axes * position, ImpostorSearch(impostor, towards_camera)});
+                    placed.pivot - axes * position, ImpostorSearch(impostor, towards_camera)});
 }
 
 void ImpostorPass::fill_bins() {

@@ -18,6 +18,9 @@ struct FarTexels {
   RayPacket::Lanes<float> openness{};
 };
 
+/// The indices of those far instances that a tracer holds, in SceneTracer::placed.
+[[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);
+
 /// The far instances of one picture: which may show in which part of it, and what rays meet of them.
 class ImpostorPass {
  public:

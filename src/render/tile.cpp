@@ -7,8 +7,8 @@
 
 #include <glm/common.hpp>
 
-#include "light/sky.h"
 #include "core/srgb.h"
+#include "light/sky.h"
 #include "render/on_face.h"
 
 namespace quoin {
@@ -55,6 +55,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
+  if (context_->impostors != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, hits, texels_);
   const std::uint32_t through_glass = lanes_through_glass(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -92,6 +93,10 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.placed = hits.placed[i];
   point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
+  if ((texels_.found >> lane & 1U) != 0) {
+    point.type = texels_.type[i];
+    point.openness = texels_.openness[i];
+  }
   add_point(point, pixel, weight);
 }
 
@@ -130,9 +135,9 @@ void Tile::light_points() {
   for (SurfacePoint& point : points_) {
     if (point.placed != known) {
       known = point.placed;
-      reader.emplace(placed[static_cast<std::size_t>(known)].grid->grid);
+      reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
-    point.type = reader->get(point.voxel);
+    if (point.type == kAir) point.type = reader->get(point.voxel);
   }
   lit_.resize(points_.size());
   rays_ += context_->lighting->light(points_, lit_);

@@ -35,6 +35,8 @@ class InstanceTree {
   /// Cost: O(n log n). Empty boxes are never visited.
   explicit InstanceTree(std::vector<DBox> boxes);
 
+  [[nodiscard]] const std::vector<DBox>& boxes() const { return boxes_; }
+
   /// The same tree with every box moved.
   [[nodiscard]] InstanceTree moved(DVec3 by) const;
 

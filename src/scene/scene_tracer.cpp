@@ -17,21 +17,16 @@ bool can_be_traced(const Instance& instance, const SceneGrid& grid) {
 }
 
 // In the world, with room for rounding.
-DBox bounds_of(const Instance& instance, const SceneGrid& grid) {
-  const IBox tight = grid.grid.bounds();
+DBox bounds_of(const PlacedGrid& placed) {
+  const IBox tight = placed.voxels->bounds();
   DBox box;
   for (int corner = 0; corner < 8; ++corner) {
     const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
                       (corner & 4) != 0 ? tight.max.z : tight.min.z};
-    box.extend(world_from_grid(instance, grid, point));
+    box.extend(placed.position + placed.world_axes * ((point - placed.pivot) * placed.voxel_size));
   }
   const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
   return {box.min - room, box.max + room};
-}
-
-bool has_transparent_types(const Grid& grid, const VoxelRegistry& types) {
-  const std::vector<VoxelType> all = grid.types();
-  return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
 }
 
 }  // namespace
@@ -41,6 +36,7 @@ SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : imp
   std::vector<const SceneGrid*> grids;
   std::vector<DBox> boxes;
   std::vector<std::size_t> slot_of;
+  impl_->scene = &scene;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
@@ -48,30 +44,54 @@ SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : imp
     const auto [found, is_new] = slots.try_emplace(instance.grid, grids.size());
     if (is_new) grids.push_back(grid);
     slot_of.push_back(found->second);
-    boxes.push_back(bounds_of(instance, *grid));
     PlacedGrid& placed = impl_->placed.emplace_back();
     placed.instance = handle;
     placed.grid = grid;
+    placed.voxels = &grid->grid;
+    placed.pivot = grid->pivot;
     placed.world_axes = world_axes(instance);
     placed.position = instance.position;
     placed.voxel_size = instance.voxel_size;
+    boxes.push_back(bounds_of(placed));
   }
   impl_->trees.resize(grids.size());
   parallel_for(grids.size(), threads, [&](std::size_t i) {
     const Grid& grid = grids[i]->grid;
-    Impl::Trees& trees = impl_->trees[i];
-    trees.opaque = OccupancyTree::build(grid, scene.types, Occupancy::Opaque);
-    if (has_transparent_types(grid, scene.types)) {
-      trees.transparent.emplace(OccupancyTree::build(grid, scene.types, Occupancy::Transparent));
-    }
+    impl_->trees[i] = OpticalTrees::build(grid, scene.types);
   });
   for (std::size_t i = 0; i < slot_of.size(); ++i) {
-    const Impl::Trees& trees = impl_->trees[slot_of[i]];
+    const OpticalTrees& trees = impl_->trees[slot_of[i]];
     impl_->placed[i].opaque = &trees.opaque;
     impl_->placed[i].transparent = trees.transparent ? &*trees.transparent : nullptr;
     impl_->has_transparent |= trees.transparent.has_value();
   }
   impl_->instances = InstanceTree(std::move(boxes));
+}
+
+SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
+  auto detailed = std::make_unique<Impl>();
+  detailed->scene = impl_->scene;
+  detailed->placed = impl_->placed;
+  detailed->has_transparent = impl_->has_transparent;
+  std::vector<DBox> boxes = impl_->instances.boxes();
+  const CoarseGrids::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
+  auto next = detailed->placed.begin();
+  for (const SelectedInstance& choice : selected) {
+    next = std::lower_bound(next, detailed->placed.end(), choice.instance,
+                            [](const PlacedGrid& placed, InstanceHandle handle) { return placed.instance < handle; });
+    if (next == detailed->placed.end()) break;
+    if (next->instance != choice.instance) continue;
+    next->detail = choice.detail;
+    const GridHandle grid = impl_->scene->instances()[choice.instance].grid;
+    const CoarseLevel* level = levels.find(grid, choice.halvings);
+    if (level == nullptr) continue;
+    level->put_in(*next);
+    boxes[static_cast<std::size_t>(next - detailed->placed.begin())] = bounds_of(*next);
+  }
+  detailed->instances = InstanceTree(std::move(boxes));
+  return SceneTracer(std::move(detailed));
 }
 
 SceneTracer::SceneTracer(SceneTracer&&) noexcept = default;

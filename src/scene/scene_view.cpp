@@ -45,6 +45,8 @@ struct SceneView::Impl {
   std::vector<Affine> grid_from_view;
   std::vector<Affine> view_from_grid;
   InstanceTree instances;  // in view space
+  InstanceTree seen;       // of these, those that `first_hits` meets, where not all
+  bool sees_all = true;
   bool is_alone = false;   // there is one instance
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
@@ -76,9 +78,9 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet ins
     // The difference of two far positions is taken first: it is small, and mostly exact.
     const DVec3 position = placed.position - origin;
     const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
-    impl_->grid_from_view.push_back({grid_axes, placed.grid->pivot - grid_axes * position});
+    impl_->grid_from_view.push_back({grid_axes, placed.pivot - grid_axes * position});
     const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
-    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.grid->pivot});
+    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
   }
   impl_->instances = tracer.impl_->instances.moved(-origin);
   impl_->is_alone = tracer.placed().size() == 1;
@@ -92,11 +94,19 @@ const SceneTracer& SceneView::tracer() const {
   return *impl_->tracer;
 }
 
+void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
+  if (placed.empty()) return;
+  std::vector<DBox> boxes = impl_->sees_all ? impl_->instances.boxes() : impl_->seen.boxes();
+  for (const std::int32_t i : placed) boxes[static_cast<std::size_t>(i)] = DBox{};
+  impl_->seen = InstanceTree(std::move(boxes));
+  impl_->sees_all = false;
+}
+
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
   RayPacket rays;
   hits.grids.hit = hits.grids.starts_inside = 0;
-  if (impl_->is_alone) {
+  if (impl_->is_alone && impl_->sees_all) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
     quoin::first_hits(*placed[0].opaque, rays, hits.grids, impl_->instructions);
     hits.placed.fill(0);
@@ -106,7 +116,8 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
   RayInterval interval = interval_of(left);
   PacketHits found;
-  impl_->instances.visit(interval, [&](std::size_t i) {
+  const InstanceTree& seen = impl_->sees_all ? impl_->instances : impl_->seen;
+  seen.visit(interval, [&](std::size_t i) {
     move(impl_->grid_from_view[i], left, rays);
     quoin::first_hits(*placed[i].opaque, rays, found, impl_->instructions);
     if (found.hit == 0) return true;

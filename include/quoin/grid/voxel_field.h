@@ -11,8 +11,9 @@ namespace quoin {
 /// Space:     sample (i, j, k) stands for the centre of voxel (i, j, k): point p of the field is point p + 0.5 of the
 ///            grid.
 /// Shape:     the distance to the nearest voxel centre of the other kind, less one half, smoothed by a 1 4 6 4 1 kernel
-///            along each axis; at least 0.1 from 0 and of its voxel's sign everywhere, so that the surface runs between
-///            the voxels that it ran between before, and nothing thin is lost. Within a band of 8 samples.
+///            along each axis; of its voxel's sign everywhere, at least 0.35 from 0 in solid voxels and 0.1 in air, so
+///            that the surface runs between the voxels that it ran between before, and nothing thin is lost. Within a
+///            band of 8 samples.
 /// Materials: the voxels' types.
 /// Order:     the same densities at any thread count.
 /// Cost:      about 5 ms a chunk that the surface comes near, on each thread; little for the others.

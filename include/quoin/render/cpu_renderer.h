@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include <quoin/core/image.h>
 #include <quoin/core/instruction_set.h>
@@ -10,6 +11,7 @@
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -20,6 +22,12 @@ struct RenderOptions {
   int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
   bool depth = false;  ///< also the distances
   LightOptions light;
+  /// How instances are drawn; without, all are Near. A picture knows nothing of the one before it: there is no
+  /// hysteresis. Whether hidden instances are drawn is for the renderer to say, not the policy.
+  std::optional<DetailPolicy> detail;
+  /// Instances in colours that tell their detail instead of their own: Near green, Mid yellow to orange the more often
+  /// halved, Far blue.
+  bool detail_colours = false;
   Threads threads;
   InstructionSet instructions = InstructionSet::Best;
 };

@@ -127,7 +127,7 @@ struct FarInstance {
 /// Depth: nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
 ///        show nothing of an instance keep their colour and depth.
 /// Left out: instances whose content's centre is at or behind the camera's plane or not finite, or whose content's radius spans less than
-///        a pixel; those that `scene` does not hold; transparent voxels.
+///        a pixel; those that `scene` does not hold or holds halved; transparent voxels.
 ///
 /// Requires: the camera and options are such that CpuRenderer accepts them; `picture` has their size, and depth.
 ///           One sample a pixel is taken, at its centre.

@@ -38,8 +38,10 @@ struct DetailPolicy {
   double mid_radii = 10.0;    ///< ByRadius: Mid up to and including
   double voxel_pixels = 1.0;  ///< ByPixels: Mid once a voxel projects to less than this
   int far_pixels = 128;       ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
-  /// A level is left only once the measure is beyond its threshold by this share. 0: no memory of the last choice.
+  /// ByPixels: a level is left only once the measure is beyond its threshold by this share. 0: no memory of the last
+  /// choice.
   double hysteresis = 0.1;
+  bool hidden = false;  ///< instances that are not visible are chosen too
 };
 
 /// By the distance between camera and content centre, in the units of `radius`. R = 0: Near at distance 0, else Far;
@@ -58,7 +60,9 @@ struct ScreenSize {
 struct SelectedInstance {
   InstanceHandle instance;
   Detail detail = Detail::Near;
-  /// Mid: how often the grid is halved (1: cells of 2^3 voxels), 1 to kCoarsestHalving; else 0.
+  /// How often the grid is halved where it is traced (1: cells of 2^3 voxels): as often as makes a cell span a pixel or
+  /// two, at most kCoarsestHalving. Mid: 1 or more; Near: 0; Far: what stands in for the voxels in shadows and the
+  /// like.
   int halvings = 0;
   double distance = 0.0;  ///< from the camera to the content's centre, world units
 };
@@ -75,8 +79,12 @@ class DetailSelector {
   ~DetailSelector();
 
   /// Replaces `out` by the visible instances whose content sphere meets the camera's frustum, in the order of their
-  /// handles.
+  /// handles. Empty grids and instances whose numbers are not finite or whose size is not positive are left out.
   ///
+  /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
+  ///
+  /// Requires: width and height are positive, `camera` is one that takes pictures; it is always the same scene, whose
+  ///           grids are edited between calls, not replaced by others of the same version.
   /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when its version has changed.
   void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
               std::vector<SelectedInstance>& out);

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <glm/mat3x3.hpp>
@@ -10,6 +12,7 @@
 #include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
+#include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
@@ -20,12 +23,19 @@ namespace quoin {
 /// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
 struct PlacedGrid {
   InstanceHandle instance;
-  const SceneGrid* grid = nullptr;
+  const SceneGrid* grid = nullptr;  ///< as the scene holds it
+  const Grid* voxels = nullptr;     ///< what is traced: its voxels, or what is left of them once halved
+  DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
-  double voxel_size = 1.0;
+  double voxel_size = 1.0;     ///< world units a voxel of `voxels`
+  Detail detail = Detail::Near;
+  int halvings = 0;  ///< how often `voxels` was halved
+
+  /// How many voxels of the full grid a voxel of `voxels` spans.
+  [[nodiscard]] double voxels_per_cell() const { return std::ldexp(1.0, halvings); }
 };
 
 /// The traversal structures of a scene's instances.
@@ -39,6 +49,13 @@ class SceneTracer {
   SceneTracer& operator=(SceneTracer&&) noexcept;
   ~SceneTracer();
 
+  /// The same instances, those of `selected` in their detail: Mid and Far ones as halved grids. The others, which are
+  /// out of the picture but may cast shadows into it, stay as they are.
+  ///
+  /// This one must outlive the result. It keeps the halved grids, so that only the first picture pays for them.
+  /// Threads: any number may call at once.
+  [[nodiscard]] SceneTracer with_detail(std::span<const SelectedInstance> selected, Threads threads = {}) const;
+
   /// In the order of the instances' handles.
   [[nodiscard]] const std::vector<PlacedGrid>& placed() const;
   [[nodiscard]] bool has_transparent() const;
@@ -46,6 +63,7 @@ class SceneTracer {
  private:
   friend class SceneView;
   struct Impl;
+  explicit SceneTracer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 
@@ -64,7 +82,8 @@ struct TransparentSpan {
 /// Traces rays through a scene, relative to a point near which they are.
 ///
 /// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
-///         world's origin as near it; and grid, voxels of a placed grid. A ray's t is the same number in both.
+///         world's origin as near it; and grid, PlacedGrid::voxels of a placed grid. A ray's t is the same number in
+///         both.
 /// Threads: any number may trace at once.
 class SceneView {
  public:
@@ -75,6 +94,10 @@ class SceneView {
   ~SceneView();
 
   [[nodiscard]] const SceneTracer& tracer() const;
+
+  /// From now on `first_hits` passes through these (indices into SceneTracer::placed), which are drawn in another way.
+  /// They still stop other rays. Cost: O(instances * log instances).
+  void leave_to_impostors(std::span<const std::int32_t> placed);
 
   /// The nearest opaque voxel of all instances for each ray, in view space; of equally near ones the instance that
   /// comes first.

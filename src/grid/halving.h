@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/grid.h>
+
+namespace quoin {
+
+/// Which voxels around one chunk of a halved grid are not air, and which of its cells are solid for that.
+///
+/// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Of what lies outside
+///        only what shares a face with the inside is known.
+class HalvingMasks {
+ public:
+  /// `chunk` is of the halved grid.
+  HalvingMasks(const Grid& grid, IVec3 chunk);
+
+  /// The chunk of the full grid at `octant`, 0 or 1 on each axis; null where all is air.
+  [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
+  /// The solid cells of a row, 0 <= y, z < 64.
+  [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
+  /// How many faces of a voxel meet air. Requires: 0 <= x, y, z < 128.
+  [[nodiscard]] int exposed_faces(IVec3 fine) const;
+
+ private:
+  static constexpr int kFineEdge = 2 * kChunkEdge;
+  static constexpr int kRows = kFineEdge + 4;
+  static constexpr int kCellRows = kChunkEdge + 2;
+
+  /// 64 cells along x, bit by bit, and the one before and after.
+  struct CellBits {
+    std::uint64_t bits = 0;
+    bool before = false;
+    bool after = false;
+    [[nodiscard]] std::uint64_t lower() const { return bits << 1 | std::uint64_t{before}; }
+    [[nodiscard]] std::uint64_t upper() const { return bits >> 1 | std::uint64_t{after} << 63; }
+  };
+  struct CellRow {
+    CellBits any;
+    CellBits half;                ///< at least 4 voxels
+    std::array<CellBits, 3> rod;  ///< 2 or 3 voxels, some in either half along the axis
+  };
+  /// 128 voxels along x, and a word before and after.
+  using FineRow = std::array<std::uint64_t, 4>;
+
+  [[nodiscard]] static std::size_t slot(IVec3 octant) {
+    return static_cast<std::size_t>((octant.z + 1) * 16 + (octant.y + 1) * 4 + octant.x + 1);
+  }
+  [[nodiscard]] const FineRow& fine(int y, int z) const {
+    return fine_[static_cast<std::size_t>((z + 2) * kRows + y + 2)];
+  }
+  [[nodiscard]] FineRow& fine(int y, int z) { return fine_[static_cast<std::size_t>((z + 2) * kRows + y + 2)]; }
+  [[nodiscard]] const CellRow& cells(int y, int z) const {
+    return cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
+  }
+  void read_voxels(IVec3 octant);
+  void count_cells(int y, int z);
+  [[nodiscard]] std::uint64_t kept_rods(int y, int z, int axis) const;
+  [[nodiscard]] bool is_solid(IVec3 fine) const;
+
+  std::array<const Chunk*, 64> chunks_{};
+  std::vector<FineRow> fine_;
+  std::vector<CellRow> cells_;
+};
+
+}  // namespace quoin
