@@ -237,9 +237,4 @@ Snapshot Impostor::snapshot(int view) const {
           std::span(occlusion_).subspan(first, kTexels), std::span(depth_).subspan(first, kTexels)};
 }
 
-std::size_t Impostor::bytes() const {
-  return types_.capacity() * sizeof(VoxelType) + faces_.capacity() * sizeof(Direction) + occlusion_.capacity() +
-         (depth_.capacity() + clear_depth_.capacity() + near_depth_.capacity()) * sizeof(float);
-}
-
 }  // namespace quoin

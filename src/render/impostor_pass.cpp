@@ -11,6 +11,7 @@ namespace quoin {
 namespace {
 
 constexpr int kBlock = 4;
+constexpr double kRoom = 1.0 + 1e-6;  // for rounding
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
@@ -104,7 +105,7 @@ void ImpostorPass::add(const Screen& screen, const PlacedGrid& placed, std::int3
   const DVec3 towards_camera = axes * (is_perspective ? -centre : -screen.camera.forward);
   if (!is_finite(towards_camera) || towards_camera == DVec3(0.0)) return;
   const double distance = is_perspective ? glm::length(centre) : glm::dot(centre, screen.camera.forward);
-  drawn_.push_back({index, &impostor, area, distance - radius * (1.0 + 1e-9), axes,
+  drawn_.push_back({index, &impostor, area, distance - radius * kRoom, centre, radius * radius * kRoom, axes,
                     placed.pivot - axes * position, ImpostorSearch(impostor, towards_camera)});
 }
 
@@ -145,6 +146,9 @@ void ImpostorPass::find_one(const Drawn& drawn, const RayPacket& rays, SceneHits
     const double max_t = is_hit ? hits.grids.t[i] : rays.max_t[i];
     if (max_t < drawn.near_t) continue;
     const Ray ray = rays.ray(lane);
+    const DVec3 to_centre = drawn.centre - ray.origin;
+    const DVec3 beside = to_centre - ray.direction * glm::dot(to_centre, ray.direction);
+    if (glm::dot(beside, beside) > drawn.radius_squared) continue;
     const DVec3 direction = drawn.axes * ray.direction;
     const DVec3 origin = drawn.axes * ray.origin + drawn.offset;
     FoundTexel found;

@@ -50,6 +50,8 @@ class ImpostorPass {
     const Impostor* impostor = nullptr;
     Area area;
     double near_t = 0.0;  // nothing of it is nearer
+    DVec3 centre{0.0};    // of the sphere around it, in view space
+    double radius_squared = 0.0;
     glm::dmat3 axes{1.0};
     DVec3 offset{0.0};  // a point p of the view is axes * p + offset in the grid
     ImpostorSearch search;

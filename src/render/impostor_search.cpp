@@ -61,6 +61,7 @@ struct ImpostorSearch::March {
   DVec3 inverse{0.0};  // 1 / unit
   double end = 0.0;
   std::array<Line, kViews> lines{};
+  std::size_t known_lines = 0;
 };
 
 ImpostorSearch::ImpostorSearch(const Impostor& impostor, DVec3 towards_camera) : impostor_(&impostor) {
@@ -77,18 +78,22 @@ ImpostorSearch::ImpostorSearch(const Impostor& impostor, DVec3 towards_camera) :
     eye.faces = impostor.faces_.data() + view * Impostor::kTexels;
   }
   texel_ = eyes_[0].camera.half_size() / kHalf;
+  step_ = kLeastStep * texel_;
   room_ = texel_ > 1.0 ? kRoom * texel_ : 0.0;
   about_ = kAboutTexels * texel_ + kAboutVoxels;
 }
 
-ImpostorSearch::Line ImpostorSearch::line_of(const Eye& eye, DVec3 origin, DVec3 unit) {
+ImpostorSearch::Line ImpostorSearch::line_of(const Eye& eye, const March& march) const {
   const SnapshotCamera& camera = eye.camera;
-  const DVec3 from_eye = origin - camera.position;
+  const DVec3 unit = march.unit;
+  const DVec3 from_eye = march.origin - camera.position;
   Line line;
   line.origin = {glm::dot(camera.right, from_eye) * camera.focal, -glm::dot(camera.up, from_eye) * camera.focal,
                  glm::dot(camera.forward, from_eye)};
   line.direction = {glm::dot(camera.right, unit) * camera.focal, -glm::dot(camera.up, unit) * camera.focal,
                     glm::dot(camera.forward, unit)};
+  const double straight = line.direction.z;
+  line.lateral = texel_ / std::sqrt(std::max(1.0 - straight * straight, 1e-4));
   return line;
 }
 
@@ -155,7 +160,7 @@ bool ImpostorSearch::crosses(const March& march, const Eye& eye, std::int32_t te
   };
   at = (floor_of(seen(frame.axis) + 0.5) - march.origin[frame.axis]) * march.inverse[frame.axis];
   // First, since elsewhere the numbers below may be too large for integers.
-  if (!(at >= -kLeastStep * texel_ && at <= march.end + kLeastStep * texel_)) return false;
+  if (!(at >= -step_ && at <= march.end + step_)) return false;
   for (const int axis : {frame.u, frame.v}) {
     const double centre = seen(axis);
     const double crossing = march.origin[axis] + at * march.unit[axis];
@@ -201,8 +206,7 @@ void ImpostorSearch::settle(const March& march, const std::array<Look, kViews>& 
   found = {at, eyes_[best].view, looks[best].texel};
 }
 
-bool ImpostorSearch::walk(const March& march, FoundTexel& found) const {
-  const double least_step = kLeastStep * texel_;
+bool ImpostorSearch::walk(March& march, FoundTexel& found) const {
   const double deep = kDeepTexels * texel_ + kDeepVoxels;
   std::array<Look, kViews> looks;
   std::array<std::int32_t, kViews> tried;
@@ -212,6 +216,7 @@ bool ImpostorSearch::walk(const March& march, FoundTexel& found) const {
   for (double at = 0.0; at <= march.end;) {
     double clear = 0.0;
     for (std::size_t i = 0; i < kViews; ++i) {
+      if (i == march.known_lines) march.lines[march.known_lines++] = line_of(eyes_[i], march);
       looks[i] = look(eyes_[i], march.lines[i], at);
       clear = std::max(clear, looks[i].clear);
       if (!looks[i].is_near) break;
@@ -225,7 +230,7 @@ bool ImpostorSearch::walk(const March& march, FoundTexel& found) const {
       if (entered_at < 0.0) entered_at = at, settle(march, looks, at, entered);
       if (at - entered_at > deep) return found = entered, true;
     }
-    at += std::max(clear, least_step);
+    at += std::max(clear, step_);
   }
   return false;
 }
@@ -236,19 +241,14 @@ bool ImpostorSearch::find(DVec3 origin, DVec3 direction, double max_t, FoundTexe
   march.unit = direction / length;
   march.inverse = 1.0 / march.unit;
   double begin = 0.0;
-  double end = max_t * length;
-  if (!clip(origin, march, begin, end)) return false;
+  double end = kInfinity;
+  // What lies further in is searched to its end, so that the answer does not depend on what was found before.
+  if (!clip(origin, march, begin, end) || begin > max_t * length) return false;
   // From where it enters: what follows is then as exact far away as it is near.
   march.origin = origin + march.unit * begin;
   march.end = end - begin;
-  for (std::size_t i = 0; i < kViews; ++i) {
-    Line& line = march.lines[i];
-    line = line_of(eyes_[i], march.origin, march.unit);
-    const double straight = line.direction.z;
-    line.lateral = texel_ / std::sqrt(std::max(1.0 - straight * straight, 1e-4));
-  }
   if (!walk(march, found)) return false;
-  found.t = std::max(begin + found.t, 0.0) / length;
+  found.t = (begin + std::max(found.t, 0.0)) / length;
   return found.t <= max_t;
 }
 

@@ -28,8 +28,7 @@ class ImpostorSearch {
   /// Views that are asked.
   static constexpr std::size_t kViews = 5;
 
-  /// `towards_camera`: in the grid's frame, of any length; not zero
-  /// and finite. `impostor` must outlive it.
+  /// `towards_camera`: in the grid's frame, of any length; not zero and finite. `impostor` must outlive it.
   ImpostorSearch(const Impostor& impostor, DVec3 towards_camera);
 
   /// Whether a ray in the grid meets it from 0 to `max_t`, in lengths of `direction`.
@@ -61,7 +60,7 @@ class ImpostorSearch {
   };
   struct March;
 
-  [[nodiscard]] static Line line_of(const Eye& eye, DVec3 origin, DVec3 unit);
+  [[nodiscard]] Line line_of(const Eye& eye, const March& march) const;
   [[nodiscard]] static Look look(const Eye& eye, const Line& line, double at);
   [[nodiscard]] bool clip(DVec3 origin, const March& march, double& begin, double& end) const;
   // Whether the ray crosses the face that a texel saw, and where. Requires: it saw one.
@@ -70,13 +69,14 @@ class ImpostorSearch {
   [[nodiscard]] bool crosses_nearby(const March& march, const Eye& eye, const Look& look, FoundTexel& found) const;
   // Which texel's voxel to show where none is crossed.
   void settle(const March& march, const std::array<Look, kViews>& looks, double at, FoundTexel& found) const;
-  [[nodiscard]] bool walk(const March& march, FoundTexel& found) const;
+  [[nodiscard]] bool walk(March& march, FoundTexel& found) const;
 
   const Impostor* impostor_;
   std::array<Eye, kViews> eyes_;
   double texel_ = 1.0;  // its side at the content's centre, in voxels
   double room_ = 0.0;   // how far from what a texel's ray met its face is taken to reach
   double about_ = 0.0;
+  double step_ = 0.5;   // the least step, in voxels
 };
 
 }  // namespace quoin

@@ -13,9 +13,8 @@ std::vector<const Impostor*> ImpostorShelf::take(const VoxelRegistry& types, std
   std::vector<const Impostor*> all;
   for (const PlacedGrid* each : placed) {
     auto found = impostors_.find(each->grid);
-    if (found == impostors_.end() && bytes_ < kMostBytes) {
+    if (found == impostors_.end() && impostors_.size() < kMostBytes / Impostor::kBytes) {
       found = impostors_.try_emplace(each->grid).first;
-      bytes_ += found->second.bytes();
       missing.push_back({each, &found->second});
     }
     all.push_back(found == impostors_.end() ? nullptr : &found->second);

@@ -25,7 +25,6 @@ class ImpostorShelf {
  private:
   std::mutex mutex_;
   std::map<const SceneGrid*, Impostor> impostors_;
-  std::size_t bytes_ = 0;
 };
 
 }  // namespace quoin

@@ -66,6 +66,7 @@ struct Snapshot {
 class Impostor {
  public:
   static constexpr int kEdge = 128;
+  static const std::size_t kBytes;  ///< of every impostor
 
   /// Of no grid: 26 empty snapshots.
   Impostor();
@@ -87,7 +88,6 @@ class Impostor {
   [[nodiscard]] bool is_empty() const { return box_.empty(); }
   /// Requires: 0 <= view < kImpostorViews.
   [[nodiscard]] Snapshot snapshot(int view) const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   friend class ImpostorSearch;
@@ -112,6 +112,10 @@ class Impostor {
   std::vector<float> clear_depth_;
   std::vector<float> near_depth_;
 };
+
+inline constexpr std::size_t Impostor::kBytes =
+    kImpostorViews *
+    (kTexels * (sizeof(VoxelType) + sizeof(Direction) + 1 + sizeof(float)) + (kTiles + kPairs) * sizeof(float));
 
 /// An instance that is drawn by its grid's impostor.
 struct FarInstance {
