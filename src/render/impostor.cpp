@@ -91,8 +91,9 @@ class SnapshotTaker {
   void take(int view) {
     camera_ = &impostor_->cameras_[static_cast<std::size_t>(view)];
     first_texel_ = static_cast<std::size_t>(view) * Impostor::kTexels;
-    for (int y = 0; y < Impostor::kEdge; y += kBlock) {
-      for (int x = 0; x < Impostor::kEdge; x += kBlock) take_block(x, y);
+    const Area area = area_of(impostor_->box());
+    for (int y = area.top; y < area.bottom; y += kBlock) {
+      for (int x = area.left; x < area.right; x += kBlock) take_block(x, y);
     }
     impostor_->find_clear_depths(view);
   }
@@ -107,6 +108,14 @@ class SnapshotTaker {
   };
   static constexpr std::size_t kKnown = 4096;
 
+  // Texels, multiples of kBlock, within which a box shows.
+  struct Area {
+    int left = Impostor::kEdge;
+    int top = Impostor::kEdge;
+    int right = 0;
+    int bottom = 0;
+  };
+  [[nodiscard]] Area area_of(const IBox& box) const;
   void take_block(int column, int row);
   void write(std::size_t texel, const RayHit& hit, DVec3 position);
   const KnownFace& face_at(IVec3 voxel, Direction face);
@@ -120,6 +129,28 @@ class SnapshotTaker {
   std::size_t first_texel_ = 0;
   std::vector<KnownFace> known_;
 };
+
+SnapshotTaker::Area SnapshotTaker::area_of(const IBox& box) const {
+  constexpr double kHalf = 0.5 * Impostor::kEdge;
+  constexpr double kRoom = 1e-6;
+  const auto block_of = [](double texel) {
+    return static_cast<int>(std::clamp(texel, 0.0, static_cast<double>(Impostor::kEdge))) / kBlock * kBlock;
+  };
+  Area area;
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 point{(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                      (corner & 4) != 0 ? box.max.z : box.min.z};
+    const DVec3 seen = point - camera_->position;
+    const double scale = camera_->focal / glm::dot(seen, camera_->forward);
+    const double x = kHalf + glm::dot(seen, camera_->right) * scale;
+    const double y = kHalf - glm::dot(seen, camera_->up) * scale;
+    area.left = std::min(area.left, block_of(x - kRoom));
+    area.top = std::min(area.top, block_of(y - kRoom));
+    area.right = std::max(area.right, std::min(block_of(x + kRoom) + kBlock, Impostor::kEdge));
+    area.bottom = std::max(area.bottom, std::min(block_of(y + kRoom) + kBlock, Impostor::kEdge));
+  }
+  return area;
+}
 
 void SnapshotTaker::take_block(int column, int row) {
   RayPacket rays;

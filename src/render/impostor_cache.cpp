@@ -44,7 +44,8 @@ struct ImpostorCache::Impl {
     while ((statistics.held + 1) * Impostor::kBytes > options.most_bytes) {
       auto oldest = entries.end();
       for (auto each = entries.begin(); each != entries.end(); ++each) {
-        if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before) continue;
+        if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before)
+          continue;
         if (oldest == entries.end() || each->second.last_use < oldest->second.last_use) oldest = each;
       }
       if (oldest == entries.end()) return false;
@@ -118,9 +119,7 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
 std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds, Threads threads) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
-  const auto is_over = [&] {
-    return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds);
-  };
+  const auto is_over = [&] { return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds); };
   const std::size_t count = resolve(threads);
   parallel_for(count, threads, [&](std::size_t i) {
     bool is_first = i == 0;

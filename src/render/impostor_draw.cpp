@@ -52,8 +52,9 @@ class FarTile {
     for (std::uint32_t left = texels.found; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
       const auto i = static_cast<std::size_t>(lane);
-      const auto pixel = static_cast<std::size_t>(row + lane / kBlock) * static_cast<std::size_t>(picture_->depth.width) +
-                         static_cast<std::size_t>(column + lane % kBlock);
+      const auto pixel =
+          static_cast<std::size_t>(row + lane / kBlock) * static_cast<std::size_t>(picture_->depth.width) +
+          static_cast<std::size_t>(column + lane % kBlock);
       const auto depth = static_cast<float>(hits.grids.t[i]);
       if (!(depth < picture_->depth.values[pixel])) continue;
       picture_->depth.values[pixel] = depth;

@@ -99,8 +99,9 @@ struct World {
 // From a distance at which the sphere spans `pixels` of a square picture a little larger.
 Camera orbiting(const World& world, double azimuth, double elevation, double roll, double pixels, int size) {
   const double distance = 12.0 * world.radius;
-  const DVec3 eye = DVec3{std::cos(elevation) * std::cos(azimuth), std::sin(elevation),
-                          std::cos(elevation) * std::sin(azimuth)} * distance;
+  const DVec3 eye =
+      DVec3{std::cos(elevation) * std::cos(azimuth), std::sin(elevation), std::cos(elevation) * std::sin(azimuth)} *
+      distance;
   Camera camera = towards(eye, {0, 0, 0}, 2.0 * std::atan(size / 24.0 / (pixels / 2.0)));
   const DVec3 right = camera.right;
   camera.right = right * std::cos(roll) + camera.up * std::sin(roll);

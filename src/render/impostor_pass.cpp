@@ -15,9 +15,9 @@ constexpr double kRoom = 1.0 + 1e-6;  // for rounding
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
-  const auto found = std::lower_bound(
-      placed.begin(), placed.end(), instance,
-      [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
+  const auto found =
+      std::lower_bound(placed.begin(), placed.end(), instance,
+                       [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
   if (found == placed.end() || found->instance != instance) return -1;
   return static_cast<std::int32_t>(found - placed.begin());
 }
@@ -78,8 +78,8 @@ struct ImpostorPass::Screen {
   }
 };
 
-ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera,
-                           int width, int height)
+ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
+                           int height)
     : across_((width + kTile - 1) / kTile), down_((height + kTile - 1) / kTile) {
   const Screen screen(camera, width, height);
   const std::vector<PlacedGrid>& placed = tracer.placed();
@@ -158,8 +158,8 @@ void ImpostorPass::find_one(const Drawn& drawn, const RayPacket& rays, SceneHits
     const auto texel = static_cast<std::size_t>(found.texel);
     const Direction face = snapshot.faces[texel];
     const DVec3 inside = origin + direction * found.t - 0.5 * DVec3(normal_of(face));
-    const DVec3 voxel = glm::clamp(glm::floor(inside), DVec3(drawn.impostor->box().min),
-                                   DVec3(drawn.impostor->box().max) - 1.0);
+    const DVec3 voxel =
+        glm::clamp(glm::floor(inside), DVec3(drawn.impostor->box().min), DVec3(drawn.impostor->box().max) - 1.0);
     hits.grids.set(lane, {IVec3(voxel), face, found.t, false});
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;

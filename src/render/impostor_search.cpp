@@ -124,8 +124,8 @@ ImpostorSearch::Look ImpostorSearch::look(const Eye& eye, const Line& line, doub
   const double narrow = static_cast<double>(eye.depth[found.texel]) - distance;
   found.distance = distance;
   found.is_near = !(about > 0.0);
-  found.clear = std::max({std::min(wide, kTile * line.lateral), std::min(about, kPair * line.lateral),
-                          std::min(narrow, line.lateral)});
+  found.clear = std::max(
+      {std::min(wide, kTile * line.lateral), std::min(about, kPair * line.lateral), std::min(narrow, line.lateral)});
   return found;
 }
 

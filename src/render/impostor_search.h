@@ -26,7 +26,7 @@ struct FoundTexel {
 class ImpostorSearch {
  public:
   /// Views that are asked.
-  static constexpr std::size_t kViews = 5;
+  static constexpr std::size_t kViews = 8;
 
   /// `towards_camera`: in the grid's frame, of any length; not zero and finite. `impostor` must outlive it.
   ImpostorSearch(const Impostor& impostor, DVec3 towards_camera);
@@ -76,7 +76,7 @@ class ImpostorSearch {
   double texel_ = 1.0;  // its side at the content's centre, in voxels
   double room_ = 0.0;   // how far from what a texel's ray met its face is taken to reach
   double about_ = 0.0;
-  double step_ = 0.5;   // the least step, in voxels
+  double step_ = 0.5;  // the least step, in voxels
 };
 
 }  // namespace quoin

@@ -54,8 +54,8 @@ Ray ray_of_texel(const SnapshotCamera& camera, int x, int y) {
 }
 
 TEST(ImpostorViews, AreTheSpecifiedOnesInTheirOrder) {
-  const std::array<IVec3, 10> first = {IVec3{1, 0, 0},  {-1, 0, 0},  {0, 1, 0},  {0, -1, 0}, {0, 0, 1},
-                                       {0, 0, -1},      {-1, -1, 0}, {-1, 0, -1}, {0, -1, -1}, {-1, 1, 0}};
+  const std::array<IVec3, 10> first = {IVec3{1, 0, 0}, {-1, 0, 0},  {0, 1, 0},   {0, -1, 0},  {0, 0, 1},
+                                       {0, 0, -1},     {-1, -1, 0}, {-1, 0, -1}, {0, -1, -1}, {-1, 1, 0}};
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_LT(glm::length(impostor_view(static_cast<int>(i)) - glm::normalize(DVec3(first[i]))), 1e-15) << i;
   }
@@ -91,7 +91,8 @@ TEST(ImpostorViews, NearestIsTheLargestProductAndNeverFurtherThanStated) {
   for (int i = 0; i < 200'000; ++i) {
     const DVec3 direction = glm::normalize(DVec3(normal(random), normal(random), normal(random)));
     const double found = glm::dot(direction, impostor_view(nearest_impostor_view(direction).value_or(0)));
-    for (int view = 0; view < kImpostorViews; ++view) ASSERT_LE(glm::dot(direction, impostor_view(view)), found + 1e-15);
+    for (int view = 0; view < kImpostorViews; ++view)
+      ASSERT_LE(glm::dot(direction, impostor_view(view)), found + 1e-15);
     worst = std::min(worst, found);
   }
   EXPECT_NEAR(std::acos(worst) * 180.0 / 3.14159265358979, 27.57, 0.1);

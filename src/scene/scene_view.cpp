@@ -47,7 +47,7 @@ struct SceneView::Impl {
   InstanceTree instances;  // in view space
   InstanceTree seen;       // of these, those that `first_hits` meets, where not all
   bool sees_all = true;
-  bool is_alone = false;   // there is one instance
+  bool is_alone = false;  // there is one instance
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {

@@ -36,8 +36,8 @@ struct SnapshotCamera {
   DVec3 right{1.0, 0.0, 0.0};
   DVec3 up{0.0, 1.0, 0.0};
   DVec3 forward{0.0, 0.0, -1.0};
-  double focal = 1.0;  ///< in texels: the content's sphere just fits the snapshot
-  double reach = 1.0;  ///< R: the radius of the content, at least 1 voxel
+  double focal = 1.0;     ///< in texels: the content's sphere just fits the snapshot
+  double reach = 1.0;     ///< R: the radius of the content, at least 1 voxel
   double distance = 8.0;  ///< from the content's centre: 8 R
 
   /// Half the side of the square at the content's centre that the snapshot shows, in voxels.
@@ -51,10 +51,10 @@ struct SnapshotCamera {
 /// is infinite.
 struct Snapshot {
   SnapshotCamera camera;
-  std::span<const VoxelType> types;        ///< coverage of its own: a black voxel is no hole
-  std::span<const Direction> faces;        ///< of the voxel seen
-  std::span<const std::uint8_t> occlusion; ///< that a blocky mesh's vertices give there: 0 open, 255 dark
-  std::span<const float> depth;            ///< voxels, Euclidean, from the snapshot's camera
+  std::span<const VoxelType> types;         ///< coverage of its own: a black voxel is no hole
+  std::span<const Direction> faces;         ///< of the voxel seen
+  std::span<const std::uint8_t> occlusion;  ///< that a blocky mesh's vertices give there: 0 open, 255 dark
+  std::span<const float> depth;             ///< voxels, Euclidean, from the snapshot's camera
 };
 
 /// Snapshots of a grid's opaque voxels from all around, by which it is drawn where it is small in the picture.
@@ -92,7 +92,7 @@ class Impostor {
  private:
   friend class ImpostorSearch;
   friend class SnapshotTaker;
-  static constexpr int kTile = 8;   // texels
+  static constexpr int kTile = 8;  // texels
   static constexpr int kPair = 2;
   static constexpr std::size_t kTexels = std::size_t{kEdge} * kEdge;
   static constexpr std::size_t kTiles = kTexels / (kTile * kTile);
@@ -125,12 +125,14 @@ struct FarInstance {
 
 /// Draws far instances into a picture that has been taken without them.
 ///
-/// Each is drawn from the views nearest to the direction in which its own frame sees the camera, and every pixel's ray is followed
-/// through the snapshots' depths to the face that it meets, so that silhouettes, depth and roll are right between
-/// views. Light is that of CpuRenderer, with shadows traced through all of `scene`, but occlusion is the texel's.
-/// Depth: nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
+/// Each is drawn from the views nearest to the direction in which its own frame sees the camera, and every pixel's ray
+/// is followed through the snapshots' depths to the face that it meets, so that silhouettes, depth and roll are right
+/// between views. Light is that of CpuRenderer, with shadows traced through all of `scene`, but occlusion is the
+/// texel's. Depth: nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels
+/// that
 ///        show nothing of an instance keep their colour and depth.
-/// Left out: instances whose content's centre is at or behind the camera's plane or not finite, or whose content's radius spans less than
+/// Left out: instances whose content's centre is at or behind the camera's plane or not finite, or whose content's
+/// radius spans less than
 ///        a pixel; those that `scene` does not hold or holds halved; transparent voxels.
 ///
 /// Requires: the camera and options are such that CpuRenderer accepts them; `picture` has their size, and depth.

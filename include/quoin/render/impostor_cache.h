@@ -40,8 +40,8 @@ class ImpostorCache {
   ImpostorCache& operator=(ImpostorCache&&) noexcept;
   ~ImpostorCache();
 
-  /// The newest impostor that is ready; null when there is none or the handle names nothing. Marks it as used, and has it
-  /// built when it is missing or older than the grid. Cost: O(log grids).
+  /// The newest impostor that is ready; null when there is none or the handle names nothing. Marks it as used, and has
+  /// it built when it is missing or older than the grid. Cost: O(log grids).
   [[nodiscard]] std::shared_ptr<const Impostor> find(const Scene& scene, GridHandle grid);
 
   /// Builds what is waiting, in the order in which it was asked for, until that many seconds have passed; at least one,
