@@ -106,7 +106,7 @@ class SnapshotTaker {
     VoxelType type = kAir;
     FaceLevels levels{};
   };
-  static constexpr std::size_t kKnown = 4096;
+  static constexpr std::size_t kKnown = std::size_t{1} << 15;
 
   // Texels, multiples of kBlock, within which a box shows.
   struct Area {
