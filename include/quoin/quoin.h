@@ -43,6 +43,8 @@
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/impostor.h>
+#include <quoin/render/impostor_cache.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>

@@ -64,11 +64,15 @@ struct Lighting::Group {
   std::array<const SurfacePoint*, RayPacket::kSize> points{};
   std::int32_t placed = 0;
   std::uint32_t surfaces = 0;  // lanes that are to be lit
+  std::uint32_t unknown = 0;   // of these, those whose openness is to be found
   bool is_one_face = true;
 
   // `lift`: in the voxels that are traced.
   void add(const SurfacePoint& point, double lift) {
-    if (point.kind == PointKind::Surface) surfaces |= 1U << size;
+    if (point.kind == PointKind::Surface) {
+      surfaces |= 1U << size;
+      if (point.openness < 0.0F) unknown |= 1U << size;
+    }
     const FaceFrame& frame = frame_of(point.face);
     DVec3 origin = point.position;
     origin[frame.axis] += lift * frame.sign;
@@ -174,14 +178,19 @@ void Lighting::tint_sunlight(const Group& group, const RayPacket& rays, std::spa
 }
 
 std::int64_t Lighting::find_openness(const Group& group, std::span<float> openness) const {
-  if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   if (options_.occlusion == OcclusionMode::Off) return 0;
+  for (std::size_t i = 0; i < group.size; ++i) openness[i] = std::max(group.points[i]->openness, 0.0F);
+  if (group.unknown == 0) return 0;
+  if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
   FaceLevels levels{};
+  const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
+    if ((group.unknown >> i & 1U) == 0) continue;
     const SurfacePoint& point = *group.points[i];
     // Neighbours often lie on the same face.
-    const bool is_new = i == 0 || point.voxel != group.points[i - 1]->voxel || point.face != group.points[i - 1]->face;
+    const bool is_new = last == nullptr || point.voxel != last->voxel || point.face != last->face;
+    last = &point;
     if (is_new) levels = corner_levels(reader, *types_, point.voxel, point.face);
     openness[i] = 1.0F - level_at(levels, point.voxel, point.face, point.position) / 3.0F;
   }
@@ -191,7 +200,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
 std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openness) const {
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
-  rays.active = group.surfaces;
+  rays.active = group.unknown;
   rays.max_t.fill(options_.occlusion_distance / voxels_per_cell(group.placed));
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
@@ -199,7 +208,9 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
     const std::uint32_t blocked = view_->any_hits(group.placed, rays);
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
-  for (std::size_t i = 0; i < group.size; ++i) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+  for (std::size_t i = 0; i < group.size; ++i) {
+    if ((group.unknown >> i & 1U) != 0) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+  }
   return std::int64_t{count} * std::popcount(rays.active);
 }
 

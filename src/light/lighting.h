@@ -30,6 +30,7 @@ struct SurfacePoint {
   Direction face = Direction::PosX;
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
+  float openness = -1.0F;   ///< 0 to 1 where it is known, whatever the options' way to find it; less than 0: it is not
 };
 
 /// The reference model of light: a sun with shadows, an ambient term with occlusion, and what voxels emit.

@@ -1,5 +1,6 @@
 #include <quoin/render/cpu_renderer.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <mutex>
@@ -9,6 +10,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "render/impostor_pass.h"
+#include "render/impostor_shelf.h"
 #include "render/tile.h"
 
 namespace quoin {
@@ -100,11 +103,55 @@ struct CpuRenderer::Impl {
     return selected;
   }
 
+  // The impostors of the far ones among the selected, which then stay whole where they are traced: shadows onto what
+  // an impostor shows are those of its voxels.
+  std::vector<FarInstance> take_impostors(std::span<SelectedInstance> selected, const RenderOptions& options) {
+    std::vector<const PlacedGrid*> placed;
+    std::vector<SelectedInstance*> far;
+    auto next = tracer.placed().begin();
+    for (SelectedInstance& choice : selected) {
+      if (choice.detail != Detail::Far) continue;
+      next = std::lower_bound(next, tracer.placed().end(), choice.instance,
+                              [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
+      if (next == tracer.placed().end()) break;
+      if (next->instance != choice.instance) continue;
+      placed.push_back(&*next);
+      far.push_back(&choice);
+    }
+    const std::vector<const Impostor*> taken =
+        impostors.take(scene->types, placed, options.threads, options.instructions);
+    std::vector<FarInstance> instances;
+    for (std::size_t i = 0; i < far.size(); ++i) {
+      if (taken[i] == nullptr) continue;
+      far[i]->halvings = 0;
+      instances.push_back({far[i]->instance, taken[i]});
+    }
+    return instances;
+  }
+
   const Scene* scene;
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
+  ImpostorShelf impostors;
 };
+
+namespace {
+
+// What a picture is taken of.
+struct Subject {
+  std::optional<SceneTracer> detailed;
+  std::optional<SceneView> view;
+  std::optional<ImpostorPass> impostors;
+
+  void leave_to_impostors(std::span<const FarInstance> far, const Camera& camera, const RenderOptions& options) {
+    if (far.empty()) return;
+    impostors.emplace(view->tracer(), far, camera, options.width, options.height);
+    view->leave_to_impostors(placed_of(view->tracer(), far));
+  }
+};
+
+}  // namespace
 
 CpuRenderer::CpuRenderer(const Scene& scene, bool hidden, Threads threads)
     : impl_(std::make_unique<Impl>(scene, hidden, threads)) {}
@@ -115,13 +162,16 @@ CpuRenderer::~CpuRenderer() = default;
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
-  const std::vector<SelectedInstance> selected = impl_->select(camera, options);
-  std::optional<SceneTracer> detailed;
-  if (options.detail) detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
-  const SceneView view(detailed ? *detailed : impl_->tracer, camera.position, options.instructions);
+  std::vector<SelectedInstance> selected = impl_->select(camera, options);
+  const std::vector<FarInstance> far = impl_->take_impostors(selected, options);
+  Subject subject;
+  if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
+  subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position, options.instructions);
+  subject.leave_to_impostors(far, camera, options);
+  const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);
-  const TileContext context{&view, &rays, &lighting, &options};
+  const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
   const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;

@@ -9,23 +9,12 @@
 
 #include "core/srgb.h"
 #include "light/sky.h"
+#include "render/on_face.h"
 
 namespace quoin {
 namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
-// Secondary rays start at least this far inside the face that was hit, in voxels, so that they start in front of it
-// whatever the rounding.
-constexpr double kRim = 1e-6;
-
-// Where a ray meets a face, in the grid.
-DVec3 on_face(DVec3 position, IVec3 voxel, Direction face) {
-  const FaceFrame& frame = frame_of(face);
-  const DVec3 low(voxel);
-  DVec3 point = glm::clamp(position, low + kRim, low + (1.0 - kRim));
-  point[frame.axis] = low[frame.axis] + (frame.sign > 0 ? 1.0 : 0.0);
-  return point;
-}
 
 }  // namespace
 
@@ -66,6 +55,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
+  if (context_->impostors != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, hits, texels_);
   const std::uint32_t through_glass = lanes_through_glass(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -103,6 +93,10 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.placed = hits.placed[i];
   point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
+  if ((texels_.found >> lane & 1U) != 0) {
+    point.type = texels_.type[i];
+    point.openness = texels_.openness[i];
+  }
   add_point(point, pixel, weight);
 }
 
@@ -143,7 +137,7 @@ void Tile::light_points() {
       known = point.placed;
       reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);
     }
-    point.type = reader->get(point.voxel);
+    if (point.type == kAir) point.type = reader->get(point.voxel);
   }
   lit_.resize(points_.size());
   rays_ += context_->lighting->light(points_, lit_);

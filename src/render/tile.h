@@ -12,6 +12,7 @@
 #include "light/glass.h"
 #include "light/lighting.h"
 #include "render/camera_rays.h"
+#include "render/impostor_pass.h"
 
 namespace quoin {
 
@@ -21,12 +22,14 @@ struct TileContext {
   const CameraRays* camera = nullptr;
   const Lighting* lighting = nullptr;
   const RenderOptions* options = nullptr;
+  const ImpostorPass* impostors = nullptr;  ///< null when there are none
 };
 
 /// One square of a picture: its rays, what they hit, and the light of that.
 class Tile {
  public:
   static constexpr int kEdge = 32;  ///< pixels; a multiple of CameraRays::kBlock
+  static_assert(kEdge == ImpostorPass::kTile);
 
   /// `column` and `row` are of its upper left pixel.
   Tile(const TileContext& context, int column, int row);
@@ -71,6 +74,7 @@ class Tile {
   std::vector<Target> targets_;
   std::vector<Vec3> lit_;
   std::vector<GlassBody> glass_;
+  FarTexels texels_;  // of the present block
 };
 
 }  // namespace quoin

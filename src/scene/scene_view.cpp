@@ -45,7 +45,9 @@ struct SceneView::Impl {
   std::vector<Affine> grid_from_view;
   std::vector<Affine> view_from_grid;
   InstanceTree instances;  // in view space
-  bool is_alone = false;   // there is one instance
+  InstanceTree seen;       // of these, those that `first_hits` meets, where not all
+  bool sees_all = true;
+  bool is_alone = false;  // there is one instance
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
@@ -92,11 +94,19 @@ const SceneTracer& SceneView::tracer() const {
   return *impl_->tracer;
 }
 
+void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
+  if (placed.empty()) return;
+  std::vector<DBox> boxes = impl_->sees_all ? impl_->instances.boxes() : impl_->seen.boxes();
+  for (const std::int32_t i : placed) boxes[static_cast<std::size_t>(i)] = DBox{};
+  impl_->seen = InstanceTree(std::move(boxes));
+  impl_->sees_all = false;
+}
+
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
   RayPacket rays;
   hits.grids.hit = hits.grids.starts_inside = 0;
-  if (impl_->is_alone) {
+  if (impl_->is_alone && impl_->sees_all) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
     quoin::first_hits(*placed[0].opaque, rays, hits.grids, impl_->instructions);
     hits.placed.fill(0);
@@ -106,7 +116,8 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
   RayInterval interval = interval_of(left);
   PacketHits found;
-  impl_->instances.visit(interval, [&](std::size_t i) {
+  const InstanceTree& seen = impl_->sees_all ? impl_->instances : impl_->seen;
+  seen.visit(interval, [&](std::size_t i) {
     move(impl_->grid_from_view[i], left, rays);
     quoin::first_hits(*placed[i].opaque, rays, found, impl_->instructions);
     if (found.hit == 0) return true;

@@ -97,6 +97,10 @@ class SceneView {
 
   [[nodiscard]] const SceneTracer& tracer() const;
 
+  /// From now on `first_hits` passes through these (indices into SceneTracer::placed), which are drawn in another way.
+  /// They still stop other rays. Cost: O(instances * log instances).
+  void leave_to_impostors(std::span<const std::int32_t> placed);
+
   /// The nearest opaque voxel of all instances for each ray, in view space; of equally near ones the instance that
   /// comes first.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;

@@ -1,0 +1,146 @@
+#include <quoin/render/impostor_cache.h>
+
+#include <chrono>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+
+namespace quoin {
+namespace {
+
+struct Entry {
+  std::shared_ptr<const Impostor> impostor;  // null until the first is ready
+  std::uint64_t version = 0;                 // of the grid, when it was taken
+  std::uint64_t last_use = 0;
+  bool is_waiting = false;
+};
+
+}  // namespace
+
+struct ImpostorCache::Impl {
+  ImpostorCacheOptions options;
+  mutable std::mutex mutex;
+  std::map<GridHandle, Entry> entries;
+  std::deque<GridHandle> waiting;
+  ImpostorCacheStatistics statistics;
+  std::uint64_t round = 0;  // of build_some
+
+  std::optional<GridHandle> take_waiting() {
+    const std::lock_guard lock(mutex);
+    if (waiting.empty()) return std::nullopt;
+    const GridHandle next = waiting.front();
+    waiting.pop_front();
+    return next;
+  }
+
+  void drop(std::map<GridHandle, Entry>::iterator entry) {
+    if (entry->second.impostor != nullptr) --statistics.held;
+    entries.erase(entry);
+  }
+
+  // Makes room for one more by dropping what was not used since `used_before`; whether that was possible.
+  bool make_room(std::uint64_t used_before) {
+    while ((statistics.held + 1) * Impostor::kBytes > options.most_bytes) {
+      auto oldest = entries.end();
+      for (auto each = entries.begin(); each != entries.end(); ++each) {
+        if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before)
+          continue;
+        if (oldest == entries.end() || each->second.last_use < oldest->second.last_use) oldest = each;
+      }
+      if (oldest == entries.end()) return false;
+      ++statistics.dropped;
+      drop(oldest);
+    }
+    return true;
+  }
+
+  void forget(GridHandle grid) {
+    const std::lock_guard lock(mutex);
+    if (const auto entry = entries.find(grid); entry != entries.end()) drop(entry);
+  }
+
+  // Whether the grid is still to be built. Where there is no room it is forgotten until it is asked for again.
+  bool has_room(GridHandle grid) {
+    const std::lock_guard lock(mutex);
+    const auto entry = entries.find(grid);
+    if (entry == entries.end()) return false;
+    if (entry->second.impostor != nullptr || make_room(entry->second.last_use)) return true;
+    entries.erase(entry);
+    return false;
+  }
+
+  void put(GridHandle grid, std::uint64_t version, std::shared_ptr<const Impostor> made) {
+    const std::lock_guard lock(mutex);
+    Entry& entry = entries[grid];
+    ++statistics.built;
+    statistics.held += entry.impostor == nullptr;
+    entry = {std::move(made), version, entry.last_use, false};
+  }
+
+  void forget_missing(const Scene& scene) {
+    const std::lock_guard lock(mutex);
+    for (auto each = entries.begin(); each != entries.end();) {
+      const auto entry = each++;
+      if (!entry->second.is_waiting && scene.grids().find(entry->first) == nullptr) drop(entry);
+    }
+    ++round;
+  }
+
+  void build(const Scene& scene, GridHandle handle) {
+    const SceneGrid* grid = scene.grids().find(handle);
+    if (grid == nullptr) return forget(handle);
+    if (!has_room(handle)) return;
+    put(handle, grid->grid.version(), std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
+  }
+};
+
+ImpostorCache::ImpostorCache(const ImpostorCacheOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->options = options;
+}
+ImpostorCache::ImpostorCache(ImpostorCache&&) noexcept = default;
+ImpostorCache& ImpostorCache::operator=(ImpostorCache&&) noexcept = default;
+ImpostorCache::~ImpostorCache() = default;
+
+std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHandle grid) {
+  const SceneGrid* named = scene.grids().find(grid);
+  if (named == nullptr) return nullptr;
+  const std::uint64_t version = named->grid.version();
+  const std::lock_guard lock(impl_->mutex);
+  Entry& entry = impl_->entries[grid];
+  entry.last_use = impl_->round;
+  if ((entry.impostor == nullptr || entry.version != version) && !entry.is_waiting) {
+    entry.is_waiting = true;
+    impl_->waiting.push_back(grid);
+  }
+  return entry.impostor;
+}
+
+std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds, Threads threads) {
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  const auto is_over = [&] { return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds); };
+  const std::size_t count = resolve(threads);
+  parallel_for(count, threads, [&](std::size_t i) {
+    bool is_first = i == 0;
+    while (is_first || !is_over()) {
+      is_first = false;
+      const std::optional<GridHandle> next = impl_->take_waiting();
+      if (!next) return;
+      impl_->build(scene, *next);
+    }
+  });
+  impl_->forget_missing(scene);
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->waiting.size();
+}
+
+ImpostorCacheStatistics ImpostorCache::statistics() const {
+  const std::lock_guard lock(impl_->mutex);
+  ImpostorCacheStatistics statistics = impl_->statistics;
+  statistics.bytes = statistics.held * Impostor::kBytes;
+  statistics.waiting = impl_->waiting.size();
+  return statistics;
+}
+
+}  // namespace quoin

@@ -1,0 +1,109 @@
+#include <quoin/render/impostor_cache.h>
+
+#include <algorithm>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "bench/workloads.h"
+
+namespace quoin {
+namespace {
+
+struct World {
+  Scene scene;
+  std::vector<GridHandle> grids;
+  explicit World(int count) {
+    scene.types = workloads::three_types();
+    for (int i = 0; i < count; ++i) {
+      SceneGrid grid;
+      grid.grid.fill_box({0, 0, 0}, {i, 2, 3}, 1);
+      grids.push_back(scene.add_grid(std::move(grid)));
+    }
+  }
+};
+
+bool shows(const Impostor& impostor, VoxelType type) {
+  const Snapshot snapshot = impostor.snapshot(0);
+  return std::find(snapshot.types.begin(), snapshot.types.end(), type) != snapshot.types.end();
+}
+
+TEST(ImpostorCache, BuildsWhatIsAskedForSomeAtATime) {
+  World world(3);
+  ImpostorCache cache;
+  for (const GridHandle grid : world.grids) EXPECT_EQ(cache.find(world.scene, grid), nullptr);
+  for (const GridHandle grid : world.grids) EXPECT_EQ(cache.find(world.scene, grid), nullptr) << "asked for once";
+  EXPECT_EQ(cache.statistics().waiting, 3U);
+  EXPECT_EQ(cache.build_some(world.scene, 0.0), 2U) << "one at least";
+  EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
+  EXPECT_EQ(cache.build_some(world.scene, 100.0, {2}), 0U);
+  EXPECT_NE(cache.find(world.scene, world.grids[2]), nullptr);
+  EXPECT_EQ(cache.statistics().built, 3U);
+  EXPECT_EQ(cache.statistics().held, 3U);
+  EXPECT_EQ(cache.find(world.scene, GridHandle{}), nullptr);
+}
+
+TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
+  World world(2);
+  ImpostorCache cache;
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  const auto old = cache.find(world.scene, world.grids[0]);
+  ASSERT_NE(old, nullptr);
+  world.scene.grids()[world.grids[0]].grid.fill_box({0, 0, 0}, {5, 5, 5}, 2);
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), old);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  const auto renewed = cache.find(world.scene, world.grids[0]);
+  ASSERT_NE(renewed, nullptr);
+  EXPECT_NE(renewed, old);
+  EXPECT_TRUE(shows(*renewed, 2));
+  EXPECT_FALSE(shows(*old, 2)) << "whoever holds it still has it";
+  EXPECT_EQ(cache.statistics().held, 1U);
+  EXPECT_EQ(cache.statistics().bytes, Impostor::kBytes);
+}
+
+TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
+  World world(3);
+  ImpostorCache cache({2 * Impostor::kBytes});
+  for (const std::size_t i : {0U, 1U}) {
+    EXPECT_EQ(cache.find(world.scene, world.grids[i]), nullptr);
+    EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  }
+  EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  EXPECT_EQ(cache.find(world.scene, world.grids[2]), nullptr);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  EXPECT_EQ(cache.statistics().held, 2U);
+  EXPECT_EQ(cache.statistics().dropped, 1U);
+  EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_NE(cache.find(world.scene, world.grids[2]), nullptr);
+  EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
+}
+
+TEST(ImpostorCache, ForgetsGridsThatAreGone) {
+  World world(2);
+  ImpostorCache cache;
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
+  world.scene.remove_grid(world.grids[0]);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.statistics().built, 0U);
+}
+
+TEST(ImpostorCache, MayBeAskedWhileAnotherThreadBuilds) {
+  World world(8);
+  ImpostorCache cache;
+  for (const GridHandle grid : world.grids) EXPECT_EQ(cache.find(world.scene, grid), nullptr);
+  std::thread builder([&] { EXPECT_EQ(cache.build_some(world.scene, 100.0, {2}), 0U); });
+  for (std::size_t ready = 0; ready < world.grids.size();) {
+    ready = 0;
+    for (const GridHandle grid : world.grids) ready += cache.find(world.scene, grid) != nullptr;
+  }
+  builder.join();
+  EXPECT_EQ(cache.statistics().built, 8U);
+}
+
+}  // namespace
+}  // namespace quoin
