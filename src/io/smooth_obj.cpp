@@ -80,11 +80,7 @@ Result<std::uint64_t> write_checked(std::span<const SmoothPart> parts, const std
 
 Result<std::uint64_t> write_smooth_obj(std::span<const SmoothPart> parts, const std::filesystem::path& path,
                                        const SmoothFileOptions& options, const Progress& progress) {
-  const Status sound = check_parts(parts);
-  auto bytes = sound ? write_checked(parts, path, options.occlusion, progress)
-                     : Result<std::uint64_t>(tl::unexpected<Error>(sound.error()));
-  if (!bytes && bytes.error().path.empty()) bytes.error().path = path.string();
-  return bytes;
+  return write_sound_parts(parts, path, [&] { return write_checked(parts, path, options.occlusion, progress); });
 }
 
 }  // namespace quoin

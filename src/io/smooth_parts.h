@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <span>
@@ -14,6 +15,16 @@ namespace quoin {
 
 /// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see smooth_files.h).
 [[nodiscard]] Status check_parts(std::span<const SmoothPart> parts);
+
+/// What `write()` answers, once the parts are found sound; every error names the file.
+template <class Write>
+[[nodiscard]] Result<std::uint64_t> write_sound_parts(std::span<const SmoothPart> parts,
+                                                      const std::filesystem::path& path, Write write) {
+  const Status sound = check_parts(parts);
+  Result<std::uint64_t> bytes = sound ? write() : Result<std::uint64_t>(tl::unexpected<Error>(sound.error()));
+  if (!bytes && bytes.error().path.empty()) bytes.error().path = path.string();
+  return bytes;
+}
 
 /// Whether anything of the part is drawn.
 [[nodiscard]] inline bool is_drawn(const SmoothPart& part) {

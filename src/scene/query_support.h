@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <quoin/core/vec.h>
-#include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/scene_query.h>
 
 #include "scene/scene_tracer_impl.h"
 
@@ -28,9 +28,7 @@ inline constexpr double kTouch = 1e-9;
 // Into the space of a placed grid's voxels.
 struct ToGrid {
   explicit ToGrid(const PlacedGrid& placed)
-      : axes(glm::transpose(placed.world_axes) / placed.voxel_size),
-        position(placed.position),
-        pivot(placed.grid->pivot) {}
+      : axes(glm::transpose(placed.world_axes) / placed.voxel_size), position(placed.position), pivot(placed.pivot) {}
   // The difference of two far positions is taken first: it is small, and mostly exact.
   [[nodiscard]] DVec3 point(DVec3 in_world) const { return axes * (in_world - position) + pivot; }
 
@@ -54,6 +52,19 @@ inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
 inline DQuat unit_rotation(DQuat q) {
   const double length = std::sqrt(glm::dot(q, q));
   return length > 0.0 && std::isfinite(length) ? q / length : DQuat(1.0, 0.0, 0.0, 0.0);
+}
+
+/// Whether a box is one: finite, and larger than nothing.
+inline bool is_box(const OrientedBox& box) {
+  const DVec3 half = box.half_size;
+  return is_finite(box.centre) && is_finite(half) && half.x > 0.0 && half.y > 0.0 && half.z > 0.0;
+}
+
+/// A box's half edges in the world, as columns.
+inline glm::dmat3 half_axes_of(const OrientedBox& box) {
+  glm::dmat3 half_axes = glm::mat3_cast(unit_rotation(box.rotation));
+  for (int axis = 0; axis < 3; ++axis) half_axes[axis] *= box.half_size[axis];
+  return half_axes;
 }
 
 /// Whether a moving body is stopped by voxels of a type; one that is not registered counts.

@@ -84,7 +84,7 @@ std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegi
   std::vector<SceneOverlap> found;
   for (const std::size_t i : near) {
     const PlacedGrid& placed = tracer.placed()[i];
-    const auto voxel = first_overlap(placed.grid->grid, types, shape_of(placed));
+    const auto voxel = first_overlap(*placed.voxels, types, shape_of(placed));
     if (voxel) found.push_back({placed.instance, *voxel});
   }
   return found;
@@ -113,7 +113,7 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_w
   });
   if (!best) return std::nullopt;
   const PlacedGrid& placed = tracer.placed()[best_placed];
-  return SceneHit{placed.instance,    best->voxel, placed.grid->grid.get(best->voxel),
+  return SceneHit{placed.instance,    best->voxel, placed.voxels->get(best->voxel),
                   best->face,         best->t,     ray.origin + best->t * ray.direction,
                   best->starts_inside};
 }
@@ -144,10 +144,8 @@ std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistr
 }
 
 std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box) {
-  const DVec3 half = box.half_size;
-  if (!is_finite(box.centre) || !is_finite(half) || half.x <= 0.0 || half.y <= 0.0 || half.z <= 0.0) return {};
-  glm::dmat3 half_axes = glm::mat3_cast(unit_rotation(box.rotation));
-  for (int axis = 0; axis < 3; ++axis) half_axes[axis] *= half[axis];
+  if (!is_box(box)) return {};
+  const glm::dmat3 half_axes = half_axes_of(box);
   const DBox bounds = BoxInGrid(box.centre, half_axes).bounds();
   return overlaps_of(tracer, types, bounds, [&](const PlacedGrid& placed) {
     const ToGrid to_grid(placed);

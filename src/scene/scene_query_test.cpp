@@ -270,5 +270,31 @@ TEST(SceneQuery, TouchingIsNotOverlapping) {
   EXPECT_TRUE(overlaps(tracer, scene.types, {0.5, 5.5, 0.5}, 2.0).empty());
 }
 
+TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
+  Scene scene;
+  scene.types = stone_and_ghost();
+  SceneGrid grid;
+  grid.pivot = DVec3(5.0, 2.0, 1.0);
+  grid.grid.fill_box({0, 0, 0}, {31, 31, 31}, 1);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  instance.position = DVec3(100.0, 0.0, 0.0);
+  const InstanceHandle handle = scene.add_instance(instance);
+  const SceneTracer full(scene);
+  const SelectedInstance selected{handle, Detail::Mid, 1, 0.0};
+  const SceneTracer halved = full.with_detail({&selected, 1});
+  ASSERT_EQ(halved.placed().at(0).halvings, 1);
+  const Ray ray{{110.3, 200.0, 10.2}, {0.0, -1.0, 0.0}};
+  const auto expected = first_hit(full, ray);
+  const auto hit = first_hit(halved, ray);
+  ASSERT_TRUE(expected.has_value() && hit.has_value());
+  EXPECT_NEAR(hit->distance, expected->distance, 1e-9);
+  EXPECT_EQ(hit->type, 1);
+  EXPECT_EQ(hit->voxel, expected->voxel / 2);
+  const OrientedBox box{{110.3, 40.0, 10.2}, DVec3(0.5), {1, 0, 0, 0}};
+  EXPECT_TRUE(overlaps(halved, scene.types, box).empty());
+  EXPECT_EQ(overlaps(halved, scene.types, {{110.3, 29.0, 10.2}, DVec3(0.5), {1, 0, 0, 0}}).size(), 1U);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -177,19 +177,12 @@ Moving moving_in_grid(const PlacedGrid& placed, const OrientedBox& box, const gl
   return moving;
 }
 
-bool can_move(const OrientedBox& box, DVec3 displacement) {
-  const DVec3 half = box.half_size;
-  return is_finite(box.centre) && is_finite(half) && is_finite(displacement) && half.x > 0.0 && half.y > 0.0 &&
-         half.z > 0.0;
-}
-
 }  // namespace
 
 std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
                                   DVec3 displacement) {
-  if (!can_move(box, displacement)) return std::nullopt;
-  glm::dmat3 half_axes = glm::mat3_cast(unit_rotation(box.rotation));
-  for (int axis = 0; axis < 3; ++axis) half_axes[axis] *= box.half_size[axis];
+  if (!is_box(box) || !is_finite(displacement)) return std::nullopt;
+  const glm::dmat3 half_axes = half_axes_of(box);
   const DVec3 reach = reach_of_axes(half_axes);
   const DVec3 end = box.centre + displacement;
   std::vector<std::size_t> near;
@@ -200,7 +193,7 @@ std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry
   for (const std::size_t i : near) {
     const PlacedGrid& placed = tracer.placed()[i];
     const Moving moving = moving_in_grid(placed, box, half_axes, displacement);
-    GridSweep sweep(placed.grid->grid, types, moving, first ? first->fraction : 1.0);
+    GridSweep sweep(*placed.voxels, types, moving, first ? first->fraction : 1.0);
     sweep.run();
     const Contact& best = sweep.best();
     if (best.axis < 0) continue;

@@ -15,7 +15,7 @@ namespace quoin {
 /// Where a ray meets a scene.
 struct SceneHit {
   InstanceHandle instance;
-  IVec3 voxel{0};  ///< in the instance's grid
+  IVec3 voxel{0};  ///< in the grid that is traced: the instance's own, unless the tracer has halved it
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit
   double distance = 0.0;             ///< in lengths of the ray's direction: world units for a unit one
