@@ -146,7 +146,7 @@ struct Subject {
 
   void leave_to_impostors(std::span<const FarInstance> far, const Camera& camera, const RenderOptions& options) {
     if (far.empty()) return;
-    impostors.emplace(view->tracer(), far, camera, options.width, options.height);
+    impostors.emplace(view->tracer(), far, camera, options.width, options.height, options.instructions);
     view->leave_to_impostors(placed_of(view->tracer(), far));
   }
 };

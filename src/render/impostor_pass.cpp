@@ -1,17 +1,25 @@
 #include "render/impostor_pass.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "light/corner_light.h"
+
 namespace quoin {
 namespace {
 
-constexpr int kBlock = 4;
+constexpr int kBlock = CameraRays::kBlock;
+constexpr std::size_t kLanes = RayPacket::kSize;
 constexpr double kRoom = 1.0 + 1e-6;  // for rounding
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Views whose faces are drawn, by level: more make fewer holes and cost more.
+constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 8, 8, 8};
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
@@ -33,6 +41,29 @@ int clamped(double pixel, int size) {
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(size)));
 }
 
+raster::Vector single(DVec3 v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
+// The nearest views to a direction, as bits. Requires: it is finite and not 0.
+std::uint32_t nearest_views(DVec3 direction, int count) {
+  const DVec3 size = glm::abs(direction);
+  direction /= std::max({size.x, size.y, size.z});
+  std::array<std::pair<double, int>, kImpostorViews> order;
+  for (int i = 0; i < kImpostorViews; ++i) order[static_cast<std::size_t>(i)] = {-glm::dot(direction, impostor_view(i)), i};
+  std::partial_sort(order.begin(), order.begin() + count, order.end());
+  std::uint32_t views = 0;
+  for (int i = 0; i < count; ++i) views |= 1U << order[static_cast<std::size_t>(i)].second;
+  return views;
+}
+
+// The coarsest level with as many texels as the content spans pixels.
+int level_for(double diameter_pixels) {
+  int level = 0;
+  while (level + 1 < ImpostorFaces::kLevels && (Impostor::kEdge >> (level + 1)) >= 2.0 * diameter_pixels) ++level;
+  return level;
+}
+
 }  // namespace
 
 std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far) {
@@ -44,69 +75,100 @@ std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const F
   return indices;
 }
 
-// The camera, with distances on the screen in pixels.
+float openness_of(std::uint8_t occlusion, IVec3 voxel, Direction face, DVec3 position_in_grid) {
+  if (occlusion == 0) return 1.0F;
+  return 1.0F - level_at(unpacked_levels(occlusion), voxel, face, position_in_grid) / 3.0F;
+}
+
+// What of a content's sphere decides whether and where it is drawn.
 struct ImpostorPass::Screen {
-  Camera camera;
-  int width = 0;
-  int height = 0;
-  double focal = 0.0;  // perspective: pixels at distance 1; orthographic: pixels a world unit
-
-  Screen(const Camera& of_camera, int picture_width, int picture_height)
-      : camera(of_camera), width(picture_width), height(picture_height) {
-    const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-    focal = height / (is_perspective ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height);
-  }
-
-  // Whether the sphere around `centre` (in view space) is to be drawn, and where on the screen it may lie.
-  bool find_area(DVec3 centre, double radius, Area& area) const {
-    const DVec3 seen{glm::dot(centre, camera.right), -glm::dot(centre, camera.up), glm::dot(centre, camera.forward)};
-    if (!is_finite(seen) || !(seen.z > 0.0) || !std::isfinite(radius)) return false;
-    const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-    if (!(radius * focal / (is_perspective ? seen.z : 1.0) >= 1.0)) return false;
-    if (is_perspective && seen.z <= radius) {  // around the camera's plane: it may be anywhere
-      area = {0, 0, width, height};
-      return true;
-    }
-    const auto reach = [&](double across) {
-      return is_perspective ? upper_tangent(across, seen.z, radius) : across + radius;
-    };
-    area.left = clamped(std::floor(0.5 * width - reach(-seen.x) * focal), width);
-    area.right = clamped(std::ceil(0.5 * width + reach(seen.x) * focal), width);
-    area.top = clamped(std::floor(0.5 * height - reach(-seen.y) * focal), height);
-    area.bottom = clamped(std::ceil(0.5 * height + reach(seen.y) * focal), height);
-    return area.left < area.right && area.top < area.bottom;
-  }
+  DVec3 seen{0.0};  // the centre: right, down, forward
+  double radius = 0.0;
+  double diameter = 0.0;  // pixels
 };
 
 ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
-                           int height)
-    : across_((width + kTile - 1) / kTile), down_((height + kTile - 1) / kTile) {
-  const Screen screen(camera, width, height);
+                           int height, InstructionSet instructions)
+    : camera_(camera),
+      is_perspective_(camera.projection == Camera::Projection::Perspective),
+      width_(width),
+      height_(height),
+      focal_(height / (is_perspective_ ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height)),
+      across_((width + kTile - 1) / kTile),
+      down_((height + kTile - 1) / kTile),
+      draw_(raster::draw_of(instructions)) {
   const std::vector<PlacedGrid>& placed = tracer.placed();
   for (const FarInstance& instance : far) {
     const std::int32_t index = index_of(placed, instance.instance);
     if (index < 0 || instance.impostor == nullptr) continue;
-    add(screen, placed[static_cast<std::size_t>(index)], index, *instance.impostor);
+    add(placed[static_cast<std::size_t>(index)], index, *instance.impostor);
   }
   std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.near_t < b.near_t; });
   fill_bins();
 }
 
-void ImpostorPass::add(const Screen& screen, const PlacedGrid& placed, std::int32_t index, const Impostor& impostor) {
+bool ImpostorPass::find_area(const Screen& screen, Area& area) const {
+  const DVec3 seen = screen.seen;
+  const double radius = screen.radius;
+  if (!is_finite(seen) || !(seen.z > 0.0) || !std::isfinite(radius) || !(0.5 * screen.diameter >= 1.0)) return false;
+  if (is_perspective_ && seen.z <= radius) {  // around the camera's plane: it may be anywhere
+    area = {0, 0, width_, height_};
+    return true;
+  }
+  const auto reach = [&](double across) {
+    return is_perspective_ ? upper_tangent(across, seen.z, radius) : across + radius;
+  };
+  area.left = clamped(std::floor(0.5 * width_ - reach(-seen.x) * focal_), width_);
+  area.right = clamped(std::ceil(0.5 * width_ + reach(seen.x) * focal_), width_);
+  area.top = clamped(std::floor(0.5 * height_ - reach(-seen.y) * focal_), height_);
+  area.bottom = clamped(std::ceil(0.5 * height_ + reach(seen.y) * focal_), height_);
+  return area.left < area.right && area.top < area.bottom;
+}
+
+void ImpostorPass::add(const PlacedGrid& placed, std::int32_t index, const Impostor& impostor) {
   if (impostor.is_empty() || placed.halvings != 0) return;
   const ContentSphere& content = impostor.content();
-  const DVec3 position = placed.position - screen.camera.position;
+  const DVec3 position = placed.position - camera_.position;
   const DVec3 centre = position + placed.world_axes * (content.centre - placed.pivot) * placed.voxel_size;
-  const double radius = content.radius * placed.voxel_size;
-  Area area;
-  if (!screen.find_area(centre, radius, area)) return;
-  const bool is_perspective = screen.camera.projection == Camera::Projection::Perspective;
-  const glm::dmat3 axes = glm::transpose(placed.world_axes) / placed.voxel_size;
-  const DVec3 towards_camera = axes * (is_perspective ? -centre : -screen.camera.forward);
+  const double size = placed.voxel_size;
+  Screen screen;
+  screen.seen = {glm::dot(centre, camera_.right), -glm::dot(centre, camera_.up), glm::dot(centre, camera_.forward)};
+  screen.radius = content.radius * size;
+  screen.diameter = 2.0 * screen.radius * focal_ / (is_perspective_ ? screen.seen.z : 1.0);
+  Drawn drawn;
+  if (!find_area(screen, drawn.area)) return;
+  const glm::dmat3 axes = glm::transpose(placed.world_axes);
+  const DVec3 towards_camera = axes * (is_perspective_ ? -centre : -camera_.forward);
   if (!is_finite(towards_camera) || towards_camera == DVec3(0.0)) return;
-  const double distance = is_perspective ? glm::length(centre) : glm::dot(centre, screen.camera.forward);
-  drawn_.push_back({index, &impostor, area, distance - radius * kRoom, centre, radius * radius * kRoom, axes,
-                    placed.pivot - axes * position, ImpostorSearch(impostor, towards_camera)});
+  const auto level = static_cast<std::size_t>(level_for(screen.diameter));
+  drawn.placed = index;
+  drawn.faces = &impostor.faces();
+  drawn.near_t = (is_perspective_ ? glm::length(centre) : screen.seen.z) - screen.radius * kRoom;
+  drawn.voxel_size = size;
+  drawn.seen_centre = screen.seen / size;
+  drawn.right = axes * camera_.right, drawn.down = axes * -camera_.up, drawn.forward = axes * camera_.forward;
+  drawn.level = &impostor.faces().levels[level];
+  drawn.views = nearest_views(towards_camera, kViews[level]);
+  drawn_.push_back(drawn);
+}
+
+void ImpostorPass::aim(const Drawn& drawn, double x, double y, raster::Job& job) const {
+  const DVec3 seen = drawn.seen_centre;
+  const double scale = is_perspective_ ? focal_ : focal_ * drawn.voxel_size;  // pixels a voxel, at distance 1
+  const double step = (is_perspective_ ? seen.z : 1.0) / scale;               // voxels a pixel, at the centre
+  job.level = drawn.level;
+  job.views = drawn.views;
+  job.point.at = single(drawn.right * (x * step - seen.x) + drawn.down * (y * step - seen.y));
+  job.point.x = single(drawn.right * step), job.point.y = single(drawn.down * step);
+  const double turn = is_perspective_ ? 1.0 / focal_ : 0.0;
+  job.direction.at = single(drawn.forward + drawn.right * (x * turn) + drawn.down * (y * turn));
+  job.direction.x = single(drawn.right * turn), job.direction.y = single(drawn.down * turn);
+  job.least_depth = static_cast<float>(-seen.z);
+  job.across = single(drawn.right * scale), job.down = single(drawn.down * scale);
+  job.across_at = static_cast<float>(seen.x * scale), job.down_at = static_cast<float>(seen.y * scale);
+  job.ahead = single(is_perspective_ ? drawn.forward : DVec3(0.0));
+  job.ahead_at = is_perspective_ ? static_cast<float>(seen.z) : 1.0F;
+  job.column_at = static_cast<float>(-x), job.row_at = static_cast<float>(-y);
 }
 
 void ImpostorPass::fill_bins() {
@@ -125,47 +187,107 @@ const std::vector<std::uint32_t>& ImpostorPass::bin_of(int column, int row) cons
   return bins_[static_cast<std::size_t>(row / kTile * across_ + column / kTile)];
 }
 
-void ImpostorPass::find(int column, int row, const RayPacket& rays_in_view, SceneHits& hits, FarTexels& texels) const {
-  texels.found = 0;
+void ImpostorPass::draw(int column, int row, PixelPoint point, FarPixels& pixels) const {
+  pixels.t.fill(kInfinity);
+  pixels.furthest.fill(kInfinity);
+  const double x = column + point.x - 0.5 * width_;
+  const double y = row + point.y - 0.5 * height_;
+  find_lengths(x, y, pixels);
+  raster::Job job;
   for (const std::uint32_t i : bin_of(column, row)) {
     const Drawn& drawn = drawn_[i];
     const Area& area = drawn.area;
-    if (area.left >= column + kBlock || area.right <= column || area.top >= row + kBlock || area.bottom <= row) {
-      continue;
-    }
-    find_one(drawn, rays_in_view, hits, texels);
+    job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, kTile);
+    job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, kTile);
+    if (is_hidden(drawn, job, pixels)) continue;
+    aim(drawn, x, y, job);
+    draw_one(static_cast<std::int32_t>(i), job, pixels);
   }
 }
 
-void ImpostorPass::find_one(const Drawn& drawn, const RayPacket& rays, SceneHits& hits, FarTexels& texels) {
+void ImpostorPass::find_lengths(double x, double y, FarPixels& pixels) const {
+  if (!is_perspective_) return pixels.length.fill(1.0);
+  const double inverse = 1.0 / focal_;
+  for (int row = 0; row < kTile; ++row) {
+    for (int column = 0; column < kTile; ++column) {
+      const double across = (x + column) * inverse;
+      const double down = (y + row) * inverse;
+      pixels.length[raster::index_of(column, row)] = std::sqrt(1.0 + across * across + down * down);
+    }
+  }
+}
+
+template <class Visit>
+void ImpostorPass::for_each_block(const raster::Job& job, Visit visit) {
+  for (int y = job.top / kBlock; y <= (job.bottom - 1) / kBlock; ++y) {
+    for (int x = job.left / kBlock; x <= (job.right - 1) / kBlock; ++x) {
+      visit(raster::index_of(x * kBlock, y * kBlock));
+    }
+  }
+}
+
+bool ImpostorPass::is_hidden(const Drawn& drawn, const raster::Job& job, const FarPixels& pixels) {
+  bool is_hidden = true;
+  for_each_block(job, [&](std::size_t first) { is_hidden &= pixels.furthest[first / kLanes] < drawn.near_t; });
+  return is_hidden;
+}
+
+void ImpostorPass::draw_one(std::int32_t index, const raster::Job& job, FarPixels& pixels) const {
+  const Drawn& drawn = drawn_[static_cast<std::size_t>(index)];
+  const double size = drawn.voxel_size;
+  const double centre = drawn.seen_centre.z;
+  // A little more, so that it is the comparison of t, below, that decides.
+  constexpr double kMore = 1e-3;
+  for_each_block(job, [&](std::size_t first) {
+    for (std::size_t i = first; i < first + kLanes; ++i) {
+      pixels.canvas.depth[i] = static_cast<float>(pixels.t[i] / (pixels.length[i] * size) - centre + kMore);
+      pixels.canvas.face[i] = -1;
+    }
+  });
+  draw_(job, pixels.canvas);
+  for_each_block(job, [&](std::size_t first) {
+    double furthest = 0.0;
+    for (std::size_t i = first; i < first + kLanes; ++i) {
+      const double t = (centre + static_cast<double>(pixels.canvas.depth[i])) * size * pixels.length[i];
+      const bool is_met = pixels.canvas.face[i] >= 0;
+      if (is_met && (t < pixels.t[i] || (t == pixels.t[i] && drawn.placed < placed_at(pixels, i)))) {
+        pixels.t[i] = t;
+        pixels.drawn[i] = index;
+        pixels.face[i] = pixels.canvas.face[i];
+      }
+      furthest = std::max(furthest, pixels.t[i]);
+    }
+    pixels.furthest[first / kLanes] = furthest;
+  });
+}
+
+std::int32_t ImpostorPass::placed_at(const FarPixels& pixels, std::size_t i) const {
+  return drawn_[static_cast<std::size_t>(pixels.drawn[i])].placed;
+}
+
+void ImpostorPass::find(int column, int row, const RayPacket& rays, const FarPixels& pixels, SceneHits& hits,
+                        FarFaces& faces) const {
+  faces.found = 0;
+  const std::size_t first = raster::index_of(column % kTile, row % kTile);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
     const std::uint32_t bit = 1U << lane;
+    const double t = pixels.t[first + i];
+    if (t == kInfinity) continue;
+    const Drawn& drawn = drawn_[static_cast<std::size_t>(pixels.drawn[first + i])];
     const bool is_hit = (hits.grids.hit & bit) != 0;
-    const double max_t = is_hit ? hits.grids.t[i] : rays.max_t[i];
-    if (max_t < drawn.near_t) continue;
-    const Ray ray = rays.ray(lane);
-    const DVec3 to_centre = drawn.centre - ray.origin;
-    const DVec3 beside = to_centre - ray.direction * glm::dot(to_centre, ray.direction);
-    if (glm::dot(beside, beside) > drawn.radius_squared) continue;
-    const DVec3 direction = drawn.axes * ray.direction;
-    const DVec3 origin = drawn.axes * ray.origin + drawn.offset;
-    FoundTexel found;
-    if (!drawn.search.find(origin, direction, max_t, found)) continue;
-    if (is_hit && found.t == max_t && hits.placed[i] < drawn.placed) continue;
-    const Snapshot snapshot = drawn.impostor->snapshot(found.view);
-    const auto texel = static_cast<std::size_t>(found.texel);
-    const Direction face = snapshot.faces[texel];
-    const DVec3 inside = origin + direction * found.t - 0.5 * DVec3(normal_of(face));
-    const DVec3 voxel =
-        glm::clamp(glm::floor(inside), DVec3(drawn.impostor->box().min), DVec3(drawn.impostor->box().max) - 1.0);
-    hits.grids.set(lane, {IVec3(voxel), face, found.t, false});
+    if (is_hit ? hits.grids.t[i] < t || (hits.grids.t[i] == t && hits.placed[i] < drawn.placed) : rays.max_t[i] < t) {
+      continue;
+    }
+    const auto face = static_cast<std::uint32_t>(pixels.face[first + i]);
+    const ImpostorFaces::Face& shown = drawn.faces->faces[face];
+    hits.grids.set(lane, {drawn.faces->voxel_of(face), shown.direction, t, false});
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
-    texels.found |= bit;
-    texels.type[i] = snapshot.types[texel];
-    texels.openness[i] = 1.0F - static_cast<float>(snapshot.occlusion[texel]) / 255.0F;
+    faces.found |= bit;
+    faces.type[i] = shown.type;
+    faces.occlusion[i] = shown.occlusion;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -7,35 +8,51 @@
 #include <quoin/render/impostor.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render/impostor_search.h"
+#include "render/camera_rays.h"
+#include "render/impostor_raster.h"
 
 namespace quoin {
 
-/// Of the lanes whose bit is set, what an impostor's texel says beside what SceneHits hold.
-struct FarTexels {
+/// Of the lanes whose bit is set, what an impostor's face says beside what SceneHits hold.
+struct FarFaces {
   std::uint32_t found = 0;
   RayPacket::Lanes<VoxelType> type{};
-  RayPacket::Lanes<float> openness{};
+  RayPacket::Lanes<std::uint8_t> occlusion{};  ///< ImpostorFaces::Face
 };
 
-/// The indices of those far instances that a tracer holds, in SceneTracer::placed.
-[[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);
+/// 1 where the corners' levels at a point of a face are 0; 0 where they are 3.
+[[nodiscard]] float openness_of(std::uint8_t occlusion, IVec3 voxel, Direction face, DVec3 position_in_grid);
+
+/// What far instances show in the pixels of one tile: the nearest of them, in the order of raster::index_of.
+struct FarPixels {
+  std::array<double, raster::kPixels> t{};             ///< along the pixel's ray; infinite where there is none
+  std::array<std::int32_t, raster::kPixels> drawn{};   ///< ImpostorPass's
+  std::array<std::int32_t, raster::kPixels> face{};    ///< ImpostorFaces::faces
+  std::array<double, raster::kPixels> length{};        ///< of the way along a ray in which it goes 1 deeper
+  std::array<double, raster::kPixels / 16> furthest{}; ///< t of each 4x4 pixels
+  raster::Canvas canvas;
+};
 
 /// The far instances of one picture: which may show in which part of it, and what rays meet of them.
 class ImpostorPass {
  public:
-  static constexpr int kTile = 32;  ///< pixels; blocks of rays lie in one tile
+  static constexpr int kTile = raster::kTile;  ///< pixels; blocks of rays lie in one tile
 
   /// All arguments but the camera must outlive it. Cost: O(far instances + tiles that they touch).
   ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
-               int height);
+               int height, InstructionSet instructions = InstructionSet::Best);
 
   /// Whether anything may show in the tile from (`column`, `row`), multiples of kTile.
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
 
+  /// Draws what shows in that tile, of rays through `point` of each pixel. Cost: about 10 ns a face.
+  void draw(int column, int row, PixelPoint point, FarPixels& pixels) const;
+
   /// Puts what is nearer than `hits` into them: for the 4x4 pixels from (`column`, `row`), whose rays from the camera
   /// these are. Faces are as if traced; voxels are those behind the faces.
-  void find(int column, int row, const RayPacket& rays_in_view, SceneHits& hits, FarTexels& texels) const;
+  /// Requires: `pixels` are of the tile.
+  void find(int column, int row, const RayPacket& rays_in_view, const FarPixels& pixels, SceneHits& hits,
+            FarFaces& faces) const;
 
  private:
   // Pixels, `right` and `bottom` exclusive.
@@ -47,26 +64,48 @@ class ImpostorPass {
   };
   struct Drawn {
     std::int32_t placed = 0;
-    const Impostor* impostor = nullptr;
+    const ImpostorFaces* faces = nullptr;
     Area area;
-    double near_t = 0.0;  // nothing of it is nearer
-    DVec3 centre{0.0};    // of the sphere around it, in view space
-    double radius_squared = 0.0;
-    glm::dmat3 axes{1.0};
-    DVec3 offset{0.0};  // a point p of the view is axes * p + offset in the grid
-    ImpostorSearch search;
+    double near_t = 0.0;       // nothing of it is nearer
+    DVec3 seen_centre{0.0};    // of the content, in voxels: right, down, forward
+    double voxel_size = 1.0;
+    // The camera's axes in the grid's frame.
+    DVec3 right{0.0};
+    DVec3 down{0.0};
+    DVec3 forward{0.0};
+    const ImpostorFaces::Level* level = nullptr;
+    std::uint32_t views = 0;
   };
 
   struct Screen;
-  void add(const Screen& screen, const PlacedGrid& placed, std::int32_t index, const Impostor& impostor);
+  // Whether it is to be drawn, and where on the screen it may lie.
+  [[nodiscard]] bool find_area(const Screen& screen, Area& area) const;
+  void add(const PlacedGrid& placed, std::int32_t index, const Impostor& impostor);
   void fill_bins();
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
-  static void find_one(const Drawn& drawn, const RayPacket& rays, SceneHits& hits, FarTexels& texels);
+  // Of the rays through the pixels of a tile, in which (0, 0) lies at (`x`, `y`) pixels from the picture's middle.
+  void aim(const Drawn& drawn, double x, double y, raster::Job& job) const;
+  // Calls `visit` with the index of the first pixel of every block that the job may show in.
+  template <class Visit>
+  static void for_each_block(const raster::Job& job, Visit visit);
+  [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const FarPixels& pixels);
+  [[nodiscard]] std::int32_t placed_at(const FarPixels& pixels, std::size_t i) const;
+  void draw_one(std::int32_t index, const raster::Job& job, FarPixels& pixels) const;
+  void find_lengths(double x, double y, FarPixels& pixels) const;
 
+  Camera camera_;
+  bool is_perspective_;
+  int width_;
+  int height_;
+  double focal_ = 0.0;  // perspective: pixels at distance 1; orthographic: pixels a world unit
   int across_;
   int down_;
+  raster::Draw draw_;
   std::vector<Drawn> drawn_;  // nearest first
   std::vector<std::vector<std::uint32_t>> bins_;
 };
+
+/// The indices of those far instances that a tracer holds, in SceneTracer::placed.
+[[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);
 
 }  // namespace quoin

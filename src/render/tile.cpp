@@ -21,6 +21,7 @@ constexpr int kBlock = CameraRays::kBlock;
 Tile::Tile(const TileContext& context, int column, int row) : context_(&context), column_(column), row_(row) {
   points_.reserve(kPixels);
   targets_.reserve(kPixels);
+  if (context.impostors != nullptr && context.impostors->may_show(column, row)) far_ = std::make_unique<FarPixels>();
 }
 
 bool Tile::render(const std::function<bool()>& goes_on) {
@@ -41,6 +42,7 @@ void Tile::take_sample(int sample) {
   targets_.clear();
   sample_seed_ = hash_of(static_cast<std::uint32_t>(sample), 0);
   const PixelPoint point = sample_point(sample);
+  if (far_ != nullptr) context_->impostors->draw(column_, row_, point, *far_);
   RayPacket rays;
   for (int y = 0; y < kEdge; y += kBlock) {
     for (int x = 0; x < kEdge; x += kBlock) {
@@ -55,7 +57,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
-  if (context_->impostors != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, hits, texels_);
+  if (far_ != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, *far_, hits, far_faces_);
   const std::uint32_t through_glass = lanes_through_glass(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -93,11 +95,10 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.placed = hits.placed[i];
   point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
-  if ((texels_.found >> lane & 1U) != 0) {
-    point.type = texels_.type[i];
-    point.openness = texels_.openness[i];
-  }
-  add_point(point, pixel, weight);
+  const bool is_far = (far_faces_.found >> lane & 1U) != 0;
+  if (is_far) point.type = far_faces_.type[i];
+  SurfacePoint& added = add_point(point, pixel, weight);
+  if (is_far) added.openness = openness_of(far_faces_.occlusion[i], added.voxel, added.face, added.position);
 }
 
 Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
@@ -119,13 +120,14 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   return passed;
 }
 
-void Tile::add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight) {
+SurfacePoint& Tile::add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight) {
   SurfacePoint& added = points_.emplace_back(point);
   added.position = on_face(point.position, point.voxel, point.face);
   const auto x = static_cast<std::uint32_t>(column_) + static_cast<std::uint32_t>(pixel % kEdge);
   const auto y = static_cast<std::uint32_t>(row_) + static_cast<std::uint32_t>(pixel / kEdge);
   added.pixel = hash_of(x, y) ^ sample_seed_;
   targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
+  return added;
 }
 
 void Tile::light_points() {

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/occlusion.h>
+#include <quoin/render/impostor.h>
+
+namespace quoin {
+
+/// The faces that an impostor is drawn from.
+struct ImpostorFaces {
+  static constexpr int kLevels = 4;           ///< snapshots of 128, 64, 32 and 16 texels a side
+  static constexpr std::size_t kGroup = 16;   ///< faces that are projected at once
+  static constexpr std::uint32_t kNone = ~0U;
+
+  /// Faces that lie close together in space. Positions are those of Level. Some fillers at the end let kernels read on.
+  struct Groups {
+    std::array<std::vector<float>, 3> centre;
+    std::array<std::vector<float>, 3> half;  ///< from the centre to the sides of the box around them
+    std::vector<std::uint32_t> views;        ///< that saw any of them
+  };
+
+  /// What the snapshots of one size show: arrays over faces, by direction, each direction's number rounded up to whole
+  /// groups with faces that no view saw.
+  struct Level {
+    std::array<std::vector<float>, 3> centre;  ///< of the face, voxels from the content's centre: exact
+    std::vector<std::uint32_t> views;          ///< bit i: view i saw it
+    std::vector<std::uint32_t> face;           ///< index into what all levels share
+    std::array<std::uint32_t, 7> begin{};      ///< of each direction; the end of the last
+    Groups groups;                             ///< of each kGroup faces
+    float size = 0.0F;  ///< of the largest coordinate
+    float half = 0.5F;  ///< from a face's middle to its edges, voxels: more than a voxel's where texels are larger
+  };
+
+  /// What is the same at all levels, in the order of the finest.
+  struct Face {
+    VoxelType type = kAir;
+    std::uint8_t occlusion = 0;  ///< the four corners' levels, two bits each
+    Direction direction = Direction::PosX;
+  };
+
+  DVec3 centre{0.0};  ///< of the content, in the grid
+  std::array<Level, kLevels> levels;
+  std::vector<Face> faces;
+
+  [[nodiscard]] IVec3 voxel_of(std::uint32_t face) const;
+  [[nodiscard]] std::size_t bytes() const;
+};
+
+[[nodiscard]] inline FaceLevels unpacked_levels(std::uint8_t packed) {
+  FaceLevels levels{};
+  for (std::size_t i = 0; i < 4; ++i) levels[i] = static_cast<std::uint8_t>(packed >> 2 * i & 3U);
+  return levels;
+}
+
+}  // namespace quoin
