@@ -150,3 +150,9 @@ inline I or_of(I a, I b) {
 inline I merge(I which, I a, I b) {
   return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};
 }
+inline Mask operator<(I a, I b) {
+  return {_mm512_cmplt_epi32_mask(a.v, b.v)};
+}
+inline float greatest_of(F a) {
+  return _mm512_reduce_max_ps(a.v);
+}

@@ -25,6 +25,9 @@ inline Mask mask_where(Of of) {
 inline Mask operator&(Mask a, Mask b) {
   return {a.m & b.m};
 }
+inline Mask operator|(Mask a, Mask b) {
+  return {a.m | b.m};
+}
 inline bool any(Mask a) {
   return a.m != 0;
 }
@@ -67,6 +70,12 @@ inline Mask operator<(F a, F b) {
 inline Mask operator<=(F a, F b) {
   return mask_where([&](int i) { return a.v[i] <= b.v[i]; });
 }
+inline Mask operator==(F a, F b) {
+  return mask_where([&](int i) { return a.v[i] == b.v[i]; });
+}
+inline Mask operator<(I a, I b) {
+  return mask_where([&](int i) { return a.v[i] < b.v[i]; });
+}
 inline F select(Mask m, F a, F b) {
   return each<F>([&](int i) { return (m.m >> i & 1U) != 0 ? a.v[i] : b.v[i]; });
 }
@@ -91,4 +100,9 @@ inline void store(float* to, F a) {
 }
 inline void store(std::int32_t* to, I a) {
   std::memcpy(to, a.v, sizeof(a.v));
+}
+inline float greatest_of(F a) {
+  const float low = a.v[0] > a.v[1] ? a.v[0] : a.v[1];
+  const float high = a.v[2] > a.v[3] ? a.v[2] : a.v[3];
+  return low > high ? low : high;
 }

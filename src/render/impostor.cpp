@@ -75,11 +75,12 @@ SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge)
 }
 
 IVec3 ImpostorFaces::voxel_of(std::uint32_t face) const {
-  const Direction direction = faces[face].direction;
+  // Middles of faces are multiples of a half.
+  const IVec3 normal = normal_of(faces[face].direction);
   IVec3 voxel;
   for (int axis = 0; axis < 3; ++axis) {
     const double middle = centre[axis] + static_cast<double>(levels[0].centre[static_cast<std::size_t>(axis)][face]);
-    voxel[axis] = static_cast<int>(std::floor(middle - 0.5 * normal_of(direction)[axis]));
+    voxel[axis] = static_cast<int>((static_cast<std::int64_t>(2.0 * middle) - normal[axis]) >> 1);
   }
   return voxel;
 }

@@ -79,7 +79,7 @@ class FarTile {
   const CameraRays* rays_;
   const Lighting* lighting_;
   Picture* picture_;
-  std::unique_ptr<FarPixels> far_ = std::make_unique<FarPixels>();
+  std::unique_ptr<raster::Canvas> far_ = std::make_unique<raster::Canvas>();
   std::vector<SurfacePoint> points_;
   std::vector<std::size_t> pixels_;
 };

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -17,9 +18,10 @@ namespace {
 constexpr int kBlock = CameraRays::kBlock;
 constexpr std::size_t kLanes = RayPacket::kSize;
 constexpr double kRoom = 1.0 + 1e-6;  // for rounding
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Faces are drawn from snapshots with at least as many texels a pixel.
+constexpr double kTexelsAPixel = 3.0;
 // Views whose faces are drawn, by level: more make fewer holes and cost more.
-constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 8, 8, 8};
+constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 6, 4, 4};
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
@@ -60,7 +62,7 @@ std::uint32_t nearest_views(DVec3 direction, int count) {
 // The coarsest level with as many texels as the content spans pixels.
 int level_for(double diameter_pixels) {
   int level = 0;
-  while (level + 1 < ImpostorFaces::kLevels && (Impostor::kEdge >> (level + 1)) >= 2.0 * diameter_pixels) ++level;
+  while (level + 1 < ImpostorFaces::kLevels && (Impostor::kEdge >> (level + 1)) >= kTexelsAPixel * diameter_pixels) ++level;
   return level;
 }
 
@@ -103,7 +105,7 @@ ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstanc
     if (index < 0 || instance.impostor == nullptr) continue;
     add(placed[static_cast<std::size_t>(index)], index, *instance.impostor);
   }
-  std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.near_t < b.near_t; });
+  std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.placed < b.placed; });
   fill_bins();
 }
 
@@ -143,7 +145,9 @@ void ImpostorPass::add(const PlacedGrid& placed, std::int32_t index, const Impos
   const auto level = static_cast<std::size_t>(level_for(screen.diameter));
   drawn.placed = index;
   drawn.faces = &impostor.faces();
-  drawn.near_t = (is_perspective_ ? glm::length(centre) : screen.seen.z) - screen.radius * kRoom;
+  drawn.nearest = screen.seen.z - screen.radius * kRoom;
+  drawn.axes = axes;
+  drawn.offset = axes * centre * (-1.0 / size);
   drawn.voxel_size = size;
   drawn.seen_centre = screen.seen / size;
   drawn.right = axes * camera_.right, drawn.down = axes * -camera_.up, drawn.forward = axes * camera_.forward;
@@ -163,7 +167,9 @@ void ImpostorPass::aim(const Drawn& drawn, double x, double y, raster::Job& job)
   const double turn = is_perspective_ ? 1.0 / focal_ : 0.0;
   job.direction.at = single(drawn.forward + drawn.right * (x * turn) + drawn.down * (y * turn));
   job.direction.x = single(drawn.right * turn), job.direction.y = single(drawn.down * turn);
-  job.least_depth = static_cast<float>(-seen.z);
+  job.forward = single(drawn.forward);
+  job.depth_at = static_cast<float>(seen.z * drawn.voxel_size);
+  job.depth_step = static_cast<float>(drawn.voxel_size);
   job.across = single(drawn.right * scale), job.down = single(drawn.down * scale);
   job.across_at = static_cast<float>(seen.x * scale), job.down_at = static_cast<float>(seen.y * scale);
   job.ahead = single(is_perspective_ ? drawn.forward : DVec3(0.0));
@@ -173,11 +179,15 @@ void ImpostorPass::aim(const Drawn& drawn, double x, double y, raster::Job& job)
 
 void ImpostorPass::fill_bins() {
   bins_.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(down_));
-  for (std::size_t i = 0; i < drawn_.size(); ++i) {
+  std::vector<std::uint32_t> order(drawn_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return drawn_[a].nearest < drawn_[b].nearest; });
+  for (const std::uint32_t i : order) {
     const Area& area = drawn_[i].area;
     for (int y = area.top / kTile; y <= (area.bottom - 1) / kTile; ++y) {
       for (int x = area.left / kTile; x <= (area.right - 1) / kTile; ++x) {
-        bins_[static_cast<std::size_t>(y * across_ + x)].push_back(static_cast<std::uint32_t>(i));
+        bins_[static_cast<std::size_t>(y * across_ + x)].push_back(i);
       }
     }
   }
@@ -187,85 +197,40 @@ const std::vector<std::uint32_t>& ImpostorPass::bin_of(int column, int row) cons
   return bins_[static_cast<std::size_t>(row / kTile * across_ + column / kTile)];
 }
 
-void ImpostorPass::draw(int column, int row, PixelPoint point, FarPixels& pixels) const {
-  pixels.t.fill(kInfinity);
-  pixels.furthest.fill(kInfinity);
+void ImpostorPass::draw(int column, int row, PixelPoint point, raster::Canvas& canvas) const {
+  canvas.clear();
   const double x = column + point.x - 0.5 * width_;
   const double y = row + point.y - 0.5 * height_;
-  find_lengths(x, y, pixels);
   raster::Job job;
   for (const std::uint32_t i : bin_of(column, row)) {
     const Drawn& drawn = drawn_[i];
     const Area& area = drawn.area;
+    job.id = static_cast<std::int32_t>(i);
     job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, kTile);
     job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, kTile);
-    if (is_hidden(drawn, job, pixels)) continue;
+    if (is_hidden(drawn, job, canvas)) continue;
     aim(drawn, x, y, job);
-    draw_one(static_cast<std::int32_t>(i), job, pixels);
+    draw_(job, canvas);
   }
 }
 
-void ImpostorPass::find_lengths(double x, double y, FarPixels& pixels) const {
-  if (!is_perspective_) return pixels.length.fill(1.0);
-  const double inverse = 1.0 / focal_;
-  for (int row = 0; row < kTile; ++row) {
-    for (int column = 0; column < kTile; ++column) {
-      const double across = (x + column) * inverse;
-      const double down = (y + row) * inverse;
-      pixels.length[raster::index_of(column, row)] = std::sqrt(1.0 + across * across + down * down);
-    }
-  }
-}
-
-template <class Visit>
-void ImpostorPass::for_each_block(const raster::Job& job, Visit visit) {
+bool ImpostorPass::is_hidden(const Drawn& drawn, const raster::Job& job, const raster::Canvas& canvas) {
   for (int y = job.top / kBlock; y <= (job.bottom - 1) / kBlock; ++y) {
     for (int x = job.left / kBlock; x <= (job.right - 1) / kBlock; ++x) {
-      visit(raster::index_of(x * kBlock, y * kBlock));
+      if (!(canvas.furthest[raster::index_of(x * kBlock, y * kBlock) / kLanes] < drawn.nearest)) return false;
     }
   }
+  return true;
 }
 
-bool ImpostorPass::is_hidden(const Drawn& drawn, const raster::Job& job, const FarPixels& pixels) {
-  bool is_hidden = true;
-  for_each_block(job, [&](std::size_t first) { is_hidden &= pixels.furthest[first / kLanes] < drawn.near_t; });
-  return is_hidden;
+double ImpostorPass::distance_to(const Drawn& drawn, std::uint32_t face, const Ray& ray) {
+  const int axis = frame_of(drawn.faces->faces[face].direction).axis;
+  const double plane = static_cast<double>(drawn.faces->levels[0].centre[static_cast<std::size_t>(axis)][face]);
+  const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
+  return ((plane - drawn.offset[axis]) * drawn.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
 }
 
-void ImpostorPass::draw_one(std::int32_t index, const raster::Job& job, FarPixels& pixels) const {
-  const Drawn& drawn = drawn_[static_cast<std::size_t>(index)];
-  const double size = drawn.voxel_size;
-  const double centre = drawn.seen_centre.z;
-  // A little more, so that it is the comparison of t, below, that decides.
-  constexpr double kMore = 1e-3;
-  for_each_block(job, [&](std::size_t first) {
-    for (std::size_t i = first; i < first + kLanes; ++i) {
-      pixels.canvas.depth[i] = static_cast<float>(pixels.t[i] / (pixels.length[i] * size) - centre + kMore);
-      pixels.canvas.face[i] = -1;
-    }
-  });
-  draw_(job, pixels.canvas);
-  for_each_block(job, [&](std::size_t first) {
-    double furthest = 0.0;
-    for (std::size_t i = first; i < first + kLanes; ++i) {
-      const double t = (centre + static_cast<double>(pixels.canvas.depth[i])) * size * pixels.length[i];
-      const bool is_met = pixels.canvas.face[i] >= 0;
-      if (is_met && (t < pixels.t[i] || (t == pixels.t[i] && drawn.placed < placed_at(pixels, i)))) {
-        pixels.t[i] = t;
-        pixels.drawn[i] = index;
-        pixels.face[i] = pixels.canvas.face[i];
-      }
-      furthest = std::max(furthest, pixels.t[i]);
-    }
-    pixels.furthest[first / kLanes] = furthest;
-  });
-}
-
-std::int32_t ImpostorPass::placed_at(const FarPixels& pixels, std::size_t i) const {
-  return drawn_[static_cast<std::size_t>(pixels.drawn[i])].placed;
-}
-
-void ImpostorPass::find(int column, int row, const RayPacket& rays, const FarPixels& pixels, SceneHits& hits,
+void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster::Canvas& canvas, SceneHits& hits,
                         FarFaces& faces) const {
   faces.found = 0;
   const std::size_t first = raster::index_of(column % kTile, row % kTile);
@@ -273,14 +238,14 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const FarPix
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
     const std::uint32_t bit = 1U << lane;
-    const double t = pixels.t[first + i];
-    if (t == kInfinity) continue;
-    const Drawn& drawn = drawn_[static_cast<std::size_t>(pixels.drawn[first + i])];
+    if (std::isinf(canvas.depth[first + i])) continue;
+    const Drawn& drawn = drawn_[static_cast<std::size_t>(canvas.id[first + i])];
+    const auto face = static_cast<std::uint32_t>(canvas.face[first + i]);
+    const double t = distance_to(drawn, face, rays.ray(lane));
     const bool is_hit = (hits.grids.hit & bit) != 0;
     if (is_hit ? hits.grids.t[i] < t || (hits.grids.t[i] == t && hits.placed[i] < drawn.placed) : rays.max_t[i] < t) {
       continue;
     }
-    const auto face = static_cast<std::uint32_t>(pixels.face[first + i]);
     const ImpostorFaces::Face& shown = drawn.faces->faces[face];
     hits.grids.set(lane, {drawn.faces->voxel_of(face), shown.direction, t, false});
     hits.grids.starts_inside &= ~bit;

@@ -23,16 +23,6 @@ struct FarFaces {
 /// 1 where the corners' levels at a point of a face are 0; 0 where they are 3.
 [[nodiscard]] float openness_of(std::uint8_t occlusion, IVec3 voxel, Direction face, DVec3 position_in_grid);
 
-/// What far instances show in the pixels of one tile: the nearest of them, in the order of raster::index_of.
-struct FarPixels {
-  std::array<double, raster::kPixels> t{};             ///< along the pixel's ray; infinite where there is none
-  std::array<std::int32_t, raster::kPixels> drawn{};   ///< ImpostorPass's
-  std::array<std::int32_t, raster::kPixels> face{};    ///< ImpostorFaces::faces
-  std::array<double, raster::kPixels> length{};        ///< of the way along a ray in which it goes 1 deeper
-  std::array<double, raster::kPixels / 16> furthest{}; ///< t of each 4x4 pixels
-  raster::Canvas canvas;
-};
-
 /// The far instances of one picture: which may show in which part of it, and what rays meet of them.
 class ImpostorPass {
  public:
@@ -46,12 +36,12 @@ class ImpostorPass {
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
 
   /// Draws what shows in that tile, of rays through `point` of each pixel. Cost: about 10 ns a face.
-  void draw(int column, int row, PixelPoint point, FarPixels& pixels) const;
+  void draw(int column, int row, PixelPoint point, raster::Canvas& canvas) const;
 
   /// Puts what is nearer than `hits` into them: for the 4x4 pixels from (`column`, `row`), whose rays from the camera
   /// these are. Faces are as if traced; voxels are those behind the faces.
-  /// Requires: `pixels` are of the tile.
-  void find(int column, int row, const RayPacket& rays_in_view, const FarPixels& pixels, SceneHits& hits,
+  /// Requires: `canvas` is that of the tile.
+  void find(int column, int row, const RayPacket& rays_in_view, const raster::Canvas& canvas, SceneHits& hits,
             FarFaces& faces) const;
 
  private:
@@ -65,16 +55,18 @@ class ImpostorPass {
   struct Drawn {
     std::int32_t placed = 0;
     const ImpostorFaces* faces = nullptr;
+    const ImpostorFaces::Level* level = nullptr;
+    std::uint32_t views = 0;
     Area area;
-    double near_t = 0.0;       // nothing of it is nearer
-    DVec3 seen_centre{0.0};    // of the content, in voxels: right, down, forward
+    double nearest = 0.0;       // depth
+    DVec3 seen_centre{0.0};     // of the content, in voxels: right, down, forward
     double voxel_size = 1.0;
+    glm::dmat3 axes{1.0};       // a point p of the view is axes * p / voxel_size + offset in the grid, about the
+    DVec3 offset{0.0};          // content's centre
     // The camera's axes in the grid's frame.
     DVec3 right{0.0};
     DVec3 down{0.0};
     DVec3 forward{0.0};
-    const ImpostorFaces::Level* level = nullptr;
-    std::uint32_t views = 0;
   };
 
   struct Screen;
@@ -85,13 +77,9 @@ class ImpostorPass {
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
   // Of the rays through the pixels of a tile, in which (0, 0) lies at (`x`, `y`) pixels from the picture's middle.
   void aim(const Drawn& drawn, double x, double y, raster::Job& job) const;
-  // Calls `visit` with the index of the first pixel of every block that the job may show in.
-  template <class Visit>
-  static void for_each_block(const raster::Job& job, Visit visit);
-  [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const FarPixels& pixels);
-  [[nodiscard]] std::int32_t placed_at(const FarPixels& pixels, std::size_t i) const;
-  void draw_one(std::int32_t index, const raster::Job& job, FarPixels& pixels) const;
-  void find_lengths(double x, double y, FarPixels& pixels) const;
+  [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const raster::Canvas& canvas);
+  // Along a ray to the plane of a face.
+  [[nodiscard]] static double distance_to(const Drawn& drawn, std::uint32_t face, const Ray& ray);
 
   Camera camera_;
   bool is_perspective_;
@@ -101,8 +89,8 @@ class ImpostorPass {
   int across_;
   int down_;
   raster::Draw draw_;
-  std::vector<Drawn> drawn_;  // nearest first
-  std::vector<std::vector<std::uint32_t>> bins_;
+  std::vector<Drawn> drawn_;                      // in the order of `placed`
+  std::vector<std::vector<std::uint32_t>> bins_;  // of tiles: indices of these, nearest first
 };
 
 /// The indices of those far instances that a tracer holds, in SceneTracer::placed.

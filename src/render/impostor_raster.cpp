@@ -1,8 +1,14 @@
 #include "render/impostor_raster.h"
 
-#include <algorithm>
+#include <limits>
 
 namespace quoin::raster {
+
+void Canvas::clear() {
+  depth.fill(std::numeric_limits<float>::infinity());
+  furthest.fill(std::numeric_limits<float>::infinity());
+  id.fill(std::numeric_limits<std::int32_t>::max());
+}
 
 Draw draw_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS

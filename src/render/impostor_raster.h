@@ -35,11 +35,15 @@ struct LinearVector {
 struct Job {
   const ImpostorFaces::Level* level = nullptr;
   std::uint32_t views = 0;  ///< faces that none of these saw are left out
-  // The ray of a pixel: a point of it in the plane through the content's centre, and how it goes on; its depth there is
-  // 0 and grows by 1 a length of `direction`.
+  std::int32_t id = 0;
+  // The ray of a pixel: a point of it in the plane through the content's centre, and how it goes on.
   LinearVector point;
   LinearVector direction;
-  float least_depth = 0.0F;  ///< what is nearer is behind the camera
+  // Depths along the camera's forward axis, in world units: `depth_at` in that plane, and how it grows a length of
+  // `direction`, which is one along `forward`.
+  Vector forward{};
+  float depth_at = 0.0F;
+  float depth_step = 1.0F;
   // Where a point q lies in the tile: ((across . q + across_at), (down . q + down_at)) / (ahead . q + ahead_at), plus
   // (column_at, row_at). In pixels, whose samples lie at whole numbers.
   Vector across{};
@@ -57,13 +61,17 @@ struct Job {
   int bottom = kTile;
 };
 
-/// What is nearest so far.
+/// What is nearest so far, in the order of index_of.
 struct Canvas {
-  alignas(64) std::array<float, kPixels> depth{};
-  alignas(64) std::array<std::int32_t, kPixels> face{};  ///< ImpostorFaces::faces; -1: none
+  alignas(64) std::array<float, kPixels> depth{};        ///< infinite: nothing
+  alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
+  alignas(64) std::array<std::int32_t, kPixels> face{};  ///< ImpostorFaces::faces
+  std::array<float, kPixels / 16> furthest{};            ///< depth of each 4x4 pixels
+
+  void clear();
 };
 
-/// Puts each face that is nearer than `canvas.depth` where a pixel's ray meets it.
+/// Puts each face where a pixel's ray meets it, if it is nearer than what is there, or as near and of a lower id.
 using Draw = void (*)(const Job& job, Canvas& canvas);
 
 extern const Draw kDrawPlain;

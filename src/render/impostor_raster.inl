@@ -126,20 +126,26 @@ inline void draw_face(const Job& job, const Side& side, const Pixels& pixels, st
   const F middle_u = all(level.centre[u][at]);
   const F middle_v = all(level.centre[v][at]);
   const F reach = all(side.reach);
-  const F least = all(job.least_depth);
+  const F depth_at = all(job.depth_at);
+  const F depth_step = all(job.depth_step);
+  const I id = all(job.id);
   const I face = all(static_cast<int>(level.face[at]));
   for (int y = areas.top[lane] / kBlock; y <= areas.bottom[lane] / kBlock; ++y) {
     for (int x = areas.left[lane] / kBlock; x <= areas.right[lane] / kBlock; ++x) {
       const std::size_t first = index_of(x * kBlock, y * kBlock);
       for (std::size_t i = first; i < first + 16; i += kLanes) {
-        const F depth = (plane - load(pixels.point[axis] + i)) * load(pixels.inverse + i);
-        const F at_u = load(pixels.point[u] + i) + depth * load(pixels.direction[u] + i);
-        const F at_v = load(pixels.point[v] + i) + depth * load(pixels.direction[v] + i);
+        const F along = (plane - load(pixels.point[axis] + i)) * load(pixels.inverse + i);
+        const F at_u = load(pixels.point[u] + i) + along * load(pixels.direction[u] + i);
+        const F at_v = load(pixels.point[v] + i) + along * load(pixels.direction[v] + i);
+        const F depth = depth_at + along * depth_step;
         const F nearest = load(canvas.depth.data() + i);
-        const Mask met = (abs(at_u - middle_u) <= reach) & (abs(at_v - middle_v) <= reach) & (depth < nearest) &
-                         (least < depth);
+        const I nearest_id = load(canvas.id.data() + i);
+        const Mask is_nearer = (depth < nearest) | ((depth == nearest) & (id < nearest_id));
+        const Mask met =
+            (abs(at_u - middle_u) <= reach) & (abs(at_v - middle_v) <= reach) & is_nearer & (all(0.0F) < depth);
         if (!any(met)) continue;
         store(canvas.depth.data() + i, select(met, depth, nearest));
+        store(canvas.id.data() + i, select(met, id, nearest_id));
         store(canvas.face.data() + i, select(met, face, load(canvas.face.data() + i)));
       }
     }
@@ -163,24 +169,48 @@ void draw_group(const Job& job, const Side& side, const Pixels& pixels, std::siz
   }
 }
 
+// Whether what is there is nearer than `depth` in all blocks of an area.
+inline bool is_hidden(const Areas& areas, std::size_t lane, float depth, const Canvas& canvas) {
+  for (int y = areas.top[lane] / kBlock; y <= areas.bottom[lane] / kBlock; ++y) {
+    for (int x = areas.left[lane] / kBlock; x <= areas.right[lane] / kBlock; ++x) {
+      if (!(canvas.furthest[static_cast<std::size_t>(y * (kTile / kBlock) + x)] < depth)) return false;
+    }
+  }
+  return true;
+}
+
 void draw_side(const Job& job, const Side& side, const Pixels& pixels, std::size_t begin, std::size_t end,
                Canvas& canvas) {
   const ImpostorFaces::Groups& groups = job.level->groups;
   Areas areas;
+  alignas(64) float least[kLanes];  // depth
   for (std::size_t first = begin; first < end; first += kLanes) {
-    const F q[3] = {load(groups.centre[0].data() + first), load(groups.centre[1].data() + first),
-                    load(groups.centre[2].data() + first)};
-    const F half[3] = {load(groups.half[0].data() + first), load(groups.half[1].data() + first),
-                       load(groups.half[2].data() + first)};
+    F q[3];
+    F half[3];
+    F near = all(0.0F);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      q[axis] = load(groups.centre[axis].data() + first);
+      half[axis] = load(groups.half[axis].data() + first);
+      near = near + q[axis] * all(job.forward[axis]) - half[axis] * abs(all(job.forward[axis]));
+    }
+    store(least, near * all(job.depth_step) + all(job.depth_at));
     project(job, q, half, areas);
     if (end - first < kLanes) areas.shown &= (1U << (end - first)) - 1U;
     for (std::uint32_t left = areas.shown; left != 0; left &= left - 1) {
-      const std::size_t group = first + static_cast<std::size_t>(std::countr_zero(left));
-      if ((groups.views[group] & job.views) != 0) {
-        draw_group(job, side, pixels, group * ImpostorFaces::kGroup, canvas);
-      }
+      const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+      if ((groups.views[first + lane] & job.views) == 0 || is_hidden(areas, lane, least[lane], canvas)) continue;
+      draw_group(job, side, pixels, (first + lane) * ImpostorFaces::kGroup, canvas);
     }
   }
+}
+
+void find_furthest(const Job& job, Canvas& canvas) {
+  for_each_block(job, [&](int x, int y) {
+    const std::size_t first = index_of(x * kBlock, y * kBlock);
+    F most = load(canvas.depth.data() + first);
+    for (std::size_t i = kLanes; i < 16; i += kLanes) most = max(most, load(canvas.depth.data() + first + i));
+    canvas.furthest[first / 16] = greatest_of(most);
+  });
 }
 
 void draw_faces(const Job& job, Canvas& canvas) {
@@ -198,4 +228,5 @@ void draw_faces(const Job& job, Canvas& canvas) {
     side.reach += 1e-5F + 2e-6F * job.level->size;
     if (turn_to(job, side, pixels)) draw_side(job, side, pixels, begin, end, canvas);
   }
+  find_furthest(job, canvas);
 }

@@ -32,9 +32,6 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
 inline I as_bits(F a) {
   return {_mm512_castps_si512(a.v)};
 }
-inline Mask operator<(I a, I b) {
-  return {_mm512_cmplt_epi32_mask(a.v, b.v)};
-}
 inline float least_of(Mask m, F a) {
   return _mm512_mask_reduce_min_ps(m.m, a.v);
 }
