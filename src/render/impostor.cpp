@@ -74,17 +74,6 @@ SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge)
   return camera;
 }
 
-IVec3 ImpostorFaces::voxel_of(std::uint32_t face) const {
-  // Middles of faces are multiples of a half.
-  const IVec3 normal = normal_of(faces[face].direction);
-  IVec3 voxel;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double middle = centre[axis] + static_cast<double>(levels[0].centre[static_cast<std::size_t>(axis)][face]);
-    voxel[axis] = static_cast<int>((static_cast<std::int64_t>(2.0 * middle) - normal[axis]) >> 1);
-  }
-  return voxel;
-}
-
 std::size_t ImpostorFaces::bytes() const {
   std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face);
   for (const Level& level : levels) {

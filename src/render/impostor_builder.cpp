@@ -206,7 +206,7 @@ void ImpostorBuilder::put_faces(ImpostorFaces& faces) const {
     if (seen.place.direction != last) index = (index + 15U) / 16U * 16U;
     last = seen.place.direction;
     const FaceLevels levels = corner_levels(reader, *types_, seen.place.voxel, seen.place.direction);
-    faces.faces[index++] = {reader.get(seen.place.voxel), packed_levels(levels), seen.place.direction};
+    faces.faces[index++] = {seen.place.voxel, reader.get(seen.place.voxel), packed_levels(levels), seen.place.direction};
   }
 }
 

@@ -40,6 +40,7 @@ struct ImpostorFaces {
 
   /// What is the same at all levels, in the order of the finest.
   struct Face {
+    IVec3 voxel{0};
     VoxelType type = kAir;
     std::uint8_t occlusion = 0;  ///< the four corners' levels, two bits each
     Direction direction = Direction::PosX;
@@ -49,7 +50,6 @@ struct ImpostorFaces {
   std::array<Level, kLevels> levels;
   std::vector<Face> faces;
 
-  [[nodiscard]] IVec3 voxel_of(std::uint32_t face) const;
   [[nodiscard]] std::size_t bytes() const;
 };
 

@@ -223,9 +223,10 @@ bool ImpostorPass::is_hidden(const Drawn& drawn, const raster::Job& job, const r
   return true;
 }
 
-double ImpostorPass::distance_to(const Drawn& drawn, std::uint32_t face, const Ray& ray) {
-  const int axis = frame_of(drawn.faces->faces[face].direction).axis;
-  const double plane = static_cast<double>(drawn.faces->levels[0].centre[static_cast<std::size_t>(axis)][face]);
+double ImpostorPass::distance_to(const Drawn& drawn, const ImpostorFaces::Face& face, const Ray& ray) {
+  const FaceFrame& frame = frame_of(face.direction);
+  const int axis = frame.axis;
+  const double plane = face.voxel[axis] + (frame.sign > 0 ? 1.0 : 0.0) - drawn.faces->centre[axis];
   const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
   return ((plane - drawn.offset[axis]) * drawn.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
 }
@@ -240,19 +241,18 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     const std::uint32_t bit = 1U << lane;
     if (std::isinf(canvas.depth[first + i])) continue;
     const Drawn& drawn = drawn_[static_cast<std::size_t>(canvas.id[first + i])];
-    const auto face = static_cast<std::uint32_t>(canvas.face[first + i]);
+    const ImpostorFaces::Face& face = drawn.faces->faces[static_cast<std::size_t>(canvas.face[first + i])];
     const double t = distance_to(drawn, face, rays.ray(lane));
     const bool is_hit = (hits.grids.hit & bit) != 0;
     if (is_hit ? hits.grids.t[i] < t || (hits.grids.t[i] == t && hits.placed[i] < drawn.placed) : rays.max_t[i] < t) {
       continue;
     }
-    const ImpostorFaces::Face& shown = drawn.faces->faces[face];
-    hits.grids.set(lane, {drawn.faces->voxel_of(face), shown.direction, t, false});
+    hits.grids.set(lane, {face.voxel, face.direction, t, false});
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
     faces.found |= bit;
-    faces.type[i] = shown.type;
-    faces.occlusion[i] = shown.occlusion;
+    faces.type[i] = face.type;
+    faces.occlusion[i] = face.occlusion;
   }
 }
 

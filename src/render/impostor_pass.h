@@ -79,7 +79,7 @@ class ImpostorPass {
   void aim(const Drawn& drawn, double x, double y, raster::Job& job) const;
   [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const raster::Canvas& canvas);
   // Along a ray to the plane of a face.
-  [[nodiscard]] static double distance_to(const Drawn& drawn, std::uint32_t face, const Ray& ray);
+  [[nodiscard]] static double distance_to(const Drawn& drawn, const ImpostorFaces::Face& face, const Ray& ray);
 
   Camera camera_;
   bool is_perspective_;

@@ -89,16 +89,16 @@ std::uint32_t Tile::lanes_through_glass(const RayPacket& rays, const SceneHits& 
 void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight) {
   const auto i = static_cast<std::size_t>(lane);
   const Ray ray = rays.ray(lane);
-  SurfacePoint point;
+  SurfacePoint& point = add_point(pixel, weight);
   point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   point.face = hits.grids.face[i];
   point.placed = hits.placed[i];
-  point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  point.position = on_face(context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
+                           point.voxel, point.face);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
-  const bool is_far = (far_faces_.found >> lane & 1U) != 0;
-  if (is_far) point.type = far_faces_.type[i];
-  SurfacePoint& added = add_point(point, pixel, weight);
-  if (is_far) added.openness = openness_of(far_faces_.occlusion[i], added.voxel, added.face, added.position);
+  if ((far_faces_.found >> lane & 1U) == 0) return;
+  point.type = far_faces_.type[i];
+  point.openness = openness_of(far_faces_.occlusion[i], point.voxel, point.face, point.position);
 }
 
 Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
@@ -107,26 +107,25 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   Vec3 passed(1.0F);
   for (const GlassBody& body : glass_) {
     const GlassLook look = look_of(surfaces[body.type], body);
-    SurfacePoint point;
+    SurfacePoint& point = add_point(pixel, passed * look.own);
     point.voxel = body.voxel;
     point.face = body.face;
     point.placed = body.placed;
-    point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
+    point.position = on_face(context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter),
+                             body.voxel, body.face);
     // Seen from inside, it tints and glows but has no surface.
     if (body.starts_inside) point.kind = PointKind::Glow;
-    add_point(point, pixel, passed * look.own);
     passed *= look.passed;
   }
   return passed;
 }
 
-SurfacePoint& Tile::add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight) {
-  SurfacePoint& added = points_.emplace_back(point);
-  added.position = on_face(point.position, point.voxel, point.face);
+SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
+  targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
+  SurfacePoint& added = points_.emplace_back();
   const auto x = static_cast<std::uint32_t>(column_) + static_cast<std::uint32_t>(pixel % kEdge);
   const auto y = static_cast<std::uint32_t>(row_) + static_cast<std::uint32_t>(pixel / kEdge);
   added.pixel = hash_of(x, y) ^ sample_seed_;
-  targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
   return added;
 }
 

@@ -54,7 +54,8 @@ class Tile {
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // Adds what is seen of the glass before `max_t`; answers what passes through it.
   Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);
-  SurfacePoint& add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight);
+  // A point that is to be filled in: what it sends counts so much in that pixel.
+  SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
   void light_points();
 
   const TileContext* context_;

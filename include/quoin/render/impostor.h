@@ -74,7 +74,7 @@ struct ImpostorFaces;
 /// (64, 32 and 16 a side) are among those of the finest one, so their faces serve for grids that span fewer pixels.
 /// Holds types and not colours: what the registry says of a type counts when it is drawn. Transparent voxels are left
 /// out: whoever draws an impostor traces them besides.
-/// Copies share what they hold. Memory: 24 bytes a face and 20 for each coarser size that shows it.
+/// Copies share what they hold. Memory: 36 bytes a face and 20 for each coarser size that shows it.
 /// Threads: any number may read at once.
 /// Source: surfels of H. Pfister et al., "Surfels: surface elements as rendering primitives" (2000), taken from layered
 ///         views as there, but of known shape.
