@@ -6,7 +6,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "render/impostor_builder.h"
 #include "render/impostor_faces.h"
 
 namespace quoin {
@@ -84,17 +83,6 @@ std::size_t ImpostorFaces::bytes() const {
 }
 
 Impostor::Impostor() : faces_(std::make_shared<const ImpostorFaces>()) {}
-
-Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                         InstructionSet instructions) {
-  Impostor made;
-  made.content_ = content_sphere(grid);
-  made.box_ = opaque.bounds();
-  if (made.is_empty()) return made;
-  made.faces_ = std::make_shared<const ImpostorFaces>(
-      ImpostorBuilder(grid, types, opaque, made.content_).build(instructions));
-  return made;
-}
 
 Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, InstructionSet instructions) {
   return build(grid, types, OccupancyTree::build(grid, types, Occupancy::Opaque), instructions);

@@ -15,9 +15,8 @@ namespace quoin {
 
 /// The faces that an impostor is drawn from.
 struct ImpostorFaces {
-  static constexpr int kLevels = 4;           ///< snapshots of 128, 64, 32 and 16 texels a side
-  static constexpr std::size_t kGroup = 16;   ///< faces that are projected at once
-  static constexpr std::uint32_t kNone = ~0U;
+  static constexpr int kLevels = 5;          ///< snapshots, each of half as many texels a side as the one before
+  static constexpr std::size_t kGroup = 16;  ///< faces that are projected at once
 
   /// Faces that lie close together in space. Positions are those of Level. Some fillers at the end let kernels read on.
   struct Groups {
@@ -31,14 +30,14 @@ struct ImpostorFaces {
   struct Level {
     std::array<std::vector<float>, 3> centre;  ///< of the face, voxels from the content's centre: exact
     std::vector<std::uint32_t> views;          ///< bit i: view i saw it
-    std::vector<std::uint32_t> face;           ///< index into what all levels share
+    std::vector<std::uint32_t> face;           ///< index into `faces`
     std::array<std::uint32_t, 7> begin{};      ///< of each direction; the end of the last
     Groups groups;                             ///< of each kGroup faces
     float size = 0.0F;  ///< of the largest coordinate
     float half = 0.5F;  ///< from a face's middle to its edges, voxels: more than a voxel's where texels are larger
   };
 
-  /// What is the same at all levels, in the order of the finest.
+  /// What is the same at all levels.
   struct Face {
     IVec3 voxel{0};
     VoxelType type = kAir;
@@ -46,6 +45,7 @@ struct ImpostorFaces {
     Direction direction = Direction::PosX;
   };
 
+  int edge = 0;       ///< texels a side of the finest snapshots
   DVec3 centre{0.0};  ///< of the content, in the grid
   std::array<Level, kLevels> levels;
   std::vector<Face> faces;

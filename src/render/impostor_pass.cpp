@@ -21,7 +21,7 @@ constexpr double kRoom = 1.0 + 1e-6;  // for rounding
 // Faces are drawn from snapshots with at least as many texels a pixel.
 constexpr double kTexelsAPixel = 3.0;
 // Views whose faces are drawn, by level: more make fewer holes and cost more.
-constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 6, 4, 4};
+constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 6, 4, 4, 4};
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
@@ -43,10 +43,6 @@ int clamped(double pixel, int size) {
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(size)));
 }
 
-raster::Vector single(DVec3 v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
-
 // The nearest views to a direction, as bits. Requires: it is finite and not 0.
 std::uint32_t nearest_views(DVec3 direction, int count) {
   const DVec3 size = glm::abs(direction);
@@ -60,10 +56,10 @@ std::uint32_t nearest_views(DVec3 direction, int count) {
 }
 
 // The coarsest level with as many texels as the content spans pixels.
-int level_for(double diameter_pixels) {
+std::size_t level_for(int edge, double diameter_pixels) {
   int level = 0;
-  while (level + 1 < ImpostorFaces::kLevels && (Impostor::kEdge >> (level + 1)) >= kTexelsAPixel * diameter_pixels) ++level;
-  return level;
+  while (level + 1 < ImpostorFaces::kLevels && (edge >> (level + 1)) >= kTexelsAPixel * diameter_pixels) ++level;
+  return static_cast<std::size_t>(level);
 }
 
 }  // namespace
@@ -142,39 +138,20 @@ void ImpostorPass::add(const PlacedGrid& placed, std::int32_t index, const Impos
   const glm::dmat3 axes = glm::transpose(placed.world_axes);
   const DVec3 towards_camera = axes * (is_perspective_ ? -centre : -camera_.forward);
   if (!is_finite(towards_camera) || towards_camera == DVec3(0.0)) return;
-  const auto level = static_cast<std::size_t>(level_for(screen.diameter));
+  const std::size_t level = level_for(impostor.faces().edge, screen.diameter);
   drawn.placed = index;
   drawn.faces = &impostor.faces();
   drawn.nearest = screen.seen.z - screen.radius * kRoom;
   drawn.axes = axes;
   drawn.offset = axes * centre * (-1.0 / size);
-  drawn.voxel_size = size;
-  drawn.seen_centre = screen.seen / size;
-  drawn.right = axes * camera_.right, drawn.down = axes * -camera_.up, drawn.forward = axes * camera_.forward;
+  drawn.aim.right = axes * camera_.right, drawn.aim.down = axes * -camera_.up, drawn.aim.forward = axes * camera_.forward;
+  drawn.aim.centre = screen.seen / size;
+  drawn.aim.is_perspective = is_perspective_;
+  drawn.aim.focal = is_perspective_ ? focal_ : focal_ * size;
+  drawn.aim.voxel_size = size;
   drawn.level = &impostor.faces().levels[level];
   drawn.views = nearest_views(towards_camera, kViews[level]);
   drawn_.push_back(drawn);
-}
-
-void ImpostorPass::aim(const Drawn& drawn, double x, double y, raster::Job& job) const {
-  const DVec3 seen = drawn.seen_centre;
-  const double scale = is_perspective_ ? focal_ : focal_ * drawn.voxel_size;  // pixels a voxel, at distance 1
-  const double step = (is_perspective_ ? seen.z : 1.0) / scale;               // voxels a pixel, at the centre
-  job.level = drawn.level;
-  job.views = drawn.views;
-  job.point.at = single(drawn.right * (x * step - seen.x) + drawn.down * (y * step - seen.y));
-  job.point.x = single(drawn.right * step), job.point.y = single(drawn.down * step);
-  const double turn = is_perspective_ ? 1.0 / focal_ : 0.0;
-  job.direction.at = single(drawn.forward + drawn.right * (x * turn) + drawn.down * (y * turn));
-  job.direction.x = single(drawn.right * turn), job.direction.y = single(drawn.down * turn);
-  job.forward = single(drawn.forward);
-  job.depth_at = static_cast<float>(seen.z * drawn.voxel_size);
-  job.depth_step = static_cast<float>(drawn.voxel_size);
-  job.across = single(drawn.right * scale), job.down = single(drawn.down * scale);
-  job.across_at = static_cast<float>(seen.x * scale), job.down_at = static_cast<float>(seen.y * scale);
-  job.ahead = single(is_perspective_ ? drawn.forward : DVec3(0.0));
-  job.ahead_at = is_perspective_ ? static_cast<float>(seen.z) : 1.0F;
-  job.column_at = static_cast<float>(-x), job.row_at = static_cast<float>(-y);
 }
 
 void ImpostorPass::fill_bins() {
@@ -209,7 +186,9 @@ void ImpostorPass::draw(int column, int row, PixelPoint point, raster::Canvas& c
     job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, kTile);
     job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, kTile);
     if (is_hidden(drawn, job, canvas)) continue;
-    aim(drawn, x, y, job);
+    job.level = drawn.level;
+    job.views = drawn.views;
+    raster::set_aim(drawn.aim, x, y, job);
     draw_(job, canvas);
   }
 }
@@ -228,7 +207,7 @@ double ImpostorPass::distance_to(const Drawn& drawn, const ImpostorFaces::Face& 
   const int axis = frame.axis;
   const double plane = face.voxel[axis] + (frame.sign > 0 ? 1.0 : 0.0) - drawn.faces->centre[axis];
   const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
-  return ((plane - drawn.offset[axis]) * drawn.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
+  return ((plane - drawn.offset[axis]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
 }
 
 void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster::Canvas& canvas, SceneHits& hits,

@@ -59,14 +59,9 @@ class ImpostorPass {
     std::uint32_t views = 0;
     Area area;
     double nearest = 0.0;       // depth
-    DVec3 seen_centre{0.0};     // of the content, in voxels: right, down, forward
-    double voxel_size = 1.0;
+    raster::Aim aim;
     glm::dmat3 axes{1.0};       // a point p of the view is axes * p / voxel_size + offset in the grid, about the
     DVec3 offset{0.0};          // content's centre
-    // The camera's axes in the grid's frame.
-    DVec3 right{0.0};
-    DVec3 down{0.0};
-    DVec3 forward{0.0};
   };
 
   struct Screen;
@@ -75,8 +70,6 @@ class ImpostorPass {
   void add(const PlacedGrid& placed, std::int32_t index, const Impostor& impostor);
   void fill_bins();
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
-  // Of the rays through the pixels of a tile, in which (0, 0) lies at (`x`, `y`) pixels from the picture's middle.
-  void aim(const Drawn& drawn, double x, double y, raster::Job& job) const;
   [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const raster::Canvas& canvas);
   // Along a ray to the plane of a face.
   [[nodiscard]] static double distance_to(const Drawn& drawn, const ImpostorFaces::Face& face, const Ray& ray);

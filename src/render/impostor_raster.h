@@ -61,6 +61,21 @@ struct Job {
   int bottom = kTile;
 };
 
+/// A camera, as the grid of an impostor sees it.
+struct Aim {
+  // Its axes, unit, in the grid's frame.
+  DVec3 right{1.0, 0.0, 0.0};
+  DVec3 down{0.0, -1.0, 0.0};
+  DVec3 forward{0.0, 0.0, -1.0};
+  DVec3 centre{0.0};  ///< of the content, along these, in voxels
+  bool is_perspective = true;
+  double focal = 1.0;       ///< pixels a voxel, in perspective at a distance of one
+  double voxel_size = 1.0;  ///< world units
+};
+
+/// Sets all that depends on the camera. Pixel (0, 0) of the tile lies at (`x`, `y`) pixels from the picture's middle.
+void set_aim(const Aim& aim, double x, double y, Job& job);
+
 /// What is nearest so far, in the order of index_of.
 struct Canvas {
   alignas(64) std::array<float, kPixels> depth{};        ///< infinite: nothing
