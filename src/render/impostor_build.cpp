@@ -45,9 +45,8 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   // Beyond that, a ray for each texel takes less time.
   const std::int64_t most_faces = std::int64_t{kImpostorViews} * edge * edge;
   const std::optional<ImpostorShell> shell = ImpostorShell::build(opaque, kMostVoxels, most_faces);
-  const std::vector<SeenFace> seen =
-      shell ? faces_seen_of(*shell, made.box_, made.content_, edge, instructions)
-            : faces_seen_by_rays(opaque, made.content_, edge, instructions);
+  const std::vector<SeenFace> seen = shell ? faces_seen_of(*shell, made.box_, made.content_, edge, instructions)
+                                           : faces_seen_by_rays(opaque, made.content_, edge, instructions);
   faces->edge = edge;
   faces->centre = made.content_.centre;
   for (std::size_t level = 0; level < faces->levels.size(); ++level) {
@@ -55,9 +54,11 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   }
   GridReader reader(grid);
   if (shell) {
-    put_faces(seen, reader, [&](IVec3 voxel) { return shell->is_occupied(voxel); }, *faces);
+    put_faces(
+        seen, reader, [&](IVec3 voxel) { return shell->is_occupied(voxel); }, *faces);
   } else {
-    put_faces(seen, reader, [&](IVec3 voxel) { return types.is_opaque(reader.get(voxel)); }, *faces);
+    put_faces(
+        seen, reader, [&](IVec3 voxel) { return types.is_opaque(reader.get(voxel)); }, *faces);
   }
   made.faces_ = std::move(faces);
   return made;

@@ -90,7 +90,8 @@ Grid voxels_of(Model model) {
   }
   if (model == Model::Terrain) {
     grid.edit({IVec3(0), IVec3(200, 60, 200)}, [](IVec3 v, VoxelType) {
-      const double height = 25 + 12 * std::sin(0.11 * v.x) * std::cos(0.07 * v.z) + 5 * std::sin(0.31 * v.x + 0.2 * v.z);
+      const double height =
+          25 + 12 * std::sin(0.11 * v.x) * std::cos(0.07 * v.z) + 5 * std::sin(0.31 * v.x + 0.2 * v.z);
       return v.y <= height ? static_cast<VoxelType>(v.y > height - 1 ? 1 : v.y > height - 4 ? 2 : 3) : kAir;
     });
   }
@@ -165,9 +166,11 @@ TEST(DrawImpostors, DISABLED_Study) {
             orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, size, edge);
         const Likeness found = likeness(taken(world.scene, camera, options), world.drawn(camera, options));
         sum.overlap += found.overlap / 24, sum.difference += found.difference / 24;
-        worst.overlap = std::min(worst.overlap, found.overlap), worst.difference = std::max(worst.difference, found.difference);
+        worst.overlap = std::min(worst.overlap, found.overlap),
+        worst.difference = std::max(worst.difference, found.difference);
       }
-      std::printf("model %d size %d: mean %.4f %.2f worst %.4f %.2f bytes %zu\n", static_cast<int>(model), size, sum.overlap, sum.difference, worst.overlap, worst.difference, world.impostor.bytes());
+      std::printf("model %d size %d: mean %.4f %.2f worst %.4f %.2f bytes %zu\n", static_cast<int>(model), size,
+                  sum.overlap, sum.difference, worst.overlap, worst.difference, world.impostor.bytes());
     }
   }
 }

@@ -33,7 +33,7 @@ struct ImpostorFaces {
     std::vector<std::uint32_t> face;           ///< index into `faces`
     std::array<std::uint32_t, 7> begin{};      ///< of each direction; the end of the last
     Groups groups;                             ///< of each kGroup faces
-    float size = 0.0F;  ///< of the largest coordinate
+    float size = 0.0F;                         ///< of the largest coordinate
     float half = 0.5F;  ///< from a face's middle to its edges, voxels: more than a voxel's where texels are larger
   };
 

@@ -48,7 +48,8 @@ std::uint32_t nearest_views(DVec3 direction, int count) {
   const DVec3 size = glm::abs(direction);
   direction /= std::max({size.x, size.y, size.z});
   std::array<std::pair<double, int>, kImpostorViews> order;
-  for (int i = 0; i < kImpostorViews; ++i) order[static_cast<std::size_t>(i)] = {-glm::dot(direction, impostor_view(i)), i};
+  for (int i = 0; i < kImpostorViews; ++i)
+    order[static_cast<std::size_t>(i)] = {-glm::dot(direction, impostor_view(i)), i};
   std::partial_sort(order.begin(), order.begin() + count, order.end());
   std::uint32_t views = 0;
   for (int i = 0; i < count; ++i) views |= 1U << order[static_cast<std::size_t>(i)].second;
@@ -144,7 +145,8 @@ void ImpostorPass::add(const PlacedGrid& placed, std::int32_t index, const Impos
   drawn.nearest = screen.seen.z - screen.radius * kRoom;
   drawn.axes = axes;
   drawn.offset = axes * centre * (-1.0 / size);
-  drawn.aim.right = axes * camera_.right, drawn.aim.down = axes * -camera_.up, drawn.aim.forward = axes * camera_.forward;
+  drawn.aim.right = axes * camera_.right, drawn.aim.down = axes * -camera_.up,
+  drawn.aim.forward = axes * camera_.forward;
   drawn.aim.centre = screen.seen / size;
   drawn.aim.is_perspective = is_perspective_;
   drawn.aim.focal = is_perspective_ ? focal_ : focal_ * size;
@@ -207,7 +209,8 @@ double ImpostorPass::distance_to(const Drawn& drawn, const ImpostorFaces::Face& 
   const int axis = frame.axis;
   const double plane = face.voxel[axis] + (frame.sign > 0 ? 1.0 : 0.0) - drawn.faces->centre[axis];
   const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
-  return ((plane - drawn.offset[axis]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
+  return ((plane - drawn.offset[axis]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) /
+         glm::dot(row, ray.direction);
 }
 
 void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster::Canvas& canvas, SceneHits& hits,

@@ -29,8 +29,8 @@ class ImpostorPass {
   static constexpr int kTile = raster::kTile;  ///< pixels; blocks of rays lie in one tile
 
   /// All arguments but the camera must outlive it. Cost: O(far instances + tiles that they touch).
-  ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
-               int height, InstructionSet instructions = InstructionSet::Best);
+  ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width, int height,
+               InstructionSet instructions = InstructionSet::Best);
 
   /// Whether anything may show in the tile from (`column`, `row`), multiples of kTile.
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
@@ -58,10 +58,10 @@ class ImpostorPass {
     const ImpostorFaces::Level* level = nullptr;
     std::uint32_t views = 0;
     Area area;
-    double nearest = 0.0;       // depth
+    double nearest = 0.0;  // depth
     raster::Aim aim;
-    glm::dmat3 axes{1.0};       // a point p of the view is axes * p / voxel_size + offset in the grid, about the
-    DVec3 offset{0.0};          // content's centre
+    glm::dmat3 axes{1.0};  // a point p of the view is axes * p / voxel_size + offset in the grid, about the
+    DVec3 offset{0.0};     // content's centre
   };
 
   struct Screen;

@@ -38,9 +38,12 @@ void Canvas::clear() {
 Draw draw_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS
   switch (resolve(instructions)) {
-    case InstructionSet::Avx512: return kDrawAvx512;
-    case InstructionSet::Avx2: return kDrawAvx2;
-    default: return kDrawPlain;
+    case InstructionSet::Avx512:
+      return kDrawAvx512;
+    case InstructionSet::Avx2:
+      return kDrawAvx2;
+    default:
+      return kDrawPlain;
   }
 #else
   static_cast<void>(instructions);

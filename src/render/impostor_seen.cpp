@@ -197,8 +197,8 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 
 }  // namespace
 
-std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box, const ContentSphere& content,
-                                    int edge, InstructionSet instructions) {
+std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box, const ContentSphere& content, int edge,
+                                    InstructionSet instructions) {
   const std::vector<VoxelFace> all = shell.faces();
   std::vector<SeenFace> faces(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];

@@ -48,8 +48,8 @@ std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std
 void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
   const OccupancyTree::RegionNode* region = tree.find_region(floor_of(chunk, 4));
   if (region == nullptr) return;
-  const std::uint32_t index = region->nodes[static_cast<std::size_t>(
-      (chunk.x & 15) + 16 * (chunk.y & 15) + 256 * (chunk.z & 15))];
+  const std::uint32_t index =
+      region->nodes[static_cast<std::size_t>((chunk.x & 15) + 16 * (chunk.y & 15) + 256 * (chunk.z & 15))];
   if (index == 0) return;
   const OccupancyTree::ChunkNode& node = tree.chunk_nodes()[index];
   const IVec3 first = chunk * kCellsAChunk - floor_of(origin_, 2);
@@ -71,7 +71,9 @@ std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) cons
   const std::uint64_t own = cells_[cell];
   const std::ptrdiff_t row = size_.x;
   const std::ptrdiff_t layer = row * size_.y;
-  const auto beside = [&](std::ptrdiff_t step) { return cells_[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step)]; };
+  const auto beside = [&](std::ptrdiff_t step) {
+    return cells_[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step)];
+  };
   std::uint64_t neighbours = 0;
   switch (direction) {
     case Direction::PosX:
@@ -86,8 +88,12 @@ std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) cons
     case Direction::NegY:
       neighbours = (own << 4 & 0xFFF0'FFF0'FFF0'FFF0U) | (beside(-row) >> 12 & 0x000F'000F'000F'000FU);
       break;
-    case Direction::PosZ: neighbours = own >> 16 | beside(layer) << 48; break;
-    case Direction::NegZ: neighbours = own << 16 | beside(-layer) >> 48; break;
+    case Direction::PosZ:
+      neighbours = own >> 16 | beside(layer) << 48;
+      break;
+    case Direction::NegZ:
+      neighbours = own << 16 | beside(-layer) >> 48;
+      break;
   }
   return own & ~neighbours;
 }

@@ -82,8 +82,7 @@ Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const Occup
         const int lane = std::countr_zero(left);
         const Ray ray = rays.ray(lane);
         const RayHit hit = hits[lane];
-        const auto texel =
-            static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
+        const auto texel = static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
         const FaceLevels levels = corner_levels(reader, types, hit.voxel, hit.face);
         const float level = level_at(levels, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
         snapshot.types[texel] = reader.get(hit.voxel);

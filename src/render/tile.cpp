@@ -21,7 +21,8 @@ constexpr int kBlock = CameraRays::kBlock;
 Tile::Tile(const TileContext& context, int column, int row) : context_(&context), column_(column), row_(row) {
   points_.reserve(kPixels);
   targets_.reserve(kPixels);
-  if (context.impostors != nullptr && context.impostors->may_show(column, row)) far_ = std::make_unique<raster::Canvas>();
+  if (context.impostors != nullptr && context.impostors->may_show(column, row))
+    far_ = std::make_unique<raster::Canvas>();
 }
 
 bool Tile::render(const std::function<bool()>& goes_on) {

@@ -77,7 +77,7 @@ class Tile {
   std::vector<Vec3> lit_;
   std::vector<GlassBody> glass_;
   std::unique_ptr<raster::Canvas> far_;  // of the present sample; null when there are none
-  FarFaces far_faces_;              // of the present block
+  FarFaces far_faces_;                   // of the present block
 };
 
 }  // namespace quoin
