@@ -137,67 +137,72 @@ Camera orbiting(const World& world, double azimuth, double elevation, double rol
   return camera;
 }
 
+constexpr std::array kModels = {Model::Ball, Model::Box, Model::Castle, Model::Blobs, Model::Ship, Model::Terrain};
+
+// Of so many pictures from all around, `pixels` wide.
+std::vector<Likeness> likenesses(World& world, int pixels, int count) {
+  world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
+  const int edge = pixels + 20;
+  const RenderOptions options = sized(edge, edge);
+  std::vector<Likeness> all;
+  for (int i = 0; i < count; ++i) {
+    const Camera camera =
+        orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, pixels, edge);
+    all.push_back(likeness(taken(world.scene, camera, options), world.drawn(camera, options)));
+  }
+  return all;
+}
+
+// The specification asks for 0.97 and 6; measured at worst: 0.9957 (castle) and 5.5 (terrain).
 TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
-  for (const Model model : {Model::Ball, Model::Box, Model::Castle}) {
+  for (const Model model : kModels) {
     World world(model);
-    world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
-    const RenderOptions options = sized(148, 148);
-    for (int i = 0; i < 24; ++i) {
-      const Camera camera =
-          orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, 128.0, 148);
-      const Likeness found = likeness(taken(world.scene, camera, options), world.drawn(camera, options));
-      EXPECT_GT(found.pixels, 2000);
-      EXPECT_GE(found.overlap, 0.97) << static_cast<int>(model) << " " << i;
-      EXPECT_LE(found.difference, 6.0) << static_cast<int>(model) << " " << i;
-    }
-  }
-}
-
-TEST(DrawImpostors, DISABLED_Study) {
-  for (const Model model : {Model::Ball, Model::Box, Model::Castle, Model::Blobs, Model::Ship, Model::Terrain}) {
-    World world(model);
-    world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
-    for (const int size : {128, 64, 32, 16}) {
-      const int edge = size + 20;
-      const RenderOptions options = sized(edge, edge);
-      Likeness sum{0, 0, 0}, worst{1, 0, 0};
-      for (int i = 0; i < 24; ++i) {
-        const Camera camera =
-            orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, size, edge);
-        const Likeness found = likeness(taken(world.scene, camera, options), world.drawn(camera, options));
-        sum.overlap += found.overlap / 24, sum.difference += found.difference / 24;
-        worst.overlap = std::min(worst.overlap, found.overlap),
-        worst.difference = std::max(worst.difference, found.difference);
+    for (const int pixels : {128, 64}) {
+      for (const Likeness& found : likenesses(world, pixels, 24)) {
+        EXPECT_GT(found.pixels, 350);
+        EXPECT_GE(found.overlap, 0.99) << static_cast<int>(model) << " " << pixels;
+        EXPECT_LE(found.difference, 6.0) << static_cast<int>(model) << " " << pixels;
       }
-      std::printf("model %d size %d: mean %.4f %.2f worst %.4f %.2f bytes %zu\n", static_cast<int>(model), size,
-                  sum.overlap, sum.difference, worst.overlap, worst.difference, world.impostor.bytes());
     }
   }
 }
 
-TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
-  const World world(Model::Castle);
-  const RenderOptions options = sized(148, 148);
-  double largest_step = 0.0;
-  double largest_error = 0.0;
-  Picture last;
-  Picture last_truth;
-  for (int degree = 0; degree < 360; degree += 1) {
-    const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
-    Picture truth = taken(world.scene, camera, options);
-    Picture picture = world.drawn(camera, options);
-    largest_error = std::max(largest_error, likeness(truth, picture).difference);
-    if (degree > 0) {
-      const double step = likeness(last, picture).difference - likeness(last_truth, truth).difference;
-      largest_step = std::max(largest_step, step);
+// Voxels are then far smaller than pixels, and what one ray a pixel meets is a matter of chance; measured: 0.9014 at
+// least (blobs at 16 pixels).
+TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
+  for (const Model model : kModels) {
+    World world(model);
+    for (const int pixels : {32, 16}) {
+      double sum = 0.0;
+      for (const Likeness& found : likenesses(world, pixels, 24)) sum += found.overlap;
+      EXPECT_GE(sum / 24.0, 0.88) << static_cast<int>(model) << " " << pixels;
     }
-    last = std::move(picture);
-    last_truth = std::move(truth);
   }
-  RecordProperty("largest_step", std::to_string(largest_step));
-  RecordProperty("largest_error", std::to_string(largest_error));
-  EXPECT_LE(largest_error, 6.0);
-  EXPECT_LE(largest_step, 3.0) << "beyond the step of the traced picture";
+}
+
+// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.26 at most.
+TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
+  for (const Model model : {Model::Castle, Model::Ship}) {
+    const World world(model);
+    const RenderOptions options = sized(148, 148);
+    double largest_step = 0.0;
+    Picture last;
+    Picture last_truth;
+    for (int degree = 0; degree < 360; ++degree) {
+      const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
+      Picture truth = taken(world.scene, camera, options);
+      Picture picture = world.drawn(camera, options);
+      EXPECT_LE(likeness(truth, picture).difference, 6.0) << degree;
+      if (degree > 0) {
+        const double step = likeness(last, picture).difference - likeness(last_truth, truth).difference;
+        largest_step = std::max(largest_step, step);
+      }
+      last = std::move(picture);
+      last_truth = std::move(truth);
+    }
+    std::printf("model %d: %.3f of 255 beyond the traced step\n", static_cast<int>(model), largest_step);
+    EXPECT_LE(largest_step, 1.0) << static_cast<int>(model);
+  }
 }
 
 TEST(DrawImpostors, TurnsMirrorsAndScalesWithTheInstance) {
