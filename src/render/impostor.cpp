@@ -74,11 +74,12 @@ SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge)
 }
 
 std::size_t ImpostorFaces::bytes() const {
-  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face);
-  for (const Level& level : levels) {
-    sum += level.views.size() * (3 * sizeof(float) + 2 * sizeof(std::uint32_t));
-    sum += level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t));
-  }
+  const auto of_level = [](const Level& level) {
+    return level.views.size() * (3 * sizeof(float) + 2 * sizeof(std::uint32_t)) +
+           level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t));
+  };
+  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + of_level(unseen);
+  for (const Level& level : levels) sum += of_level(level);
   return sum;
 }
 

@@ -52,6 +52,7 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   for (std::size_t level = 0; level < faces->levels.size(); ++level) {
     faces->levels[level] = faces_of_level(seen, level, edge >> level, made.content_);
   }
+  faces->unseen = unseen_faces(seen, made.content_);
   GridReader reader(grid);
   if (shell) {
     put_faces(

@@ -180,7 +180,7 @@ TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
   }
 }
 
-// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.26 at most.
+// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.45 of 255 at most (the ship).
 TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
   for (const Model model : {Model::Castle, Model::Ship}) {
     const World world(model);

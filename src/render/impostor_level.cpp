@@ -75,6 +75,10 @@ ImpostorFaces::Level faces_of_level(const std::vector<SeenFace>& faces, std::siz
   return level_of(faces, content, half, [&](const SeenFace& face) { return face.views[level]; });
 }
 
+ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
+  return level_of(faces, content, 0.5, [](const SeenFace& face) { return face.views[0] == 0 ? ~0U : 0U; });
+}
+
 ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
   return level_of(faces, content, 0.5, [](const SeenFace&) { return ~0U; });
 }

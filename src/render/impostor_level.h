@@ -12,6 +12,9 @@ namespace quoin {
 [[nodiscard]] ImpostorFaces::Level faces_of_level(const std::vector<SeenFace>& faces, std::size_t level, int edge,
                                                   const ContentSphere& content);
 
+/// Those that no view saw at the finest level, as if every view had seen them.
+[[nodiscard]] ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
+
 /// All of them, as if every view had seen them, of their own size.
 [[nodiscard]] ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
 

@@ -192,6 +192,10 @@ void ImpostorPass::draw(int column, int row, PixelPoint point, raster::Canvas& c
     job.views = drawn.views;
     raster::set_aim(drawn.aim, x, y, job);
     draw_(job, canvas);
+    if (drawn.level != drawn.faces->levels.data()) continue;
+    job.level = &drawn.faces->unseen;
+    job.views = ~0U;
+    draw_(job, canvas);
   }
 }
 

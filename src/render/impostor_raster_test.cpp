@@ -7,7 +7,9 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -105,7 +107,7 @@ TEST(ImpostorRaster, MeetsWhatEveryFaceAskedForEveryPixelMeets) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Shape shape(seed);
     std::mt19937 random(seed);
-    for (int round = 0; round < 8; ++round) {
+    for (int round = 0; round < 16; ++round) {
       const raster::Aim aim = random_aim(random, shape.content.radius);
       raster::Job job;
       job.level = &shape.level;
@@ -191,19 +193,25 @@ TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
     const auto drawn = faces_seen_of(*shell, tree.bounds(), content, 128, InstructionSet::Best);
     const auto met = faces_seen_by_rays(tree, content, 128, InstructionSet::Best);
     ASSERT_GT(drawn.size(), 5'000U);
-    std::vector<SeenFace> by_index(shell->faces().size());
-    for (const SeenFace& face : met) by_index[shell->index_of(face.face)] = face;
+    const auto key_of = [](const VoxelFace& face) {
+      return std::tuple(face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction));
+    };
+    std::map<std::tuple<int, int, int, int>, SeenFace> by_face;
+    for (const SeenFace& face : met) by_face[key_of(face.face)] = face;
     std::size_t views = 0;
     std::size_t others = 0;
     for (const SeenFace& face : drawn) {
-      const SeenFace& other = by_index[shell->index_of(face.face)];
+      const auto found = by_face.find(key_of(face.face));
       for (std::size_t level = 0; level < face.views.size(); ++level) {
+        const std::uint32_t by_rays = found == by_face.end() ? 0 : found->second.views[level];
         views += static_cast<std::size_t>(std::popcount(face.views[level]));
-        others += static_cast<std::size_t>(std::popcount(face.views[level] ^ other.views[level]));
+        // Rays' faces have the views of those beside them too.
+        others += static_cast<std::size_t>(
+            std::popcount(level == 0 ? face.views[level] & ~by_rays : face.views[level] ^ by_rays));
       }
     }
+    EXPECT_GT(views, 50'000U);
     EXPECT_LE(others, views / 500);
-    EXPECT_NEAR(static_cast<double>(met.size()), static_cast<double>(drawn.size()), 1e-3 * static_cast<double>(met.size()));
   }
 }
 

@@ -32,18 +32,6 @@ void mark(Views& views, std::uint32_t bit, int column, int row) {
   }
 }
 
-template <class Visit>
-void for_each_edge(const VoxelFace& face, Visit visit) {
-  const FaceFrame& frame = frame_of(face.direction);
-  for (const int axis : {frame.u, frame.v}) {
-    for (const int sign : {-1, 1}) visit(axis, sign);
-  }
-}
-
-void erase_unseen(std::vector<SeenFace>& faces) {
-  std::erase_if(faces, [](const SeenFace& face) { return face.views[0] == 0; });
-}
-
 raster::Aim aim_of(const SnapshotCamera& camera) {
   raster::Aim aim;
   aim.right = camera.right, aim.down = -camera.up, aim.forward = camera.forward;
@@ -109,6 +97,17 @@ class ShellViews {
   std::vector<Views> views_;
 };
 
+// The face beside another at the edge towards `sign` along `axis`: in the same plane, or around the edge.
+VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const OccupancyTree& opaque) {
+  IVec3 beside = face.voxel;
+  beside[axis] += sign;
+  const IVec3 front = beside + normal_of(face.direction);
+  const auto towards = [&](int along) { return static_cast<Direction>(2 * axis + (along > 0 ? 0 : 1)); };
+  if (opaque.is_occupied(front)) return {front, towards(-sign)};
+  if (opaque.is_occupied(beside)) return {beside, face.direction};
+  return {face.voxel, towards(sign)};
+}
+
 struct FaceHash {
   std::size_t operator()(const VoxelFace& face) const {
     const auto bits = [](int coordinate) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(coordinate)); };
@@ -143,10 +142,10 @@ class MetFaces {
   void add_neighbours(const OccupancyTree& opaque) {
     const std::vector<SeenFace> found = faces_;
     for (const SeenFace& seen : found) {
-      for_each_edge(seen.face, [&](int axis, int sign) {
-        const auto is_occupied = [&](IVec3 voxel) { return opaque.is_occupied(voxel); };
-        at(face_beside(seen.face, axis, sign, is_occupied)).views[0] |= seen.views[0];
-      });
+      const FaceFrame& frame = frame_of(seen.face.direction);
+      for (const int axis : {frame.u, frame.v}) {
+        for (const int sign : {-1, 1}) at(face_beside(seen.face, axis, sign, opaque)).views[0] |= seen.views[0];
+      }
     }
   }
 
@@ -203,15 +202,7 @@ std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box,
   std::vector<SeenFace> faces(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];
   const std::vector<Views> views = ShellViews(faces, box, content, edge, instructions).take();
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (views[i][0] == 0) continue;
-    for (std::size_t level = 0; level < views[i].size(); ++level) faces[i].views[level] |= views[i][level];
-    for_each_edge(all[i], [&](int axis, int sign) {
-      const auto is_occupied = [&](IVec3 voxel) { return shell.is_occupied(voxel); };
-      faces[shell.index_of(face_beside(all[i], axis, sign, is_occupied))].views[0] |= views[i][0];
-    });
-  }
-  erase_unseen(faces);
+  for (std::size_t i = 0; i < all.size(); ++i) faces[i].views = views[i];
   return faces;
 }
 

@@ -1,6 +1,5 @@
 #include "render/impostor_shell.h"
 
-#include <algorithm>
 #include <bit>
 #include <cstddef>
 
@@ -98,21 +97,18 @@ std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) cons
   return own & ~neighbours;
 }
 
-std::int64_t ImpostorShell::count_faces() {
+std::int64_t ImpostorShell::count_faces() const {
   std::int64_t count = 0;
-  for (const Direction direction : kDirections) {
-    std::vector<std::uint32_t>& first = first_[static_cast<std::size_t>(direction)];
-    first.resize(cells_.size());
-    for (std::size_t cell = 0; cell < cells_.size(); ++cell) {
-      first[cell] = static_cast<std::uint32_t>(std::min<std::int64_t>(count, UINT32_MAX));
-      if (cells_[cell] != 0) count += std::popcount(exposed(direction, cell));
-    }
+  for (std::size_t cell = 0; cell < cells_.size(); ++cell) {
+    if (cells_[cell] == 0) continue;
+    for (const Direction direction : kDirections) count += std::popcount(exposed(direction, cell));
   }
   return count;
 }
 
 std::vector<VoxelFace> ImpostorShell::faces() const {
   std::vector<VoxelFace> all;
+  all.reserve(static_cast<std::size_t>(count_faces()));
   for (const Direction direction : kDirections) {
     std::size_t cell = 0;
     for (int z = 0; z < size_.z; ++z) {
@@ -129,14 +125,6 @@ std::vector<VoxelFace> ImpostorShell::faces() const {
     }
   }
   return all;
-}
-
-std::uint32_t ImpostorShell::index_of(const VoxelFace& face) const {
-  const IVec3 local = face.voxel - origin_;
-  const std::size_t cell = cell_of(local);
-  const std::uint64_t before = (std::uint64_t{1} << bit_of(local)) - 1;
-  return first_[static_cast<std::size_t>(face.direction)][cell] +
-         static_cast<std::uint32_t>(std::popcount(exposed(face.direction, cell) & before));
 }
 
 }  // namespace quoin

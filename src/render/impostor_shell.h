@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -18,21 +17,9 @@ struct VoxelFace {
   bool operator==(const VoxelFace&) const = default;
 };
 
-/// The face beside another at the edge towards `sign` along `axis`: in the same plane, or around the edge.
-template <class IsOccupied>
-[[nodiscard]] VoxelFace face_beside(const VoxelFace& face, int axis, int sign, IsOccupied&& is_occupied) {
-  IVec3 beside = face.voxel;
-  beside[axis] += sign;
-  const IVec3 front = beside + normal_of(face.direction);
-  const auto towards = [&](int along) { return static_cast<Direction>(2 * axis + (along > 0 ? 0 : 1)); };
-  if (is_occupied(front)) return {front, towards(-sign)};
-  if (is_occupied(beside)) return {beside, face.direction};
-  return {face.voxel, towards(sign)};
-}
-
 /// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
 ///
-/// Memory: 0.5 bytes a voxel of the box.
+/// Memory: a bit a voxel of the box.
 class ImpostorShell {
  public:
   /// None where the box has more than `most_voxels`, or more than `most_faces` lie in it.
@@ -41,8 +28,6 @@ class ImpostorShell {
 
   /// By direction, then by cell of 4^3 voxels.
   [[nodiscard]] std::vector<VoxelFace> faces() const;
-  /// Its place in `faces`. Requires: it is one of them.
-  [[nodiscard]] std::uint32_t index_of(const VoxelFace& face) const;
   /// Requires: `voxel` is at most one beside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
     const IVec3 local = voxel - origin_;
@@ -58,12 +43,11 @@ class ImpostorShell {
   void copy_chunk(const OccupancyTree& tree, IVec3 chunk);
   // The voxels of a cell that have a face in that direction.
   [[nodiscard]] std::uint64_t exposed(Direction direction, std::size_t cell) const;
-  [[nodiscard]] std::int64_t count_faces();
+  [[nodiscard]] std::int64_t count_faces() const;
 
   IVec3 origin_{0};  // the voxel at the least corner, a multiple of 4
   IVec3 size_{0};    // cells; one empty cell around everything
   std::vector<std::uint64_t> cells_;
-  std::array<std::vector<std::uint32_t>, 6> first_;  // by direction and cell: the place of its first face
 };
 
 }  // namespace quoin
