@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "light/corner_light.h"
 #include "render/impostor_faces.h"
 
 namespace quoin {
@@ -81,6 +82,12 @@ std::size_t ImpostorFaces::bytes() const {
   std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + of_level(unseen);
   for (const Level& level : levels) sum += of_level(level);
   return sum;
+}
+
+float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position) {
+  if (mode != OcclusionMode::Vertex) return static_cast<float>(face.open_rays) / ImpostorFaces::Face::kRays;
+  if (face.occlusion == 0) return 1.0F;
+  return 1.0F - level_at(unpacked_levels(face.occlusion), face.voxel, face.direction, position) / 3.0F;
 }
 
 Impostor::Impostor() : faces_(std::make_shared<const ImpostorFaces>()) {}

@@ -1,7 +1,12 @@
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 
+#include <quoin/trace/packet.h>
+
 #include "light/corner_light.h"
+#include "light/occlusion_directions.h"
 #include "render/impostor_level.h"
 #include "render/impostor_seen.h"
 #include "render/impostor_shell.h"
@@ -23,12 +28,46 @@ std::uint8_t packed(const FaceLevels& levels) {
   return static_cast<std::uint8_t>(all);
 }
 
+// How many of the rays of OcclusionDirections reach open space from the middle of each face; by sixteens, which mostly
+// are of one direction.
+void count_open_rays(const OccupancyTree& opaque, InstructionSet instructions,
+                     std::vector<ImpostorFaces::Face>& faces) {
+  constexpr double kLift = 0.01;
+  constexpr int kRays = ImpostorFaces::Face::kRays;
+  const OcclusionDirections directions(kRays);
+  RayPacket rays;
+  rays.max_t.fill(LightOptions{}.occlusion_distance);
+  for (std::size_t begin = 0; begin < faces.size(); begin += RayPacket::kSize) {
+    const std::size_t size = std::min<std::size_t>(RayPacket::kSize, faces.size() - begin);
+    rays.active = (1U << size) - 1U;
+    for (std::size_t i = 0; i < size; ++i) {
+      const ImpostorFaces::Face& face = faces[begin + i];
+      const DVec3 origin = DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
+      rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
+    }
+    std::array<int, RayPacket::kSize> open{};
+    for (int ray = 0; ray < kRays; ++ray) {
+      for (std::size_t i = 0; i < size; ++i) {
+        const DVec3 direction = directions.fixed(static_cast<std::size_t>(faces[begin + i].direction), ray);
+        rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
+      }
+      const std::uint32_t blocked = any_hits(opaque, rays, instructions);
+      for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
+    }
+    for (std::size_t i = 0; i < size; ++i) faces[begin + i].open_rays = static_cast<std::uint8_t>(open[i] & 15);
+  }
+}
+
 template <class IsOpaque>
 void put_faces(const std::vector<SeenFace>& seen, GridReader& reader, IsOpaque is_opaque, ImpostorFaces& out) {
   out.faces.reserve(seen.size());
   for (const SeenFace& each : seen) {
     const auto [voxel, direction] = each.face;
-    out.faces.push_back({voxel, reader.get(voxel), packed(corner_levels(is_opaque, voxel, direction)), direction});
+    ImpostorFaces::Face& face = out.faces.emplace_back();
+    face.voxel = voxel;
+    face.direction = direction;
+    face.type = reader.get(voxel);
+    face.occlusion = packed(corner_levels(is_opaque, voxel, direction));
   }
 }
 
@@ -61,6 +100,7 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
     put_faces(
         seen, reader, [&](IVec3 voxel) { return types.is_opaque(reader.get(voxel)); }, *faces);
   }
+  count_open_rays(opaque, instructions, faces->faces);
   made.faces_ = std::move(faces);
   return made;
 }

@@ -22,8 +22,8 @@ constexpr int kBlock = CameraRays::kBlock;
 class FarTile {
  public:
   FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,
-          Picture& picture)
-      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), picture_(&picture) {}
+          OcclusionMode mode, Picture& picture)
+      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), picture_(&picture) {}
 
   void draw(int column, int row) {
     pass_->draw(column, row, PixelPoint{}, *far_);
@@ -68,8 +68,8 @@ class FarTile {
       point.placed = hits.placed[i];
       point.position = on_face(view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
                                point.voxel, point.face);
-      point.type = faces.type[i];
-      point.openness = openness_of(faces.occlusion[i], point.voxel, point.face, point.position);
+      point.type = faces.face[i]->type;
+      point.openness = openness_of(*faces.face[i], mode_, point.position);
       pixels_.push_back(pixel);
     }
   }
@@ -78,6 +78,7 @@ class FarTile {
   const SceneView* view_;
   const CameraRays* rays_;
   const Lighting* lighting_;
+  OcclusionMode mode_;
   Picture* picture_;
   std::unique_ptr<raster::Canvas> far_ = std::make_unique<raster::Canvas>();
   std::vector<SurfacePoint> points_;
@@ -98,7 +99,8 @@ void draw_impostors(const SceneTracer& scene, const VoxelRegistry& types, std::s
   parallel_for(static_cast<std::size_t>(across * down), options.threads, [&](std::size_t i) {
     const int column = static_cast<int>(i) % across * kTile;
     const int row = static_cast<int>(i) / across * kTile;
-    if (pass.may_show(column, row)) FarTile(pass, view, rays, lighting, picture).draw(column, row);
+    if (pass.may_show(column, row))
+      FarTile(pass, view, rays, lighting, options.light.occlusion, picture).draw(column, row);
   });
 }
 

@@ -49,7 +49,7 @@ Likeness likeness(const Picture& truth, const Picture& picture) {
 }
 
 // A few models in one scene, one grid each, with their pivots at the contents' centres.
-enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain };
+enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb };
 
 Grid voxels_of(Model model) {
   Grid grid;
@@ -94,6 +94,10 @@ Grid voxels_of(Model model) {
           25 + 12 * std::sin(0.11 * v.x) * std::cos(0.07 * v.z) + 5 * std::sin(0.31 * v.x + 0.2 * v.z);
       return v.y <= height ? static_cast<VoxelType>(v.y > height - 1 ? 1 : v.y > height - 4 ? 2 : 3) : kAir;
     });
+  }
+  if (model == Model::Comb) {
+    grid.fill_box({0, 0, 0}, {40, 2, 30}, 2);
+    for (int x = 0; x <= 40; x += 2) grid.fill_box({x, 3, 0}, {x, 24, 30}, x % 4 == 0 ? 1 : 3);
   }
   return grid;
 }
@@ -153,16 +157,27 @@ std::vector<Likeness> likenesses(World& world, int pixels, int count) {
   return all;
 }
 
-// The specification asks for 0.97 and 6; measured at worst: 0.9957 (castle) and 5.5 (terrain).
+// The specification asks for 0.97 and 6; measured at worst: 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all others).
 TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
   for (const Model model : kModels) {
     World world(model);
     for (const int pixels : {128, 64}) {
       for (const Likeness& found : likenesses(world, pixels, 24)) {
         EXPECT_GT(found.pixels, 350);
-        EXPECT_GE(found.overlap, 0.99) << static_cast<int>(model) << " " << pixels;
-        EXPECT_LE(found.difference, 6.0) << static_cast<int>(model) << " " << pixels;
+        EXPECT_GE(found.overlap, 0.995) << static_cast<int>(model) << " " << pixels;
+        EXPECT_LE(found.difference, model == Model::Terrain ? 5.0 : 2.0) << static_cast<int>(model) << " " << pixels;
       }
+    }
+  }
+}
+
+// Between its plates no snapshot sees far down.
+TEST(DrawImpostors, HasNoHolesInCrevices) {
+  World world(Model::Comb);
+  for (const int pixels : {128, 90}) {
+    for (const Likeness& found : likenesses(world, pixels, 30)) {
+      EXPECT_GE(found.overlap, 0.9995);
+      EXPECT_LE(found.difference, 6.0);
     }
   }
 }
@@ -180,7 +195,8 @@ TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
   }
 }
 
-// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.45 of 255 at most (the ship).
+// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.06 of 255
+// at most (the ship).
 TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
   for (const Model model : {Model::Castle, Model::Ship}) {
     const World world(model);
@@ -201,7 +217,7 @@ TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
       last_truth = std::move(truth);
     }
     std::printf("model %d: %.3f of 255 beyond the traced step\n", static_cast<int>(model), largest_step);
-    EXPECT_LE(largest_step, 1.0) << static_cast<int>(model);
+    EXPECT_LE(largest_step, 0.3) << static_cast<int>(model);
   }
 }
 

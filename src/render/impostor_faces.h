@@ -8,6 +8,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/light/light_options.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/render/impostor.h>
 
@@ -42,19 +43,24 @@ struct ImpostorFaces {
     IVec3 voxel{0};
     VoxelType type = kAir;
     std::uint8_t occlusion = 0;  ///< the four corners' levels, two bits each
-    Direction direction = Direction::PosX;
+    Direction direction : 3 = Direction::PosX;
+    std::uint8_t open_rays : 4 = kRays;  ///< of so many occlusion rays from the face's middle
+    static constexpr int kRays = 9;
   };
 
   int edge = 0;       ///< texels a side of the finest snapshots
   DVec3 centre{0.0};  ///< of the content, in the grid
   std::array<Level, kLevels> levels;
-  /// Faces in crevices that no snapshot looked into but a camera may: drawn with the finest level, where nothing of that
-  /// is before them. Of grids with very many faces they are not known.
+  /// Faces in crevices that no snapshot looked into but a camera may: drawn with the finest level, where nothing of
+  /// that is before them. Of grids with very many faces they are not known.
   Level unseen;
   std::vector<Face> faces;
 
   [[nodiscard]] std::size_t bytes() const;
 };
+
+/// 0 to 1 at a point of a face (in the grid): in OcclusionMode::Vertex by its corners, else by rays from its middle.
+[[nodiscard]] float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position);
 
 [[nodiscard]] inline FaceLevels unpacked_levels(std::uint8_t packed) {
   FaceLevels levels{};

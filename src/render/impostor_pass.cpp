@@ -10,8 +10,6 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "light/corner_light.h"
-
 namespace quoin {
 namespace {
 
@@ -72,11 +70,6 @@ std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const F
     if (index >= 0) indices.push_back(index);
   }
   return indices;
-}
-
-float openness_of(std::uint8_t occlusion, IVec3 voxel, Direction face, DVec3 position_in_grid) {
-  if (occlusion == 0) return 1.0F;
-  return 1.0F - level_at(unpacked_levels(occlusion), voxel, face, position_in_grid) / 3.0F;
 }
 
 // What of a content's sphere decides whether and where it is drawn.
@@ -237,8 +230,7 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
     faces.found |= bit;
-    faces.type[i] = face.type;
-    faces.occlusion[i] = face.occlusion;
+    faces.face[i] = &face;
   }
 }
 

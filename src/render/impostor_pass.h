@@ -16,12 +16,8 @@ namespace quoin {
 /// Of the lanes whose bit is set, what an impostor's face says beside what SceneHits hold.
 struct FarFaces {
   std::uint32_t found = 0;
-  RayPacket::Lanes<VoxelType> type{};
-  RayPacket::Lanes<std::uint8_t> occlusion{};  ///< ImpostorFaces::Face
+  RayPacket::Lanes<const ImpostorFaces::Face*> face{};
 };
-
-/// 1 where the corners' levels at a point of a face are 0; 0 where they are 3.
-[[nodiscard]] float openness_of(std::uint8_t occlusion, IVec3 voxel, Direction face, DVec3 position_in_grid);
 
 /// The far instances of one picture: which may show in which part of it, and what rays meet of them.
 class ImpostorPass {

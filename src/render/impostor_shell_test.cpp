@@ -27,7 +27,9 @@ struct World {
 
   explicit World(unsigned seed) {
     std::mt19937 random(seed);
-    const auto around = [&](int reach) { return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach; };
+    const auto around = [&](int reach) {
+      return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach;
+    };
     const IVec3 corner{around(3000), around(3000), around(3000)};
     for (int i = 0; i < 30; ++i) {
       const IVec3 at = corner + IVec3{around(45), around(45), around(45)};

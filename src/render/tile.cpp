@@ -98,8 +98,8 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
                            point.voxel, point.face);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
   if ((far_faces_.found >> lane & 1U) == 0) return;
-  point.type = far_faces_.type[i];
-  point.openness = openness_of(far_faces_.occlusion[i], point.voxel, point.face, point.position);
+  point.type = far_faces_.face[i]->type;
+  point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion, point.position);
 }
 
 Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
