@@ -178,14 +178,15 @@ class PacketTree::Builder {
 
   void put(std::size_t at, const DBox& box, std::uint32_t child, bool is_box, DBox& around) {
     Node& node = nodes_[at];
-    const std::uint32_t slot = node.count++;
+    const auto slot = static_cast<std::size_t>(std::popcount(node.present));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<int>(axis);
       node.boxes[axis][slot] = rounded_up(box.max[i] - origin_[i]);
       node.boxes[axis + 3][slot] = rounded_up(origin_[i] - box.min[i]);
     }
     node.children[slot] = child;
-    node.is_box[slot] = is_box;
+    node.is_box |= std::uint32_t{is_box} << slot;
+    node.present |= 1U << slot;
     around = {glm::min(around.min, box.min), glm::max(around.max, box.max)};
   }
 

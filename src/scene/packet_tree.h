@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -127,12 +128,13 @@ class PacketTree {
   template <class Visit>
   void visit(const PacketBounds& rays, Visit&& visit) const {
     if (nodes_.empty() || !(rays.scale() > 0.0F)) return;
-    std::array<Entry, kMaxHeight> stack{};
+    std::array<Entry, kMaxHeight> stack;
+    stack[0] = {0, kWhole, 0.0F};
     std::size_t height = 1;
     while (height > 0) {
       const Entry top = stack[--height];
       if (!rays.reaches(top.near)) continue;
-      if (top.is_box) {
+      if (top.slot != kWhole) {
         const Node& node = nodes_[top.node];
         if (!visit(static_cast<std::size_t>(node.children[top.slot]), node.boxes, std::size_t{top.slot})) return;
         continue;
@@ -147,14 +149,15 @@ class PacketTree {
   struct Node {
     FourBoxes boxes;
     std::array<std::uint32_t, 4> children{};  // nodes, or indices of boxes
-    std::array<bool, 4> is_box{};
-    std::uint32_t count = 0;
+    std::uint32_t is_box = 0;   // bit by bit: a child is a box, not a node
+    std::uint32_t present = 0;  // likewise: there is a child
   };
+  // What is yet to be looked into: a node, or one of its boxes.
+  static constexpr std::uint32_t kWhole = 4;
   struct Entry {
-    std::uint32_t node = 0;
-    float near = 0.0F;
-    std::uint8_t slot = 0;
-    bool is_box = false;
+    std::uint32_t node;
+    std::uint32_t slot;
+    float near;
   };
 
   // The nearest comes last, on top.
@@ -163,11 +166,12 @@ class PacketTree {
     Four near;
     const unsigned met = rays.meet(node.boxes, near);
     const std::size_t base = height;
-    for (std::uint8_t slot = 0; slot < node.count; ++slot) {
-      if ((met >> slot & 1U) == 0) continue;
+    for (std::uint32_t left = met & node.present; left != 0; left &= left - 1) {
+      const auto slot = static_cast<std::uint32_t>(std::countr_zero(left));
       std::size_t at = height++;
       for (; at > base && stack[at - 1].near < near[slot]; --at) stack[at] = stack[at - 1];
-      stack[at] = {node.is_box[slot] ? index : node.children[slot], near[slot], slot, node.is_box[slot]};
+      const bool is_box = (node.is_box >> slot & 1U) != 0;
+      stack[at] = {is_box ? index : node.children[slot], is_box ? slot : kWhole, near[slot]};
     }
     return height;
   }

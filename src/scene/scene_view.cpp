@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <functional>
-#include <optional>
+#include <new>
+#include <type_traits>
 
 #include <glm/matrix.hpp>
 
@@ -12,6 +14,35 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kLanes = RayPacket::kSize;
+
+// Room for something that is written before it is read: to clear packets first takes longer than to fill them.
+template <class T>
+class RoomFor {
+ public:
+  RoomFor() {}  // NOLINT: left as it is
+  [[nodiscard]] T& operator*() { return *std::launder(reinterpret_cast<T*>(bytes_)); }
+
+ private:
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+  alignas(T) std::byte bytes_[sizeof(T)];
+};
+
+// The lanes of a packet, once they are asked for.
+class LanesWhenNeeded {
+ public:
+  LanesWhenNeeded(const RayPacket& rays, const PacketBounds& bounds) : rays_(rays), bounds_(bounds) {}
+  [[nodiscard]] PacketLanes& operator*() {
+    if (!is_made_) new (&*lanes_) PacketLanes(rays_, bounds_);
+    is_made_ = true;
+    return *lanes_;
+  }
+
+ private:
+  const RayPacket& rays_;
+  const PacketBounds& bounds_;
+  RoomFor<PacketLanes> lanes_;
+  bool is_made_ = false;
+};
 
 // Moves points and directions from one space to another.
 struct Affine {
@@ -118,7 +149,8 @@ void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
 
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
-  RayPacket rays;
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
   hits.grids.hit = hits.grids.starts_inside = 0;
   if (impl_->is_alone && impl_->sees_all()) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
@@ -128,12 +160,12 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   }
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
   PacketBounds bounds(left);
-  std::optional<PacketLanes> lanes;
-  PacketHits found;
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<PacketHits> room_for_hits;
+  PacketHits& found = *room_for_hits;
   const PacketTree& seen = impl_->sees_all() ? impl_->instances : impl_->seen;
   seen.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
-    if (!lanes) lanes.emplace(left, bounds);
-    const std::uint32_t near = lanes->meet(boxes, box) & left.active;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
@@ -142,7 +174,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
     impl_->take_nearer(i, found, left, hits);
     for (std::uint32_t each = found.hit; each != 0; each &= each - 1) {
       const int lane = std::countr_zero(each);
-      lanes->set_reach(lane, left.max_t[static_cast<std::size_t>(lane)]);
+      (*lanes).set_reach(lane, left.max_t[static_cast<std::size_t>(lane)]);
     }
     if (hits.grids.hit == left.active) bounds.set_reach(farthest(left));
     return true;
@@ -154,16 +186,17 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
   const auto own = static_cast<std::size_t>(home);
   std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid, impl_->instructions);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
-  RayPacket in_view;
+  RoomFor<RayPacket> room_in_view;
+  RayPacket& in_view = *room_in_view;
   move(impl_->view_from_grid[own], rays_in_grid, in_view);
   in_view.active &= ~blocked;
   const PacketBounds bounds(in_view);
-  std::optional<PacketLanes> lanes;
-  RayPacket rays;
+  LanesWhenNeeded lanes(in_view, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
   impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     if (i == own) return true;
-    if (!lanes) lanes.emplace(in_view, bounds);
-    const std::uint32_t near = lanes->meet(boxes, box) & in_view.active;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & in_view.active;
     if (near == 0) return true;
     move(impl_->grid_from_view[i], in_view, rays);
     rays.active = near;
@@ -179,13 +212,13 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
   if (rays_in_view.active == 0 || !impl_->tracer->has_transparent()) return 0;
   RayPacket left = rays_in_view;
   const PacketBounds bounds(left);
-  std::optional<PacketLanes> lanes;
-  RayPacket rays;
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
   impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
     if (tree == nullptr) return true;
-    if (!lanes) lanes.emplace(left, bounds);
-    const std::uint32_t near = lanes->meet(boxes, box) & left.active;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
