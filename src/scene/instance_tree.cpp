@@ -43,6 +43,12 @@ bool may_meet(const Ray& ray, double max_t, const DBox& box) {
   return high >= 0.0 && low <= high * (1.0 + kRoom) + kRoom;
 }
 
+// What is sorted: a box by its centre.
+struct InstanceTree::Item {
+  DVec3 twice_centre{0.0};
+  std::size_t box = 0;
+};
+
 InstanceTree::InstanceTree(std::vector<DBox> boxes) : boxes_(std::move(boxes)) {
   build();
 }
@@ -52,12 +58,17 @@ void InstanceTree::build() {
   nodes_.clear();
   leaf_of_.assign(boxes_.size(), kNoLeaf);
   areas_ = built_cost_ = 0.0;
+  std::vector<Item> items;
+  items.reserve(boxes_.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    if (!boxes_[i].empty()) order_.push_back(i);
+    if (!boxes_[i].empty()) items.push_back({boxes_[i].min + boxes_[i].max, i});
   }
-  if (order_.empty()) return;
+  if (items.empty()) return;
+  order_.resize(items.size());
+  nodes_.reserve(items.size());
   nodes_.emplace_back();
-  split(0, 0, order_.size());
+  split(0, items, 0);
+  for (std::size_t i = nodes_.size(); i-- > 0;) fit(nodes_[i]);
   for (const Node& node : nodes_) areas_ += area_of(node.box);
   built_cost_ = search_cost();
 }
@@ -104,38 +115,35 @@ void InstanceTree::change(std::span<const Change> changes) {
   if (!nodes_.empty() && !(search_cost() <= kMostWorse * built_cost_)) build();
 }
 
-void InstanceTree::split(std::size_t node, std::size_t begin, std::size_t end) {
-  DBox box;
-  DBox centres;
-  for (std::size_t i = begin; i < end; ++i) {
-    const DBox& each = boxes_[order_[i]];
-    box.extend(each.min);
-    box.extend(each.max);
-    centres.extend(each.min + each.max);
-  }
-  nodes_[node].box = box;
-  if (end - begin <= kLeafSize) {
+// Makes the nodes below one that holds `items`, whose boxes stand in `order_` from `begin` on.
+void InstanceTree::split(std::size_t node, std::span<Item> items, std::size_t begin) {
+  if (items.size() <= kLeafSize) {
     nodes_[node].first = begin;
-    nodes_[node].count = end - begin;
-    for (std::size_t i = begin; i < end; ++i) leaf_of_[order_[i]] = node;
+    nodes_[node].count = items.size();
+    for (const Item& item : items) {
+      leaf_of_[item.box] = node;
+      order_[begin++] = item.box;
+    }
     return;
   }
+  DBox centres;
+  for (const Item& item : items) centres.extend(item.twice_centre);
   const DVec3 size = centres.max - centres.min;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  const std::size_t middle = begin + (end - begin) / 2;
-  const auto at = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-  std::nth_element(at(begin), at(middle), at(end), [&](std::size_t a, std::size_t b) {
-    const double centre_a = boxes_[a].min[axis] + boxes_[a].max[axis];
-    const double centre_b = boxes_[b].min[axis] + boxes_[b].max[axis];
-    return centre_a != centre_b ? centre_a < centre_b : a < b;
-  });
+  const std::size_t middle = items.size() / 2;
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(middle), items.end(),
+                   [axis](const Item& a, const Item& b) {
+                     const double at_a = a.twice_centre[axis];
+                     const double at_b = b.twice_centre[axis];
+                     return at_a != at_b ? at_a < at_b : a.box < b.box;
+                   });
   const std::size_t upper = nodes_.size() + 1;
   nodes_[node].axis = axis;
   nodes_[node].first = upper;
   nodes_.resize(nodes_.size() + 2);
   nodes_[upper - 1].parent = nodes_[upper].parent = node;
-  split(upper - 1, begin, middle);
-  split(upper, middle, end);
+  split(upper - 1, items.first(middle), begin);
+  split(upper, items.subspan(middle), begin + middle);
 }
 
 }  // namespace quoin

@@ -97,8 +97,9 @@ class InstanceTree {
  private:
   static constexpr std::size_t kMaxDepth = 72;
   static constexpr std::size_t kLeafSize = 4;
+  struct Item;
   void build();
-  void split(std::size_t node, std::size_t begin, std::size_t end);
+  void split(std::size_t node, std::span<Item> items, std::size_t begin);
   void fit(Node& node) const;
   [[nodiscard]] double search_cost() const;
 

@@ -75,14 +75,15 @@ TEST(PacketTree, LeavesOutNearlyAllThatARayAloneDoesNotMeet) {
   int needless = 0;
   for (int round = 0; round < 300; ++round) {
     RayPacket rays;
-    rays.set(round % 16, {world.vector(150.0), world.vector(1.0)}, kInfinity);
+    const DVec3 origin = world.vector(150.0);
+    rays.set(round % 16, {origin, world.vector(80.0) - origin}, kInfinity);
     for (const auto& [i, lanes] : visited(tree, rays)) {
       const bool is_met = meets(rays.ray(round % 16), kInfinity, boxes[i]);
       met += is_met;
       needless += !is_met;
     }
   }
-  EXPECT_GT(met, 300);
+  EXPECT_GT(met, 200);
   EXPECT_LT(needless, met / 100 + 1);
 }
 

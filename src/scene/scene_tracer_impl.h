@@ -30,12 +30,20 @@ struct TracedGrid {
 [[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
 
 struct SceneTracer::Impl {
-  // What a placed grid was read from, besides what it says itself.
+  // What a placed grid was read from, to be compared with what its instance is now.
   struct Source {
+    InstanceHandle instance;
     TracedGrid* grid = nullptr;
     std::uint64_t shape = 0;
+    DVec3 position{0.0};
     DQuat rotation{1.0, 0.0, 0.0, 0.0};
+    double voxel_size = 1.0;
     bool mirrored = false;
+
+    [[nodiscard]] bool is_of(const Instance& now, const TracedGrid& its_grid) const {
+      return grid == &its_grid && shape == its_grid.shape && position == now.position && rotation == now.rotation &&
+             voxel_size == now.voxel_size && mirrored == now.mirrored;
+    }
   };
 
   const Scene* scene = nullptr;
@@ -58,7 +66,6 @@ struct SceneTracer::Impl {
   void look_at_grids();
   void look_at(GridHandle handle, const SceneGrid& grid);
   [[nodiscard]] TracedGrid* grid_to_place(const Instance& instance) const;
-  [[nodiscard]] bool is_up_to_date(std::size_t i, const Instance& instance, const TracedGrid& grid) const;
   void place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid);
   [[nodiscard]] bool move_instances();
   void place_instances();

@@ -99,20 +99,12 @@ void SceneTracer::Impl::look_at(GridHandle handle, const SceneGrid& grid) {
   known->can_be_placed = !tight.empty() && is_finite(grid.pivot);
 }
 
-// The grid of an instance that is to be traced; null for any other.
+// The grid of an instance that is to be traced where it has a place; null for any other.
 TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
   if ((!instance.visible && !hidden) || instance.grid.index >= grids.size()) return nullptr;
   TracedGrid* grid = grids[instance.grid.index].get();
   if (grid == nullptr || grid->handle != instance.grid || !grid->can_be_placed) return nullptr;
-  return has_place(instance) ? grid : nullptr;
-}
-
-bool SceneTracer::Impl::is_up_to_date(std::size_t i, const Instance& instance, const TracedGrid& grid) const {
-  const PlacedGrid& place = placed[i];
-  const Source& source = sources[i];
-  return source.grid == &grid && source.shape == grid.shape && place.position == instance.position &&
-         source.rotation == instance.rotation && place.voxel_size == instance.voxel_size &&
-         source.mirrored == instance.mirrored;
+  return grid;
 }
 
 void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid) {
@@ -125,7 +117,8 @@ void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instan
   placed[i].world_axes = world_axes(instance);
   placed[i].position = instance.position;
   placed[i].voxel_size = instance.voxel_size;
-  sources[i] = {&grid, grid.shape, instance.rotation, instance.mirrored};
+  sources[i] = {handle,           &grid, grid.shape, instance.position, instance.rotation, instance.voxel_size,
+                instance.mirrored};
 }
 
 // Places anew what was moved; false, with some of it done, when other instances are to be traced than were.
@@ -137,10 +130,13 @@ bool SceneTracer::Impl::move_instances() {
     if (!is_same) return;
     TracedGrid* grid = grid_to_place(instance);
     if (grid == nullptr) return;
-    is_same = next < placed.size() && placed[next].instance == handle;
+    const bool is_next = next < sources.size() && sources[next].instance == handle;
+    const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
+    if (has_moved && !has_place(instance)) return;
+    is_same = is_next;
     if (!is_same) return;
     grid->is_placed = true;
-    if (!is_up_to_date(next, instance, *grid)) {
+    if (has_moved) {
       place(next, handle, instance, *grid);
       moved.push_back({next, bounds_in_world(placed[next], grid->tight)});
     }
@@ -158,7 +154,7 @@ void SceneTracer::Impl::place_instances() {
   sources.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     TracedGrid* grid = grid_to_place(instance);
-    if (grid == nullptr) return;
+    if (grid == nullptr || !has_place(instance)) return;
     grid->is_placed = true;
     placed.emplace_back();
     sources.emplace_back();
@@ -178,9 +174,9 @@ void SceneTracer::Impl::update_trees(Threads threads) {
     is_other[i] = static_cast<std::uint8_t>(used[i]->trees.update(used[i]->grid->grid, scene->types));
   });
   has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
-  if (!has_other_trees) return;
   has_transparent = std::any_of(used.begin(), used.end(),
                                 [](const TracedGrid* grid) { return grid->trees.transparent() != nullptr; });
+  if (!has_other_trees) return;
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const TracedGrid& grid = *sources[i].grid;
     placed[i].grid = grid.grid;
