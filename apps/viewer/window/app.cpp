@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <thread>
+#include <utility>
 
 #include "outline.h"
 #include "wake.h"
@@ -63,11 +65,25 @@ int App::patience_milliseconds() const {
 }
 
 void App::wait_and_process() {
-  const int patience = patience_milliseconds();
-  SDL_Event event;
-  bool has_event = patience > 0 ? SDL_WaitEventTimeout(&event, patience) != 0 : SDL_PollEvent(&event) != 0;
+  const int patience = postponed_ ? 0 : patience_milliseconds();
   was_idle_ = patience > 0;
-  for (; has_event; has_event = SDL_PollEvent(&event) != 0) process(event);
+  SDL_Event event;
+  bool has_event = true;
+  if (postponed_) {
+    event = *std::exchange(postponed_, std::nullopt);
+  } else {
+    has_event = patience > 0 ? SDL_WaitEventTimeout(&event, patience) != 0 : SDL_PollEvent(&event) != 0;
+  }
+  std::set<SDL_Scancode> pressed;
+  for (; has_event; has_event = SDL_PollEvent(&event) != 0) {
+    // The GUI looks at keys once a frame: one that is let go at once would never have been down.
+    if (event.type == SDL_KEYUP && pressed.contains(event.key.keysym.scancode)) {
+      postponed_ = event;
+      return;
+    }
+    if (event.type == SDL_KEYDOWN) pressed.insert(event.key.keysym.scancode);
+    process(event);
+  }
 }
 
 void App::process(const SDL_Event& event) {
@@ -97,10 +113,11 @@ void App::frame() {
   if (window_.is_minimised()) return;
   state_.camera.advance(step, input_.push(), input_.boost());
   input_.editing.advance(state_);
-  gui_.begin_frame();
   state_.pixels_per_unit = window_.pixels_per_unit();
-  draw_gui();
   take_picture();
+  gui_.begin_frame();
+  draw_gui();
+  ask_for_picture();
   window_.draw_picture(state_.picture_place);
   gui_.end_frame();
   SDL_RenderPresent(window_.renderer());
@@ -121,20 +138,21 @@ void App::place_picture(float top, float right, float bottom) {
                           std::max(output.y - pixels(top) - pixels(bottom), 0)};
 }
 
+void App::ask_for_picture() {
+  if (!state_.open.backend || !state_.has_picture_place()) return;
+  ViewRequest request;
+  request.camera = state_.camera.camera();
+  request.width = state_.picture_place.w;
+  request.height = state_.picture_place.h;
+  request.light = state_.settings.light;
+  request.samples = state_.settings.samples;
+  request.detail_by_pixels = state_.settings.detail_by_pixels;
+  state_.open.backend->show(request);
+}
+
 void App::take_picture() {
   if (!state_.open.backend) return;
-  if (state_.has_picture_place()) {
-    ViewRequest request;
-    request.camera = state_.camera.camera();
-    request.width = state_.picture_place.w;
-    request.height = state_.picture_place.h;
-    request.light = state_.settings.light;
-    request.samples = state_.settings.samples;
-    request.detail_by_pixels = state_.settings.detail_by_pixels;
-    state_.open.backend->show(request);
-  }
-  auto frame = state_.open.backend->take();
-  if (frame) {
+  if (auto frame = state_.open.backend->take()) {
     state_.facts = {frame->colour.width, frame->colour.height, frame->samples,
                     frame->is_settled,   frame->seconds,       frame->rays};
     state_.picture = std::move(frame->colour);
@@ -142,18 +160,21 @@ void App::take_picture() {
   }
   if (const auto fault = state_.open.backend->fault(); fault && !state_.message) {
     state_.tell(*fault);
-    if (!options_.screenshot.empty()) {
-      status_ = tl::unexpected<Error>(*fault);
-      is_running_ = false;
-    }
+    if (!options_.screenshot.empty()) end_with(*fault);
   }
   const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
                           state_.facts.height == state_.picture_place.h;
-  if (is_current && is_screenshot_wanted_) save_screenshot();
-  if (is_current && !options_.screenshot.empty() && is_running_) {
-    write_screenshot(options_.screenshot);
+  if (!is_current) return;
+  if (is_screenshot_wanted_) save_screenshot();
+  if (!options_.screenshot.empty() && is_running_) {
     is_running_ = false;
+    write_screenshot(options_.screenshot);
   }
+}
+
+void App::end_with(const Error& error) {
+  status_ = tl::unexpected<Error>(error);
+  is_running_ = false;
 }
 
 void App::update_hover() {

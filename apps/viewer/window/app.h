@@ -41,7 +41,9 @@ class App {
   void process(const SDL_Event& event);
   void frame();
   void place_picture(float left_top, float right, float bottom);
+  void ask_for_picture();
   void take_picture();
+  void end_with(const Error& error);
   void pace();
   void draw_gui();
   void draw_bars();
@@ -80,6 +82,7 @@ class App {
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
   bool is_screenshot_wanted_ = false;
+  std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();
   bool was_idle_ = true;

@@ -85,10 +85,7 @@ void App::take_loaded() {
     return;
   }
   state_.tell(opened.error());
-  if (!options_.screenshot.empty()) {
-    status_ = tl::unexpected<Error>(opened.error());
-    is_running_ = false;
-  }
+  if (!options_.screenshot.empty()) end_with(opened.error());
 }
 
 void App::adopt(OpenDocument opened) {
@@ -154,7 +151,7 @@ void App::write_screenshot(const std::filesystem::path& path) {
   const auto written = write_png(state_.picture, path);
   if (!written) {
     state_.tell(written.error());
-    if (!options_.screenshot.empty()) status_ = tl::unexpected<Error>(written.error());
+    if (!options_.screenshot.empty()) end_with(written.error());
     return;
   }
   state_.tell("saved " + path.string());

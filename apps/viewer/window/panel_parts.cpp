@@ -56,7 +56,7 @@ void draw_palette(ViewState& state) {
   const int across = std::max(1, static_cast<int>((ImGui::GetContentRegionAvail().x - 16.0F) / (edge + gap)));
   const std::size_t shown = std::min<std::size_t>(scene.types.size() - 1, 1'024);
   const int rows = static_cast<int>((shown + static_cast<std::size_t>(across) - 1) / static_cast<std::size_t>(across));
-  const float height = static_cast<float>(std::min(rows, 6)) * (edge + gap) + 2.0F;
+  const float height = static_cast<float>(std::min(rows, 4)) * (edge + gap) + 2.0F;
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {gap, gap});
   ImGui::BeginChild("palette", {0.0F, height});
   for (std::size_t i = 1; i <= shown; ++i) {
@@ -126,6 +126,7 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
   ImGui::SliderInt("radius", &state.brush.radius, 0, kLargestBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
   draw_palette(state);
   draw_new_colour(state);
+  ImGui::SameLine();
   const EditHistory& history = state.open.document->history();
   ImGui::BeginDisabled(!history.can_undo());
   command_button(Command::Undo, "Undo", choice);
@@ -151,7 +152,6 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
     if (i % 3 != 0) ImGui::SameLine();
     command_button(kViews[i].first, kViews[i].second, choice);
   }
-  ImGui::Text("speed %.3g a second", state.camera.speed());
 }
 
 void draw_light_part(ViewState& state) {
@@ -197,10 +197,11 @@ void draw_statistics_part(const ViewState& state) {
   row("rays a second", "%.1f million",
       facts.seconds > 0.0 ? static_cast<double>(facts.rays) / facts.seconds / 1e6 : 0.0);
   row("samples a pixel", "%.0f", facts.samples);
+  row("flight a second", "%.3g voxels", state.camera.speed());
   row("memory", "%.0f MB", resident_megabytes());
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
   row("wait of edits", "%.2f ms", state.last_wait_seconds * 1e3);
-  row("longest", "%.2f ms", state.longest_wait_seconds * 1e3);
+  row("longest wait", "%.2f ms", state.longest_wait_seconds * 1e3);
   ImGui::TextDisabled("drawn by");
   ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
   ImGui::TextUnformatted(state.open.backend ? state.open.backend->name().c_str() : "-");
