@@ -71,12 +71,16 @@ int run_view(const ViewArguments&) {
 
 /// Answers what is wrong with the usage, or "".
 std::string settle(const CLI::App& command, ViewArguments& arguments) {
+  constexpr PictureSize kSmallest{320, 240};
   constexpr int kLongestSide = 16'384;
   if (command.count("--size") > 0) {
     const std::string text = command.get_option("--size")->results().back();
     const auto size = parse_size(text);
-    if (!size || size->width > kLongestSide || size->height > kLongestSide) {
-      return "--size: must be WIDTHxHEIGHT of at most 16384, as in 1280x720, not \"" + text + "\"";
+    const bool fits = size && size->width >= kSmallest.width && size->height >= kSmallest.height &&
+                      size->width <= kLongestSide && size->height <= kLongestSide;
+    if (!fits) {
+      return "--size: must be WIDTHxHEIGHT of at least 320x240 and at most 16384 a side, as in 1280x720, not \"" +
+             text + "\"";
     }
     arguments.size = *size;
   }

@@ -2,7 +2,7 @@
 # Uses the viewer as a user does: a real window under Xvfb, real keys and a real mouse by xdotool.
 # Usage: window.sh QUOIN QUOIN_DEMO_WORLD. Exits with 77, and says so, where xvfb-run or xdotool is not installed.
 set -euo pipefail
-quoin="$1" demo_world="$2"
+quoin="$(realpath "$1")" demo_world="$(realpath "$2")"
 
 for program in xvfb-run xauth xdotool; do
   command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
@@ -131,7 +131,7 @@ grep -q '"panel": false' config/quoin/viewer.json || fail "the panel's state is 
 grep -q 'world.vox' config/quoin/viewer.json || fail "the file is not among the recent ones"
 
 echo "another file, and the picture of the settled window is the renderer's"
-"$quoin" view castle.vox --bare --size 160x100 --screenshot window.png
-"$quoin" render castle.vox --size 160x100 --samples 16 -o render.png >/dev/null
+"$quoin" view castle.vox --bare --size 320x240 --screenshot window.png
+"$quoin" render castle.vox --size 320x240 --samples 16 -o render.png >/dev/null
 cmp window.png render.png || fail "the window shows another picture than quoin render"
 echo "passed"

@@ -107,7 +107,6 @@ void App::frame() {
   last_frame_ = now;
   // After a rest the first step is a usual one, however long the rest was.
   const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
-  if (!was_idle_) state_.frame_seconds += 0.1 * (elapsed - state_.frame_seconds);
   take_loaded();
   take_saved();
   if (window_.is_minimised()) return;
@@ -122,6 +121,7 @@ void App::frame() {
   gui_.end_frame();
   SDL_RenderPresent(window_.renderer());
   update_title();
+  state_.frame_seconds += 0.1 * (seconds_between(last_frame_, Clock::now()) - state_.frame_seconds);
   pace();
 }
 

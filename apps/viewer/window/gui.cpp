@@ -39,6 +39,7 @@ void set_style(float scale) {
   style.WindowPadding = {12.0F, 10.0F};
   style.FramePadding = {8.0F, 4.0F};
   style.ItemSpacing = {8.0F, 6.0F};
+  style.Colors[ImGuiCol_TextDisabled] = {0.62F, 0.65F, 0.70F, 1.0F};
   const ImVec4 accent{0.28F, 0.49F, 0.79F, 1.0F};
   style.Colors[ImGuiCol_WindowBg] = {0.105F, 0.115F, 0.135F, 1.0F};
   style.Colors[ImGuiCol_PopupBg] = {0.13F, 0.14F, 0.165F, 1.0F};

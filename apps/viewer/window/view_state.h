@@ -55,7 +55,7 @@ struct ViewState {
 
   Image picture;  ///< the last that arrived
   FrameFacts facts;
-  double frame_seconds = 0.0;         ///< between two frames of the window, smoothed
+  double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
   double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop
   double last_wait_seconds = 0.0;
 
