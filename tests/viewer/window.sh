@@ -112,6 +112,25 @@ xdotool key --delay 80 ctrl+y
 picture redone.png
 cmp -s edited.png redone.png || fail "redo does not bring back the edit"
 
+xdotool key --delay 80 ctrl+z
+
+echo "choose a colour in the panel, paint"
+xdotool key --delay 80 4
+xdotool mousemove 493 158
+sleep 0.3
+xdotool click 1
+xdotool mousemove 180 220
+drag 1 6 2
+picture painted.png
+! cmp -s home.png painted.png || fail "the paint is not seen"
+! cmp -s edited.png painted.png || fail "painting removes"
+xdotool key --delay 80 ctrl+z
+until_true 20 title_is "world.vox - Quoin" || fail "painting cannot be undone"
+xdotool key --delay 80 ctrl+y ctrl+z 3
+xdotool mousemove 180 220
+drag 1 6 2
+title_is "* world.vox - Quoin" || fail "the second edit leaves no mark in the title"
+
 echo "save"
 before="$(voxels world.vox)"
 xdotool key --delay 80 ctrl+s

@@ -75,20 +75,26 @@ void App::wait_and_process() {
     has_event = patience > 0 ? SDL_WaitEventTimeout(&event, patience) != 0 : SDL_PollEvent(&event) != 0;
   }
   std::set<SDL_Scancode> pressed;
+  bool is_mouse_moved = false;
   for (; has_event; has_event = SDL_PollEvent(&event) != 0) {
-    // The GUI looks at keys once a frame: one that is let go at once would never have been down.
-    if (event.type == SDL_KEYUP && pressed.contains(event.key.keysym.scancode)) {
+    // The GUI looks at keys once a frame: one that is let go at once would never have been down. It also learns there
+    // what the mouse is over, which whoever presses a button has to know.
+    const bool is_let_go = event.type == SDL_KEYUP && pressed.contains(event.key.keysym.scancode);
+    if (is_let_go || (event.type == SDL_MOUSEBUTTONDOWN && is_mouse_moved)) {
       postponed_ = event;
       return;
     }
     if (event.type == SDL_KEYDOWN) pressed.insert(event.key.keysym.scancode);
+    is_mouse_moved |= event.type == SDL_MOUSEMOTION;
     process(event);
   }
 }
 
 void App::process(const SDL_Event& event) {
   frames_left_ = std::max(frames_left_, is_wake(event) ? 1 : kFramesAfterEvents);
-  gui_.process(event);
+  // With Tab the GUI would take the keyboard for the first number in the panel, and flight would end.
+  const bool is_tab = event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_TAB;
+  if (!is_tab || gui_.wants_keys()) gui_.process(event);
   if (event.type == SDL_QUIT) leave({true, {}});
   if (event.type == SDL_DROPFILE) {
     const std::filesystem::path file = event.drop.file;
@@ -115,6 +121,7 @@ void App::frame() {
   state_.pixels_per_unit = window_.pixels_per_unit();
   take_picture();
   gui_.begin_frame();
+  input_.find_mouse(state_, gui_.wants_mouse());
   draw_gui();
   ask_for_picture();
   window_.draw_picture(state_.picture_place);

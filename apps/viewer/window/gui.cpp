@@ -115,6 +115,11 @@ void Gui::load_font() {
 
 void Gui::process(const SDL_Event& event) {
   ImGui_ImplSDL2_ProcessEvent(&event);
+  if (event.type == SDL_MOUSEMOTION) mouse_ = {static_cast<float>(event.motion.x), static_cast<float>(event.motion.y)};
+  if (event.type == SDL_MOUSEBUTTONDOWN) {
+    mouse_ = {static_cast<float>(event.button.x), static_cast<float>(event.button.y)};
+  }
+  if (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_LEAVE) mouse_ = {-1e6F, -1e6F};
 }
 
 void Gui::begin_frame() {
@@ -122,6 +127,8 @@ void Gui::begin_frame() {
   // The backend asks OpenGL for the output's size, which the renderer need not be.
   const auto ratio = static_cast<float>(window_->pixels_per_unit());
   ImGui::GetIO().DisplayFramebufferScale = {ratio, ratio};
+  // It also asks the display where the mouse is, which may not know yet what the events say.
+  ImGui::GetIO().MousePos = mouse_;
   ImGui::NewFrame();
 }
 

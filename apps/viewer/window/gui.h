@@ -33,6 +33,7 @@ class Gui {
   SdlWindow* window_;
   double scale_;
   SdlPointer<SDL_Texture> font_;
+  ImVec2 mouse_{-1e6F, -1e6F};
 };
 
 /// How large things should be on the display that shows the window: 1 where it has some 96 dots an inch.

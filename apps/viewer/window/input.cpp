@@ -23,17 +23,23 @@ constexpr std::array kPushKeys = {PushKey{SDL_SCANCODE_W, {0, 0, 1}},     PushKe
                                   PushKey{SDL_SCANCODE_UP, {0, 0, 1}},    PushKey{SDL_SCANCODE_DOWN, {0, 0, -1}},
                                   PushKey{SDL_SCANCODE_RIGHT, {1, 0, 0}}, PushKey{SDL_SCANCODE_LEFT, {-1, 0, 0}}};
 
-MousePlace place_of(int x, int y, const ViewState& state, bool is_free) {
-  MousePlace place;
-  // The middle of the pixel.
-  place.x = (x + 0.5) * state.pixels_per_unit - state.picture_place.x;
-  place.y = (y + 0.5) * state.pixels_per_unit - state.picture_place.y;
-  place.is_over =
-      is_free && place.x >= 0 && place.y >= 0 && place.x < state.picture_place.w && place.y < state.picture_place.h;
-  return place;
+}  // namespace
+
+void Input::note_mouse(int x, int y, ViewState& state, bool gui_has_mouse) {
+  mouse_ = {x, y};
+  is_in_window_ = true;
+  find_mouse(state, gui_has_mouse);
 }
 
-}  // namespace
+void Input::find_mouse(ViewState& state, bool gui_has_mouse) const {
+  MousePlace& place = state.mouse;
+  // The middle of the pixel.
+  place.x = (mouse_.x + 0.5) * state.pixels_per_unit - state.picture_place.x;
+  place.y = (mouse_.y + 0.5) * state.pixels_per_unit - state.picture_place.y;
+  const bool is_inside =
+      place.x >= 0 && place.y >= 0 && place.x < state.picture_place.w && place.y < state.picture_place.h;
+  place.is_over = is_in_window_ && is_inside && (!gui_has_mouse || drag_ != Drag::None);
+}
 
 void Input::process(const SDL_Event& event, ViewState& state, bool gui_has_mouse, bool gui_has_keys,
                     std::vector<Command>& asked) {
@@ -45,14 +51,14 @@ void Input::process(const SDL_Event& event, ViewState& state, bool gui_has_mouse
       held_.erase(event.key.keysym.scancode);
       break;
     case SDL_MOUSEBUTTONDOWN:
-      state.mouse = place_of(event.button.x, event.button.y, state, !gui_has_mouse);
+      note_mouse(event.button.x, event.button.y, state, gui_has_mouse);
       if (state.mouse.is_over && drag_ == Drag::None) button_down(event.button, state);
       break;
     case SDL_MOUSEBUTTONUP:
       if (drag_ != Drag::None && event.button.button == drag_button_) end_drag();
       break;
     case SDL_MOUSEMOTION:
-      state.mouse = place_of(event.motion.x, event.motion.y, state, !gui_has_mouse || drag_ != Drag::None);
+      note_mouse(event.motion.x, event.motion.y, state, gui_has_mouse);
       motion(event.motion, state);
       break;
     case SDL_MOUSEWHEEL:
@@ -60,7 +66,7 @@ void Input::process(const SDL_Event& event, ViewState& state, bool gui_has_mouse
       break;
     case SDL_WINDOWEVENT:
       if (event.window.event == SDL_WINDOWEVENT_FOCUS_LOST) release_all();
-      if (event.window.event == SDL_WINDOWEVENT_LEAVE) state.mouse.is_over = false;
+      if (event.window.event == SDL_WINDOWEVENT_LEAVE) is_in_window_ = false;
       break;
     default:
       break;

@@ -18,6 +18,9 @@ class Input {
   void process(const SDL_Event& event, ViewState& state, bool gui_has_mouse, bool gui_has_keys,
                std::vector<Command>& asked);
 
+  /// Once a frame, when the GUI knows what the mouse is over: whether that is the picture.
+  void find_mouse(ViewState& state, bool gui_has_mouse) const;
+
   /// Where the keys that are held push, and how hard.
   [[nodiscard]] CameraPush push() const;
   [[nodiscard]] double boost() const;
@@ -34,10 +37,13 @@ class Input {
   void motion(const SDL_MouseMotionEvent& motion, ViewState& state);
   void wheel(const SDL_MouseWheelEvent& wheel, ViewState& state);
   void end_drag();
+  void note_mouse(int x, int y, ViewState& state, bool gui_has_mouse);
 
   std::set<SDL_Scancode> held_;
   Drag drag_ = Drag::None;
   Uint8 drag_button_ = 0;
+  SDL_Point mouse_{0, 0};  // in the window's units
+  bool is_in_window_ = false;
 };
 
 }  // namespace quoin::viewer
