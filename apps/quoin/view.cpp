@@ -5,6 +5,7 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
 #include "parse.h"
 #ifdef QUOIN_HAVE_VIEWER
 #include "viewer/window/viewer.h"
@@ -49,6 +50,7 @@ int run_view(const ViewArguments& arguments) {
   options.is_bare = arguments.is_bare;
   options.screenshot = arguments.screenshot;
   Status status = check_input(arguments.input);
+  if (status) status = check_outputs({arguments.screenshot});
   if (status) {
     catch_interrupts();
     status = viewer::run_viewer(options, was_interrupted);

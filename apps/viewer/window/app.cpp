@@ -22,6 +22,47 @@ double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::
   return std::chrono::duration<double>(to - from).count();
 }
 
+std::optional<View> view_of(Command command) {
+  switch (command) {
+    case Command::ViewFront:
+      return View::Front;
+    case Command::ViewBack:
+      return View::Back;
+    case Command::ViewLeft:
+      return View::Left;
+    case Command::ViewRight:
+      return View::Right;
+    case Command::ViewTop:
+      return View::Top;
+    case Command::ViewIso:
+      return View::Iso;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Tool> tool_of(Command command) {
+  switch (command) {
+    case Command::ToolLook:
+      return Tool::Look;
+    case Command::ToolPlace:
+      return Tool::Place;
+    case Command::ToolRemove:
+      return Tool::Remove;
+    case Command::ToolPaint:
+      return Tool::Paint;
+    default:
+      return std::nullopt;
+  }
+}
+
+void change_brush(Command command, Brush& brush) {
+  if (command == Command::BrushSmaller) brush.radius = std::max(brush.radius - 1, 0);
+  if (command == Command::BrushLarger) brush.radius = std::min(brush.radius + 1, kLargestBrush);
+  if (command != Command::BrushShape) return;
+  brush.shape = brush.shape == BrushShape::Box ? BrushShape::Sphere : BrushShape::Box;
+}
+
 }  // namespace
 
 App::App(const ViewerOptions& options, Settings settings, SdlWindow window)
@@ -201,27 +242,20 @@ void App::update_title() {
 }
 
 void App::run_command(Command command) {
-  Brush& brush = state_.brush;
+  if (const auto view = view_of(command)) return show_from(*view);
+  if (const auto tool = tool_of(command)) {
+    state_.tool = *tool;
+    return;
+  }
   switch (command) {
     case Command::Undo:
       return undo(state_);
     case Command::Redo:
       return redo(state_);
-    case Command::ToolLook:
-    case Command::ToolPlace:
-    case Command::ToolRemove:
-    case Command::ToolPaint:
-      state_.tool = static_cast<Tool>(static_cast<int>(command) - static_cast<int>(Command::ToolLook));
-      return;
     case Command::BrushSmaller:
-      brush.radius = std::max(brush.radius - 1, 0);
-      return;
     case Command::BrushLarger:
-      brush.radius = std::min(brush.radius + 1, kLargestBrush);
-      return;
     case Command::BrushShape:
-      brush.shape = brush.shape == BrushShape::Box ? BrushShape::Sphere : BrushShape::Box;
-      return;
+      return change_brush(command, state_.brush);
     case Command::PickType:
       return pick_type();
     case Command::CameraMode:
@@ -231,18 +265,6 @@ void App::run_command(Command command) {
     case Command::Focus:
       if (state_.hover) state_.camera.set_pivot(state_.hover->position);
       return;
-    case Command::ViewFront:
-      return show_from(View::Front);
-    case Command::ViewBack:
-      return show_from(View::Back);
-    case Command::ViewLeft:
-      return show_from(View::Left);
-    case Command::ViewRight:
-      return show_from(View::Right);
-    case Command::ViewTop:
-      return show_from(View::Top);
-    case Command::ViewIso:
-      return show_from(View::Iso);
     case Command::Panel:
       state_.settings.is_panel_shown = !state_.settings.is_panel_shown;
       return;
