@@ -39,7 +39,7 @@ title_is() { [ "$(xdotool getwindowname "$window" 2>/dev/null)" = "$1" ]; }
 voxels() { "$quoin" info "$1" --json | sed -n 's/^  "voxels": \([0-9]*\).*/\1/p'; }
 
 start() {
-  "$quoin" view "$@" --size 640x400 >viewer.log 2>&1 &
+  "$quoin" view "$@" >viewer.log 2>&1 &
   viewer=$!
   window="$(timeout 60 xdotool search --sync --onlyvisible --pid "$viewer" 2>/dev/null | head -n 1)" || true
   [ -n "$window" ] || window="$(timeout 30 xdotool search --sync --onlyvisible --name 'Quoin' | head -n 1)"
@@ -74,6 +74,8 @@ drag() {
   sleep 0.3
 }
 
+mkdir -p config/quoin
+echo '{"width": 640, "height": 400}' >config/quoin/viewer.json
 "$demo_world" castle.vox
 "$quoin" generate terrain world.vox --chunks 2x2x2 >/dev/null
 
@@ -147,6 +149,7 @@ stop
 
 echo "settings are remembered"
 grep -q '"panel": false' config/quoin/viewer.json || fail "the panel's state is not remembered"
+grep -q '"width": 500' config/quoin/viewer.json || fail "the window's size is not remembered"
 grep -q 'world.vox' config/quoin/viewer.json || fail "the file is not among the recent ones"
 
 echo "another file, and the picture of the settled window is the renderer's"

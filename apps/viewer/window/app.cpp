@@ -89,7 +89,15 @@ Status App::run(const std::function<bool()>& is_interrupted) {
       frames_left_ = std::max(frames_left_ - 1, 0);
     }
   }
+  note_size();
   return status_;
+}
+
+void App::note_size() {
+  const bool is_given = options_.width > 0;
+  const Uint32 odd = SDL_WINDOW_MAXIMIZED | SDL_WINDOW_MINIMIZED | SDL_WINDOW_FULLSCREEN;
+  if (is_given || (SDL_GetWindowFlags(window_.window()) & odd) != 0) return;
+  SDL_GetWindowSize(window_.window(), &state_.settings.width, &state_.settings.height);
 }
 
 bool App::is_animating() const {

@@ -52,6 +52,7 @@ class App {
   void draw_leaving();
   void update_hover();
   void update_title();
+  void note_size();
 
   // What commands do.
   void run_command(Command command);

@@ -28,6 +28,17 @@ std::optional<BrushAction> action_of(Tool tool) {
   return std::nullopt;
 }
 
+/// Where a model stands several times, all of them change: that is worth a word.
+void tell_of_copies(ViewState& state, const SceneHit& hit) {
+  const Instance* touched = state.scene().instances().find(hit.instance);
+  if (touched == nullptr) return;
+  int copies = 0;
+  state.scene().instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (instance.grid == touched->grid) ++copies;
+  });
+  if (copies > 1) state.tell("this model stands at " + std::to_string(copies) + " places: all of them change");
+}
+
 /// Runs `edit` on the document while nothing draws it. `edit` answers whether it changed anything.
 template <class Edit>
 void edit_paused(ViewState& state, Edit edit) {
@@ -71,6 +82,7 @@ void Editing::begin(ViewState& state) {
   const auto action = action_of(state.tool);
   const auto hit = action ? pick_at(state, from_.x, from_.y) : std::nullopt;
   if (!hit) return;
+  tell_of_copies(state, *hit);
   Brush brush = state.brush;
   brush.action = *action;
   edit_paused(state, [&](Document& document) {

@@ -152,6 +152,13 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
     if (i % 3 != 0) ImGui::SameLine();
     command_button(kViews[i].first, kViews[i].second, choice);
   }
+  constexpr std::array kSamples = {1, 4, 16, 64};
+  const auto* const chosen = std::find(kSamples.begin(), kSamples.end(), state.settings.samples);
+  int index = chosen == kSamples.end() ? -1 : static_cast<int>(chosen - kSamples.begin());
+  if (ImGui::Combo("samples", &index, "1\0004\00016\00064\0")) {
+    state.settings.samples = kSamples[static_cast<std::size_t>(index)];
+  }
+  ImGui::Checkbox("coarser far away", &state.settings.detail_by_pixels);
 }
 
 void draw_light_part(ViewState& state) {
