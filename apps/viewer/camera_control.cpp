@@ -48,6 +48,16 @@ void CameraControl::set_pivot(DVec3 pivot) {
   if (is_finite(pivot)) pivot_ = pivot;
 }
 
+void CameraControl::face(DVec3 point) {
+  const DVec3 way = point - camera_.position;
+  const double level = std::hypot(way.x, way.z);
+  if (!is_finite(way) || (level == 0.0 && way.y == 0.0)) return;
+  if (level > 0.0) yaw_ = std::atan2(way.x, -way.z);
+  pitch_ = std::atan2(way.y, level);
+  apply_angles();
+  pivot_ = point;
+}
+
 void CameraControl::apply_angles() {
   const double level = std::cos(pitch_);
   camera_.forward = {std::sin(yaw_) * level, std::sin(pitch_), -std::cos(yaw_) * level};

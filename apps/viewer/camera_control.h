@@ -42,6 +42,9 @@ class CameraControl {
   /// The point that orbiting and zooming keep in its place in the picture.
   void set_pivot(DVec3 pivot);
 
+  /// Turns the head to a point, which becomes the pivot.
+  void face(DVec3 point);
+
   /// Turns the head, or about the pivot, as `mode` says; in pixels of dragging, in a picture of that height.
   void turn(double dx, double dy, int picture_height);
   /// Moves the camera so that what lies at the pivot's distance follows the mouse.

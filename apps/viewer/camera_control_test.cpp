@@ -94,6 +94,20 @@ TEST(CameraControl, OrbitKeepsTheDistanceAndThePivotsPlace) {
   }
 }
 
+TEST(CameraControl, FacesAPoint) {
+  CameraControl control = framed();
+  const DVec3 position = control.camera().position;
+  for (const DVec3 point : {DVec3{3.0, 4.0, 5.0}, position + DVec3{0.0, -9.0, 0.0}, position + DVec3{-5.0, 0.0, 0.0}}) {
+    control.face(point);
+    EXPECT_EQ(control.camera().position, position);
+    EXPECT_LT(glm::length(control.camera().forward - glm::normalize(point - position)), 1e-9);
+    EXPECT_EQ(control.pivot(), point);
+    expect_upright(control.camera());
+  }
+  control.face(position);
+  EXPECT_NE(control.pivot(), position) << "nowhere to look";
+}
+
 TEST(CameraControl, FlyingTurnsTheHeadOnly) {
   CameraControl control = framed(View::Front);
   control.mode = CameraMode::Fly;

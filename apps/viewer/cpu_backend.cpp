@@ -74,8 +74,8 @@ struct CpuBackend::Impl {
 
   void work();
   [[nodiscard]] bool has_work() const {
-    return is_stopped ||
-           (!is_paused && (is_stale || (request && !is_done && request->width > 0 && request->height > 0)));
+    const bool can_draw = request && !is_done && request->width > 0 && request->height > 0;
+    return is_stopped || (!is_paused && !is_broken && (is_stale || can_draw));
   }
   void update(std::unique_lock<std::mutex>& lock);
   void draw(std::unique_lock<std::mutex>& lock);
@@ -100,6 +100,7 @@ struct CpuBackend::Impl {
   bool is_stale = false;
   bool is_busy = false;  // reads the scene
   bool is_stopped = false;
+  bool is_broken = false;  // there was not memory enough: nothing is done until the scene has changed again
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
   double seconds_per_pixel = 0.0;  // 0: not known
@@ -121,8 +122,7 @@ void CpuBackend::Impl::work() {
     } catch (const std::bad_alloc&) {
       if (!lock.owns_lock()) lock.lock();
       error = Error{ErrorCode::LimitExceeded, "out of memory", "", std::nullopt};
-      is_done = true;
-      is_stale = false;
+      is_broken = true;
     }
     is_busy = false;
     idle.notify_all();
@@ -231,6 +231,7 @@ void CpuBackend::resume(bool changed) {
     impl_->halt = impl_->is_stopped;
     if (changed) {
       impl_->is_stale = true;
+      impl_->is_broken = false;
       impl_->is_done = false;
       impl_->stage.reset();
       impl_->frame.reset();

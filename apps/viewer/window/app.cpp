@@ -271,7 +271,7 @@ void App::run_command(Command command) {
       state_.settings.camera_mode = state_.camera.mode;
       return;
     case Command::Focus:
-      if (state_.hover) state_.camera.set_pivot(state_.hover->position);
+      if (state_.hover) state_.camera.face(state_.hover->position);
       return;
     case Command::Panel:
       state_.settings.is_panel_shown = !state_.settings.is_panel_shown;

@@ -23,7 +23,7 @@ constexpr std::array kCommands = {
     CommandInfo{Command::BrushShape, "Box or sphere", "B", SDLK_b, false, false},
     CommandInfo{Command::PickType, "Take the type under the mouse", "I", SDLK_i, false, false},
     CommandInfo{Command::CameraMode, "Orbit or fly", "C", SDLK_c, false, false},
-    CommandInfo{Command::Focus, "Turn about what is under the mouse", "F", SDLK_f, false, false},
+    CommandInfo{Command::Focus, "Look at what is under the mouse", "F", SDLK_f, false, false},
     CommandInfo{Command::ViewIso, "Show all", "Home", SDLK_HOME, false, false},
     CommandInfo{Command::ViewFront, "From the front", "Shift+1", SDLK_1, false, true},
     CommandInfo{Command::ViewBack, "From the back", "Shift+2", SDLK_2, false, true},

@@ -1,7 +1,9 @@
 #include "viewer.h"
 
+#include <SDL.h>
 #include <cstdlib>
 #include <fstream>
+#include <utility>
 
 #include <unistd.h>
 
@@ -102,6 +104,23 @@ TEST_F(ViewerTest, PanelsAreDrawnInWindowsOfAnySize) {
     EXPECT_GT(shot->width, 0);
   }
   EXPECT_TRUE(std::filesystem::exists(folder_.file("config/quoin/viewer.json")));
+}
+
+TEST_F(ViewerTest, ADroppedFileIsOpened) {
+  ViewerOptions given = options(320, 240);
+  const std::string file = std::exchange(given.file, {}).string();
+  int asked = 0;
+  const Status status = run_viewer(given, [&] {
+    if (asked++ == 0) {
+      SDL_Event drop{};
+      drop.type = SDL_DROPFILE;
+      drop.drop.file = SDL_strdup(file.c_str());
+      SDL_PushEvent(&drop);
+    }
+    return false;
+  });
+  ASSERT_TRUE(status) << to_string(status.error());
+  EXPECT_TRUE(std::filesystem::exists(given.screenshot));
 }
 
 TEST_F(ViewerTest, EndsAtOnceWhenInterrupted) {
