@@ -32,11 +32,23 @@ struct RayInterval {
 /// Source: halves at the median of the longest axis of the centres; a leaf holds up to four.
 class InstanceTree {
  public:
+  /// A leaf's `first` counts in `order()`. An inner node, whose `count` is 0, has its lower child in
+  /// `nodes()[first - 1]`, its upper one in `nodes()[first]`. The first node is the root.
+  struct Node {
+    DBox box;
+    std::size_t first = 0;
+    std::size_t count = 0;
+    int axis = 0;
+  };
+
   InstanceTree() = default;
   /// Cost: O(n log n). Empty boxes are never visited.
   explicit InstanceTree(std::vector<DBox> boxes);
 
   [[nodiscard]] const std::vector<DBox>& boxes() const { return boxes_; }
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+  /// The boxes' indices as the leaves have them.
+  [[nodiscard]] const std::vector<std::size_t>& order() const { return order_; }
 
   /// The same tree with every box moved.
   [[nodiscard]] InstanceTree moved(DVec3 by) const;
@@ -91,14 +103,6 @@ class InstanceTree {
  private:
   static constexpr std::size_t kMaxDepth = 72;
   static constexpr std::size_t kLeafSize = 4;
-  /// A leaf's `first` counts in `order_`. An inner node has its lower child in `nodes_[first - 1]`, its upper one in
-  /// `nodes_[first]`.
-  struct Node {
-    DBox box;
-    std::size_t first = 0;
-    std::size_t count = 0;
-    int axis = 0;
-  };
   void split(std::size_t node, std::size_t begin, std::size_t end);
 
   std::vector<DBox> boxes_;

@@ -1,35 +1,12 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
-#include "scene/instance_axes.h"
+#include "scene/placed_grid.h"
 #include "scene/scene_tracer_impl.h"
 
 namespace quoin {
-namespace {
-
-bool can_be_traced(const Instance& instance, const SceneGrid& grid) {
-  const DQuat& q = instance.rotation;
-  return is_finite(instance.position) && is_finite(grid.pivot) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&
-         std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0 && !grid.grid.bounds().empty();
-}
-
-// In the world, with room for rounding.
-DBox bounds_of(const PlacedGrid& placed) {
-  const IBox tight = placed.voxels->bounds();
-  DBox box;
-  for (int corner = 0; corner < 8; ++corner) {
-    const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
-                      (corner & 4) != 0 ? tight.max.z : tight.min.z};
-    box.extend(placed.position + placed.world_axes * ((point - placed.pivot) * placed.voxel_size));
-  }
-  const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
-  return {box.min - room, box.max + room};
-}
-
-}  // namespace
 
 SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
   std::map<GridHandle, std::size_t> slots;
@@ -40,19 +17,11 @@ SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : imp
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden) || !can_be_traced(instance, *grid)) continue;
+    if (!can_be_traced(instance, grid, hidden)) continue;
     const auto [found, is_new] = slots.try_emplace(instance.grid, grids.size());
     if (is_new) grids.push_back(grid);
     slot_of.push_back(found->second);
-    PlacedGrid& placed = impl_->placed.emplace_back();
-    placed.instance = handle;
-    placed.grid = grid;
-    placed.voxels = &grid->grid;
-    placed.pivot = grid->pivot;
-    placed.world_axes = world_axes(instance);
-    placed.position = instance.position;
-    placed.voxel_size = instance.voxel_size;
-    boxes.push_back(bounds_of(placed));
+    boxes.push_back(bounds_of(impl_->placed.emplace_back(placed_as(scene, handle))));
   }
   impl_->trees.resize(grids.size());
   parallel_for(grids.size(), threads, [&](std::size_t i) {

@@ -1,0 +1,49 @@
+#version 460
+// The bodies of glass before what each pixel shows.
+#include "data.glsl"
+#include "walk.glsl"
+#include "instances.glsl"
+#include "glass.glsl"
+#include "count.glsl"
+
+
+void find_glass(uint slot, inout State state, out float first_t) {
+  vec2 point = picture_point();
+  ViewRay ray = camera_ray(point);
+  float max_t = Points(frame().points).at[slot].inside.w;
+  BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
+  vec3 unused = vec3(1.0);
+  start_visit();
+  for (int i = next_instance(ray.origin, ray.direction, max_t); i >= 0;
+       i = next_instance(ray.origin, ray.direction, max_t)) {
+    Placed placed = placed_at(i);
+    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
+    GridRay in_grid = camera_ray_in(placed, point);
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t)) continue;
+    find_bodies_in(i, in_grid, placed.ref_view.w / placed.ref_inside.w, max_t, state.weight.w, list, unused);
+  }
+  first_t = list.count > 0 ? Bodies(list.address).at[list.first].lengths.x : kInfinity;
+  state.weight.w = list.dropped_t;
+  state.colour.w = float(list.count + 1);
+}
+
+void main() {
+  bool is_new_hit = false;
+  bool is_pending = false;
+  if (is_in_tile()) {
+    uint slot = slot_of_pixel();
+    State state = States(frame().states).at[slot];
+    // In later rounds only where bodies were left over.
+    if (push.round == 0 || state.colour.w > 0.0) {
+      float first_t;
+      find_glass(slot, state, first_t);
+      is_pending = state.weight.w < kInfinity;
+      if (push.first != 0 && push.round == 0 && first_t < kInfinity) {
+        is_new_hit = Points(frame().points).at[slot].voxel.w < 0;
+        Depths(frame().depths).at[slot] = first_t;
+      }
+      States(frame().states).at[slot] = state;
+    }
+  }
+  add_counts(0, is_new_hit, is_pending);
+}

@@ -1,0 +1,115 @@
+// Rays among many instances.
+
+const int kVisitDepth = 28;
+
+uint visit_stack[kVisitDepth];
+int visit_height;
+uint visit_next;
+uint visit_end;
+
+void start_visit() {
+  visit_stack[0] = 0;
+  visit_height = frame().placed_count > 0 ? 1 : 0;
+  visit_next = visit_end = 0;
+}
+
+bool may_meet(vec3 low, vec3 high, vec3 origin, vec3 direction, float max_t) {
+  float enter_t = 0.0;
+  float exit_t = max_t;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0.0) {
+      if (origin[axis] < low[axis] || origin[axis] > high[axis]) return false;
+      continue;
+    }
+    float inverse = 1.0 / direction[axis];
+    float a = (low[axis] - origin[axis]) * inverse;
+    float b = (high[axis] - origin[axis]) * inverse;
+    enter_t = max(enter_t, min(a, b));
+    exit_t = min(exit_t, max(a, b));
+  }
+  // The boxes have room for rounding; their distances need it too.
+  return enter_t <= exit_t * 1.00001 + 1e-5;
+}
+
+// The next instance whose box a ray in view may meet, nearer ones mostly first; -1 when there is none left.
+int next_instance(vec3 origin, vec3 direction, float max_t) {
+  Vectors nodes = Vectors(frame().tree);
+  Vectors leaves = Vectors(frame().leaves);
+  for (;;) {
+    while (visit_next < visit_end) {
+      vec4 low = leaves.at[2 * visit_next];
+      vec4 high = leaves.at[2 * visit_next + 1];
+      ++visit_next;
+      if (may_meet(low.xyz, high.xyz, origin, direction, max_t)) return floatBitsToInt(low.w);
+    }
+    if (visit_height == 0) return -1;
+    uint node = visit_stack[--visit_height];
+    vec4 low = nodes.at[2 * node];
+    vec4 high = nodes.at[2 * node + 1];
+    if (!may_meet(low.xyz, high.xyz, origin, direction, max_t)) continue;
+    uint first = floatBitsToUint(low.w);
+    int count = floatBitsToInt(high.w);
+    if (count > 0) {
+      visit_next = first;
+      visit_end = first + uint(count);
+      continue;
+    }
+    bool is_forward = direction[-1 - count] >= 0.0;
+    visit_stack[visit_height] = is_forward ? first : first - 1;
+    visit_stack[visit_height + 1] = is_forward ? first - 1 : first;
+    visit_height += 2;
+  }
+}
+
+struct GridRay {
+  ivec3 base;
+  vec3 origin;
+  vec3 direction;
+  float t;  // of its start
+};
+
+struct ViewRay {
+  vec3 origin;
+  vec3 direction;
+};
+
+vec3 turned(vec4 columns[3], vec3 v) {
+  return columns[0].xyz * v.x + columns[1].xyz * v.y + columns[2].xyz * v.z;
+}
+
+Placed placed_at(int i) {
+  return PlacedGrids(frame().placed).at[i];
+}
+
+GridRay grid_from_view(Placed placed, ViewRay ray) {
+  vec3 origin = placed.ref_inside.xyz + turned(placed.grid_axes, ray.origin - placed.ref_view.xyz);
+  return GridRay(placed.ref_base.xyz, origin, turned(placed.grid_axes, ray.direction), 0.0);
+}
+
+ViewRay view_from_grid(Placed placed, GridRay ray) {
+  vec3 from_ref = vec3(ray.base - placed.ref_base.xyz) + (ray.origin - placed.ref_inside.xyz);
+  return ViewRay(placed.ref_view.xyz + turned(placed.view_axes, from_ref), turned(placed.view_axes, ray.direction));
+}
+
+// Where the invocation's ray crosses the picture, in pixels.
+vec2 picture_point() {
+  return vec2(push.corner + tile_pixel()) + push.point;
+}
+
+ViewRay camera_ray(vec2 point) {
+  Frame f = frame();
+  vec3 across = f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+  if (!has(kPerspective)) return ViewRay(across, f.forward.xyz);
+  vec3 d = across + f.forward.xyz;
+  return ViewRay(vec3(0.0), d * (1.0 / sqrt(dot(d, d))));
+}
+
+// A camera's ray in an instance's grid. It starts near the grid, so that distance costs no precision.
+GridRay camera_ray_in(Placed placed, vec2 point) {
+  Frame f = frame();
+  vec3 across = f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+  vec3 d = has(kPerspective) ? across + f.forward.xyz : f.forward.xyz;
+  float size = has(kPerspective) ? sqrt(dot(d, d)) : 1.0;
+  vec3 start = placed.start.xyz + placed.start_x.xyz * point.x + placed.start_y.xyz * point.y;
+  return GridRay(placed.start_base.xyz, start, turned(placed.grid_axes, d * (1.0 / size)), placed.start.w * size);
+}
