@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <set>
 
 #include <tsl/robin_map.h>
@@ -13,6 +14,15 @@
 
 namespace quoin {
 
+namespace {
+
+std::uint64_t next_identity() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+}  // namespace
+
 struct Grid::Impl {
   struct Entry {
     Chunk chunk;
@@ -23,6 +33,7 @@ struct Grid::Impl {
   tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries;
   std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
+  std::uint64_t identity = next_identity();
 
   Entry* find(IVec3 chunk) const {
     const auto it = entries.find(chunk);
@@ -268,6 +279,10 @@ std::uint64_t Grid::neighbourhood_version(IVec3 chunk) const {
 
 std::uint64_t Grid::version() const {
   return impl_->version;
+}
+
+std::uint64_t Grid::identity() const {
+  return impl_->identity;
 }
 
 std::vector<IVec3> Grid::take_dirty() {

@@ -299,5 +299,19 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
 }
 
+TEST(Grid, EveryGridHasAnIdentityOfItsOwnThatMovesWithIt) {
+  Grid a;
+  a.set({1, 2, 3}, 1);
+  const Grid b = a.clone();
+  const Grid c;
+  const std::uint64_t identity = a.identity();
+  EXPECT_EQ(b.version(), a.version());
+  EXPECT_NE(b.identity(), identity);
+  EXPECT_NE(c.identity(), identity);
+  EXPECT_NE(c.identity(), b.identity());
+  const Grid moved = std::move(a);
+  EXPECT_EQ(moved.identity(), identity);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::int64_t kWidest = std::int64_t{1} << 29;  // voxels; shaders count in 32 bits
 constexpr std::size_t kPage = 4096;
+constexpr std::size_t kMostInstances = std::size_t{1} << 24;
 
 template <class T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values) {
@@ -96,8 +97,8 @@ void DeviceScene::forget_old_types(const VoxelRegistry& types) {
   grids_.clear();
 }
 
-Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
-  forget_old_types(scene.types);
+// Lists the instances and keeps, of the known grids, those that are among them; answers the new ones.
+std::vector<GridHandle> DeviceScene::place(const Scene& scene, bool hidden) {
   placed_.clear();
   std::vector<DBox> boxes;
   std::vector<GridHandle> made;
@@ -106,12 +107,11 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(instance, grid, hidden)) continue;
-    if (is_too_wide(grid->grid.bounds())) {
-      return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
-    }
-    if (const auto known = grids_.find(instance.grid); known != grids_.end()) {
+    const auto known = grids_.find(instance.grid);
+    if (known != grids_.end() && known->second.identity == grid->grid.identity()) {
       kept.insert(grids_.extract(known));
-    } else if (kept.try_emplace(instance.grid).second) {
+    } else if (const auto [added, is_new] = kept.try_emplace(instance.grid); is_new) {
+      added->second.identity = grid->grid.identity();
       made.push_back(instance.grid);
     }
     placed_.push_back({placed_as(scene, handle)});
@@ -120,18 +120,11 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
   for (auto& [handle, grid] : grids_) release(grid);
   grids_ = std::move(kept);
   instances_ = InstanceTree(std::move(boxes));
-  parallel_for(made.size(), threads, [&](std::size_t i) {
-    grids_.find(made[i])->second.trees = OpticalTrees::build(scene.grids()[made[i]].grid, scene.types);
-  });
-  std::int32_t index = 0;
-  has_transparent_ = false;
-  for (auto& [handle, known] : grids_) {
-    known.index = index++;
-    const bool is_new = std::find(made.begin(), made.end(), handle) != made.end();
-    const Status done = update_grid(known, scene.grids()[handle].grid, scene.types, is_new);
-    if (!done) return done;
-    has_transparent_ |= known.transparent.top.root.mask != 0;
-  }
+  return made;
+}
+
+// What depends on the grids as they are by now.
+void DeviceScene::finish_placed(const Scene& scene) {
   for (DevicePlaced& each : placed_) {
     const DeviceGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
     const IBox bounds = each.placed.voxels->bounds();
@@ -142,6 +135,32 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
     each.placed.grid = nullptr;
     each.placed.voxels = nullptr;
   }
+}
+
+Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
+  forget_old_types(scene.types);
+  std::vector<GridHandle> made = place(scene, hidden);
+  std::sort(made.begin(), made.end());
+  if (placed_.size() > kMostInstances) {
+    return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
+  }
+  for (const auto& [handle, known] : grids_) {
+    if (!is_too_wide(scene.grids()[handle].grid.bounds())) continue;
+    return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
+  }
+  parallel_for(made.size(), threads, [&](std::size_t i) {
+    grids_.find(made[i])->second.trees = OpticalTrees::build(scene.grids()[made[i]].grid, scene.types);
+  });
+  std::int32_t index = 0;
+  has_transparent_ = false;
+  for (auto& [handle, known] : grids_) {
+    known.index = index++;
+    const bool is_new = std::binary_search(made.begin(), made.end(), handle);
+    const Status done = update_grid(known, scene.grids()[handle].grid, scene.types, is_new);
+    if (!done) return done;
+    has_transparent_ |= known.transparent.top.root.mask != 0;
+  }
+  finish_placed(scene);
   if (Status done = put_surfaces(scene.types); !done) return done;
   return put_grids();
 }

@@ -54,6 +54,7 @@ class DeviceScene {
     TopTree top;
   };
   struct DeviceGrid {
+    std::uint64_t identity = 0;
     std::uint64_t version = 0;
     OpticalTrees trees;
     std::map<IVec3, DeviceChunk, ByPlace> chunks;
@@ -66,7 +67,8 @@ class DeviceScene {
   void clear();
   void release(DeviceGrid& grid);
   void forget_old_types(const VoxelRegistry& types);
-  void drop_unplaced(const Scene& scene, const std::map<GridHandle, std::vector<InstanceHandle>>& instances);
+  [[nodiscard]] std::vector<GridHandle> place(const Scene& scene, bool hidden);
+  void finish_placed(const Scene& scene);
   Status try_update(const Scene& scene, bool hidden, Threads threads);
   Status update_grid(DeviceGrid& known, const Grid& grid, const VoxelRegistry& types, bool is_new);
   Status put_chunk(DeviceGrid& known, const Grid& grid, IVec3 chunk);

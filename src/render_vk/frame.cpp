@@ -41,57 +41,11 @@ double depth_of(const DevicePlaced& grid, const glm::dmat3& view_axes, DVec3 cam
     depth = std::min(depth, glm::dot(view_axes * (point - camera_in_grid), forward));
   }
   const double voxel = grid.placed.voxel_size;
-  return depth > kNearby * voxel ? depth * (1.0 - 1e-5) - voxel : 0.0;
-}
-
-// The camera's numbers as CameraRays has them.
-struct Rays {
-  bool is_perspective;
-  DVec3 right, down, corner, forward;
-};
-
-void set_start(const DevicePlaced& grid, const glm::dmat3& grid_axes, const glm::dmat3& view_axes, DVec3 camera_in_grid,
-               const Rays& rays, int width, int height, ShaderPlaced& out) {
-  const double depth = depth_of(grid, view_axes, camera_in_grid, rays.forward);
-  // For pixel (x, y): origin + x right + y down, in the grid.
-  const double spread = rays.is_perspective ? depth : 1.0;
-  const DVec3 right = grid_axes * (rays.right * spread);
-  const DVec3 down = grid_axes * (rays.down * spread);
-  const DVec3 origin = camera_in_grid + grid_axes * (rays.forward * depth + rays.corner * spread);
-  const IVec3 base = base_at(origin + right * (0.5 * width) + down * (0.5 * height), grid);
-  out.start_base = IVec4(base, 0);
-  out.start = to_vec4(origin - DVec3(base), depth);
-  out.start_x = to_vec4(right);
-  out.start_y = to_vec4(down);
-}
-
-ShaderPlaced place(const DevicePlaced& grid, const Camera& camera, const Rays& rays, DVec3 sun,
-                   const RenderOptions& options) {
-  const PlacedGrid& placed = grid.placed;
-  // The difference of two far positions is taken first: it is small, and mostly exact.
-  const DVec3 position = placed.position - camera.position;
-  const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
-  const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
-  const DVec3 camera_in_grid = placed.pivot - grid_axes * position - DVec3(grid.origin);
-  ShaderPlaced out;
-  for (int axis = 0; axis < 3; ++axis) {
-    out.grid_axes[static_cast<std::size_t>(axis)] = to_vec4(grid_axes[axis]);
-    out.view_axes[static_cast<std::size_t>(axis)] = to_vec4(view_axes[axis]);
-  }
-  const DVec3 ref = glm::clamp(camera_in_grid, grid.low - kNearby, grid.high + kNearby);
-  const IVec3 ref_base = base_at(ref, grid);
-  out.ref_base = IVec4(ref_base, grid.grid);
-  out.ref_inside = to_vec4(ref - DVec3(ref_base), placed.voxel_size);
-  out.ref_view = to_vec4(view_axes * (ref - camera_in_grid), placed.voxels_per_cell());
-  set_start(grid, grid_axes, view_axes, camera_in_grid, rays, options.width, options.height, out);
-  const DVec3 sun_in_grid = glm::transpose(placed.world_axes) * sun;
-  out.to_sun = to_vec4(sun_in_grid);
-  for (const Direction face : kDirections) {
-    const auto i = static_cast<std::size_t>(face);
-    const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
-    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0));
-  }
-  return out;
+  if (!(depth > kNearby * voxel)) return 0.0;
+  // A number of few bits, so that the difference of two of them is exact on the device too.
+  int exponent = 0;
+  const double fraction = std::frexp(depth * (1.0 - 1e-5) - voxel, &exponent);
+  return std::ldexp(std::floor(fraction * 4096.0), exponent - 12);
 }
 
 // A box in single precision, with room for its rounding and that of rays.
@@ -111,6 +65,97 @@ void add_instances(const InstanceTree& tree, FrameData& data) {
     add_box(node.box, static_cast<std::uint32_t>(node.first), count, data.tree);
   }
   for (const std::size_t i : tree.order()) add_box(tree.boxes()[i], static_cast<std::uint32_t>(i), 0, data.leaves);
+}
+
+// The camera's numbers as CameraRays has them.
+struct Rays {
+  bool is_perspective;
+  DVec3 right, down, corner, forward;
+
+  // What a pixel to the right or down is at a depth.
+  [[nodiscard]] double spread(double depth) const { return is_perspective ? depth : 1.0; }
+};
+
+// A grid's space, seen from the camera.
+struct GridSpace {
+  glm::dmat3 grid_axes;  // grid from view
+  glm::dmat3 view_axes;
+  DVec3 camera{0.0};  // in the tree's coordinates
+
+  GridSpace(const DevicePlaced& grid, const Camera& from) {
+    const PlacedGrid& placed = grid.placed;
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 position = placed.position - from.position;
+    grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
+    view_axes = placed.world_axes * placed.voxel_size;
+    camera = placed.pivot - grid_axes * position - DVec3(grid.origin);
+  }
+};
+
+void set_start(const DevicePlaced& grid, const GridSpace& space, const Rays& rays, double depth,
+               const RenderOptions& options, ShaderPlaced& out) {
+  // For pixel (x, y): origin + x right + y down, in the grid.
+  const double spread = rays.spread(depth);
+  const DVec3 right = space.grid_axes * (rays.right * spread);
+  const DVec3 down = space.grid_axes * (rays.down * spread);
+  const DVec3 origin = space.camera + space.grid_axes * (rays.forward * depth + rays.corner * spread);
+  const IVec3 base = base_at(origin + right * (0.5 * options.width) + down * (0.5 * options.height), grid);
+  out.start_base = IVec4(base, 0);
+  out.start = to_vec4(origin - DVec3(base), depth);
+  out.start_x = to_vec4(right);
+  out.start_y = to_vec4(down);
+}
+
+// `view_origin`: from the camera.
+void set_spaces(const DevicePlaced& grid, const GridSpace& space, DVec3 view_origin, ShaderPlaced& out) {
+  for (int axis = 0; axis < 3; ++axis) {
+    out.grid_axes[static_cast<std::size_t>(axis)] = to_vec4(space.grid_axes[axis]);
+    out.view_axes[static_cast<std::size_t>(axis)] = to_vec4(space.view_axes[axis]);
+  }
+  const DVec3 origin = space.camera + space.grid_axes * view_origin;
+  const DVec3 ref = glm::clamp(origin, grid.low - kNearby, grid.high + kNearby);
+  const IVec3 base = base_at(ref, grid);
+  out.ref_base = IVec4(base, grid.grid);
+  out.ref_inside = to_vec4(ref - DVec3(base), grid.placed.voxel_size);
+  out.ref_view = to_vec4(space.view_axes * (ref - origin), grid.placed.voxels_per_cell());
+}
+
+void set_sun(const PlacedGrid& placed, DVec3 sun, ShaderPlaced& out) {
+  const DVec3 sun_in_grid = glm::transpose(placed.world_axes) * sun;
+  out.to_sun = to_vec4(sun_in_grid);
+  for (const Direction face : kDirections) {
+    const auto i = static_cast<std::size_t>(face);
+    const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
+    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0));
+  }
+}
+
+// Where rays start, and view space has its origin: as far ahead as there is nothing.
+void add_placed(const DeviceScene& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
+                FrameData& data) {
+  const DVec3 sun = to_sun(options.light);
+  std::vector<GridSpace> spaces;
+  std::vector<double> depths;
+  double least = scene.placed().empty() ? 0.0 : std::numeric_limits<double>::infinity();
+  for (const DevicePlaced& grid : scene.placed()) {
+    const GridSpace& space = spaces.emplace_back(grid, camera);
+    depths.push_back(depth_of(grid, space.view_axes, space.camera, rays.forward));
+    least = std::min(least, depths.back());
+  }
+  const DVec3 view_origin = rays.forward * least;
+  for (std::size_t i = 0; i < spaces.size(); ++i) {
+    const DevicePlaced& grid = scene.placed()[i];
+    ShaderPlaced& placed = data.placed.emplace_back();
+    set_start(grid, spaces[i], rays, depths[i], options, placed);
+    set_spaces(grid, spaces[i], view_origin, placed);
+    set_sun(grid.placed, sun, placed);
+  }
+  const double spread = rays.spread(least);
+  data.frame.start = to_vec4(rays.corner * spread, least);
+  data.frame.start_x = to_vec4(rays.right * spread);
+  data.frame.start_y = to_vec4(rays.down * spread);
+  // Two far positions first, as everywhere.
+  add_instances(scene.instances().moved(-camera.position).moved(-view_origin), data);
 }
 
 void add_directions(int rays, FrameData& data) {
@@ -183,9 +228,7 @@ FrameData make_frame(const DeviceScene& scene, const Camera& camera, const Rende
   frame.last_surface = scene.last_surface();
   frame.placed_count = static_cast<std::uint32_t>(scene.placed().size());
   set_light(options, frame);
-  const DVec3 sun = to_sun(options.light);
-  for (const DevicePlaced& grid : scene.placed()) data.placed.push_back(place(grid, camera, rays, sun, options));
-  add_instances(scene.instances().moved(-camera.position), data);
+  add_placed(scene, camera, options, rays, data);
   add_directions(options.light.occlusion_rays, data);
   return data;
 }

@@ -76,6 +76,9 @@ struct ShaderFrame {
   Vec4 down{0.0F};
   Vec4 corner{0.0F};
   Vec4 forward{0.0F};
+  Vec4 start{0.0F};
+  Vec4 start_x{0.0F};
+  Vec4 start_y{0.0F};
   Vec4 sky_zenith{0.0F};
   Vec4 sky_horizon{0.0F};
   Vec4 sky_ground{0.0F};
@@ -126,7 +129,7 @@ struct ShaderPush {
 };
 
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
-static_assert(sizeof(ShaderPlaced) == 256 && sizeof(ShaderFrame) == 9 * 16 + 16 * 8 + 12 * 4);
+static_assert(sizeof(ShaderPlaced) == 256 && sizeof(ShaderFrame) == 12 * 16 + 16 * 8 + 12 * 4);
 static_assert(sizeof(ShaderPush) == 48 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

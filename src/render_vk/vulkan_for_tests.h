@@ -100,6 +100,12 @@ inline Differences differences(const Picture& a, const Picture& b) {
     for (std::size_t c = 3 * at; c < 3 * at + 3; ++c)
       most = std::max(most, std::abs(a.colour.rgb[c] - b.colour.rgb[c]));
     if (most > 2) {
+      if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+        std::printf("  (%d, %d): %d %d %d, not %d %d %d; depth %.9g, not %.9g\n", i % a.colour.width,
+                    i / a.colour.width, a.colour.rgb[3 * at], a.colour.rgb[3 * at + 1], a.colour.rgb[3 * at + 2],
+                    b.colour.rgb[3 * at], b.colour.rgb[3 * at + 1], b.colour.rgb[3 * at + 2],
+                    static_cast<double>(a.depth.values[at]), static_cast<double>(b.depth.values[at]));
+      }
       ++found.pixels;
       found.elsewhere += !is_at_silhouette(b.depth, i % a.colour.width, i / a.colour.width);
     }

@@ -63,6 +63,9 @@ class Grid {
   [[nodiscard]] std::uint64_t neighbourhood_version(IVec3 chunk) const;
   /// Raised by every edit that changed anything.
   [[nodiscard]] std::uint64_t version() const;
+  /// No other grid of this program has it, clones neither: versions of one identity can be compared. It moves with the
+  /// voxels.
+  [[nodiscard]] std::uint64_t identity() const;
   /// The chunks whose mesh may have changed since the last call, sorted as `chunks`; dropped ones are among them.
   std::vector<IVec3> take_dirty();
 

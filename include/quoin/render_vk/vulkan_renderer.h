@@ -62,8 +62,7 @@ class VulkanRenderer {
   /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards. Instances that are not
   /// visible are left out unless `hidden`.
   ///
-  /// What changed is told by the versions of grids and chunks: so a grid must not be assigned to from another one
-  /// between two calls, but inserted in its place.
+  /// What changed is told by the identities of grids and the versions of chunks; it may be another scene each time.
   /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
   /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels; then the device holds nothing.
   [[nodiscard]] Status update(const Scene& scene, bool hidden = false, Threads threads = {});

@@ -27,7 +27,8 @@ struct GridTrees {
   Tree transparent;
 };
 
-// An instance, relative to the camera. `ref` is a point of the grid not far from the camera.
+// An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
+// everything is far. `ref` is a point of the grid not far from there.
 struct Placed {
   vec4 grid_axes[3];  // columns: grid from view
   vec4 view_axes[3];  // columns: view from grid
@@ -46,11 +47,11 @@ struct Placed {
 struct Point {
   ivec4 voxel;  // w: the instance; -1: none
   vec4 inside;  // where in the voxel; w: t
-  uvec4 what;   // type, face, kind
+  uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
 };
 
-// A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels;
-// `what`: type, face, whether the ray starts inside.
+// A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
+// enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
@@ -120,6 +121,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 down;
   vec4 corner;
   vec4 forward;  // w: turns the way from an orthographic picture's middle into the tangent of an angle
+  vec4 start;    // of pixel (x, y)'s ray: start + x start_x + y start_y; w: the depth at which view space has its origin
+  vec4 start_x;
+  vec4 start_y;
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;

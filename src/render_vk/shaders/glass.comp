@@ -7,10 +7,17 @@
 #include "count.glsl"
 
 
+// Distances count from where view space has its origin, but for `first_t`.
 void find_glass(uint slot, inout State state, out float first_t) {
   vec2 point = picture_point();
   ViewRay ray = camera_ray(point);
-  float max_t = Points(frame().points).at[slot].inside.w;
+  Point hit = Points(frame().points).at[slot];
+  float scale = length_a_depth(point);
+  float depth = frame().start.w;
+  float max_t = kInfinity;
+  if (hit.voxel.w >= 0) {
+    max_t = (placed_at(hit.voxel.w).start.w - depth) * scale + uintBitsToFloat(hit.what.w);
+  }
   BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
   vec3 unused = vec3(1.0);
   start_visit();
@@ -19,10 +26,11 @@ void find_glass(uint slot, inout State state, out float first_t) {
     Placed placed = placed_at(i);
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = camera_ray_in(placed, point);
+    in_grid.t = (placed.start.w - depth) * scale;
     if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t)) continue;
     find_bodies_in(i, in_grid, placed.ref_view.w / placed.ref_inside.w, max_t, state.weight.w, list, unused);
   }
-  first_t = list.count > 0 ? Bodies(list.address).at[list.first].lengths.x : kInfinity;
+  first_t = list.count > 0 ? depth * scale + Bodies(list.address).at[list.first].lengths.x : kInfinity;
   state.weight.w = list.dropped_t;
   state.colour.w = float(list.count + 1);
 }
@@ -38,7 +46,7 @@ void main() {
       float first_t;
       find_glass(slot, state, first_t);
       is_pending = state.weight.w < kInfinity;
-      if (push.first != 0 && push.round == 0 && first_t < kInfinity) {
+      if (push.first != 0 && push.round == 0 && state.colour.w > 1.0) {
         is_new_hit = Points(frame().points).at[slot].voxel.w < 0;
         Depths(frame().depths).at[slot] = first_t;
       }

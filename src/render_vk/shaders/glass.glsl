@@ -86,10 +86,10 @@ void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float fro
     Body next;
     next.voxel = ivec4(walk_voxel, i);
     next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? 1 : 0, 0);
-    next.lengths.x = ray.t + walk_t;
+    float enter_t = walk_t;
     bool goes_on = leave_block(0, room);
-    next.lengths.y = min(ray.t + walk_t, max_t);
-    next.lengths.z = (next.lengths.y - next.lengths.x) * voxels_a_t;
+    float exit_t = min(walk_t, room);
+    next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
     if (next.lengths.z > 0.0) {
       clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
       if (has_body && continues(body, next)) {

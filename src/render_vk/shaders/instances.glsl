@@ -96,20 +96,30 @@ vec2 picture_point() {
   return vec2(push.corner + tile_pixel()) + push.point;
 }
 
+vec3 picture_vector(vec2 point) {
+  Frame f = frame();
+  return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+}
+
+// A camera's ray. It starts where view space has its origin, at frame().start.w times length_a_depth.
 ViewRay camera_ray(vec2 point) {
   Frame f = frame();
-  vec3 across = f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
-  if (!has(kPerspective)) return ViewRay(across, f.forward.xyz);
-  vec3 d = across + f.forward.xyz;
-  return ViewRay(vec3(0.0), d * (1.0 / sqrt(dot(d, d))));
+  vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;
+  if (!has(kPerspective)) return ViewRay(start, f.forward.xyz);
+  vec3 d = picture_vector(point) + f.forward.xyz;
+  return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
+}
+
+// The ray's length by which its forward component grows by 1.
+float length_a_depth(vec2 point) {
+  if (!has(kPerspective)) return 1.0;
+  vec3 d = picture_vector(point) + frame().forward.xyz;
+  return sqrt(dot(d, d));
 }
 
 // A camera's ray in an instance's grid. It starts near the grid, so that distance costs no precision.
 GridRay camera_ray_in(Placed placed, vec2 point) {
-  Frame f = frame();
-  vec3 across = f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
-  vec3 d = has(kPerspective) ? across + f.forward.xyz : f.forward.xyz;
-  float size = has(kPerspective) ? sqrt(dot(d, d)) : 1.0;
   vec3 start = placed.start.xyz + placed.start_x.xyz * point.x + placed.start_y.xyz * point.y;
-  return GridRay(placed.start_base.xyz, start, turned(placed.grid_axes, d * (1.0 / size)), placed.start.w * size);
+  vec3 direction = turned(placed.grid_axes, camera_ray(point).direction);
+  return GridRay(placed.start_base.xyz, start, direction, placed.start.w * length_a_depth(point));
 }

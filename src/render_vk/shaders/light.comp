@@ -33,9 +33,10 @@ vec3 sky_colour(float up) {
 }
 
 float sky_up(vec2 point) {
-  ViewRay ray = camera_ray(point);
-  if (has(kPerspective)) return ray.direction.y;
-  return normalize(frame().forward.xyz + ray.origin * frame().forward.w).y;
+  if (has(kPerspective)) return camera_ray(point).direction.y;
+  vec4 forward = frame().forward;
+  vec3 d = forward.xyz + picture_vector(point) * forward.w;
+  return d.y / length(d);
 }
 
 // A well-mixed number of one.
@@ -219,7 +220,7 @@ vec3 light_of(Point point, uint slot) {
 Point point_of(Body body, vec2 at) {
   Placed placed = placed_at(body.voxel.w);
   GridRay ray = camera_ray_in(placed, at);
-  precise vec3 position = ray.origin + (body.lengths.x - ray.t) * ray.direction;
+  precise vec3 position = ray.origin + body.lengths.w * ray.direction;
   Point point;
   point.voxel = body.voxel;
   point.inside = vec4(position - vec3(body.voxel.xyz - ray.base), body.lengths.x);
@@ -236,11 +237,18 @@ bool light_pixel(uint slot, inout State state) {
   bool is_last = !kHasGlass || state.weight.w == kInfinity;
   uint i = 0;
   Body body;
+  bool is_first = true;
   bool is_done = false;
   while (!is_done) {
     Point point = opaque;
     vec3 weight = state.weight.xyz;
     if (kHasGlass && next_body(list, i, body)) {
+      // What there was no room for may go on where the last ends: both are for the next round.
+      if (!is_last && !is_first && i == list.count) {
+        state.weight.w = body.lengths.x;
+        break;
+      }
+      is_first = false;
       bool starts_inside = body.what.z != 0;
       Surface surface = surface_of(body.what.x);
       point = point_of(body, at);
