@@ -151,7 +151,8 @@ void add_placed(const DeviceScene& scene, const Camera& camera, const RenderOpti
     set_sun(grid.placed, sun, placed);
   }
   const double spread = rays.spread(least);
-  data.frame.start = to_vec4(rays.corner * spread, least);
+  data.frame.view_depth = static_cast<float>(least);
+  data.frame.start = to_vec4(rays.corner * spread);
   data.frame.start_x = to_vec4(rays.right * spread);
   data.frame.start_y = to_vec4(rays.down * spread);
   // Two far positions first, as everywhere.
@@ -197,7 +198,8 @@ float capped(double value) {
 
 void set_light(const RenderOptions& options, ShaderFrame& frame) {
   const LightOptions& light = options.light;
-  frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, static_cast<float>(kRayLift)};
+  frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
+  frame.lift = static_cast<float>(kRayLift);
   frame.sky_zenith = {sky::kZenith, 0.0F};
   frame.sky_horizon = {sky::kHorizon, 0.0F};
   frame.sky_ground = {sky::kGround, 0.0F};
@@ -221,7 +223,8 @@ FrameData make_frame(const DeviceScene& scene, const Camera& camera, const Rende
   frame.right = to_vec4(rays.right);
   frame.down = to_vec4(rays.down);
   frame.corner = to_vec4(rays.corner);
-  frame.forward = to_vec4(rays.forward, picture.sky_scale());
+  frame.forward = to_vec4(rays.forward);
+  frame.sky_scale = static_cast<float>(picture.sky_scale());
   frame.width = options.width;
   frame.height = options.height;
   frame.samples = static_cast<float>(options.samples);

@@ -112,6 +112,10 @@ struct ShaderFrame {
   float samples = 1.0F;
   float ground_begins = 0.0F;
   float ground_is_full = 0.0F;
+  float view_depth = 0.0F;
+  float sky_scale = 0.0F;
+  float lift = 0.0F;
+  std::uint32_t pad = 0;
 };
 
 struct ShaderPush {
@@ -129,7 +133,7 @@ struct ShaderPush {
 };
 
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
-static_assert(sizeof(ShaderPlaced) == 256 && sizeof(ShaderFrame) == 12 * 16 + 16 * 8 + 12 * 4);
+static_assert(sizeof(ShaderPlaced) == 256 && sizeof(ShaderFrame) == 12 * 16 + 16 * 8 + 16 * 4);
 static_assert(sizeof(ShaderPush) == 48 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -141,6 +141,11 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
   with("short_shadows", [](RenderOptions& o) { o.light.shadow_distance = 3.0; });
   with("low_sun", [](RenderOptions& o) { o.light.sun = {1e-30, 0.3e-30, 1e-30}; });
   with("exposed", [](RenderOptions& o) { o.light.exposure = 2.5; });
+  with("many_tiles", [](RenderOptions& o) {
+    o.width = 530;
+    o.height = 20;
+    o.light.lit = false;
+  });
   with("colours", [](RenderOptions& o) { o.detail_colours = true; });
 }
 

@@ -115,20 +115,20 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters {
   uint pending;
 };
 
-// Of a picture.
+// Of a picture. Vectors are read as a whole: see docs/decisions/040.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
   vec4 right;  // a pixel to the right and down, and the picture's upper left corner, at a distance of 1
   vec4 down;
   vec4 corner;
-  vec4 forward;  // w: turns the way from an orthographic picture's middle into the tangent of an angle
-  vec4 start;    // of pixel (x, y)'s ray: start + x start_x + y start_y; w: the depth at which view space has its origin
+  vec4 forward;
+  vec4 start;  // of pixel (x, y)'s ray: start + x start_x + y start_y
   vec4 start_x;
   vec4 start_y;
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
   vec4 detail_colour;
-  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all, lift
+  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
   uvec2 placed;
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
@@ -157,6 +157,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float samples;
   float ground_begins;
   float ground_is_full;
+  float view_depth;  // where view space has its origin
+  float sky_scale;   // turns the way from an orthographic picture's middle into the tangent of an angle
+  float lift;
+  uint pad;
 };
 
 layout(push_constant) uniform Push {

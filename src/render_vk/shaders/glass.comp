@@ -6,16 +6,16 @@
 #include "glass.glsl"
 #include "count.glsl"
 
-
 // Distances count from where view space has its origin, but for `first_t`.
-void find_glass(uint slot, inout State state, out float first_t) {
+void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {
   vec2 point = picture_point();
   ViewRay ray = camera_ray(point);
   Point hit = Points(frame().points).at[slot];
+  has_hit = hit.voxel.w >= 0;
   float scale = length_a_depth(point);
-  float depth = frame().start.w;
+  float depth = frame().view_depth;
   float max_t = kInfinity;
-  if (hit.voxel.w >= 0) {
+  if (has_hit) {
     max_t = (placed_at(hit.voxel.w).start.w - depth) * scale + uintBitsToFloat(hit.what.w);
   }
   BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
@@ -44,10 +44,11 @@ void main() {
     // In later rounds only where bodies were left over.
     if (push.round == 0 || state.colour.w > 0.0) {
       float first_t;
-      find_glass(slot, state, first_t);
+      bool has_hit;
+      find_glass(slot, state, first_t, has_hit);
       is_pending = state.weight.w < kInfinity;
       if (push.first != 0 && push.round == 0 && state.colour.w > 1.0) {
-        is_new_hit = Points(frame().points).at[slot].voxel.w < 0;
+        is_new_hit = !has_hit;
         Depths(frame().depths).at[slot] = first_t;
       }
       States(frame().states).at[slot] = state;

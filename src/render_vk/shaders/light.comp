@@ -34,8 +34,7 @@ vec3 sky_colour(float up) {
 
 float sky_up(vec2 point) {
   if (has(kPerspective)) return camera_ray(point).direction.y;
-  vec4 forward = frame().forward;
-  vec3 d = forward.xyz + picture_vector(point) * forward.w;
+  vec3 d = frame().forward.xyz + picture_vector(point) * frame().sky_scale;
   return d.y / length(d);
 }
 
@@ -163,7 +162,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   openness = 0.0;
   ivec3 base = point.voxel.xyz & ~63;
   vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
-  origin[axis] += frame().light.w / cells * sign_of(face);
+  origin[axis] += frame().lift / cells * sign_of(face);
   int first = has(kShadows) && cosine > 0.0 ? -1 : 0;
   int count = has(kOcclusionRays) ? frame().occlusion_count : 0;
   ivec2 pixel = push.corner + tile_pixel();

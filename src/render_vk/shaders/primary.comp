@@ -19,7 +19,7 @@ Point first_hit(vec2 at) {
   float nearest = kInfinity;
   start_visit();
   for (int i = next_instance(ray.origin, ray.direction, kInfinity); i >= 0;
-       i = next_instance(ray.origin, ray.direction, (depth - frame().start.w) * scale + nearest)) {
+       i = next_instance(ray.origin, ray.direction, (depth - frame().view_depth) * scale + nearest)) {
     Placed placed = placed_at(i);
     GridRay in_grid = camera_ray_in(placed, at);
     float limit = (depth - placed.start.w) * scale + nearest;
