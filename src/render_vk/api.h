@@ -69,12 +69,14 @@ template <class T>
 
 /// Vulkan's functions, as far as they are looked up.
 struct Api {
+  // NOLINTBEGIN(readability-identifier-naming): Vulkan's own names
   PFN_vkGetInstanceProcAddr vkGetInstanceProcAddr = nullptr;
 #define QUOIN_VULKAN_MEMBER(name) PFN_##name name = nullptr;
   QUOIN_VULKAN_OF_LOADER(QUOIN_VULKAN_MEMBER)
   QUOIN_VULKAN_OF_INSTANCE(QUOIN_VULKAN_MEMBER)
   QUOIN_VULKAN_OF_DEVICE(QUOIN_VULKAN_MEMBER)
 #undef QUOIN_VULKAN_MEMBER
+  // NOLINTEND(readability-identifier-naming)
 
   /// Those of the loader. Errors: Unsupported when there is none.
   [[nodiscard]] static Result<Api> load();

@@ -156,7 +156,7 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
   for (auto& [handle, known] : grids_) {
     known.index = index++;
     const bool is_new = std::binary_search(made.begin(), made.end(), handle);
-    const Status done = update_grid(known, scene.grids()[handle].grid, scene.types, is_new);
+    Status done = update_grid(known, scene.grids()[handle].grid, scene.types, is_new);
     if (!done) return done;
     has_transparent_ |= known.transparent.top.root.mask != 0;
   }

@@ -169,7 +169,7 @@ Status DeviceMemory::write(const Place& place, std::span<const std::byte> bytes,
 
 Status DeviceMemory::flush() {
   if (copies_.empty()) return {};
-  const Status done = device_->run("uploading", [&](VkCommandBuffer commands) {
+  Status done = device_->run("uploading", [&](VkCommandBuffer commands) {
     for (const Copy& copy : copies_) {
       device_->api().vkCmdCopyBuffer(commands, staging_.handle(), copy.to, 1, &copy.region);
     }

@@ -107,7 +107,7 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
   push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
   push.first = sample == 0 ? 1 : 0;
   const bool has_glass = scene_->has_transparent();
-  const Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     pipelines_->dispatch(commands, Pass::Primary, push);
     if (has_glass) return;
     pipelines_->dispatch(commands, Pass::Light, push);
@@ -118,7 +118,7 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
 // Bodies of glass are lit as many at a time as there is room for, until no pixel has more.
 Status PicturePass::finish_glass(ShaderPush push) {
   for (;;) {
-    const Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+    Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
       const VkDeviceSize pending = offsetof(ShaderCounters, pending);
       device_->api().vkCmdFillBuffer(commands, output_.handle(), pending, 4, 0);
       device_->separate(commands);
@@ -136,7 +136,7 @@ Status PicturePass::finish_glass(ShaderPush push) {
 }
 
 Status PicturePass::read_tile(const Tile& tile, Picture& picture) {
-  const Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     pipelines_->dispatch(commands, Pass::Resolve, push_for(tile));
     const VkBufferCopy all{0, 0, output_.size()};
     device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &all);
@@ -159,7 +159,7 @@ Status PicturePass::read_tile(const Tile& tile, Picture& picture) {
 }
 
 Status PicturePass::read_counters(ShaderCounters& counters) {
-  const Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     const VkBufferCopy region{0, 0, sizeof(ShaderCounters)};
     device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &region);
   });

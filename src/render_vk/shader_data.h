@@ -47,16 +47,15 @@ struct ShaderPlaced {
   std::array<Vec4, 2> diffuse{};
 };
 
-enum FrameFlag : std::uint32_t {
-  kPerspective = 1,
-  kLit = 2,
-  kShadows = 4,
-  kOcclusionRays = 8,
-  kOcclusionVertex = 16,
-  kAffectsAll = 32,
-  kFixedDirections = 64,
-  kDetailColours = 128,
-};
+// Bits of ShaderFrame::flags.
+constexpr std::uint32_t kPerspective = 1;
+constexpr std::uint32_t kLit = 2;
+constexpr std::uint32_t kShadows = 4;
+constexpr std::uint32_t kOcclusionRays = 8;
+constexpr std::uint32_t kOcclusionVertex = 16;
+constexpr std::uint32_t kAffectsAll = 32;
+constexpr std::uint32_t kFixedDirections = 64;
+constexpr std::uint32_t kDetailColours = 128;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;

@@ -54,7 +54,7 @@ const VulkanDevice& VulkanRenderer::device() const {
 
 Status VulkanRenderer::update(const Scene& scene, bool hidden, Threads threads) {
   const std::uint64_t before = impl_->memory.written();
-  const Status done = impl_->scene.update(scene, hidden, threads);
+  Status done = impl_->scene.update(scene, hidden, threads);
   impl_->uploaded = impl_->memory.written() - before;
   return done;
 }

@@ -182,6 +182,17 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "panes");
 }
 
+TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
+  Scene scene;
+  const Types types = add_types(scene);
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {15, 0, 15}, types.wall);
+  for (int i = 0; i < 12; ++i)
+    grid.fill_box({20'000 + i, i, 2 * i}, {20'000 + i, 12, 30}, i % 2 ? types.roof : types.wall);
+  place(scene, std::move(grid));
+  compare(scene, towards({3.2, 6.1, 7.7}, {20'000, 6, 15}, 2e-3), sized(96, 72), "corridor");
+}
+
 TEST_F(VulkanScene, AnEmptySceneIsTheSky) {
   const Scene scene;
   compare(scene, towards({0, 0, 0}, {1, 0.2, 0}, 2.0), sized(64, 48), "sky");

@@ -44,7 +44,8 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   vec3 near = 0.01 + abs(position) * 1e-6;
   bvec3 is_close = either(lessThan(past, near), greaterThan(past, 1.0 - near));
   bvec3 is_other = notEqual(ivec3(0, 1, 2), ivec3(axis));
-  if (!any(both(is_close, is_other))) return ivec3(at);
+  // The last clamp is for numbers beyond 2^24, which rounding moves by more than one.
+  if (!any(both(is_close, is_other))) return clamp(ivec3(at), low, high);
   vec3 ahead = mix(at, at + 1.0, ray_forward);
   vec3 behind = mix(at + 1.0, at, ray_forward);
   precise vec3 ahead_t = (ahead - ray_origin) * ray_inverse;
@@ -58,7 +59,8 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   bvec3 comes_later = axis < 0 ? bvec3(false) : greaterThan(ivec3(0, 1, 2), ivec3(axis));
   bvec3 is_far = both(both(either(lessThan(now, behind_t), both(equal(behind_t, now), comes_later)), moves),
                       both(not(was_inside), not(is_short)));
-  return ivec3(at + mix(vec3(0.0), ray_sign, is_short) - mix(vec3(0.0), ray_sign, is_far));
+  at += mix(vec3(0.0), ray_sign, is_short) - mix(vec3(0.0), ray_sign, is_far);
+  return clamp(ivec3(at), low, high);
 }
 
 // Puts a ray at its start, or where it enters the tree's bounds; false when it misses them.
