@@ -153,7 +153,8 @@ TEST_F(VulkanScene, FromInsideGlassAndStone) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {30, 30, 30}, types.water);
+  const VoxelType clear = add_type(scene, {60, 140, 220, 9}, Visibility::Transparent);
+  grid.fill_box({0, 0, 0}, {30, 30, 30}, clear);
   grid.fill_box({0, 0, 0}, {30, 3, 30}, types.wall);
   grid.fill_sphere({20, 8, 20}, 5, types.roof);
   grid.fill_box({8, 4, 24}, {12, 12, 26}, types.glass);
@@ -187,8 +188,9 @@ TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
   const Types types = add_types(scene);
   Grid grid;
   grid.fill_box({0, 0, 0}, {15, 0, 15}, types.wall);
-  for (int i = 0; i < 12; ++i)
-    grid.fill_box({20'000 + i, i, 2 * i}, {20'000 + i, 12, 30}, i % 2 ? types.roof : types.wall);
+  for (int i = 0; i < 12; ++i) {
+    grid.fill_box({20'000 + i, 0, 2 * i}, {20'000 + i, 1 + i, 2 * i + 3}, i % 2 != 0 ? types.roof : types.wall);
+  }
   place(scene, std::move(grid));
   compare(scene, towards({3.2, 6.1, 7.7}, {20'000, 6, 15}, 2e-3), sized(96, 72), "corridor");
 }
