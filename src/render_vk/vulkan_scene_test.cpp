@@ -86,6 +86,24 @@ TEST_F(VulkanScene, TurnedMirroredAndScaledInstances) {
   compare(scene, towards({50, 40, 70}, {0, 0, 0}), sized(160, 120), "village");
 }
 
+TEST_F(VulkanScene, ManyInstances) {
+  Scene scene;
+  const Types types = add_types(scene);
+  SceneGrid small;
+  small.grid.fill_sphere({0, 0, 0}, 3, types.roof);
+  small.grid.fill_box({-1, 3, -1}, {1, 4, 1}, types.glass);
+  const GridHandle grid = scene.add_grid(std::move(small));
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int i = 0; i < 900; ++i) {
+    const DVec3 position{70 * unit(random), 12 * unit(random), 70 * unit(random)};
+    add_instance(scene, grid, position, {unit(random), unit(random), unit(random), unit(random)}, 0.6, i % 2 == 0);
+  }
+  compare(scene, towards({60, 30, 70}, {0, 0, 0}), sized(96, 72), "many");
+  // Along the axes, where directions are 0.
+  compare(scene, from_above(0.3, 60, -0.7, 80), sized(64, 64), "many_from_above");
+}
+
 TEST_F(VulkanScene, GlassOfTurnedInstances) {
   const Scene scene = village(DVec3(0.0), true);
   compare(scene, towards({-40, 30, 60}, {0, 0, 0}), sized(128, 96), "glass_village");

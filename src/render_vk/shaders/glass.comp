@@ -20,9 +20,8 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   }
   BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
   vec3 unused = vec3(1.0);
-  start_visit();
-  for (int i = next_instance(ray.origin, ray.direction, max_t); i >= 0;
-       i = next_instance(ray.origin, ray.direction, max_t)) {
+  start_visit(ray);
+  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = camera_ray_in(placed, point);

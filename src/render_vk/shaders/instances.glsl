@@ -1,66 +1,5 @@
 // Rays among many instances.
 
-const int kVisitDepth = 28;
-
-uint visit_stack[kVisitDepth];
-int visit_height;
-uint visit_next;
-uint visit_end;
-
-void start_visit() {
-  visit_stack[0] = 0;
-  visit_height = frame().placed_count > 0 ? 1 : 0;
-  visit_next = visit_end = 0;
-}
-
-bool may_meet(vec3 low, vec3 high, vec3 origin, vec3 direction, float max_t) {
-  float enter_t = 0.0;
-  float exit_t = max_t;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (direction[axis] == 0.0) {
-      if (origin[axis] < low[axis] || origin[axis] > high[axis]) return false;
-      continue;
-    }
-    float inverse = 1.0 / direction[axis];
-    float a = (low[axis] - origin[axis]) * inverse;
-    float b = (high[axis] - origin[axis]) * inverse;
-    enter_t = max(enter_t, min(a, b));
-    exit_t = min(exit_t, max(a, b));
-  }
-  // The boxes have room for rounding; their distances need it too.
-  return enter_t <= exit_t * 1.00001 + 1e-5;
-}
-
-// The next instance whose box a ray in view may meet, nearer ones mostly first; -1 when there is none left.
-int next_instance(vec3 origin, vec3 direction, float max_t) {
-  Vectors nodes = Vectors(frame().tree);
-  Vectors leaves = Vectors(frame().leaves);
-  for (;;) {
-    while (visit_next < visit_end) {
-      vec4 low = leaves.at[2 * visit_next];
-      vec4 high = leaves.at[2 * visit_next + 1];
-      ++visit_next;
-      if (may_meet(low.xyz, high.xyz, origin, direction, max_t)) return floatBitsToInt(low.w);
-    }
-    if (visit_height == 0) return -1;
-    uint node = visit_stack[--visit_height];
-    vec4 low = nodes.at[2 * node];
-    vec4 high = nodes.at[2 * node + 1];
-    if (!may_meet(low.xyz, high.xyz, origin, direction, max_t)) continue;
-    uint first = floatBitsToUint(low.w);
-    int count = floatBitsToInt(high.w);
-    if (count > 0) {
-      visit_next = first;
-      visit_end = first + uint(count);
-      continue;
-    }
-    bool is_forward = direction[-1 - count] >= 0.0;
-    visit_stack[visit_height] = is_forward ? first : first - 1;
-    visit_stack[visit_height + 1] = is_forward ? first - 1 : first;
-    visit_height += 2;
-  }
-}
-
 struct GridRay {
   ivec3 base;
   vec3 origin;
@@ -72,6 +11,72 @@ struct ViewRay {
   vec3 origin;
   vec3 direction;
 };
+
+const int kVisitDepth = 28;
+
+uint visit_stack[kVisitDepth];
+int visit_height;
+uint visit_next;
+uint visit_end;
+
+vec3 visit_origin;
+vec3 visit_direction;
+vec3 visit_inverse;
+bvec3 visit_still;
+
+// Begins to list the instances whose boxes a ray in view may meet.
+void start_visit(ViewRay ray) {
+  visit_stack[0] = 0;
+  visit_height = frame().placed_count > 0 ? 1 : 0;
+  visit_next = visit_end = 0;
+  visit_origin = ray.origin;
+  visit_direction = ray.direction;
+  visit_still = equal(ray.direction, vec3(0.0));
+  visit_inverse = 1.0 / mix(ray.direction, vec3(1.0), visit_still);
+}
+
+bool may_meet(vec3 low, vec3 high, float max_t) {
+  bvec3 is_outside = either(lessThan(visit_origin, low), greaterThan(visit_origin, high));
+  if (any(both(visit_still, is_outside))) return false;
+  vec3 a = (low - visit_origin) * visit_inverse;
+  vec3 b = (high - visit_origin) * visit_inverse;
+  vec3 near = mix(min(a, b), vec3(0.0), visit_still);
+  vec3 far = mix(max(a, b), vec3(kNever), visit_still);
+  float enter_t = max(max(near.x, near.y), max(near.z, 0.0));
+  float exit_t = min(min(far.x, far.y), min(far.z, max_t));
+  // The boxes have room for rounding; their distances need it too.
+  return enter_t <= exit_t * 1.00001 + 1e-5;
+}
+
+// The next of them up to max_t, nearer ones mostly first; -1 when there is none left.
+int next_instance(float max_t) {
+  Vectors nodes = Vectors(frame().tree);
+  Vectors leaves = Vectors(frame().leaves);
+  for (;;) {
+    while (visit_next < visit_end) {
+      vec4 low = leaves.at[2 * visit_next];
+      vec4 high = leaves.at[2 * visit_next + 1];
+      ++visit_next;
+      if (may_meet(low.xyz, high.xyz, max_t)) return floatBitsToInt(low.w);
+    }
+    if (visit_height == 0) return -1;
+    uint node = visit_stack[--visit_height];
+    vec4 low = nodes.at[2 * node];
+    vec4 high = nodes.at[2 * node + 1];
+    if (!may_meet(low.xyz, high.xyz, max_t)) continue;
+    uint first = floatBitsToUint(low.w);
+    int count = floatBitsToInt(high.w);
+    if (count > 0) {
+      visit_next = first;
+      visit_end = first + uint(count);
+      continue;
+    }
+    bool is_forward = visit_direction[-1 - count] >= 0.0;
+    visit_stack[visit_height] = is_forward ? first : first - 1;
+    visit_stack[visit_height + 1] = is_forward ? first - 1 : first;
+    visit_height += 2;
+  }
+}
 
 vec3 turned(vec4 columns[3], vec3 v) {
   return columns[0].xyz * v.x + columns[1].xyz * v.y + columns[2].xyz * v.z;

@@ -66,10 +66,10 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
 // Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel of any instance.
 bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   ViewRay in_view = view_from_grid(own, ray);
-  start_visit();
+  start_visit(in_view);
   Placed placed = own;
   bool is_first = true;
-  for (int i = home; i >= 0; i = next_instance(in_view.origin, in_view.direction, max_t)) {
+  for (int i = home; i >= 0; i = next_instance(max_t)) {
     if (i == home && !is_first) continue;
     if (!is_first) {
       placed = placed_at(i);
@@ -89,9 +89,8 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   float length = own.ref_inside.w;
   BodyList list = BodyList(frame().sun_bodies, slot * kBodies, 0, kInfinity);
   vec3 passed = vec3(1.0);
-  start_visit();
-  for (int i = next_instance(in_view.origin, in_view.direction, max_t); i >= 0;
-       i = next_instance(in_view.origin, in_view.direction, max_t)) {
+  start_visit(in_view);
+  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = ray;

@@ -17,9 +17,9 @@ Point first_hit(vec2 at) {
   float scale = length_a_depth(at);
   float depth = 0.0;
   float nearest = kInfinity;
-  start_visit();
-  for (int i = next_instance(ray.origin, ray.direction, kInfinity); i >= 0;
-       i = next_instance(ray.origin, ray.direction, (depth - frame().view_depth) * scale + nearest)) {
+  start_visit(ray);
+  for (int i = next_instance(kInfinity); i >= 0;
+       i = next_instance((depth - frame().view_depth) * scale + nearest)) {
     Placed placed = placed_at(i);
     GridRay in_grid = camera_ray_in(placed, at);
     float limit = (depth - placed.start.w) * scale + nearest;
