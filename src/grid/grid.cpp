@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <set>
 
 #include <tsl/robin_map.h>
@@ -12,6 +13,14 @@
 #include "grid/reach.h"
 
 namespace quoin {
+namespace {
+
+std::uint64_t next_identity() {
+  static std::atomic<std::uint64_t> count{0};
+  return count.fetch_add(1, std::memory_order_relaxed) + 1;
+}
+
+}  // namespace
 
 struct Grid::Impl {
   struct Entry {
@@ -23,6 +32,7 @@ struct Grid::Impl {
   tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries;
   std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
+  std::uint64_t identity = next_identity();
 
   Entry* find(IVec3 chunk) const {
     const auto it = entries.find(chunk);
@@ -268,6 +278,10 @@ std::uint64_t Grid::neighbourhood_version(IVec3 chunk) const {
 
 std::uint64_t Grid::version() const {
   return impl_->version;
+}
+
+std::uint64_t Grid::identity() const {
+  return impl_->identity;
 }
 
 std::vector<IVec3> Grid::take_dirty() {

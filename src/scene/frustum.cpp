@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 namespace quoin {
@@ -23,16 +22,6 @@ Frustum::Frustum(const Camera& camera, int width, int height) {
     }
   }
   planes_[4] = {glm::normalize(camera.forward), 0.0};
-}
-
-bool Frustum::meets(DVec3 centre, double radius) const {
-  // Room for rounding, of far centres too.
-  constexpr double kRoom = 1e-9;
-  const double reach = radius + kRoom * (radius + std::abs(centre.x) + std::abs(centre.y) + std::abs(centre.z));
-  for (const Plane& plane : planes_) {
-    if (glm::dot(plane.inward, centre) < plane.offset - reach) return false;
-  }
-  return true;
 }
 
 }  // namespace quoin

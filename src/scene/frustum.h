@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include <quoin/core/vec.h>
 #include <quoin/scene/camera.h>
@@ -18,7 +19,17 @@ class Frustum {
 
   /// False only when no ray of the picture meets the sphere; some spheres near the picture's corners count as met.
   /// What is not a number counts as met.
-  [[nodiscard]] bool meets(DVec3 centre, double radius) const;
+  [[nodiscard]] bool meets(DVec3 centre, double radius) const {
+    // Room for rounding, of far centres too.
+    constexpr double kRoom = 1e-9;
+    const double reach = radius + kRoom * (radius + std::abs(centre.x) + std::abs(centre.y) + std::abs(centre.z));
+    bool is_out = false;
+    for (const Plane& plane : planes_) {
+      const DVec3& inward = plane.inward;
+      is_out |= inward.x * centre.x + inward.y * centre.y + inward.z * centre.z < plane.offset - reach;
+    }
+    return !is_out;
+  }
 
  private:
   struct Plane {

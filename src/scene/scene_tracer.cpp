@@ -1,71 +1,20 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
+#include <utility>
 
-#include "scene/instance_axes.h"
 #include "scene/scene_tracer_impl.h"
 
 namespace quoin {
-namespace {
-
-bool can_be_traced(const Instance& instance, const SceneGrid& grid) {
-  const DQuat& q = instance.rotation;
-  return is_finite(instance.position) && is_finite(grid.pivot) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&
-         std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0 && !grid.grid.bounds().empty();
-}
-
-// In the world, with room for rounding.
-DBox bounds_of(const PlacedGrid& placed) {
-  const IBox tight = placed.voxels->bounds();
-  DBox box;
-  for (int corner = 0; corner < 8; ++corner) {
-    const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
-                      (corner & 4) != 0 ? tight.max.z : tight.min.z};
-    box.extend(placed.position + placed.world_axes * ((point - placed.pivot) * placed.voxel_size));
-  }
-  const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
-  return {box.min - room, box.max + room};
-}
-
-}  // namespace
 
 SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
-  std::map<GridHandle, std::size_t> slots;
-  std::vector<const SceneGrid*> grids;
-  std::vector<DBox> boxes;
-  std::vector<std::size_t> slot_of;
   impl_->scene = &scene;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden) || !can_be_traced(instance, *grid)) continue;
-    const auto [found, is_new] = slots.try_emplace(instance.grid, grids.size());
-    if (is_new) grids.push_back(grid);
-    slot_of.push_back(found->second);
-    PlacedGrid& placed = impl_->placed.emplace_back();
-    placed.instance = handle;
-    placed.grid = grid;
-    placed.voxels = &grid->grid;
-    placed.pivot = grid->pivot;
-    placed.world_axes = world_axes(instance);
-    placed.position = instance.position;
-    placed.voxel_size = instance.voxel_size;
-    boxes.push_back(bounds_of(placed));
-  }
-  impl_->trees.resize(grids.size());
-  parallel_for(grids.size(), threads, [&](std::size_t i) {
-    const Grid& grid = grids[i]->grid;
-    impl_->trees[i] = OpticalTrees::build(grid, scene.types);
-  });
-  for (std::size_t i = 0; i < slot_of.size(); ++i) {
-    const OpticalTrees& trees = impl_->trees[slot_of[i]];
-    impl_->placed[i].opaque = &trees.opaque;
-    impl_->placed[i].transparent = trees.transparent ? &*trees.transparent : nullptr;
-    impl_->has_transparent |= trees.transparent.has_value();
-  }
-  impl_->instances = InstanceTree(std::move(boxes));
+  impl_->hidden = hidden;
+  impl_->update(threads);
+}
+
+bool SceneTracer::update(Threads threads) {
+  return impl_->update(threads);
 }
 
 SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -75,7 +24,7 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
   detailed->scene = impl_->scene;
   detailed->placed = impl_->placed;
   detailed->has_transparent = impl_->has_transparent;
-  std::vector<DBox> boxes = impl_->instances.boxes();
+  std::vector<InstanceTree::Change> halved;
   const CoarseGrids::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
   auto next = detailed->placed.begin();
   for (const SelectedInstance& choice : selected) {
@@ -88,9 +37,11 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
     const CoarseLevel* level = levels.find(grid, choice.halvings);
     if (level == nullptr) continue;
     level->put_in(*next);
-    boxes[static_cast<std::size_t>(next - detailed->placed.begin())] = bounds_of(*next);
+    halved.push_back(
+        {static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});
   }
-  detailed->instances = InstanceTree(std::move(boxes));
+  detailed->instances = impl_->instances;
+  detailed->instances.change(halved);
   return SceneTracer(std::move(detailed));
 }
 
