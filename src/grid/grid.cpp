@@ -13,12 +13,11 @@
 #include "grid/reach.h"
 
 namespace quoin {
-
 namespace {
 
 std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> last{0};
-  return ++last;
+  static std::atomic<std::uint64_t> count{0};
+  return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
 }  // namespace

@@ -299,18 +299,17 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
 }
 
-TEST(Grid, EveryGridHasAnIdentityOfItsOwnThatMovesWithIt) {
-  Grid a;
-  a.set({1, 2, 3}, 1);
-  const Grid b = a.clone();
-  const Grid c;
-  const std::uint64_t identity = a.identity();
-  EXPECT_EQ(b.version(), a.version());
-  EXPECT_NE(b.identity(), identity);
-  EXPECT_NE(c.identity(), identity);
-  EXPECT_NE(c.identity(), b.identity());
-  const Grid moved = std::move(a);
-  EXPECT_EQ(moved.identity(), identity);
+TEST(Grid, ItsIdentityGoesWithTheVoxelsAndIsNoOthers) {
+  Grid grid;
+  const std::uint64_t identity = grid.identity();
+  grid.set({1, 2, 3}, 1);
+  EXPECT_EQ(grid.identity(), identity) << "an edit raises the version alone";
+  EXPECT_NE(grid.clone().identity(), identity);
+  EXPECT_NE(Grid().identity(), identity);
+  Grid other = std::move(grid);
+  EXPECT_EQ(other.identity(), identity);
+  other = Grid();
+  EXPECT_NE(other.identity(), identity);
 }
 
 }  // namespace

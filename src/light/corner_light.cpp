@@ -17,22 +17,7 @@ float interpolated_level(const FaceLevels& levels, float u, float v) {
 }
 
 FaceLevels corner_levels(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face) {
-  const FaceFrame& frame = frame_of(face);
-  const IVec3 front = voxel + normal_of(face);
-  std::array<std::array<bool, 3>, 3> is_occluder{};
-  for (int dv = -1; dv <= 1; ++dv) {
-    for (int du = -1; du <= 1; ++du) {
-      if (du == 0 && dv == 0) continue;
-      IVec3 at = front;
-      at[frame.u] += du;
-      at[frame.v] += dv;
-      is_occluder[static_cast<std::size_t>(dv + 1)][static_cast<std::size_t>(du + 1)] = types.is_opaque(grid.get(at));
-    }
-  }
-  const auto level = [&](std::size_t u, std::size_t v) {
-    return vertex_occlusion(is_occluder[1][u], is_occluder[v][1], is_occluder[v][u]);
-  };
-  return {level(0, 0), level(2, 0), level(2, 2), level(0, 2)};
+  return corner_levels([&](IVec3 at) { return types.is_opaque(grid.get(at)); }, voxel, face);
 }
 
 float level_at(const FaceLevels& levels, IVec3 voxel, Direction face, DVec3 position) {

@@ -28,18 +28,25 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
 
 // The points' indices: those of one grid together, in it those of one face, so that most groups of sixteen have all
 // their rays in parallel (7 % of a picture's time).
-std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint> points) const {
-  std::array<std::size_t, 7> begin{};
-  for (const SurfacePoint& point : points) ++begin[index_of(point.face) + 1];
-  for (std::size_t face = 1; face < begin.size(); ++face) begin[face] += begin[face - 1];
-  std::vector<std::uint32_t> order(points.size());
+std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint> points) {
+  constexpr std::size_t kFaces = 6;
+  std::vector<std::int32_t> grids;  // in the order in which they come
+  std::vector<std::uint32_t> bucket(points.size());
+  std::size_t slot = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    order[begin[index_of(points[i].face)]++] = static_cast<std::uint32_t>(i);
+    const std::int32_t grid = points[i].placed;
+    if (slot >= grids.size() || grids[slot] != grid) {
+      const auto found = std::find(grids.begin(), grids.end(), grid);
+      slot = static_cast<std::size_t>(found - grids.begin());
+      if (found == grids.end()) grids.push_back(grid);
+    }
+    bucket[i] = static_cast<std::uint32_t>(kFaces * slot + index_of(points[i].face));
   }
-  if (frames_.size() > 1) {
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return points[a].placed < points[b].placed; });
-  }
+  std::vector<std::uint32_t> begin(kFaces * grids.size() + 1);
+  for (const std::uint32_t each : bucket) ++begin[each + 1];
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<std::uint32_t> order(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) order[begin[bucket[i]]++] = static_cast<std::uint32_t>(i);
   return order;
 }
 
@@ -79,11 +86,12 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       surfaces_(&surfaces),
       options_(options),
       directions_(options.occlusion_rays),
-      detail_colours_(detail_colours),
       exposure_(exposure_of(options)) {
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : view.tracer().placed()) {
+    if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.halvings);
     Frame& frame = frames_.emplace_back();
+    frame.voxels_per_cell = placed.voxels_per_cell();
     frame.to_sun = glm::transpose(placed.world_axes) * sun;
     for (const Direction face : kDirections) {
       const double cosine = glm::dot(DVec3(normal_of(face)), frame.to_sun);
@@ -117,7 +125,7 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
 }
 
 double Lighting::voxels_per_cell(std::int32_t placed) const {
-  return view_->tracer().placed()[static_cast<std::size_t>(placed)].voxels_per_cell();
+  return frames_[static_cast<std::size_t>(placed)].voxels_per_cell;
 }
 
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
@@ -211,17 +219,13 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
-Surface Lighting::surface_at(const SurfacePoint& point) const {
-  const Surface& own = (*surfaces_)[point.type];
-  if (!detail_colours_) return own;
-  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
-  Surface surface;
-  surface.colour = colour_of_detail(placed.detail, placed.halvings);
-  return surface;
+const Surface& Lighting::surface_at(const SurfacePoint& point) const {
+  if (detail_surfaces_.empty()) return (*surfaces_)[point.type];
+  return detail_surfaces_[static_cast<std::size_t>(point.placed)];
 }
 
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
-  const Surface surface = surface_at(point);
+  const Surface& surface = surface_at(point);
   if (point.kind == PointKind::Unlit) return surface.colour;
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {

@@ -59,10 +59,11 @@ class Lighting {
   /// Of one placed grid, in its own frame.
   struct Frame {
     DVec3 to_sun{0.0};
+    double voxels_per_cell = 1.0;
     std::array<float, 6> diffuse{};
   };
   struct Group;
-  [[nodiscard]] std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points) const;
+  [[nodiscard]] static std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points);
   [[nodiscard]] double voxels_per_cell(std::int32_t placed) const;
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
@@ -70,7 +71,7 @@ class Lighting {
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
-  [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
+  [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
 
   const SceneView* view_;
@@ -79,7 +80,7 @@ class Lighting {
   LightOptions options_;
   OcclusionDirections directions_;
   std::vector<Frame> frames_;
-  bool detail_colours_;
+  std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   float exposure_ = 1.0F;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -79,7 +80,7 @@ struct CpuRenderer::Impl {
       far.push_back(&choice);
     }
     const std::vector<const Impostor*> taken =
-        impostors.take(scene->types, placed, options.threads, options.instructions);
+        impostors->take(scene->types, placed, options.threads, options.instructions);
     std::vector<FarInstance> instances;
     for (std::size_t i = 0; i < far.size(); ++i) {
       if (taken[i] == nullptr) continue;
@@ -93,7 +94,7 @@ struct CpuRenderer::Impl {
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
-  ImpostorShelf impostors;
+  std::unique_ptr<ImpostorShelf> impostors = std::make_unique<ImpostorShelf>();
 };
 
 namespace {
@@ -106,7 +107,7 @@ struct Subject {
 
   void leave_to_impostors(std::span<const FarInstance> far, const Camera& camera, const RenderOptions& options) {
     if (far.empty()) return;
-    impostors.emplace(view->tracer(), far, camera, options.width, options.height);
+    impostors.emplace(view->tracer(), far, camera, options.width, options.height, options.instructions);
     view->leave_to_impostors(placed_of(view->tracer(), far));
   }
 };
@@ -118,6 +119,12 @@ CpuRenderer::CpuRenderer(const Scene& scene, bool hidden, Threads threads)
 CpuRenderer::CpuRenderer(CpuRenderer&&) noexcept = default;
 CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
+
+void CpuRenderer::update(Threads threads) {
+  const bool are_grids_other = impl_->tracer.update(threads);
+  impl_->surfaces = Surfaces(impl_->scene->types);
+  if (are_grids_other) impl_->impostors = std::make_unique<ImpostorShelf>();
+}
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {

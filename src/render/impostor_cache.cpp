@@ -24,6 +24,7 @@ struct ImpostorCache::Impl {
   std::map<GridHandle, Entry> entries;
   std::deque<GridHandle> waiting;
   ImpostorCacheStatistics statistics;
+  std::uint64_t built_bytes = 0;
   std::uint64_t round = 0;  // of build_some
 
   std::optional<GridHandle> take_waiting() {
@@ -35,13 +36,20 @@ struct ImpostorCache::Impl {
   }
 
   void drop(std::map<GridHandle, Entry>::iterator entry) {
-    if (entry->second.impostor != nullptr) --statistics.held;
+    release(entry->second);
     entries.erase(entry);
   }
 
-  // Makes room for one more by dropping what was not used since `used_before`; whether that was possible.
-  bool make_room(std::uint64_t used_before) {
-    while ((statistics.held + 1) * Impostor::kBytes > options.most_bytes) {
+  void release(Entry& entry) {
+    if (entry.impostor == nullptr) return;
+    --statistics.held;
+    statistics.bytes -= entry.impostor->bytes();
+    entry.impostor = nullptr;
+  }
+
+  // Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
+  bool make_room(std::size_t bytes, std::uint64_t used_before) {
+    while (statistics.bytes + bytes > options.most_bytes) {
       auto oldest = entries.end();
       for (auto each = entries.begin(); each != entries.end(); ++each) {
         if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before)
@@ -60,22 +68,33 @@ struct ImpostorCache::Impl {
     if (const auto entry = entries.find(grid); entry != entries.end()) drop(entry);
   }
 
-  // Whether the grid is still to be built. Where there is no room it is forgotten until it is asked for again.
+  // Whether the grid is still to be built, going by the mean size of those that were. Where there is no room it is
+  // forgotten until it is asked for again.
   bool has_room(GridHandle grid) {
     const std::lock_guard lock(mutex);
     const auto entry = entries.find(grid);
     if (entry == entries.end()) return false;
-    if (entry->second.impostor != nullptr || make_room(entry->second.last_use)) return true;
+    const std::size_t likely = statistics.built == 0 ? 1 : built_bytes / statistics.built;
+    if (entry->second.impostor != nullptr || make_room(likely, entry->second.last_use)) return true;
     entries.erase(entry);
     return false;
   }
 
   void put(GridHandle grid, std::uint64_t version, std::shared_ptr<const Impostor> made) {
     const std::lock_guard lock(mutex);
-    Entry& entry = entries[grid];
+    const auto entry = entries.try_emplace(grid).first;
+    const std::size_t bytes = made->bytes();
     ++statistics.built;
-    statistics.held += entry.impostor == nullptr;
-    entry = {std::move(made), version, entry.last_use, false};
+    built_bytes += bytes;
+    release(entry->second);
+    if (!make_room(bytes, entry->second.last_use)) {
+      ++statistics.dropped;
+      entries.erase(entry);
+      return;
+    }
+    ++statistics.held;
+    statistics.bytes += bytes;
+    entry->second = {std::move(made), version, entry->second.last_use, false};
   }
 
   void forget_missing(const Scene& scene) {
@@ -138,7 +157,6 @@ std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds,
 ImpostorCacheStatistics ImpostorCache::statistics() const {
   const std::lock_guard lock(impl_->mutex);
   ImpostorCacheStatistics statistics = impl_->statistics;
-  statistics.bytes = statistics.held * Impostor::kBytes;
   statistics.waiting = impl_->waiting.size();
   return statistics;
 }

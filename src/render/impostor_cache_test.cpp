@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/workloads.h"
+#include "render/impostor_faces.h"
 
 namespace quoin {
 namespace {
@@ -25,8 +26,8 @@ struct World {
 };
 
 bool shows(const Impostor& impostor, VoxelType type) {
-  const Snapshot snapshot = impostor.snapshot(0);
-  return std::find(snapshot.types.begin(), snapshot.types.end(), type) != snapshot.types.end();
+  const std::vector<ImpostorFaces::Face>& faces = impostor.faces().faces;
+  return std::any_of(faces.begin(), faces.end(), [&](const ImpostorFaces::Face& face) { return face.type == type; });
 }
 
 TEST(ImpostorCache, BuildsWhatIsAskedForSomeAtATime) {
@@ -61,12 +62,13 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_TRUE(shows(*renewed, 2));
   EXPECT_FALSE(shows(*old, 2)) << "whoever holds it still has it";
   EXPECT_EQ(cache.statistics().held, 1U);
-  EXPECT_EQ(cache.statistics().bytes, Impostor::kBytes);
+  EXPECT_EQ(cache.statistics().bytes, renewed->bytes());
 }
 
 TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   World world(3);
-  ImpostorCache cache({2 * Impostor::kBytes});
+  const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();
+  ImpostorCache cache({2 * one});
   for (const std::size_t i : {0U, 1U}) {
     EXPECT_EQ(cache.find(world.scene, world.grids[i]), nullptr);
     EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
@@ -80,6 +82,17 @@ TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_NE(cache.find(world.scene, world.grids[2]), nullptr);
   EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
+}
+
+TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
+  World world(1);
+  ImpostorCache cache({1000});
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+  EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
+  EXPECT_EQ(cache.statistics().held, 0U);
+  EXPECT_EQ(cache.statistics().bytes, 0U);
+  EXPECT_EQ(cache.statistics().dropped, 1U);
 }
 
 TEST(ImpostorCache, ForgetsGridsThatAreGone) {

@@ -1,4 +1,5 @@
 #include <bit>
+#include <memory>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -21,10 +22,11 @@ constexpr int kBlock = CameraRays::kBlock;
 class FarTile {
  public:
   FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,
-          Picture& picture)
-      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), picture_(&picture) {}
+          OcclusionMode mode, Picture& picture)
+      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), picture_(&picture) {}
 
   void draw(int column, int row) {
+    pass_->draw(column, row, PixelPoint{}, *far_);
     RayPacket rays;
     for (int y = row; y < row + kTile; y += kBlock) {
       for (int x = column; x < column + kTile; x += kBlock) {
@@ -47,9 +49,10 @@ class FarTile {
  private:
   void draw_block(int column, int row, const RayPacket& rays) {
     SceneHits hits;
-    FarTexels texels;
-    pass_->find(column, row, rays, hits, texels);
-    for (std::uint32_t left = texels.found; left != 0; left &= left - 1) {
+    FarFaces faces;
+    hits.grids.hit = hits.grids.starts_inside = 0;
+    pass_->find(column, row, rays, *far_, hits, faces);
+    for (std::uint32_t left = faces.found; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
       const auto i = static_cast<std::size_t>(lane);
       const auto pixel =
@@ -65,8 +68,8 @@ class FarTile {
       point.placed = hits.placed[i];
       point.position = on_face(view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
                                point.voxel, point.face);
-      point.type = texels.type[i];
-      point.openness = texels.openness[i];
+      point.type = faces.face[i]->type;
+      point.openness = openness_of(*faces.face[i], mode_, point.position);
       pixels_.push_back(pixel);
     }
   }
@@ -75,7 +78,9 @@ class FarTile {
   const SceneView* view_;
   const CameraRays* rays_;
   const Lighting* lighting_;
+  OcclusionMode mode_;
   Picture* picture_;
+  std::unique_ptr<raster::Canvas> far_ = std::make_unique<raster::Canvas>();
   std::vector<SurfacePoint> points_;
   std::vector<std::size_t> pixels_;
 };
@@ -88,13 +93,14 @@ void draw_impostors(const SceneTracer& scene, const VoxelRegistry& types, std::s
   const Surfaces surfaces(types);
   const Lighting lighting(view, types, surfaces, options.light);
   const CameraRays rays(camera, options.width, options.height);
-  const ImpostorPass pass(scene, far, camera, options.width, options.height);
+  const ImpostorPass pass(scene, far, camera, options.width, options.height, options.instructions);
   const int across = (options.width + kTile - 1) / kTile;
   const int down = (options.height + kTile - 1) / kTile;
   parallel_for(static_cast<std::size_t>(across * down), options.threads, [&](std::size_t i) {
     const int column = static_cast<int>(i) % across * kTile;
     const int row = static_cast<int>(i) / across * kTile;
-    if (pass.may_show(column, row)) FarTile(pass, view, rays, lighting, picture).draw(column, row);
+    if (pass.may_show(column, row))
+      FarTile(pass, view, rays, lighting, options.light.occlusion, picture).draw(column, row);
   });
 }
 

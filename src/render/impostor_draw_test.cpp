@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -48,7 +49,7 @@ Likeness likeness(const Picture& truth, const Picture& picture) {
 }
 
 // A few models in one scene, one grid each, with their pivots at the contents' centres.
-enum class Model { Ball, Box, Castle };
+enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb };
 
 Grid voxels_of(Model model) {
   Grid grid;
@@ -66,6 +67,37 @@ Grid voxels_of(Model model) {
     grid.fill_box({8, 1, 3}, {36, 14, 5}, 3);
     grid.fill_box({8, 1, 39}, {36, 14, 41}, 3);
     grid.fill_box({16, 1, 16}, {28, 22, 28}, 3);
+  }
+  if (model == Model::Blobs) {
+    std::mt19937 random(9);
+    for (int i = 0; i < 40; ++i) {
+      const auto coordinate = [&] { return static_cast<int>(random() % 41); };
+      const IVec3 at{coordinate(), coordinate(), coordinate()};
+      grid.fill_box(at, at + IVec3(static_cast<int>(random() % 9)), static_cast<VoxelType>(1 + random() % 3));
+    }
+  }
+  if (model == Model::Ship) {
+    for (int z = 0; z < 48; ++z) {
+      const int half = std::min({6, z / 2 + 1, (47 - z) / 3 + 2});
+      grid.fill_box({-half, 0, z}, {half, 5, z}, 1);
+      grid.fill_box({1 - half, 4, z}, {half - 1, 5, z}, kAir);
+    }
+    for (const int z : {12, 24, 36}) {
+      grid.fill_box({0, 5, z}, {0, 34, z}, 2);
+      grid.fill_box({-9, 26, z}, {9, 26, z}, 2);
+      grid.fill_box({-8, 12, z}, {8, 25, z}, 3);
+    }
+  }
+  if (model == Model::Terrain) {
+    grid.edit({IVec3(0), IVec3(200, 60, 200)}, [](IVec3 v, VoxelType) {
+      const double height =
+          25 + 12 * std::sin(0.11 * v.x) * std::cos(0.07 * v.z) + 5 * std::sin(0.31 * v.x + 0.2 * v.z);
+      return v.y <= height ? static_cast<VoxelType>(v.y > height - 1 ? 1 : v.y > height - 4 ? 2 : 3) : kAir;
+    });
+  }
+  if (model == Model::Comb) {
+    grid.fill_box({0, 0, 0}, {40, 2, 30}, 2);
+    for (int x = 0; x <= 40; x += 2) grid.fill_box({x, 3, 0}, {x, 24, 30}, x % 4 == 0 ? 1 : 3);
   }
   return grid;
 }
@@ -109,45 +141,84 @@ Camera orbiting(const World& world, double azimuth, double elevation, double rol
   return camera;
 }
 
+constexpr std::array kModels = {Model::Ball, Model::Box, Model::Castle, Model::Blobs, Model::Ship, Model::Terrain};
+
+// Of so many pictures from all around, `pixels` wide.
+std::vector<Likeness> likenesses(World& world, int pixels, int count) {
+  world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
+  const int edge = pixels + 20;
+  const RenderOptions options = sized(edge, edge);
+  std::vector<Likeness> all;
+  for (int i = 0; i < count; ++i) {
+    const Camera camera =
+        orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, pixels, edge);
+    all.push_back(likeness(taken(world.scene, camera, options), world.drawn(camera, options)));
+  }
+  return all;
+}
+
+// The specification asks for 0.97 and 6; measured at worst: 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all others).
 TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
-  for (const Model model : {Model::Ball, Model::Box, Model::Castle}) {
+  for (const Model model : kModels) {
     World world(model);
-    world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
-    const RenderOptions options = sized(148, 148);
-    for (int i = 0; i < 24; ++i) {
-      const Camera camera =
-          orbiting(world, 47.0 * i * kDegree, (i % 7 - 3) * 25.0 * kDegree, 31.0 * i * kDegree, 128.0, 148);
-      const Likeness found = likeness(taken(world.scene, camera, options), world.drawn(camera, options));
-      EXPECT_GT(found.pixels, 2000);
-      EXPECT_GE(found.overlap, 0.97) << static_cast<int>(model) << " " << i;
-      EXPECT_LE(found.difference, 6.0) << static_cast<int>(model) << " " << i;
+    for (const int pixels : {128, 64}) {
+      for (const Likeness& found : likenesses(world, pixels, 24)) {
+        EXPECT_GT(found.pixels, 350);
+        EXPECT_GE(found.overlap, 0.995) << static_cast<int>(model) << " " << pixels;
+        EXPECT_LE(found.difference, model == Model::Terrain ? 5.0 : 2.0) << static_cast<int>(model) << " " << pixels;
+      }
     }
   }
 }
 
-TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
-  const World world(Model::Castle);
-  const RenderOptions options = sized(148, 148);
-  double largest_step = 0.0;
-  double largest_error = 0.0;
-  Picture last;
-  Picture last_truth;
-  for (int degree = 0; degree < 360; degree += 1) {
-    const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
-    Picture truth = taken(world.scene, camera, options);
-    Picture picture = world.drawn(camera, options);
-    largest_error = std::max(largest_error, likeness(truth, picture).difference);
-    if (degree > 0) {
-      const double step = likeness(last, picture).difference - likeness(last_truth, truth).difference;
-      largest_step = std::max(largest_step, step);
+// Between its plates no snapshot sees far down.
+TEST(DrawImpostors, HasNoHolesInCrevices) {
+  World world(Model::Comb);
+  for (const int pixels : {128, 90}) {
+    for (const Likeness& found : likenesses(world, pixels, 30)) {
+      EXPECT_GE(found.overlap, 0.9995);
+      EXPECT_LE(found.difference, 6.0);
     }
-    last = std::move(picture);
-    last_truth = std::move(truth);
   }
-  RecordProperty("largest_step", std::to_string(largest_step));
-  RecordProperty("largest_error", std::to_string(largest_error));
-  EXPECT_LE(largest_error, 6.0);
-  EXPECT_LE(largest_step, 3.0) << "beyond the step of the traced picture";
+}
+
+// Voxels are then far smaller than pixels, and what one ray a pixel meets is a matter of chance; measured: 0.9014 at
+// least (blobs at 16 pixels).
+TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
+  for (const Model model : kModels) {
+    World world(model);
+    for (const int pixels : {32, 16}) {
+      double sum = 0.0;
+      for (const Likeness& found : likenesses(world, pixels, 24)) sum += found.overlap;
+      EXPECT_GE(sum / 24.0, 0.88) << static_cast<int>(model) << " " << pixels;
+    }
+  }
+}
+
+// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.06 of 255
+// at most (the ship).
+TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
+  for (const Model model : {Model::Castle, Model::Ship}) {
+    const World world(model);
+    const RenderOptions options = sized(148, 148);
+    double largest_step = 0.0;
+    Picture last;
+    Picture last_truth;
+    for (int degree = 0; degree < 360; ++degree) {
+      const Camera camera = orbiting(world, degree * kDegree, 0.5, 0.0, 128.0, 148);
+      Picture truth = taken(world.scene, camera, options);
+      Picture picture = world.drawn(camera, options);
+      EXPECT_LE(likeness(truth, picture).difference, 6.0) << degree;
+      if (degree > 0) {
+        const double step = likeness(last, picture).difference - likeness(last_truth, truth).difference;
+        largest_step = std::max(largest_step, step);
+      }
+      last = std::move(picture);
+      last_truth = std::move(truth);
+    }
+    std::printf("model %d: %.3f of 255 beyond the traced step\n", static_cast<int>(model), largest_step);
+    EXPECT_LE(largest_step, 0.3) << static_cast<int>(model);
+  }
 }
 
 TEST(DrawImpostors, TurnsMirrorsAndScalesWithTheInstance) {

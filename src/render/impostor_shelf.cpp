@@ -13,7 +13,7 @@ std::vector<const Impostor*> ImpostorShelf::take(const VoxelRegistry& types, std
   std::vector<const Impostor*> all;
   for (const PlacedGrid* each : placed) {
     auto found = impostors_.find(each->grid);
-    if (found == impostors_.end() && impostors_.size() < kMostBytes / Impostor::kBytes) {
+    if (found == impostors_.end() && impostors_.size() < 4096) {
       found = impostors_.try_emplace(each->grid).first;
       missing.push_back({each, &found->second});
     }

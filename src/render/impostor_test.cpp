@@ -117,11 +117,10 @@ TEST(ImpostorViews, CamerasShowTheWholeSphereAndNoMore) {
 TEST(Impostor, HoldsWhatSingleRaysSee) {
   const VoxelRegistry types = two_types();
   const Grid grid = blobs(4);
-  const Impostor impostor = Impostor::build(grid, types);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   GridReader reader(grid);
   for (int view = 0; view < kImpostorViews; ++view) {
-    const Snapshot snapshot = impostor.snapshot(view);
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
     for (std::size_t i = 0; i < snapshot.types.size(); i += 37) {
       const Ray ray = ray_of_texel(snapshot.camera, static_cast<int>(i % 128), static_cast<int>(i / 128));
       const auto hit = first_hit(tree, ray);
@@ -143,9 +142,9 @@ TEST(Impostor, BlackVoxelsAreNoHoles) {
   const VoxelRegistry types = two_types();
   Grid grid;
   grid.fill_box({0, 0, 0}, {9, 9, 9}, 1);
-  const Impostor impostor = Impostor::build(grid, types);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   for (int view = 0; view < kImpostorViews; ++view) {
-    const Snapshot snapshot = impostor.snapshot(view);
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
     for (int y = 60; y < 68; ++y) {
       for (int x = 60; x < 68; ++x) EXPECT_EQ(snapshot.types[static_cast<std::size_t>(y * 128 + x)], 1);
     }
@@ -153,14 +152,16 @@ TEST(Impostor, BlackVoxelsAreNoHoles) {
 }
 
 TEST(Impostor, OfNothingIsEmpty) {
-  for (const Impostor& impostor : {Impostor(), Impostor::build(Grid(), two_types())}) {
-    EXPECT_TRUE(impostor.is_empty());
-    for (int view = 0; view < kImpostorViews; ++view) {
-      const Snapshot snapshot = impostor.snapshot(view);
-      ASSERT_EQ(snapshot.types.size(), 128U * 128U);
-      EXPECT_TRUE(std::all_of(snapshot.types.begin(), snapshot.types.end(), [](auto type) { return type == kAir; }));
-      EXPECT_TRUE(std::all_of(snapshot.depth.begin(), snapshot.depth.end(), [](auto d) { return d == kInfinity; }));
-    }
+  EXPECT_TRUE(Impostor().is_empty());
+  const VoxelRegistry types = two_types();
+  const Grid grid;
+  EXPECT_TRUE(Impostor::build(grid, types).is_empty());
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    ASSERT_EQ(snapshot.types.size(), 128U * 128U);
+    EXPECT_TRUE(std::all_of(snapshot.types.begin(), snapshot.types.end(), [](auto type) { return type == kAir; }));
+    EXPECT_TRUE(std::all_of(snapshot.depth.begin(), snapshot.depth.end(), [](auto d) { return d == kInfinity; }));
   }
 }
 
@@ -173,9 +174,9 @@ TEST(Impostor, SeesWhateverLiesInABoxFromEveryView) {
       const auto coordinate = [&] { return static_cast<int>(random() % 41) - 20; };
       grid.set({coordinate(), coordinate(), coordinate()}, 2);
     }
-    const Impostor impostor = Impostor::build(grid, types);
+    const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
     for (int view = 0; view < kImpostorViews; ++view) {
-      const Snapshot snapshot = impostor.snapshot(view);
+      const Snapshot snapshot = take_snapshot(grid, types, tree, view);
       EXPECT_NE(std::count(snapshot.types.begin(), snapshot.types.end(), VoxelType{2}), 0) << round << " " << view;
       for (std::size_t i = 0; i < 128; ++i) {  // and none is cropped
         ASSERT_LE(snapshot.types[i] + snapshot.types[128 * i] + snapshot.types[128 * i + 127], round == 0 ? 6 : 3);

@@ -21,6 +21,8 @@ constexpr int kBlock = CameraRays::kBlock;
 Tile::Tile(const TileContext& context, int column, int row) : context_(&context), column_(column), row_(row) {
   points_.reserve(kPixels);
   targets_.reserve(kPixels);
+  if (context.impostors != nullptr && context.impostors->may_show(column, row))
+    far_ = std::make_unique<raster::Canvas>();
 }
 
 bool Tile::render(const std::function<bool()>& goes_on) {
@@ -41,6 +43,7 @@ void Tile::take_sample(int sample) {
   targets_.clear();
   sample_seed_ = hash_of(static_cast<std::uint32_t>(sample), 0);
   const PixelPoint point = sample_point(sample);
+  if (far_ != nullptr) context_->impostors->draw(column_, row_, point, *far_);
   RayPacket rays;
   for (int y = 0; y < kEdge; y += kBlock) {
     for (int x = 0; x < kEdge; x += kBlock) {
@@ -55,7 +58,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
   SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += std::popcount(rays.active);
-  if (context_->impostors != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, hits, texels_);
+  if (far_ != nullptr) context_->impostors->find(column_ + x, row_ + y, rays, *far_, hits, far_faces_);
   const std::uint32_t through_glass = lanes_through_glass(rays, hits);
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
@@ -87,17 +90,16 @@ std::uint32_t Tile::lanes_through_glass(const RayPacket& rays, const SceneHits& 
 void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight) {
   const auto i = static_cast<std::size_t>(lane);
   const Ray ray = rays.ray(lane);
-  SurfacePoint point;
+  SurfacePoint& point = add_point(pixel, weight);
   point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   point.face = hits.grids.face[i];
   point.placed = hits.placed[i];
-  point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  point.position = on_face(context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
+                           point.voxel, point.face);
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
-  if ((texels_.found >> lane & 1U) != 0) {
-    point.type = texels_.type[i];
-    point.openness = texels_.openness[i];
-  }
-  add_point(point, pixel, weight);
+  if ((far_faces_.found >> lane & 1U) == 0) return;
+  point.type = far_faces_.face[i]->type;
+  point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion, point.position);
 }
 
 Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
@@ -106,26 +108,26 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   Vec3 passed(1.0F);
   for (const GlassBody& body : glass_) {
     const GlassLook look = look_of(surfaces[body.type], body);
-    SurfacePoint point;
+    SurfacePoint& point = add_point(pixel, passed * look.own);
     point.voxel = body.voxel;
     point.face = body.face;
     point.placed = body.placed;
-    point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
+    point.position = on_face(context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter),
+                             body.voxel, body.face);
     // Seen from inside, it tints and glows but has no surface.
     if (body.starts_inside) point.kind = PointKind::Glow;
-    add_point(point, pixel, passed * look.own);
     passed *= look.passed;
   }
   return passed;
 }
 
-void Tile::add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight) {
-  SurfacePoint& added = points_.emplace_back(point);
-  added.position = on_face(point.position, point.voxel, point.face);
+SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
+  targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
+  SurfacePoint& added = points_.emplace_back();
   const auto x = static_cast<std::uint32_t>(column_) + static_cast<std::uint32_t>(pixel % kEdge);
   const auto y = static_cast<std::uint32_t>(row_) + static_cast<std::uint32_t>(pixel / kEdge);
   added.pixel = hash_of(x, y) ^ sample_seed_;
-  targets_.push_back({static_cast<std::uint32_t>(pixel), weight});
+  return added;
 }
 
 void Tile::light_points() {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -53,7 +54,8 @@ class Tile {
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // Adds what is seen of the glass before `max_t`; answers what passes through it.
   Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);
-  void add_point(const SurfacePoint& point, std::size_t pixel, Vec3 weight);
+  // A point that is to be filled in: what it sends counts so much in that pixel.
+  SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
   void light_points();
 
   const TileContext* context_;
@@ -74,7 +76,8 @@ class Tile {
   std::vector<Target> targets_;
   std::vector<Vec3> lit_;
   std::vector<GlassBody> glass_;
-  FarTexels texels_;  // of the present block
+  std::unique_ptr<raster::Canvas> far_;  // of the present sample; null when there are none
+  FarFaces far_faces_;                   // of the present block
 };
 
 }  // namespace quoin

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "light/surfaces.h"
-#include "scene/placed_grid.h"
+#include "scene/instance_axes.h"
+#include "scene/scene_tracer_impl.h"
 
 namespace quoin::vulkan {
 namespace {
@@ -25,24 +27,19 @@ bool is_too_wide(const IBox& bounds) {
   return false;
 }
 
-bool has_transparent_types(const Grid& grid, std::span<const IVec3> chunks, const VoxelRegistry& types) {
-  for (const IVec3 at : chunks) {
-    const Chunk* chunk = grid.find_chunk(at);
-    if (chunk == nullptr) continue;
-    for (const VoxelType type : chunk->types()) {
-      if (types.is_transparent(type)) return true;
-    }
-  }
-  return false;
+bool can_be_traced(const Instance& instance, const SceneGrid* grid, bool hidden) {
+  return grid != nullptr && (instance.visible || hidden) && has_place(instance) && is_finite(grid->pivot) &&
+         !grid->grid.bounds().empty();
 }
 
-void update_trees(OpticalTrees& trees, const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> changed) {
-  trees.opaque.update(grid, types, changed);
-  if (trees.transparent) {
-    trees.transparent->update(grid, types, changed);
-  } else if (has_transparent_types(grid, changed, types)) {
-    trees.transparent.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
-  }
+PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
+  PlacedGrid placed;
+  placed.instance = handle;
+  placed.pivot = grid.pivot;
+  placed.world_axes = world_axes(instance);
+  placed.position = instance.position;
+  placed.voxel_size = instance.voxel_size;
+  return placed;
 }
 
 ShaderTree shader_tree(const TopTree& top, const OccupancyTree* tree, IVec3 origin) {
@@ -97,50 +94,50 @@ void DeviceScene::forget_old_types(const VoxelRegistry& types) {
   grids_.clear();
 }
 
-// Lists the instances and keeps, of the known grids, those that are among them; answers the new ones.
-std::vector<GridHandle> DeviceScene::place(const Scene& scene, bool hidden) {
+// Lists the instances and keeps, of the known grids, those that are among them.
+void DeviceScene::place(const Scene& scene, bool hidden) {
   placed_.clear();
   std::vector<DBox> boxes;
-  std::vector<GridHandle> made;
   std::map<GridHandle, DeviceGrid> kept;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
+  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (!can_be_traced(instance, grid, hidden)) continue;
+    if (!can_be_traced(instance, grid, hidden)) return;
     const auto known = grids_.find(instance.grid);
     if (known != grids_.end() && known->second.identity == grid->grid.identity()) {
       kept.insert(grids_.extract(known));
     } else if (const auto [added, is_new] = kept.try_emplace(instance.grid); is_new) {
       added->second.identity = grid->grid.identity();
-      made.push_back(instance.grid);
     }
-    placed_.push_back({placed_as(scene, handle)});
-    boxes.push_back(bounds_of(placed_.back().placed));
-  }
+    placed_.push_back({placed_as(instance, *grid, handle)});
+    boxes.push_back(bounds_in_world(placed_.back().placed, grid->grid.bounds()));
+  });
   for (auto& [handle, grid] : grids_) release(grid);
   grids_ = std::move(kept);
   instances_ = InstanceTree(std::move(boxes));
-  return made;
+}
+
+void DeviceScene::update_trees(const Scene& scene, Threads threads) {
+  std::vector<std::pair<KeptTrees*, const Grid*>> all;
+  for (auto& [handle, known] : grids_) all.emplace_back(&known.trees, &scene.grids()[handle].grid);
+  parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->update(*all[i].second, scene.types); });
 }
 
 // What depends on the grids as they are by now.
 void DeviceScene::finish_placed(const Scene& scene) {
   for (DevicePlaced& each : placed_) {
-    const DeviceGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
-    const IBox bounds = each.placed.voxels->bounds();
+    const GridHandle handle = scene.instances()[each.placed.instance].grid;
+    const DeviceGrid& known = grids_.find(handle)->second;
+    const IBox bounds = scene.grids()[handle].grid.bounds();
     each.grid = known.index;
     each.origin = known.origin * kChunkEdge;
     each.low = DVec3(bounds.min - each.origin);
     each.high = DVec3(bounds.max - each.origin);
-    each.placed.grid = nullptr;
-    each.placed.voxels = nullptr;
   }
 }
 
 Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
   forget_old_types(scene.types);
-  std::vector<GridHandle> made = place(scene, hidden);
-  std::sort(made.begin(), made.end());
+  place(scene, hidden);
   if (placed_.size() > kMostInstances) {
     return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
   }
@@ -148,16 +145,12 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
     if (!is_too_wide(scene.grids()[handle].grid.bounds())) continue;
     return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
   }
-  parallel_for(made.size(), threads, [&](std::size_t i) {
-    grids_.find(made[i])->second.trees = OpticalTrees::build(scene.grids()[made[i]].grid, scene.types);
-  });
+  update_trees(scene, threads);
   std::int32_t index = 0;
   has_transparent_ = false;
   for (auto& [handle, known] : grids_) {
     known.index = index++;
-    const bool is_new = std::binary_search(made.begin(), made.end(), handle);
-    Status done = update_grid(known, scene.grids()[handle].grid, scene.types, is_new);
-    if (!done) return done;
+    if (Status done = update_grid(known, scene.grids()[handle].grid); !done) return done;
     has_transparent_ |= known.transparent.top.root.mask != 0;
   }
   finish_placed(scene);
@@ -165,8 +158,8 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
   return put_grids();
 }
 
-Status DeviceScene::update_grid(DeviceGrid& known, const Grid& grid, const VoxelRegistry& types, bool is_new) {
-  if (!is_new && known.version == grid.version()) return {};
+Status DeviceScene::update_grid(DeviceGrid& known, const Grid& grid) {
+  if (!known.chunks.empty() && known.version == grid.version()) return {};
   const std::vector<IVec3> present = grid.chunks();
   std::vector<IVec3> changed;
   for (const IVec3 at : present) {
@@ -176,7 +169,6 @@ Status DeviceScene::update_grid(DeviceGrid& known, const Grid& grid, const Voxel
   for (auto& [at, chunk] : known.chunks) {
     if (grid.find_chunk(at) == nullptr) changed.push_back(at);
   }
-  if (!is_new) update_trees(known.trees, grid, types, changed);
   for (const IVec3 at : changed) {
     if (Status done = put_chunk(known, grid, at); !done) return done;
   }
@@ -198,8 +190,7 @@ Status DeviceScene::put_chunk(DeviceGrid& known, const Grid& grid, IVec3 chunk) 
   }
   DeviceChunk& entry = known.chunks[chunk];
   memory_->release(entry.place);
-  ChunkRecord record =
-      pack_chunk(known.trees.opaque, known.trees.transparent ? &*known.trees.transparent : nullptr, *voxels, chunk);
+  ChunkRecord record = pack_chunk(known.trees.opaque(), known.trees.transparent(), *voxels, chunk);
   const auto place = memory_->allocate(record.words.size() * 4, "uploading voxels");
   if (!place) return tl::unexpected(place.error());
   entry.place = *place;
@@ -272,9 +263,8 @@ Status DeviceScene::put_grids() {
   std::vector<ShaderGrid> table;
   for (const auto& [handle, grid] : grids_) {
     const IVec3 origin = grid.origin * kChunkEdge;
-    const OccupancyTree* transparent = grid.trees.transparent ? &*grid.trees.transparent : nullptr;
-    table.push_back({shader_tree(grid.opaque.top, &grid.trees.opaque, origin),
-                     shader_tree(grid.transparent.top, transparent, origin)});
+    table.push_back({shader_tree(grid.opaque.top, &grid.trees.opaque(), origin),
+                     shader_tree(grid.transparent.top, grid.trees.transparent(), origin)});
   }
   const auto is_same = [&] {
     return table.size() == grid_table_.size() &&

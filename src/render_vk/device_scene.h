@@ -10,8 +10,8 @@
 
 #include "render_vk/memory.h"
 #include "render_vk/tree_packing.h"
-#include "scene/coarse_grids.h"
 #include "scene/instance_tree.h"
+#include "scene/kept_trees.h"
 
 namespace quoin::vulkan {
 
@@ -56,7 +56,7 @@ class DeviceScene {
   struct DeviceGrid {
     std::uint64_t identity = 0;
     std::uint64_t version = 0;
-    OpticalTrees trees;
+    KeptTrees trees;
     std::map<IVec3, DeviceChunk, ByPlace> chunks;
     IVec3 origin{0};  // in chunks
     DeviceTree opaque;
@@ -67,10 +67,11 @@ class DeviceScene {
   void clear();
   void release(DeviceGrid& grid);
   void forget_old_types(const VoxelRegistry& types);
-  [[nodiscard]] std::vector<GridHandle> place(const Scene& scene, bool hidden);
+  void place(const Scene& scene, bool hidden);
+  void update_trees(const Scene& scene, Threads threads);
   void finish_placed(const Scene& scene);
   Status try_update(const Scene& scene, bool hidden, Threads threads);
-  Status update_grid(DeviceGrid& known, const Grid& grid, const VoxelRegistry& types, bool is_new);
+  Status update_grid(DeviceGrid& known, const Grid& grid);
   Status put_chunk(DeviceGrid& known, const Grid& grid, IVec3 chunk);
   Status put_top(DeviceGrid& known, DeviceTree& tree, Node DeviceChunk::*node);
   Status put_table(Place& place, std::span<const std::byte> bytes);

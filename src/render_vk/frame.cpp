@@ -59,12 +59,18 @@ void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vec
   out.push_back(high);
 }
 
-void add_instances(const InstanceTree& tree, FrameData& data) {
+// `view_origin`: from the camera.
+void add_instances(const InstanceTree& tree, const Camera& camera, DVec3 view_origin, FrameData& data) {
+  // Two far positions first, as everywhere.
+  const auto in_view = [&](const DBox& box) {
+    return DBox{box.min - camera.position - view_origin, box.max - camera.position - view_origin};
+  };
   for (const InstanceTree::Node& node : tree.nodes()) {
     const int count = node.count > 0 ? static_cast<int>(node.count) : -1 - node.axis;
-    add_box(node.box, static_cast<std::uint32_t>(node.first), count, data.tree);
+    add_box(in_view(node.box), static_cast<std::uint32_t>(node.first), count, data.tree);
   }
-  for (const std::size_t i : tree.order()) add_box(tree.boxes()[i], static_cast<std::uint32_t>(i), 0, data.leaves);
+  for (const std::size_t i : tree.order())
+    add_box(in_view(tree.boxes()[i]), static_cast<std::uint32_t>(i), 0, data.leaves);
 }
 
 // The camera's numbers as CameraRays has them.
@@ -155,8 +161,7 @@ void add_placed(const DeviceScene& scene, const Camera& camera, const RenderOpti
   data.frame.start = to_vec4(rays.corner * spread);
   data.frame.start_x = to_vec4(rays.right * spread);
   data.frame.start_y = to_vec4(rays.down * spread);
-  // Two far positions first, as everywhere.
-  add_instances(scene.instances().moved(-camera.position).moved(-view_origin), data);
+  add_instances(scene.instances(), camera, view_origin, data);
 }
 
 void add_directions(int rays, FrameData& data) {

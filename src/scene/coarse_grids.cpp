@@ -9,11 +9,6 @@
 namespace quoin {
 namespace {
 
-bool has_transparent_types(const Grid& grid, const VoxelRegistry& types) {
-  const std::vector<VoxelType> all = grid.types();
-  return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
-}
-
 // Whether the voxels of a grid halved that often fill as much as those of the full one, but for an
 // eighth.
 bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
@@ -24,40 +19,48 @@ bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
 
 }  // namespace
 
-OpticalTrees OpticalTrees::build(const Grid& grid, const VoxelRegistry& types) {
-  OpticalTrees trees;
-  trees.opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
-  if (has_transparent_types(grid, types)) {
-    trees.transparent.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
-  }
-  return trees;
-}
-
 void CoarseLevel::put_in(PlacedGrid& placed) const {
   const double cell = std::ldexp(1.0, halvings);
   placed.voxels = voxels;
-  placed.opaque = &trees.opaque;
-  placed.transparent = trees.transparent ? &*trees.transparent : nullptr;
+  placed.opaque = &trees.opaque();
+  placed.transparent = trees.transparent();
   placed.pivot = placed.grid->pivot / cell;
   placed.voxel_size *= cell;
   placed.halvings = halvings;
 }
 
 void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
-  if (version != grid.version()) {
-    levels.clear();
-    is_coarsest = false;
-  }
+  if (identity != grid.identity()) *this = {};
+  if (identity != 0 && version != grid.version()) renew(grid, types, threads);
+  identity = grid.identity();
   version = grid.version();
-  const auto made = static_cast<int>(levels.size());
-  if (is_coarsest || made >= halvings) return;
-  for (int level = made + 1; level <= halvings; ++level) {
+  for (int level = static_cast<int>(levels.size()) + 1; level <= halvings && !is_coarsest; ++level) {
     pyramid.update(grid, types, level, threads);
-    is_coarsest = pyramid.levels() < level || !has_volume_of(pyramid.level(level), level, grid);
-    if (is_coarsest) return;
-    const Grid& voxels = pyramid.level(level);
-    levels.push_back(std::make_unique<CoarseLevel>(CoarseLevel{&voxels, level, OpticalTrees::build(voxels, types)}));
+    is_coarsest = !take_level(grid, types, level);
   }
+}
+
+// Brings what there is up to date with an edit.
+void CoarseGrids::Entry::renew(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+  const int most = pyramid.levels();
+  pyramid.update(grid, types, most, threads);
+  is_coarsest = false;
+  for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
+}
+
+// Puts a level of the pyramid among those that are like the grid; false, and none from there on, when it is not.
+bool CoarseGrids::Entry::take_level(const Grid& grid, const VoxelRegistry& types, int halvings) {
+  const auto index = static_cast<std::size_t>(halvings - 1);
+  if (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid)) {
+    levels.resize(std::min(levels.size(), index));
+    return false;
+  }
+  if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
+  CoarseLevel& level = *levels[index];
+  level.voxels = &pyramid.level(halvings);
+  level.halvings = halvings;
+  if (level.trees.update(*level.voxels, types)) level.tight = level.voxels->bounds();
+  return true;
 }
 
 const CoarseLevel* CoarseGrids::Lock::find(GridHandle grid, int halvings) const {

@@ -3,7 +3,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,41 +10,39 @@
 #include <quoin/grid/downsample.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
-#include <quoin/trace/occupancy_tree.h>
+
+#include "scene/kept_trees.h"
 
 namespace quoin {
 
 struct PlacedGrid;
 
-/// What rays that make light need of a grid.
-struct OpticalTrees {
-  OccupancyTree opaque;
-  std::optional<OccupancyTree> transparent;  ///< none when the grid has no transparent voxel
-
-  [[nodiscard]] static OpticalTrees build(const Grid& grid, const VoxelRegistry& types);
-};
-
 /// A halved grid, ready to be traced.
 struct CoarseLevel {
   const Grid* voxels = nullptr;
+  IBox tight;  ///< around these
   int halvings = 0;
-  OpticalTrees trees;
+  KeptTrees trees;
 
   /// Has a placed grid traced through this instead of its own voxels. Requires: it is placed as the scene says.
   void put_in(PlacedGrid& placed) const;
 };
 
-/// Halved grids with their trees, made when first asked for and kept; made anew for grids that were edited since.
+/// Halved grids with their trees, made when first asked for and kept; where grids were edited since, the chunks that an
+/// edit can have changed are made anew.
 ///
 /// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
 /// bridge's deck, becomes twice as thick, and shows. Threads: any number may call.
 class CoarseGrids {
   struct Entry {
-    std::uint64_t version = 0;  // of the grid
+    std::uint64_t identity = 0;  // of the grid; 0: none
+    std::uint64_t version = 0;
     GridPyramid pyramid;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
     bool is_coarsest = false;                          // there are no more levels that are like the grid
     void make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads);
+    void renew(const Grid& grid, const VoxelRegistry& types, Threads threads);
+    bool take_level(const Grid& grid, const VoxelRegistry& types, int halvings);
   };
 
  public:
@@ -65,6 +62,13 @@ class CoarseGrids {
 
   /// Makes what the selected instances need.
   [[nodiscard]] Lock make(const Scene& scene, std::span<const SelectedInstance> selected, Threads threads);
+
+  /// What was made of a grid goes when `is_stale(handle)`.
+  template <class IsStale>
+  void forget(IsStale&& is_stale) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(entries_, [&](const auto& entry) { return is_stale(entry.first); });
+  }
 
   CoarseGrids() = default;
 

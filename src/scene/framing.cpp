@@ -72,7 +72,7 @@ double reach_of(const Scene& scene, bool hidden_too, DVec3 direction, DVec3 midd
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden_too)) continue;
+    if (grid == nullptr || (!instance.visible && !hidden_too) || !has_place(instance)) continue;
     add_candidates(instance, *grid, direction, middle, candidates);
   }
   std::sort(candidates.begin(), candidates.end(),

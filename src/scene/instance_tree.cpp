@@ -1,12 +1,15 @@
 #include "scene/instance_tree.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 #include <utility>
 
 namespace quoin {
 namespace {
+
+constexpr std::size_t kNoLeaf = std::numeric_limits<std::size_t>::max();
+// By how much a tree may become slower to search before it is built from scratch.
+constexpr double kMostWorse = 1.5;
 
 // Narrows [low, high] to the t at which `origin + t * direction` is at most `limit`.
 void clip(double origin, double direction, double limit, double& low, double& high) {
@@ -19,81 +22,128 @@ void clip(double origin, double direction, double limit, double& low, double& hi
   }
 }
 
-}  // namespace
-
-RayInterval interval_of(const RayPacket& rays) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  RayInterval all{DVec3(kInfinity), DVec3(-kInfinity), DVec3(kInfinity), DVec3(-kInfinity), 0.0};
-  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    const Ray ray = rays.ray(lane);
-    all.origin_low = glm::min(all.origin_low, ray.origin);
-    all.origin_high = glm::max(all.origin_high, ray.origin);
-    all.direction_low = glm::min(all.direction_low, ray.direction);
-    all.direction_high = glm::max(all.direction_high, ray.direction);
-    all.max_t = std::max(all.max_t, rays.max_t[static_cast<std::size_t>(lane)]);
-  }
-  return all;
+// Half of a box's surface.
+double area_of(const DBox& box) {
+  if (box.empty()) return 0.0;
+  const DVec3 size = box.max - box.min;
+  return size.x * size.y + size.y * size.z + size.z * size.x;
 }
 
-bool may_meet(const RayInterval& rays, const DBox& box) {
+}  // namespace
+
+bool may_meet(const Ray& ray, double max_t, const DBox& box) {
   // Room for the rounding of far boxes and long rays.
   constexpr double kRoom = 1e-9;
   double low = 0.0;
-  double high = rays.max_t;
+  double high = max_t;
   for (int axis = 0; axis < 3; ++axis) {
-    clip(rays.origin_low[axis], rays.direction_low[axis], box.max[axis], low, high);
-    clip(-rays.origin_high[axis], -rays.direction_high[axis], -box.min[axis], low, high);
+    clip(ray.origin[axis], ray.direction[axis], box.max[axis], low, high);
+    clip(-ray.origin[axis], -ray.direction[axis], -box.min[axis], low, high);
   }
   return high >= 0.0 && low <= high * (1.0 + kRoom) + kRoom;
 }
 
+// What is sorted: a box by its centre.
+struct InstanceTree::Item {
+  DVec3 twice_centre{0.0};
+  std::size_t box = 0;
+};
+
 InstanceTree::InstanceTree(std::vector<DBox> boxes) : boxes_(std::move(boxes)) {
+  build();
+}
+
+void InstanceTree::build() {
+  order_.clear();
+  nodes_.clear();
+  leaf_of_.assign(boxes_.size(), kNoLeaf);
+  areas_ = built_cost_ = 0.0;
+  std::vector<Item> items;
+  items.reserve(boxes_.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    if (!boxes_[i].empty()) order_.push_back(i);
+    if (!boxes_[i].empty()) items.push_back({boxes_[i].min + boxes_[i].max, i});
   }
-  if (order_.empty()) return;
+  if (items.empty()) return;
+  order_.resize(items.size());
+  nodes_.reserve(items.size());
   nodes_.emplace_back();
-  split(0, 0, order_.size());
+  split(0, items, 0);
+  for (std::size_t i = nodes_.size(); i-- > 0;) fit(nodes_[i]);
+  for (const Node& node : nodes_) areas_ += area_of(node.box);
+  built_cost_ = search_cost();
 }
 
-InstanceTree InstanceTree::moved(DVec3 by) const {
-  InstanceTree tree = *this;
-  for (DBox& box : tree.boxes_) box = {box.min + by, box.max + by};
-  for (Node& node : tree.nodes_) node.box = {node.box.min + by, node.box.max + by};
-  return tree;
+// How many nodes a ray through the whole may be expected to look into (surface area heuristic).
+double InstanceTree::search_cost() const {
+  const double whole = area_of(nodes_.front().box);
+  return whole > 0.0 ? areas_ / whole : 0.0;
 }
 
-void InstanceTree::split(std::size_t node, std::size_t begin, std::size_t end) {
-  DBox box;
-  DBox centres;
-  for (std::size_t i = begin; i < end; ++i) {
-    const DBox& each = boxes_[order_[i]];
-    box.extend(each.min);
-    box.extend(each.max);
-    centres.extend(each.min + each.max);
-  }
-  nodes_[node].box = box;
-  if (end - begin <= kLeafSize) {
-    nodes_[node].first = begin;
-    nodes_[node].count = end - begin;
+void InstanceTree::fit(Node& node) const {
+  if (node.count == 0) {
+    const DBox& a = nodes_[node.first - 1].box;
+    const DBox& b = nodes_[node.first].box;
+    node.box = {glm::min(a.min, b.min), glm::max(a.max, b.max)};
     return;
   }
+  node.box = {};
+  for (std::size_t i = node.first; i < node.first + node.count; ++i) {
+    const DBox& each = boxes_[order_[i]];
+    node.box = {glm::min(node.box.min, each.min), glm::max(node.box.max, each.max)};
+  }
+}
+
+void InstanceTree::change(std::span<const Change> changes) {
+  if (changes.empty()) return;
+  bool is_stale = false;
+  std::vector<bool> above(nodes_.size());
+  for (const Change& change : changes) {
+    boxes_[change.index] = change.box;
+    const std::size_t leaf = leaf_of_[change.index];
+    is_stale |= (leaf == kNoLeaf) != change.box.empty();
+    if (leaf == kNoLeaf) continue;
+    for (std::size_t node = leaf; !above[node]; node = nodes_[node].parent) above[node] = true;
+  }
+  if (is_stale) return build();
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    if (!above[i]) continue;
+    areas_ -= area_of(nodes_[i].box);
+    fit(nodes_[i]);
+    areas_ += area_of(nodes_[i].box);
+  }
+  // Also when it is not a number.
+  if (!nodes_.empty() && !(search_cost() <= kMostWorse * built_cost_)) build();
+}
+
+// Makes the nodes below one that holds `items`, whose boxes stand in `order_` from `begin` on.
+void InstanceTree::split(std::size_t node, std::span<Item> items, std::size_t begin) {
+  if (items.size() <= kLeafSize) {
+    nodes_[node].first = begin;
+    nodes_[node].count = items.size();
+    for (const Item& item : items) {
+      leaf_of_[item.box] = node;
+      order_[begin++] = item.box;
+    }
+    return;
+  }
+  DBox centres;
+  for (const Item& item : items) centres.extend(item.twice_centre);
   const DVec3 size = centres.max - centres.min;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  const std::size_t middle = begin + (end - begin) / 2;
-  const auto at = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-  std::nth_element(at(begin), at(middle), at(end), [&](std::size_t a, std::size_t b) {
-    const double centre_a = boxes_[a].min[axis] + boxes_[a].max[axis];
-    const double centre_b = boxes_[b].min[axis] + boxes_[b].max[axis];
-    return centre_a != centre_b ? centre_a < centre_b : a < b;
-  });
+  const std::size_t middle = items.size() / 2;
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(middle), items.end(),
+                   [axis](const Item& a, const Item& b) {
+                     const double at_a = a.twice_centre[axis];
+                     const double at_b = b.twice_centre[axis];
+                     return at_a != at_b ? at_a < at_b : a.box < b.box;
+                   });
   const std::size_t upper = nodes_.size() + 1;
   nodes_[node].axis = axis;
   nodes_[node].first = upper;
   nodes_.resize(nodes_.size() + 2);
-  split(upper - 1, begin, middle);
-  split(upper, middle, end);
+  nodes_[upper - 1].parent = nodes_[upper].parent = node;
+  split(upper - 1, items.first(middle), begin);
+  split(upper, items.subspan(middle), begin + middle);
 }
 
 }  // namespace quoin

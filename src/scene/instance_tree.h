@@ -7,38 +7,30 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
-#include <quoin/trace/packet.h>
+#include <quoin/trace/ray.h>
 
 namespace quoin {
 
-/// All rays of a packet as one: at distance t they lie between `origin_low + t direction_low` and
-/// `origin_high + t direction_high`.
-struct RayInterval {
-  DVec3 origin_low{0.0};
-  DVec3 origin_high{0.0};
-  DVec3 direction_low{0.0};
-  DVec3 direction_high{0.0};
-  double max_t = 0.0;
-};
+/// False only when the ray does not meet the box from 0 to `max_t`.
+[[nodiscard]] bool may_meet(const Ray& ray, double max_t, const DBox& box);
 
-/// Of the active rays. Requires: there is one.
-[[nodiscard]] RayInterval interval_of(const RayPacket& rays);
-
-/// False only when no ray of the interval meets the box from 0 to max_t.
-[[nodiscard]] bool may_meet(const RayInterval& rays, const DBox& box);
-
-/// A bounding-volume tree over boxes that finds those which a packet of rays may meet.
+/// A bounding-volume tree over boxes.
 ///
 /// Source: halves at the median of the longest axis of the centres; a leaf holds up to four.
 class InstanceTree {
  public:
-  /// A leaf's `first` counts in `order()`. An inner node, whose `count` is 0, has its lower child in
-  /// `nodes()[first - 1]`, its upper one in `nodes()[first]`. The first node is the root.
+  /// A leaf's `first` counts in `order`. An inner node has its lower child in `nodes()[first - 1]`, its upper one in
+  /// `nodes()[first]`, both behind itself.
   struct Node {
     DBox box;
     std::size_t first = 0;
-    std::size_t count = 0;
+    std::size_t count = 0;  ///< 0: an inner node
+    std::size_t parent = 0;
     int axis = 0;
+  };
+  struct Change {
+    std::size_t index = 0;
+    DBox box;
   };
 
   InstanceTree() = default;
@@ -47,31 +39,33 @@ class InstanceTree {
 
   [[nodiscard]] const std::vector<DBox>& boxes() const { return boxes_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  /// The boxes' indices as the leaves have them.
   [[nodiscard]] const std::vector<std::size_t>& order() const { return order_; }
 
-  /// The same tree with every box moved.
-  [[nodiscard]] InstanceTree moved(DVec3 by) const;
+  /// Puts other boxes in place. Only the nodes above them are fitted anew; the tree is built from scratch once these
+  /// have grown so much that it would be slow to search, or when a box became empty or was.
+  ///
+  /// Cost: O(changes * log n) at most; O(n log n) when built from scratch.
+  void change(std::span<const Change> changes);
 
-  /// Calls `visit(index)` for every box that the rays may meet, nearer ones mostly first, until it answers false. It
-  /// may lower `rays.max_t` on the way.
+  /// Calls `visit(index)` for every box that the ray may meet from 0 to `max_t`, nearer ones mostly first, until it
+  /// answers false. It may lower `max_t` on the way.
   template <class Visit>
-  void visit(RayInterval& rays, Visit&& visit) const {
+  void visit(const Ray& ray, double& max_t, Visit&& visit) const {
     if (nodes_.empty()) return;
     std::array<std::size_t, kMaxDepth> stack{};
     std::size_t height = 0;
     stack[height++] = 0;
     while (height > 0) {
       const Node& node = nodes_[stack[--height]];
-      if (!may_meet(rays, node.box)) continue;
+      if (!may_meet(ray, max_t, node.box)) continue;
       if (node.count == 0) {
-        const bool is_forward = rays.direction_low[node.axis] + rays.direction_high[node.axis] >= 0.0;
+        const bool is_forward = ray.direction[node.axis] >= 0.0;
         stack[height++] = is_forward ? node.first : node.first - 1;
         stack[height++] = is_forward ? node.first - 1 : node.first;
         continue;
       }
       for (std::size_t i = node.first; i < node.first + node.count; ++i) {
-        if (may_meet(rays, boxes_[order_[i]]) && !visit(order_[i])) return;
+        if (may_meet(ray, max_t, boxes_[order_[i]]) && !visit(order_[i])) return;
       }
     }
   }
@@ -103,11 +97,18 @@ class InstanceTree {
  private:
   static constexpr std::size_t kMaxDepth = 72;
   static constexpr std::size_t kLeafSize = 4;
-  void split(std::size_t node, std::size_t begin, std::size_t end);
+  struct Item;
+  void build();
+  void split(std::size_t node, std::span<Item> items, std::size_t begin);
+  void fit(Node& node) const;
+  [[nodiscard]] double search_cost() const;
 
   std::vector<DBox> boxes_;
   std::vector<std::size_t> order_;
   std::vector<Node> nodes_;
+  std::vector<std::size_t> leaf_of_;  // by box: its leaf's index; kNoLeaf for an empty one
+  double built_cost_ = 0.0;           // what `search_cost` was once built
+  double areas_ = 0.0;                // of all nodes' boxes
 };
 
 }  // namespace quoin

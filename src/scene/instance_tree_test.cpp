@@ -1,97 +1,108 @@
 #include "scene/instance_tree.h"
 
-#include <cmath>
 #include <limits>
-#include <random>
 #include <set>
 
 #include <gtest/gtest.h>
 
+#include "scene/box_test_support.h"
+
 namespace quoin {
 namespace {
 
-// Whether a single ray meets a box, by slabs.
-bool meets(const Ray& ray, double max_t, const DBox& box) {
-  double low = 0.0;
-  double high = max_t;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (ray.direction[axis] == 0.0) {
-      if (ray.origin[axis] < box.min[axis] || ray.origin[axis] > box.max[axis]) return false;
-      continue;
-    }
-    const double a = (box.min[axis] - ray.origin[axis]) / ray.direction[axis];
-    const double b = (box.max[axis] - ray.origin[axis]) / ray.direction[axis];
-    low = std::max(low, std::min(a, b));
-    high = std::min(high, std::max(a, b));
-  }
-  return low <= high;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::set<std::size_t> visited(const InstanceTree& tree, const Ray& ray, double max_t) {
+  std::set<std::size_t> found;
+  tree.visit(ray, max_t, [&](std::size_t i) { return found.insert(i).second; });
+  return found;
 }
 
-struct RandomBoxes {
-  std::mt19937 random{3};
-  std::uniform_real_distribution<double> share{-1.0, 1.0};
-  DVec3 vector(double size) { return DVec3(share(random), share(random), share(random)) * size; }
-  std::vector<DBox> boxes(int count) {
-    std::vector<DBox> all(static_cast<std::size_t>(count));
-    for (DBox& box : all) {
-      const DVec3 at = vector(100.0);
-      box.extend(at);
-      box.extend(at + glm::abs(vector(10.0)));
+void expect_finds_all(const InstanceTree& tree, const std::vector<DBox>& boxes, RandomBoxes& world) {
+  for (int round = 0; round < 100; ++round) {
+    Ray ray{world.vector(150.0), world.vector(1.0)};
+    if (round % 5 == 0) ray.direction.y = 0.0;
+    const double max_t = round % 2 == 0 ? kInfinity : 60.0;
+    const std::set<std::size_t> found = visited(tree, ray, max_t);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      ASSERT_TRUE(found.count(i) == 1 || !meets(ray, max_t, boxes[i])) << i;
+      ASSERT_TRUE(found.count(i) == 0 || !boxes[i].empty()) << i;
     }
-    return all;
   }
-};
+}
 
-TEST(InstanceTree, FindsEveryBoxThatAnyRayOfAPacketMeets) {
-  RandomBoxes world;
-  for (const int count : {1, 2, 5, 64, 300}) {
+TEST(InstanceTree, FindsEveryBoxThatARayMeets) {
+  RandomBoxes world(3);
+  for (const int count : {0, 1, 2, 5, 64, 300}) {
     const std::vector<DBox> boxes = world.boxes(count);
-    const InstanceTree tree(boxes);
-    for (int round = 0; round < 200; ++round) {
-      RayPacket rays;
-      const DVec3 origin = world.vector(150.0);
-      const DVec3 direction = world.vector(1.0);
-      const double spread = round % 3 == 0 ? 0.0 : 0.1;
-      const double max_t = round % 2 == 0 ? std::numeric_limits<double>::infinity() : 60.0;
-      for (int lane = 0; lane < 16; ++lane) {
-        Ray ray{origin + world.vector(spread), direction + world.vector(spread)};
-        if (round % 5 == 0) ray.direction.y = 0.0;
-        rays.set(lane, ray, max_t);
+    expect_finds_all(InstanceTree(boxes), boxes, world);
+  }
+}
+
+TEST(InstanceTree, FindsThemAfterChangesToo) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE(seed);
+    RandomBoxes world(seed);
+    std::vector<DBox> boxes = world.boxes(1 + static_cast<int>(world.random() % 100));
+    InstanceTree tree(boxes);
+    for (int round = 0; round < 10; ++round) {
+      std::vector<InstanceTree::Change> changes;
+      const std::vector<DBox> others = world.boxes(static_cast<int>(world.random() % 20));
+      for (DBox other : others) {
+        const std::size_t i = world.random() % boxes.size();
+        if (world.random() % 8 == 0) other = {};
+        boxes[i] = other;
+        changes.push_back({i, other});
       }
-      std::set<std::size_t> found;
-      RayInterval interval = interval_of(rays);
-      tree.visit(interval, [&](std::size_t i) { return found.insert(i).second; });
+      tree.change(changes);
       for (std::size_t i = 0; i < boxes.size(); ++i) {
-        for (int lane = 0; lane < 16; ++lane) {
-          ASSERT_TRUE(found.count(i) == 1 || !meets(rays.ray(lane), max_t, boxes[i]));
-        }
+        EXPECT_EQ(tree.boxes()[i].min, boxes[i].min);
+        EXPECT_EQ(tree.boxes()[i].max, boxes[i].max);
       }
+      expect_finds_all(tree, boxes, world);
     }
   }
 }
 
-TEST(InstanceTree, LeavesOutMostOfWhatIsFarFromTheRays) {
-  RandomBoxes world;
+// However boxes wander about, searching stays as good as in a new tree, but for a factor.
+TEST(InstanceTree, StaysGoodToSearchHoweverBoxesWander) {
+  RandomBoxes world(5);
+  std::vector<DBox> boxes = world.boxes(1000);
+  InstanceTree tree(boxes);
+  for (int round = 0; round < 20; ++round) {
+    std::vector<InstanceTree::Change> changes;
+    const std::vector<DBox> others = world.boxes(100);
+    for (const DBox& other : others) {
+      const std::size_t i = world.random() % boxes.size();
+      boxes[i] = other;
+      changes.push_back({i, other});
+    }
+    tree.change(changes);
+  }
+  const auto looked_into = [](const InstanceTree& each) {
+    int count = 0;
+    for (const InstanceTree::Node& node : each.nodes()) count += may_meet({{-200, 3, 4}, {1, 0, 0}}, 1e9, node.box);
+    return count;
+  };
+  EXPECT_LT(looked_into(tree), 4 * looked_into(InstanceTree(boxes)));
+}
+
+TEST(InstanceTree, LeavesOutMostOfWhatIsFarFromTheRay) {
+  RandomBoxes world(3);
   const InstanceTree tree(world.boxes(1000));
-  RayPacket rays;
-  rays.set(3, {{-200, 0, 0}, {1, 0, 0}}, std::numeric_limits<double>::infinity());
-  RayInterval interval = interval_of(rays);
-  int visited = 0;
-  tree.visit(interval, [&](std::size_t) { return ++visited > 0; });
-  EXPECT_LT(visited, 40);
+  EXPECT_LT(visited(tree, {{-200, 0, 0}, {1, 0, 0}}, kInfinity).size(), 40U);
 }
 
 TEST(InstanceTree, StopsWhenToldAndIgnoresEmptyBoxes) {
   const DBox unit{DVec3(0.0), DVec3(1.0)};
   const InstanceTree tree({unit, DBox{}, unit, unit});
-  RayInterval all{DVec3(-1.0), DVec3(-1.0), DVec3(1.0), DVec3(1.0), 10.0};
-  std::set<std::size_t> found;
-  tree.visit(all, [&](std::size_t i) { return found.insert(i).second; });
-  EXPECT_EQ(found, (std::set<std::size_t>{0, 2, 3}));
-  int visited = 0;
-  tree.visit(all, [&](std::size_t) { return ++visited < 2; });
-  EXPECT_EQ(visited, 2);
-  InstanceTree().visit(all, [](std::size_t) -> bool { throw 1; });
+  const Ray ray{DVec3(-1.0), DVec3(1.0)};
+  EXPECT_EQ(visited(tree, ray, 10.0), (std::set<std::size_t>{0, 2, 3}));
+  int count = 0;
+  double max_t = 10.0;
+  tree.visit(ray, max_t, [&](std::size_t) { return ++count < 2; });
+  EXPECT_EQ(count, 2);
+  InstanceTree().visit(ray, max_t, [](std::size_t) -> bool { throw 1; });
 }
 
 }  // namespace

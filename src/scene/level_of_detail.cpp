@@ -3,23 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <glm/geometric.hpp>
 
 #include "scene/frustum.h"
+#include "scene/instance_axes.h"
 
 namespace quoin {
 namespace {
 
 // As many as keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
-  int halvings = 0;
-  double cell_pixels = 2.0 * voxel_pixels;
-  while (halvings < kCoarsestHalving && cell_pixels <= policy.cell_pixels) {
-    ++halvings;
-    cell_pixels *= 2.0;
-  }
-  return halvings;
+  static_assert(kCoarsestHalving == 4);
+  // Halves and doubles are exact: 16 sizes within the limit are one within its sixteenth.
+  const double cell = policy.cell_pixels;
+  return static_cast<int>(voxel_pixels <= 0.5 * cell) + static_cast<int>(voxel_pixels <= 0.25 * cell) +
+         static_cast<int>(voxel_pixels <= 0.125 * cell) + static_cast<int>(voxel_pixels <= 0.0625 * cell);
 }
 
 // What the camera's picture makes of lengths.
@@ -50,7 +50,9 @@ struct Choice {
 };
 
 bool is_far(const ScreenSize& size, const DetailPolicy& policy) {
-  return !std::isfinite(size.voxel_pixels) || !std::isfinite(size.diameter_pixels) ||
+  // Less than infinite is finite: sizes are never negative, and what is not a number is not less.
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return !(size.voxel_pixels < kInfinity && size.diameter_pixels < kInfinity && size.voxel_pixels > -kInfinity) ||
          size.diameter_pixels <= policy.far_pixels;
 }
 
@@ -58,18 +60,25 @@ ScreenSize scaled(const ScreenSize& size, double by) {
   return {size.voxel_pixels * by, size.diameter_pixels * by};
 }
 
+Detail by_pixels(const ScreenSize& size, const DetailPolicy& policy) {
+  if (is_far(size, policy)) return Detail::Far;
+  return size.voxel_pixels < policy.voxel_pixels ? Detail::Mid : Detail::Near;
+}
+
 // The last choice stays while a size within the hysteresis of this one would give it.
 Choice chosen_by_pixels(const ScreenSize& size, const DetailPolicy& policy, const Choice* last) {
-  const double room = last != nullptr && policy.hysteresis > 0.0 ? 1.0 + policy.hysteresis : 1.0;
+  const bool has_room = last != nullptr && policy.hysteresis > 0.0;
+  const double room = has_room ? 1.0 + policy.hysteresis : 1.0;
   const ScreenSize larger = scaled(size, room);
-  const ScreenSize smaller = scaled(size, 1.0 / room);
   Choice choice;
-  choice.detail = detail_by_pixels(larger, policy);
-  const int fewest = halvings_for(larger.voxel_pixels, policy);
-  int halvings = fewest;
-  if (last != nullptr) {
-    choice.detail = std::clamp(last->detail, choice.detail, detail_by_pixels(smaller, policy));
-    halvings = std::clamp<int>(last->halvings, fewest, halvings_for(smaller.voxel_pixels, policy));
+  choice.detail = by_pixels(larger, policy);
+  int halvings = halvings_for(larger.voxel_pixels, policy);
+  if (has_room) {
+    const ScreenSize smaller = scaled(size, 1.0 / room);
+    if (choice.detail != Detail::Far) {
+      choice.detail = std::clamp(last->detail, choice.detail, by_pixels(smaller, policy));
+    }
+    halvings = std::clamp<int>(last->halvings, halvings, halvings_for(smaller.voxel_pixels, policy));
   }
   choice.halvings = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   return choice;
@@ -97,29 +106,67 @@ Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy) {
 
 struct DetailSelector::Impl {
   struct Content {
-    bool is_known = false;
-    std::uint32_t generation = 0;  // of the grid
+    std::uint32_t generation = 0;  // of the grid's handle
+    bool is_there = false;         // now
+    std::uint64_t identity = 0;    // of the grid; 0: none
     std::uint64_t version = 0;
     ContentSphere sphere;
+    DVec3 from_pivot{0.0};  // the sphere's centre, in voxels
   };
   std::vector<Content> contents;  // by the grids' slots
   std::vector<Choice> choices;    // by the instances' slots
 
+  // An instance whose content meets the picture's frustum.
+  struct Seen {
+    InstanceHandle instance;
+    DVec3 centre{0.0};  // of the content, from the camera
+    double radius = 0.0;
+    double voxel_size = 0.0;
+  };
+  std::vector<Seen> seen;  // room for every instance
+
   void look_at_grids(const Scene& scene);
+  std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum, bool hidden);
   Choice choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
                 const DetailPolicy& policy);
 };
 
 void DetailSelector::Impl::look_at_grids(const Scene& scene) {
-  for (const GridHandle handle : scene.grids().handles()) {
+  for (Content& content : contents) content.is_there = false;
+  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
     if (handle.index >= contents.size()) contents.resize(handle.index + std::size_t{1});
-    const SceneGrid& grid = scene.grids()[handle];
     Content& content = contents[handle.index];
+    const std::uint64_t identity = grid.grid.identity();
     const std::uint64_t version = grid.grid.version();
-    if (!content.is_known || content.generation != handle.generation || content.version != version) {
-      content = {true, handle.generation, version, content_sphere(grid.grid)};
-    }
-  }
+    if (content.identity != identity || content.version != version) content.sphere = content_sphere(grid.grid);
+    content.identity = identity;
+    content.version = version;
+    content.generation = handle.generation;
+    content.is_there = content.sphere.radius > 0.0;
+    content.from_pivot = content.sphere.centre - grid.pivot;
+  });
+}
+
+// Instances are written before it is known whether they are seen: no processor guesses that (a tenth of the time).
+std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instances(const Scene& scene, DVec3 camera,
+                                                                                    const Frustum& frustum,
+                                                                                    bool hidden) {
+  if (seen.size() < scene.instances().size()) seen.resize(scene.instances().size());
+  std::size_t count = 0;
+  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    if (instance.grid.index >= contents.size() || !(instance.visible || hidden)) return;
+    const Content& content = contents[instance.grid.index];
+    const double voxel_size = instance.voxel_size;
+    if (!content.is_there || content.generation != instance.grid.generation || !(voxel_size > 0.0)) return;
+    DVec3 offset = content.from_pivot * voxel_size;
+    if (instance.mirrored) offset.x = -offset.x;
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 centre = (instance.position - camera) + unit_rotation(instance.rotation) * offset;
+    const double radius = content.sphere.radius * voxel_size;
+    seen[count] = {handle, centre, radius, voxel_size};
+    count += static_cast<std::size_t>(is_finite(centre + radius) && frustum.meets(centre, radius));
+  });
+  return {seen.data(), count};
 }
 
 Choice DetailSelector::Impl::choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
@@ -150,22 +197,11 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
   impl_->look_at_grids(scene);
   const Frustum frustum(camera, width, height);
   const PixelScale pixels(camera, height);
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || !(instance.visible || policy.hidden) || !(instance.voxel_size > 0.0)) continue;
-    const ContentSphere& content = impl_->contents[instance.grid.index].sphere;
-    if (content.radius == 0.0) continue;
-    DVec3 offset = (content.centre - grid->pivot) * instance.voxel_size;
-    if (instance.mirrored) offset.x = -offset.x;
-    // The difference of two far positions is taken first: it is small, and mostly exact.
-    const DVec3 centre = (instance.position - camera.position) + instance.rotation * offset;
-    const double radius = content.radius * instance.voxel_size;
-    if (!is_finite(centre) || !std::isfinite(radius) || !frustum.meets(centre, radius)) continue;
-    const double distance = glm::length(centre);
-    const ScreenSize size = pixels.of(distance, radius, instance.voxel_size);
-    const Choice choice = impl_->choose(handle, size, distance, radius, policy);
-    out.push_back({handle, choice.detail, choice.halvings, distance});
+  for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.hidden)) {
+    const double distance = glm::length(seen.centre);
+    const ScreenSize size = pixels.of(distance, seen.radius, seen.voxel_size);
+    const Choice choice = impl_->choose(seen.instance, size, distance, seen.radius, policy);
+    out.push_back({seen.instance, choice.detail, choice.halvings, distance});
   }
 }
 

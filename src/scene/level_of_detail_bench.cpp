@@ -4,36 +4,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <numbers>
-#include <random>
 #include <vector>
 
 #include <benchmark/benchmark.h>
-#include <glm/geometric.hpp>
 
 #include <quoin/scene/level_of_detail.h>
 
+#include "scene/mixed_scene.h"
+
 namespace quoin {
 namespace {
-
-Scene mixed_scene(std::int64_t count) {
-  Scene scene;
-  std::mt19937 random(11);
-  std::uniform_real_distribution<double> share(-1.0, 1.0);
-  std::vector<GridHandle> grids;
-  for (const int edge : {8, 30, 90, 200, 500}) {
-    SceneGrid grid;
-    grid.grid.fill_box({0, 0, 0}, IVec3(edge - 1), 1);
-    grids.push_back(scene.add_grid(std::move(grid)));
-  }
-  for (std::int64_t i = 0; i < count; ++i) {
-    Instance instance;
-    instance.grid = grids[static_cast<std::size_t>(i) % grids.size()];
-    instance.position = DVec3(share(random), 0.1 * share(random), share(random)) * 6000.0;
-    instance.rotation = glm::normalize(DQuat(share(random), share(random), share(random), 1.1));
-    scene.add_instance(instance);
-  }
-  return scene;
-}
 
 void select(benchmark::State& state) {
   const Scene scene = mixed_scene(state.range(0));

@@ -12,6 +12,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_query.h>
 
+#include "scene/instance_axes.h"
 #include "scene/scene_tracer_impl.h"
 
 namespace quoin {
@@ -49,15 +50,12 @@ inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
   return box;
 }
 
-inline DQuat unit_rotation(DQuat q) {
-  const double length = std::sqrt(glm::dot(q, q));
-  return length > 0.0 && std::isfinite(length) ? q / length : DQuat(1.0, 0.0, 0.0, 0.0);
-}
-
 /// Whether a box is one: finite, and larger than nothing.
 inline bool is_box(const OrientedBox& box) {
   const DVec3 half = box.half_size;
-  return is_finite(box.centre) && is_finite(half) && half.x > 0.0 && half.y > 0.0 && half.z > 0.0;
+  const DQuat& q = box.rotation;
+  return is_finite(box.centre) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) && is_finite(half) && half.x > 0.0 &&
+         half.y > 0.0 && half.z > 0.0;
 }
 
 /// A box's half edges in the world, as columns.

@@ -1,5 +1,6 @@
 #include <quoin/scene/scene.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "scene/instance_axes.h"
@@ -11,7 +12,7 @@ namespace {
 /// The rotation's matrix, exact for quarter turns, whose quaternions hold the irrational square root of one half.
 glm::dmat3 exact_matrix(const DQuat& rotation) {
   constexpr double kRounding = 1e-12;
-  glm::dmat3 matrix = glm::mat3_cast(rotation);
+  glm::dmat3 matrix = glm::mat3_cast(unit_rotation(rotation));
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) {
       const double nearest = std::round(matrix[column][row]);
@@ -23,10 +24,24 @@ glm::dmat3 exact_matrix(const DQuat& rotation) {
 
 }  // namespace
 
+DQuat made_unit(const DQuat& q) {
+  if (q.x == 0.0 && q.y == 0.0 && q.z == 0.0 && q.w == 0.0) return {1.0, 0.0, 0.0, 0.0};
+  // Scaled first: the square of a very small or large number is 0 or infinite.
+  const double largest = std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), std::abs(q.w)});
+  const DQuat scaled = q / largest;
+  return scaled / std::sqrt(glm::dot(scaled, scaled));
+}
+
 glm::dmat3 world_axes(const Instance& instance) {
   glm::dmat3 axes = exact_matrix(instance.rotation);
   if (instance.mirrored) axes[0] = -axes[0];
   return axes;
+}
+
+bool has_place(const Instance& instance) {
+  const DQuat& q = instance.rotation;
+  return is_finite(instance.position) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) &&
+         std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0;
 }
 
 bool Scene::remove_grid(GridHandle handle) {
@@ -48,7 +63,7 @@ DBox Scene::bounds(bool hidden_too) const {
   for (const InstanceHandle handle : instances_.handles()) {
     const Instance& instance = instances_[handle];
     const SceneGrid* grid = grids_.find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden_too)) continue;
+    if (grid == nullptr || (!instance.visible && !hidden_too) || !has_place(instance)) continue;
     const IBox tight = grid->grid.bounds();
     if (tight.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {

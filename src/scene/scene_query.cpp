@@ -97,17 +97,17 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_w
   if (!is_finite(ray.origin) || !is_finite(ray.direction) || ray.direction == DVec3(0.0) || !(max_distance >= 0.0)) {
     return std::nullopt;
   }
-  RayInterval interval{ray.origin, ray.origin, ray.direction, ray.direction, max_distance};
+  double max_t = max_distance;
   std::optional<RayHit> best;
   std::size_t best_placed = 0;
-  SceneQuery::instances(tracer).visit(interval, [&](std::size_t i) {
+  SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = tracer.placed()[i];
     const ToGrid to_grid(placed);
-    const auto hit = first_of_grid(placed, {to_grid.point(ray.origin), to_grid.axes * ray.direction}, interval.max_t);
+    const auto hit = first_of_grid(placed, {to_grid.point(ray.origin), to_grid.axes * ray.direction}, max_t);
     if (hit && (!best || hit->t < best->t || (hit->t == best->t && i < best_placed))) {
       best = hit;
       best_placed = i;
-      interval.max_t = hit->t;
+      max_t = hit->t;
     }
     return true;
   });

@@ -1,40 +1,20 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include <algorithm>
-#include <map>
+#include <utility>
 
-#include "scene/placed_grid.h"
 #include "scene/scene_tracer_impl.h"
 
 namespace quoin {
 
 SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
-  std::map<GridHandle, std::size_t> slots;
-  std::vector<const SceneGrid*> grids;
-  std::vector<DBox> boxes;
-  std::vector<std::size_t> slot_of;
   impl_->scene = &scene;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (!can_be_traced(instance, grid, hidden)) continue;
-    const auto [found, is_new] = slots.try_emplace(instance.grid, grids.size());
-    if (is_new) grids.push_back(grid);
-    slot_of.push_back(found->second);
-    boxes.push_back(bounds_of(impl_->placed.emplace_back(placed_as(scene, handle))));
-  }
-  impl_->trees.resize(grids.size());
-  parallel_for(grids.size(), threads, [&](std::size_t i) {
-    const Grid& grid = grids[i]->grid;
-    impl_->trees[i] = OpticalTrees::build(grid, scene.types);
-  });
-  for (std::size_t i = 0; i < slot_of.size(); ++i) {
-    const OpticalTrees& trees = impl_->trees[slot_of[i]];
-    impl_->placed[i].opaque = &trees.opaque;
-    impl_->placed[i].transparent = trees.transparent ? &*trees.transparent : nullptr;
-    impl_->has_transparent |= trees.transparent.has_value();
-  }
-  impl_->instances = InstanceTree(std::move(boxes));
+  impl_->hidden = hidden;
+  impl_->update(threads);
+}
+
+bool SceneTracer::update(Threads threads) {
+  return impl_->update(threads);
 }
 
 SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -42,9 +22,10 @@ SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
   auto detailed = std::make_unique<Impl>();
   detailed->scene = impl_->scene;
+  detailed->hidden = impl_->hidden;
   detailed->placed = impl_->placed;
   detailed->has_transparent = impl_->has_transparent;
-  std::vector<DBox> boxes = impl_->instances.boxes();
+  std::vector<InstanceTree::Change> halved;
   const CoarseGrids::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
   auto next = detailed->placed.begin();
   for (const SelectedInstance& choice : selected) {
@@ -57,9 +38,10 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
     const CoarseLevel* level = levels.find(grid, choice.halvings);
     if (level == nullptr) continue;
     level->put_in(*next);
-    boxes[static_cast<std::size_t>(next - detailed->placed.begin())] = bounds_of(*next);
+    halved.push_back({static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});
   }
-  detailed->instances = InstanceTree(std::move(boxes));
+  detailed->instances = impl_->instances;
+  detailed->instances.change(halved);
   return SceneTracer(std::move(detailed));
 }
 

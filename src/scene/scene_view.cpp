@@ -1,14 +1,48 @@
+#include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <functional>
+#include <new>
+#include <type_traits>
 
 #include <glm/matrix.hpp>
 
+#include "scene/packet_tree.h"
 #include "scene/scene_tracer_impl.h"
 
 namespace quoin {
 namespace {
 
 constexpr std::size_t kLanes = RayPacket::kSize;
+
+// Room for something that is written before it is read: to clear packets first takes longer than to fill them.
+template <class T>
+class RoomFor {
+ public:
+  RoomFor() {}  // NOLINT: left as it is
+  [[nodiscard]] T& operator*() { return *std::launder(reinterpret_cast<T*>(bytes_)); }
+
+ private:
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+  alignas(T) std::byte bytes_[sizeof(T)];
+};
+
+// The lanes of a packet, once they are asked for.
+class LanesWhenNeeded {
+ public:
+  LanesWhenNeeded(const RayPacket& rays, const PacketBounds& bounds) : rays_(rays), bounds_(bounds) {}
+  [[nodiscard]] PacketLanes& operator*() {
+    if (!is_made_) new (&*lanes_) PacketLanes(rays_, bounds_);
+    is_made_ = true;
+    return *lanes_;
+  }
+
+ private:
+  const RayPacket& rays_;
+  const PacketBounds& bounds_;
+  RoomFor<PacketLanes> lanes_;
+  bool is_made_ = false;
+};
 
 // Moves points and directions from one space to another.
 struct Affine {
@@ -37,6 +71,15 @@ void move(const Affine& by, const RayPacket& from, RayPacket& to) {
   to.active = from.active;
 }
 
+// How far the rays that count go at most.
+double farthest(const RayPacket& rays) {
+  double max_t = 0.0;
+  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+    max_t = std::max(max_t, rays.max_t[static_cast<std::size_t>(std::countr_zero(left))]);
+  }
+  return max_t;
+}
+
 }  // namespace
 
 struct SceneView::Impl {
@@ -44,10 +87,12 @@ struct SceneView::Impl {
   InstructionSet instructions = InstructionSet::Best;
   std::vector<Affine> grid_from_view;
   std::vector<Affine> view_from_grid;
-  InstanceTree instances;  // in view space
-  InstanceTree seen;       // of these, those that `first_hits` meets, where not all
-  bool sees_all = true;
-  bool is_alone = false;  // there is one instance
+  DVec3 origin{0.0};
+  PacketTree instances;                 // in view space
+  PacketTree seen;                      // of these, those that `first_hits` meets, where not all
+  std::vector<bool> left_to_impostors;  // none: sees all
+  bool is_alone = false;                // there is one instance
+  [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
@@ -82,7 +127,8 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet ins
     const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
     impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
   }
-  impl_->instances = tracer.impl_->instances.moved(-origin);
+  impl_->origin = origin;
+  impl_->instances = PacketTree(tracer.impl_->instances, origin);
   impl_->is_alone = tracer.placed().size() == 1;
 }
 
@@ -96,33 +142,41 @@ const SceneTracer& SceneView::tracer() const {
 
 void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
   if (placed.empty()) return;
-  std::vector<DBox> boxes = impl_->sees_all ? impl_->instances.boxes() : impl_->seen.boxes();
-  for (const std::int32_t i : placed) boxes[static_cast<std::size_t>(i)] = DBox{};
-  impl_->seen = InstanceTree(std::move(boxes));
-  impl_->sees_all = false;
+  impl_->left_to_impostors.resize(impl_->tracer->placed().size());
+  for (const std::int32_t i : placed) impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
+  impl_->seen = PacketTree(impl_->tracer->impl_->instances, impl_->origin, impl_->left_to_impostors);
 }
 
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
-  RayPacket rays;
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
   hits.grids.hit = hits.grids.starts_inside = 0;
-  if (impl_->is_alone && impl_->sees_all) {
+  if (impl_->is_alone && impl_->sees_all()) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
     quoin::first_hits(*placed[0].opaque, rays, hits.grids, impl_->instructions);
     hits.placed.fill(0);
     return;
   }
-  if (rays_in_view.active == 0) return;
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
-  RayInterval interval = interval_of(left);
-  PacketHits found;
-  const InstanceTree& seen = impl_->sees_all ? impl_->instances : impl_->seen;
-  seen.visit(interval, [&](std::size_t i) {
+  PacketBounds bounds(left);
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<PacketHits> room_for_hits;
+  PacketHits& found = *room_for_hits;
+  const PacketTree& seen = impl_->sees_all() ? impl_->instances : impl_->seen;
+  seen.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
+    if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
+    rays.active = near;
     quoin::first_hits(*placed[i].opaque, rays, found, impl_->instructions);
     if (found.hit == 0) return true;
     impl_->take_nearer(i, found, left, hits);
-    if (hits.grids.hit == left.active) interval.max_t = interval_of(left).max_t;
+    for (std::uint32_t each = found.hit; each != 0; each &= each - 1) {
+      const int lane = std::countr_zero(each);
+      (*lanes).set_reach(lane, left.max_t[static_cast<std::size_t>(lane)]);
+    }
+    if (hits.grids.hit == left.active) bounds.set_reach(farthest(left));
     return true;
   });
 }
@@ -132,14 +186,20 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
   const auto own = static_cast<std::size_t>(home);
   std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid, impl_->instructions);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
-  RayPacket in_view;
+  RoomFor<RayPacket> room_in_view;
+  RayPacket& in_view = *room_in_view;
   move(impl_->view_from_grid[own], rays_in_grid, in_view);
   in_view.active &= ~blocked;
-  RayInterval interval = interval_of(in_view);
-  RayPacket rays;
-  impl_->instances.visit(interval, [&](std::size_t i) {
+  const PacketBounds bounds(in_view);
+  LanesWhenNeeded lanes(in_view, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     if (i == own) return true;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & in_view.active;
+    if (near == 0) return true;
     move(impl_->grid_from_view[i], in_view, rays);
+    rays.active = near;
     const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays, impl_->instructions);
     blocked |= found;
     in_view.active &= ~found;
@@ -151,12 +211,17 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
 std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
   if (rays_in_view.active == 0 || !impl_->tracer->has_transparent()) return 0;
   RayPacket left = rays_in_view;
-  RayInterval interval = interval_of(left);
-  RayPacket rays;
-  impl_->instances.visit(interval, [&](std::size_t i) {
+  const PacketBounds bounds(left);
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
     if (tree == nullptr) return true;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
+    if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
+    rays.active = near;
     left.active &= ~quoin::any_hits(*tree, rays, impl_->instructions);
     return left.active != 0;
   });
@@ -165,8 +230,9 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
                                   const std::function<bool(const TransparentSpan&)>& visit) const {
-  RayInterval interval{ray_in_view.origin, ray_in_view.origin, ray_in_view.direction, ray_in_view.direction, max_t};
-  impl_->instances.visit(interval, [&](std::size_t i) {
+  RayPacket alone;
+  alone.set(0, ray_in_view, max_t);
+  impl_->instances.visit(PacketBounds(alone), [&](std::size_t i, const FourBoxes&, std::size_t) {
     const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
     if (tree == nullptr) return true;
     const Affine& to_grid = impl_->grid_from_view[i];

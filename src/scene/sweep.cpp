@@ -12,6 +12,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Fractions that differ by less are of voxels met at once.
 constexpr double kAtOnce = 1e-9;
 
+// Of any finite vector: the square of a large one would be infinite.
+double length_of(DVec3 v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (largest == 0.0) return 0.0;
+  return std::min(largest * glm::length(v / largest), std::numeric_limits<double>::max());
+}
+
 // A box on its way through a grid's space.
 struct Moving {
   DVec3 centre{0.0};
@@ -85,13 +92,16 @@ class GridSweep {
 
   void run() {
     const DVec3 reach = reach_of_axes(box_.half_axes);
-    const double length = glm::length(box_.displacement);
+    const double length = length_of(box_.displacement);
     const double step = std::max(1.0, std::min({reach.x, reach.y, reach.z}));
     const auto [first, last] = times_within(reach);
     if (first > last) return;
     // Whole steps from the start, so that what is met does not depend on the grid's bounds.
     const double steps = std::max(1.0, std::ceil(length / step));
-    for (double i = std::floor(first * steps); i / steps <= std::min(last, most_); ++i) {
+    double i = std::floor(first * steps);
+    // So far away steps are lost in rounding; what there is within the bounds is looked at in one.
+    if (i + 1.0 == i) return check_part(reach, first, std::min(last, most_));
+    for (; i / steps <= std::min(last, most_); ++i) {
       check_part(reach, i / steps, std::min((i + 1.0) / steps, 1.0));
       if (best_.fraction <= (i + 1.0) / steps || i + 1.0 >= steps) break;
     }

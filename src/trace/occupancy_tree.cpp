@@ -256,23 +256,29 @@ struct OccupancyTree::Impl {
     return found == regions.end() ? nullptr : found->second.get();
   }
 
-  // Makes the tables for the box of chunks, or none when they would be too large.
-  void make_flat(const IBox& chunks) {
-    flat = {};
-    flat_chunks = {};
+  // Whether tables for the box of chunks are not too large for what is in it.
+  [[nodiscard]] bool can_be_flat(const IBox& chunks) const {
     const IVec3 size = chunks.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
-    const auto limit =
-        static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(bricks.size() * sizeof(Node) +
-                                                                             chunk_nodes.size() * sizeof(ChunkNode))));
-    const double cell_bits = static_cast<double>(cells) * (16.0 * size.z + 2.0);
-    const double brick_count = 64.0 * size.x * static_cast<double>(size.y) * size.z;
+    const std::size_t used_bytes = (bricks.size() - free_bricks.size()) * sizeof(Node) +
+                                   (chunk_nodes.size() - free_chunks.size()) * sizeof(ChunkNode);
+    const auto limit = static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(used_bytes)));
+    const double brick_bytes = 4.0 * 64.0 * size.x * static_cast<double>(size.y) * size.z;
     // Kernels count bits in 32 bits.
-    if (chunks.empty() || cell_bits / 8 + brick_count * 4 > limit || cell_bits > 2e9) return;
+    return !chunks.empty() && bits_of(cells, size.z) / 8 + brick_bytes <= limit && bits_of(cells, size.z) <= 2e9;
+  }
+  static double bits_of(std::int64_t cells, int chunks_along_z) {
+    return static_cast<double>(cells) * (16.0 * chunks_along_z + 2.0);
+  }
+
+  void make_flat(const IBox& chunks) {
+    flat = {};
+    const IVec3 size = flat.chunks = chunks.size();
+    const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
     flat.origin = chunks.min * kChunkEdge;
-    flat.chunks = size;
-    flat.cells.assign(static_cast<std::size_t>(cell_bits) / 32 + 2, 0);
-    flat.bricks.assign(static_cast<std::size_t>(brick_count), 0);
+    flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
+    flat.bricks.assign(
+        64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
     flat_chunks = chunks;
     for (const auto& [chunk, box] : chunk_bounds) flatten(chunk);
   }
@@ -290,7 +296,13 @@ struct OccupancyTree::Impl {
       bounds = unite(bounds, box);
       chunks = unite(chunks, {chunk, chunk + 1});
     }
-    if (flat_chunks.empty() || !(chunks == flat_chunks)) return make_flat(chunks);
+    // As a tree built from scratch would have it.
+    if (!can_be_flat(chunks)) {
+      flat = {};
+      flat_chunks = {};
+      return;
+    }
+    if (!(chunks == flat_chunks)) return make_flat(chunks);
     for (const IVec3 chunk : changed) {
       if (flat_chunks.contains(chunk)) flatten(chunk);
     }

@@ -77,6 +77,14 @@ class SlotMap {
     return all;
   }
 
+  /// Calls `visit(handle, value)` for every element, in slot order. Requires: `visit` neither inserts nor removes.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::uint32_t i = 0; i < slots_.size(); ++i) {
+      if (slots_[i].value.has_value()) visit(Handle<T>{i, slots_[i].generation}, *slots_[i].value);
+    }
+  }
+
  private:
   struct Slot {
     std::optional<T> value;

@@ -63,8 +63,8 @@ class Grid {
   [[nodiscard]] std::uint64_t neighbourhood_version(IVec3 chunk) const;
   /// Raised by every edit that changed anything.
   [[nodiscard]] std::uint64_t version() const;
-  /// No other grid of this program has it, clones neither: versions of one identity can be compared. It moves with the
-  /// voxels.
+  /// Tells this field of voxels from every other of the process, also from one whose place it has taken: it moves along
+  /// with the voxels, and a clone has its own. Together with the versions it says whether anything has changed.
   [[nodiscard]] std::uint64_t identity() const;
   /// The chunks whose mesh may have changed since the last call, sorted as `chunks`; dropped ones are among them.
   std::vector<IVec3> take_dirty();

@@ -54,12 +54,20 @@ struct Picture {
 /// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.
 class CpuRenderer {
  public:
-  /// Copies nothing of the voxels but what traversal and shading need; `scene` must outlive it unchanged.
-  /// Instances that are not visible are left out unless `hidden`.
+  /// Copies nothing of the voxels but what traversal and shading need; `scene` must outlive it in its place, and after
+  /// an edit be taken over with `update`. Instances that are not visible are left out unless `hidden`.
   CpuRenderer(const Scene& scene, bool hidden = false, Threads threads = {});
   CpuRenderer(CpuRenderer&&) noexcept;
   CpuRenderer& operator=(CpuRenderer&&) noexcept;
   ~CpuRenderer();
+
+  /// Takes over whatever was changed in the scene: instances, grids, and types in all their properties. Pictures are
+  /// then those of a renderer that was built anew.
+  ///
+  /// Requires: no picture is being taken.
+  /// Cost:     that of SceneTracer::update, and the types' colours; when a grid was edited, impostors are taken again
+  ///           as they are needed.
+  void update(Threads threads = {});
 
   /// One picture. The same bytes for any number of threads and any instruction set.
   ///

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -47,32 +48,44 @@ struct SnapshotCamera {
 /// Upright along the grid's +Y; along its +X where the view is within 8 degrees of the Y axis.
 [[nodiscard]] SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge);
 
-/// One view of an impostor: what each texel sees, rows from the top. A texel whose type is air saw nothing; its depth
-/// is infinite.
+/// One view of a grid's opaque voxels: what each texel sees, rows from the top. A texel whose type is air saw nothing;
+/// its depth is infinite.
 struct Snapshot {
   SnapshotCamera camera;
-  std::span<const VoxelType> types;         ///< coverage of its own: a black voxel is no hole
-  std::span<const Direction> faces;         ///< of the voxel seen
-  std::span<const std::uint8_t> occlusion;  ///< that a blocky mesh's vertices give there: 0 open, 255 dark
-  std::span<const float> depth;             ///< voxels, Euclidean, from the snapshot's camera
+  int edge = 0;                         ///< texels a side
+  std::vector<VoxelType> types;         ///< coverage of its own: a black voxel is no hole
+  std::vector<Direction> faces;         ///< of the voxel seen
+  std::vector<std::uint8_t> occlusion;  ///< that a blocky mesh's vertices give there: 0 open, 255 dark
+  std::vector<float> depth;             ///< voxels, Euclidean, from the snapshot's camera
 };
 
-/// Snapshots of a grid's opaque voxels from all around, by which it is drawn where it is small in the picture.
+/// Requires: `opaque` is the grid's tree of opaque voxels; 0 <= view < kImpostorViews; 1 <= edge <= 4096.
+[[nodiscard]] Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
+                                     int view, int edge = 128);
+
+struct ImpostorFaces;
+
+/// What 26 snapshots from all around see of a grid's opaque voxels, by which it is drawn where it is small in the
+/// picture.
 ///
+/// A texel of a snapshot knows exactly which face of which voxel it saw. An impostor holds these faces, each once, with
+/// the views that saw it, and draws those that the views nearest to the camera's direction saw: as exact squares where
+/// voxels are larger than texels, as squares of a texel's size where they are smaller. The texels of coarser snapshots
+/// (64, 32 and 16 a side) are among those of the finest one, so their faces serve for grids that span fewer pixels.
 /// Holds types and not colours: what the registry says of a type counts when it is drawn. Transparent voxels are left
 /// out: whoever draws an impostor traces them besides.
-/// Memory: 9 bytes a texel; 3.9 MB.
+/// Copies share what they hold. Memory: 36 bytes a face and 20 for each coarser size that shows it.
 /// Threads: any number may read at once.
+/// Source: surfels of H. Pfister et al., "Surfels: surface elements as rendering primitives" (2000), taken from layered
+///         views as there, but of known shape.
 class Impostor {
  public:
-  static constexpr int kEdge = 128;
-  static const std::size_t kBytes;  ///< of every impostor
+  static constexpr int kEdge = 128;  ///< texels a side of the finest snapshots
 
-  /// Of no grid: 26 empty snapshots.
+  /// Of no grid.
   Impostor();
 
-  /// Takes all snapshots, on the calling thread. Cost: about 0.3 microseconds a covered texel; 33 ms
-  /// for a ball 57 voxels wide, on a busy machine.
+  /// Takes all snapshots, on the calling thread. Cost: about 0.1 microseconds a covered texel.
   ///
   /// Requires: `opaque` is the grid's tree of opaque voxels; the grid is not edited meanwhile.
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
@@ -81,42 +94,19 @@ class Impostor {
   static Impostor build(const Grid& grid, const VoxelRegistry& types,
                         InstructionSet instructions = InstructionSet::Best);
 
-  [[nodiscard]] int edge() const { return kEdge; }
   /// Around all voxels of the grid, transparent ones too.
   [[nodiscard]] const ContentSphere& content() const { return content_; }
   /// Of the opaque voxels.
   [[nodiscard]] const IBox& box() const { return box_; }
   [[nodiscard]] bool is_empty() const { return box_.empty(); }
-  /// Requires: 0 <= view < kImpostorViews.
-  [[nodiscard]] Snapshot snapshot(int view) const;
+  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] const ImpostorFaces& faces() const { return *faces_; }
 
  private:
-  friend class ImpostorSearch;
-  friend class SnapshotTaker;
-  static constexpr int kTile = 8;  // texels
-  static constexpr int kPair = 2;
-  static constexpr std::size_t kTexels = std::size_t{kEdge} * kEdge;
-  static constexpr std::size_t kTiles = kTexels / (kTile * kTile);
-  static constexpr std::size_t kPairs = kTexels / (kPair * kPair);
-
-  void find_clear_depths(int view);
-  static void spread_least(std::span<const float> depth, int tile, std::span<float> out);
-
   ContentSphere content_;
   IBox box_;
-  std::array<SnapshotCamera, kImpostorViews> cameras_;
-  std::vector<VoxelType> types_;
-  std::vector<Direction> faces_;
-  std::vector<std::uint8_t> occlusion_;
-  std::vector<float> depth_;
-  // The least depth of each tile of 8x8 texels and its eight neighbours; and of each 2x2 texels, likewise.
-  std::vector<float> clear_depth_;
-  std::vector<float> near_depth_;
+  std::shared_ptr<const ImpostorFaces> faces_;
 };
-
-inline constexpr std::size_t Impostor::kBytes =
-    kImpostorViews *
-    (kTexels * (sizeof(VoxelType) + sizeof(Direction) + 1 + sizeof(float)) + (kTiles + kPairs) * sizeof(float));
 
 /// An instance that is drawn by its grid's impostor.
 struct FarInstance {
@@ -127,10 +117,9 @@ struct FarInstance {
 /// Draws far instances into a picture that has been taken without them.
 ///
 /// Each is drawn from the views nearest to the direction in which its own frame sees the camera, and every pixel's ray
-/// is followed through the snapshots' depths to the face that it meets, so that silhouettes, depth and roll are right
-/// between views. Light is that of CpuRenderer, with shadows traced through all of `scene`, but occlusion is the
-/// texel's. Depth: nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels
-/// that
+/// is met with the faces that these saw, so that silhouettes, depth and roll are right between views. Light is that of
+/// CpuRenderer, with shadows traced through all of `scene`, but occlusion is that of mesh vertices. Depth: nearer than
+/// what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
 ///        show nothing of an instance keep their colour and depth.
 /// Left out: instances whose content's centre is at or behind the camera's plane or not finite, or whose content's
 /// radius spans less than

@@ -86,8 +86,8 @@ class DetailSelector {
   ///
   /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
   ///
-  /// Requires: width and height are positive, `camera` is one that takes pictures; it is always the same scene, whose
-  ///           grids are edited between calls, not replaced by others of the same version.
+  /// Requires: width and height are positive, `camera` is one that takes pictures; it is always the same scene, edited
+  ///           between calls as you like.
   /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when its version has changed.
   void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
               std::vector<SelectedInstance>& out);

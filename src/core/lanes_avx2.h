@@ -1,0 +1,164 @@
+// Eight lanes in AVX2 registers. Included within a namespace and a target region, after <immintrin.h>.
+
+constexpr int kWidth = 8;
+
+struct Mask {
+  __m256 v;
+};
+struct F {
+  __m256 v;
+};
+struct I {
+  __m256i v;
+};
+
+inline Mask operator&(Mask a, Mask b) {
+  return {_mm256_and_ps(a.v, b.v)};
+}
+inline Mask operator|(Mask a, Mask b) {
+  return {_mm256_or_ps(a.v, b.v)};
+}
+inline Mask operator~(Mask a) {
+  return {_mm256_xor_ps(a.v, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))};
+}
+inline std::uint32_t bits(Mask a) {
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(a.v));
+}
+inline bool any(Mask a) {
+  return _mm256_movemask_ps(a.v) != 0;
+}
+inline Mask mask_of(std::uint32_t b) {
+  const __m256i each = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i on = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(b)), each);
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(on, each))};
+}
+
+inline F all(float x) {
+  return {_mm256_set1_ps(x)};
+}
+inline I all(int x) {
+  return {_mm256_set1_epi32(x)};
+}
+inline F operator+(F a, F b) {
+  return {_mm256_add_ps(a.v, b.v)};
+}
+inline F operator-(F a, F b) {
+  return {_mm256_sub_ps(a.v, b.v)};
+}
+inline F operator*(F a, F b) {
+  return {_mm256_mul_ps(a.v, b.v)};
+}
+inline F operator/(F a, F b) {
+  return {_mm256_div_ps(a.v, b.v)};
+}
+inline F min(F a, F b) {
+  return {_mm256_min_ps(a.v, b.v)};
+}
+inline F max(F a, F b) {
+  return {_mm256_max_ps(a.v, b.v)};
+}
+inline F abs(F a) {
+  return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)};
+}
+inline F floor(F a) {
+  return {_mm256_floor_ps(a.v)};
+}
+inline Mask operator<(F a, F b) {
+  return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)};
+}
+inline Mask operator<=(F a, F b) {
+  return {_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)};
+}
+inline Mask operator==(F a, F b) {
+  return {_mm256_cmp_ps(a.v, b.v, _CMP_EQ_OQ)};
+}
+inline F select(Mask m, F a, F b) {
+  return {_mm256_blendv_ps(b.v, a.v, m.v)};
+}
+inline F add_if(Mask m, F a, F b) {
+  return {_mm256_add_ps(a.v, _mm256_and_ps(m.v, b.v))};
+}
+
+inline I operator+(I a, I b) {
+  return {_mm256_add_epi32(a.v, b.v)};
+}
+inline I operator-(I a, I b) {
+  return {_mm256_sub_epi32(a.v, b.v)};
+}
+inline Mask equals(I a, int b) {
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, _mm256_set1_epi32(b)))};
+}
+inline I operator*(I a, I b) {
+  return {_mm256_mullo_epi32(a.v, b.v)};
+}
+inline I operator&(I a, I b) {
+  return {_mm256_and_si256(a.v, b.v)};
+}
+template <int kBits>
+inline I shift_left(I a) {
+  return {_mm256_slli_epi32(a.v, kBits)};
+}
+template <int kBits>
+inline I shift_right(I a) {
+  return {_mm256_srli_epi32(a.v, kBits)};
+}
+template <int kBits>
+inline I shift_right_signed(I a) {
+  return {_mm256_srai_epi32(a.v, kBits)};
+}
+inline I min_unsigned(I a, I b) {
+  return {_mm256_min_epu32(a.v, b.v)};
+}
+inline I select(Mask m, I a, I b) {
+  return {_mm256_blendv_epi8(b.v, a.v, _mm256_castps_si256(m.v))};
+}
+inline I add_if(Mask m, I a, I b) {
+  return {_mm256_add_epi32(a.v, _mm256_and_si256(_mm256_castps_si256(m.v), b.v))};
+}
+// Whether any of `b`'s bits is set in `a`.
+inline Mask test(I a, I b) {
+  const __m256i none = _mm256_cmpeq_epi32(_mm256_and_si256(a.v, b.v), _mm256_setzero_si256());
+  return {_mm256_castsi256_ps(_mm256_xor_si256(none, _mm256_set1_epi32(-1)))};
+}
+// Bit `at % 32` of each lane: moved to the sign.
+inline Mask test_bit(I a, I at) {
+  const __m256i up = _mm256_sub_epi32(_mm256_set1_epi32(31), _mm256_and_si256(at.v, _mm256_set1_epi32(31)));
+  return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_sllv_epi32(a.v, up), 31))};
+}
+inline I gather(const std::uint32_t* base, I at) {
+  return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), at.v, 4)};
+}
+inline I to_int(F a) {
+  return {_mm256_cvttps_epi32(a.v)};
+}
+inline F to_float(I a) {
+  return {_mm256_cvtepi32_ps(a.v)};
+}
+inline void store(std::int32_t* to, I a) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), a.v);
+}
+inline I load(const std::int32_t* from) {
+  return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from))};
+}
+inline F load(const float* from) {
+  return {_mm256_loadu_ps(from)};
+}
+inline void store(float* to, F a) {
+  _mm256_storeu_ps(to, a.v);
+}
+
+inline I or_of(I a, I b) {
+  return {_mm256_or_si256(a.v, b.v)};
+}
+// `a` where `which` has bits, else `b`.
+inline I merge(I which, I a, I b) {
+  return {_mm256_or_si256(_mm256_and_si256(which.v, a.v), _mm256_andnot_si256(which.v, b.v))};
+}
+inline Mask operator<(I a, I b) {
+  return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(b.v, a.v))};
+}
+inline float greatest_of(F a) {
+  __m128 most = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+  most = _mm_max_ps(most, _mm_movehl_ps(most, most));
+  return _mm_cvtss_f32(_mm_max_ss(most, _mm_movehdup_ps(most)));
+}

@@ -1,0 +1,158 @@
+// Sixteen lanes in AVX-512 registers. Included within a namespace and a target region, after <immintrin.h>.
+
+constexpr int kWidth = 16;
+
+struct Mask {
+  __mmask16 m;
+};
+struct F {
+  __m512 v;
+};
+struct I {
+  __m512i v;
+};
+
+inline Mask operator&(Mask a, Mask b) {
+  return {static_cast<__mmask16>(a.m & b.m)};
+}
+inline Mask operator|(Mask a, Mask b) {
+  return {static_cast<__mmask16>(a.m | b.m)};
+}
+inline Mask operator~(Mask a) {
+  return {static_cast<__mmask16>(~a.m)};
+}
+inline bool any(Mask a) {
+  return a.m != 0;
+}
+inline std::uint32_t bits(Mask a) {
+  return a.m;
+}
+inline Mask mask_of(std::uint32_t b) {
+  return {static_cast<__mmask16>(b)};
+}
+
+inline F all(float x) {
+  return {_mm512_set1_ps(x)};
+}
+inline I all(int x) {
+  return {_mm512_set1_epi32(x)};
+}
+inline F operator+(F a, F b) {
+  return {_mm512_add_ps(a.v, b.v)};
+}
+inline F operator-(F a, F b) {
+  return {_mm512_sub_ps(a.v, b.v)};
+}
+inline F operator*(F a, F b) {
+  return {_mm512_mul_ps(a.v, b.v)};
+}
+inline F operator/(F a, F b) {
+  return {_mm512_div_ps(a.v, b.v)};
+}
+inline F min(F a, F b) {
+  return {_mm512_min_ps(a.v, b.v)};
+}
+inline F max(F a, F b) {
+  return {_mm512_max_ps(a.v, b.v)};
+}
+inline F abs(F a) {
+  return {_mm512_abs_ps(a.v)};
+}
+inline F floor(F a) {
+  return {_mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC)};
+}
+inline Mask operator<(F a, F b) {
+  return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)};
+}
+inline Mask operator<=(F a, F b) {
+  return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LE_OQ)};
+}
+inline Mask operator==(F a, F b) {
+  return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_EQ_OQ)};
+}
+inline F select(Mask m, F a, F b) {
+  return {_mm512_mask_blend_ps(m.m, b.v, a.v)};
+}
+inline F add_if(Mask m, F a, F b) {
+  return {_mm512_mask_add_ps(a.v, m.m, a.v, b.v)};
+}
+
+inline I operator+(I a, I b) {
+  return {_mm512_add_epi32(a.v, b.v)};
+}
+inline I operator-(I a, I b) {
+  return {_mm512_sub_epi32(a.v, b.v)};
+}
+inline Mask equals(I a, int b) {
+  return {_mm512_cmpeq_epi32_mask(a.v, _mm512_set1_epi32(b))};
+}
+inline I operator*(I a, I b) {
+  return {_mm512_mullo_epi32(a.v, b.v)};
+}
+inline I operator&(I a, I b) {
+  return {_mm512_and_si512(a.v, b.v)};
+}
+template <int kBits>
+inline I shift_left(I a) {
+  return {_mm512_slli_epi32(a.v, kBits)};
+}
+template <int kBits>
+inline I shift_right(I a) {
+  return {_mm512_srli_epi32(a.v, kBits)};
+}
+template <int kBits>
+inline I shift_right_signed(I a) {
+  return {_mm512_srai_epi32(a.v, kBits)};
+}
+inline I min_unsigned(I a, I b) {
+  return {_mm512_min_epu32(a.v, b.v)};
+}
+inline I select(Mask m, I a, I b) {
+  return {_mm512_mask_blend_epi32(m.m, b.v, a.v)};
+}
+inline I add_if(Mask m, I a, I b) {
+  return {_mm512_mask_add_epi32(a.v, m.m, a.v, b.v)};
+}
+// Whether any of `b`'s bits is set in `a`.
+inline Mask test(I a, I b) {
+  return {_mm512_test_epi32_mask(a.v, b.v)};
+}
+// Bit `at % 32` of each lane.
+inline Mask test_bit(I a, I at) {
+  return test(a, I{_mm512_sllv_epi32(_mm512_set1_epi32(1), _mm512_and_si512(at.v, _mm512_set1_epi32(31)))});
+}
+inline I gather(const std::uint32_t* base, I at) {
+  return {_mm512_i32gather_epi32(at.v, base, 4)};
+}
+inline I to_int(F a) {
+  return {_mm512_cvttps_epi32(a.v)};
+}
+inline F to_float(I a) {
+  return {_mm512_cvtepi32_ps(a.v)};
+}
+inline void store(std::int32_t* to, I a) {
+  _mm512_storeu_si512(to, a.v);
+}
+inline I load(const std::int32_t* from) {
+  return {_mm512_loadu_si512(from)};
+}
+inline F load(const float* from) {
+  return {_mm512_loadu_ps(from)};
+}
+inline void store(float* to, F a) {
+  _mm512_storeu_ps(to, a.v);
+}
+
+inline I or_of(I a, I b) {
+  return {_mm512_or_si512(a.v, b.v)};
+}
+// `a` where `which` has bits, else `b`.
+inline I merge(I which, I a, I b) {
+  return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};
+}
+inline Mask operator<(I a, I b) {
+  return {_mm512_cmplt_epi32_mask(a.v, b.v)};
+}
+inline float greatest_of(F a) {
+  return _mm512_reduce_max_ps(a.v);
+}

@@ -1,0 +1,108 @@
+// Four lanes in plain C++, which compilers turn into what the build's baseline has. Included within a namespace.
+// What a comparison with a number that is none answers, and which of two `min` and `max` take then, is as in x86-64.
+
+constexpr int kWidth = 4;
+
+struct Mask {
+  std::uint32_t m;
+};
+struct F {
+  float v[4];
+};
+struct I {
+  std::int32_t v[4];
+};
+
+template <class Vector, class Of>
+inline Vector each(Of of) {
+  return {{of(0), of(1), of(2), of(3)}};
+}
+template <class Of>
+inline Mask mask_where(Of of) {
+  return {std::uint32_t{of(0)} | std::uint32_t{of(1)} << 1 | std::uint32_t{of(2)} << 2 | std::uint32_t{of(3)} << 3};
+}
+
+inline Mask operator&(Mask a, Mask b) {
+  return {a.m & b.m};
+}
+inline Mask operator|(Mask a, Mask b) {
+  return {a.m | b.m};
+}
+inline bool any(Mask a) {
+  return a.m != 0;
+}
+inline std::uint32_t bits(Mask a) {
+  return a.m;
+}
+inline F all(float x) {
+  return {{x, x, x, x}};
+}
+inline I all(int x) {
+  return {{x, x, x, x}};
+}
+inline F operator+(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] + b.v[i]; });
+}
+inline F operator-(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] - b.v[i]; });
+}
+inline F operator*(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] * b.v[i]; });
+}
+inline F operator/(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] / b.v[i]; });
+}
+inline F min(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] < b.v[i] ? a.v[i] : b.v[i]; });
+}
+inline F max(F a, F b) {
+  return each<F>([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
+}
+inline F abs(F a) {
+  return each<F>([&](int i) { return std::fabs(a.v[i]); });
+}
+inline F floor(F a) {
+  return each<F>([&](int i) { return std::floor(a.v[i]); });
+}
+inline Mask operator<(F a, F b) {
+  return mask_where([&](int i) { return a.v[i] < b.v[i]; });
+}
+inline Mask operator<=(F a, F b) {
+  return mask_where([&](int i) { return a.v[i] <= b.v[i]; });
+}
+inline Mask operator==(F a, F b) {
+  return mask_where([&](int i) { return a.v[i] == b.v[i]; });
+}
+inline Mask operator<(I a, I b) {
+  return mask_where([&](int i) { return a.v[i] < b.v[i]; });
+}
+inline F select(Mask m, F a, F b) {
+  return each<F>([&](int i) { return (m.m >> i & 1U) != 0 ? a.v[i] : b.v[i]; });
+}
+inline I select(Mask m, I a, I b) {
+  return each<I>([&](int i) { return (m.m >> i & 1U) != 0 ? a.v[i] : b.v[i]; });
+}
+// Whether any of `b`'s bits is set in `a`.
+inline Mask test(I a, I b) {
+  return mask_where([&](int i) { return (a.v[i] & b.v[i]) != 0; });
+}
+inline I to_int(F a) {
+  return each<I>([&](int i) { return static_cast<std::int32_t>(a.v[i]); });
+}
+inline F load(const float* from) {
+  return each<F>([&](int i) { return from[i]; });
+}
+inline I load(const std::int32_t* from) {
+  return each<I>([&](int i) { return from[i]; });
+}
+inline void store(float* to, F a) {
+  std::memcpy(to, a.v, sizeof(a.v));
+}
+inline void store(std::int32_t* to, I a) {
+  std::memcpy(to, a.v, sizeof(a.v));
+}
+inline float greatest_of(F a) {
+  const float low = a.v[0] > a.v[1] ? a.v[0] : a.v[1];
+  const float high = a.v[2] > a.v[3] ? a.v[2] : a.v[3];
+  return low > high ? low : high;
+}

@@ -1,0 +1,98 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include "light/corner_light.h"
+#include "render/snapshot_rays.h"
+
+namespace quoin {
+
+TexelArea texels_of(const SnapshotCamera& camera, const IBox& box, int edge) {
+  const double half = 0.5 * edge;
+  constexpr double kRoom = 1e-6;
+  const auto block_of = [&](double texel) {
+    return static_cast<int>(std::clamp(texel, 0.0, static_cast<double>(edge))) / kTexelBlock * kTexelBlock;
+  };
+  TexelArea area{edge, edge, 0, 0};
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 point{(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                      (corner & 4) != 0 ? box.max.z : box.min.z};
+    const DVec3 seen = point - camera.position;
+    const double scale = camera.focal / glm::dot(seen, camera.forward);
+    const double x = half + glm::dot(seen, camera.right) * scale;
+    const double y = half - glm::dot(seen, camera.up) * scale;
+    area.left = std::min(area.left, block_of(x - kRoom));
+    area.top = std::min(area.top, block_of(y - kRoom));
+    area.right = std::max(area.right, std::min(block_of(x + kRoom) + kTexelBlock, edge));
+    area.bottom = std::max(area.bottom, std::min(block_of(y + kRoom) + kTexelBlock, edge));
+  }
+  return area;
+}
+
+RayPacket rays_of_texels(const SnapshotCamera& camera, int edge, int column, int row) {
+  RayPacket rays;
+  rays.origin_x.fill(camera.position.x);
+  rays.origin_y.fill(camera.position.y);
+  rays.origin_z.fill(camera.position.z);
+  rays.max_t.fill(std::numeric_limits<double>::infinity());
+  rays.active = 0;
+  const double half = 0.5 * edge;
+  RayPacket::Lanes<double> scale;
+  RayPacket::Lanes<double> x;
+  RayPacket::Lanes<double> y;
+  for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+    const int texel_x = column + static_cast<int>(i) % kTexelBlock;
+    const int texel_y = row + static_cast<int>(i) / kTexelBlock;
+    if (texel_x < edge && texel_y < edge) rays.active |= 1U << i;
+    x[i] = texel_x + 0.5 - half;
+    y[i] = half - (texel_y + 0.5);
+    scale[i] = 1.0 / std::sqrt(x[i] * x[i] + y[i] * y[i] + camera.focal * camera.focal);
+  }
+  const auto turn = [&](int axis, RayPacket::Lanes<double>& out) {
+    const double forward = camera.forward[axis] * camera.focal;
+    for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+      out[i] = (camera.right[axis] * x[i] + camera.up[axis] * y[i] + forward) * scale[i];
+    }
+  };
+  turn(0, rays.direction_x), turn(1, rays.direction_y), turn(2, rays.direction_z);
+  return rays;
+}
+
+Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque, int view, int edge) {
+  const auto texels = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
+  Snapshot snapshot;
+  snapshot.camera = snapshot_camera(content_sphere(grid), view, edge);
+  snapshot.edge = edge;
+  snapshot.types.assign(texels, kAir);
+  snapshot.faces.assign(texels, Direction::PosX);
+  snapshot.occlusion.assign(texels, 0);
+  snapshot.depth.assign(texels, std::numeric_limits<float>::infinity());
+  if (opaque.bounds().empty()) return snapshot;
+  GridReader reader(grid);
+  PacketHits hits;
+  const TexelArea area = texels_of(snapshot.camera, opaque.bounds(), edge);
+  for (int row = area.top; row < area.bottom; row += kTexelBlock) {
+    for (int column = area.left; column < area.right; column += kTexelBlock) {
+      const RayPacket rays = rays_of_texels(snapshot.camera, edge, column, row);
+      first_hits(opaque, rays, hits);
+      for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
+        const int lane = std::countr_zero(left);
+        const Ray ray = rays.ray(lane);
+        const RayHit hit = hits[lane];
+        const auto texel = static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
+        const FaceLevels levels = corner_levels(reader, types, hit.voxel, hit.face);
+        const float level = level_at(levels, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
+        snapshot.types[texel] = reader.get(hit.voxel);
+        snapshot.faces[texel] = hit.face;
+        snapshot.occlusion[texel] = static_cast<std::uint8_t>(std::lround(level * (255.0F / 3.0F)));
+        snapshot.depth[texel] = static_cast<float>(hit.t);
+      }
+    }
+  }
+  return snapshot;
+}
+
+}  // namespace quoin

@@ -1,0 +1,316 @@
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/scene/scene_query.h>
+#include <quoin/scene/scene_tracer.h>
+
+namespace quoin {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A scene, and things that may happen to it.
+class ChangingScene {
+ public:
+  explicit ChangingScene(unsigned seed) : random_(seed) {
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(scene.types.add(properties()).has_value());
+    for (int i = 0; i < 4; ++i) add_grid();
+    for (int i = 0; i < 12; ++i) add_instance();
+  }
+
+  void change() {
+    switch (below(14)) {
+      case 0:
+        return add_grid();
+      case 1:
+        return remove_grid();
+      case 2:
+        return add_instance();
+      case 3:
+        return remove_instance();
+      case 4:
+        return replace_grid();
+      case 5:
+        return change_types();
+      case 6:
+        if (SceneGrid* grid = any_grid()) grid->pivot = vector() * 20.0;
+        return;
+      case 7:
+        if (SceneGrid* grid = any_grid()) (void)grid->grid.take_dirty();
+        return;
+      case 8:
+        if (SceneGrid* grid = any_grid()) empty(grid->grid);
+        return;
+      case 9:
+      case 10:
+      case 11:
+        if (SceneGrid* grid = any_grid()) edit(grid->grid);
+        return;
+      default:
+        if (Instance* instance = any_instance()) move(*instance);
+    }
+  }
+
+  DVec3 vector() { return {share(), share(), share()}; }
+  double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(random_); }
+  int below(int limit) { return static_cast<int>(random_() % static_cast<unsigned>(limit)); }
+
+  Scene scene;
+
+ private:
+  VoxelProperties properties() {
+    VoxelProperties properties;
+    properties.visibility = below(3) == 0 ? Visibility::Transparent : Visibility::Opaque;
+    return properties;
+  }
+  // One of them is not registered.
+  VoxelType type() { return static_cast<VoxelType>(1 + static_cast<unsigned>(below(4))); }
+
+  SceneGrid* any_grid() {
+    const auto handles = scene.grids().handles();
+    return handles.empty() ? nullptr : &scene.grids()[handles[random_() % handles.size()]];
+  }
+  Instance* any_instance() {
+    const auto handles = scene.instances().handles();
+    return handles.empty() ? nullptr : &scene.instances()[handles[random_() % handles.size()]];
+  }
+
+  void edit(Grid& grid) {
+    const IVec3 at = IVec3(vector() * 60.0) * 2;
+    if (below(3) == 0) {
+      grid.set(at, below(3) == 0 ? kAir : type());
+    } else {
+      const IVec3 size(1 + 2 * below(30), 1 + 2 * below(30), 1 + 2 * below(30));
+      grid.fill_box(at, at + size, below(4) == 0 ? kAir : type());
+    }
+  }
+  void empty(Grid& grid) {
+    if (below(2) == 0) grid.clear();
+    if (!grid.bounds().empty()) grid.fill_box(grid.bounds().min, grid.bounds().max, kAir);
+  }
+  // Another in its place; often of the same version.
+  void replace_grid() {
+    SceneGrid* grid = any_grid();
+    if (grid == nullptr) return;
+    if (below(2) == 0) {
+      grid->grid = grid->grid.clone();
+      return;
+    }
+    const std::uint64_t version = grid->grid.version();
+    grid->grid = Grid();
+    for (std::uint64_t i = 0; i < std::min<std::uint64_t>(version, 20); ++i) {
+      grid->grid.set({static_cast<int>(i), below(5), below(5)}, type());
+    }
+  }
+  void change_types() {
+    if (below(3) == 0 && scene.types.size() < 6) {
+      EXPECT_TRUE(scene.types.add(properties()).has_value());
+    } else {
+      scene.types.replace(static_cast<VoxelType>(1 + below(3)), properties());
+    }
+  }
+  void add_grid() {
+    SceneGrid grid;
+    grid.pivot = vector() * 20.0;
+    for (int i = below(4); i >= 0; --i) edit(grid.grid);
+    scene.add_grid(std::move(grid));
+  }
+  void remove_grid() {
+    const auto handles = scene.grids().handles();
+    if (handles.size() > 1) scene.remove_grid(handles[random_() % handles.size()]);
+  }
+  void add_instance() {
+    const auto handles = scene.grids().handles();
+    if (handles.empty()) return;
+    Instance instance;
+    instance.grid = handles[random_() % handles.size()];
+    instance.position = vector() * 300.0;
+    scene.add_instance(instance);
+    move(scene.instances()[scene.instances().handles().back()]);
+  }
+  void remove_instance() {
+    const auto handles = scene.instances().handles();
+    if (!handles.empty()) scene.remove_instance(handles[random_() % handles.size()]);
+  }
+  void move(Instance& instance) {
+    const int what = below(12);
+    if (what < 5) instance.position = vector() * 300.0;
+    if (what == 5 || what == 6) instance.rotation = DQuat(share(), share(), share(), share());
+    if (what == 7) instance.voxel_size = 1.0 + 0.5 * share();
+    if (what == 8) instance.mirrored = !instance.mirrored;
+    if (what == 9) instance.visible = !instance.visible;
+    if (what == 10) instance.position.x = std::isfinite(instance.position.x) ? kInfinity : 0.0;
+    if (what == 11) instance.grid = scene.grids().handles()[0];
+  }
+
+  std::mt19937 random_;
+};
+
+struct Counts {
+  int hits = 0;
+  int transparent = 0;
+  int halved = 0;
+};
+
+void expect_same_placed(const SceneTracer& updated, const SceneTracer& fresh, bool is_detailed, Counts& counts) {
+  ASSERT_EQ(updated.placed().size(), fresh.placed().size());
+  EXPECT_EQ(updated.has_transparent(), fresh.has_transparent());
+  for (std::size_t i = 0; i < fresh.placed().size(); ++i) {
+    const PlacedGrid& a = updated.placed()[i];
+    const PlacedGrid& b = fresh.placed()[i];
+    EXPECT_EQ(a.instance, b.instance);
+    EXPECT_EQ(a.grid, b.grid);
+    EXPECT_TRUE(is_detailed || a.voxels == b.voxels);
+    EXPECT_EQ(a.voxels->voxel_count(), b.voxels->voxel_count());
+    EXPECT_EQ(a.pivot, b.pivot);
+    EXPECT_EQ(a.world_axes, b.world_axes);
+    EXPECT_EQ(a.position, b.position);
+    EXPECT_EQ(a.voxel_size, b.voxel_size);
+    EXPECT_EQ(a.detail, b.detail);
+    EXPECT_EQ(a.halvings, b.halvings);
+    EXPECT_EQ(a.opaque->bounds(), b.opaque->bounds());
+    ASSERT_EQ(a.transparent == nullptr, b.transparent == nullptr);
+    if (a.transparent != nullptr) {
+      EXPECT_EQ(a.transparent->bounds(), b.transparent->bounds());
+    }
+    counts.halved += b.halvings > 0;
+  }
+}
+
+// What rays meet of both, in every way in which they can be asked.
+void expect_same_hits(const SceneTracer& updated, const SceneTracer& fresh, ChangingScene& world, Counts& counts) {
+  const DVec3 origin = world.vector() * 300.0;
+  const SceneView a(updated, origin);
+  const SceneView b(fresh, origin);
+  for (int round = 0; round < 12 && !fresh.placed().empty(); ++round) {
+    const auto home = static_cast<std::int32_t>(world.below(static_cast<int>(fresh.placed().size())));
+    const DVec3 towards = fresh.placed()[static_cast<std::size_t>(home)].position - origin + world.vector() * 40.0;
+    RayPacket rays;
+    const DVec3 from = world.vector() * 300.0;
+    for (int lane = 0; lane < 16; ++lane) {
+      rays.set(lane, {from, glm::normalize(towards - from) + world.vector() * 0.05}, lane == 3 ? 200.0 : kInfinity);
+    }
+    SceneHits hits_a;
+    SceneHits hits_b;
+    a.first_hits(rays, hits_a);
+    b.first_hits(rays, hits_b);
+    ASSERT_EQ(hits_a.grids.hit, hits_b.grids.hit);
+    EXPECT_EQ(a.any_transparent(rays), b.any_transparent(rays));
+    EXPECT_EQ(a.any_hits(home, rays), b.any_hits(home, rays));
+    counts.hits += hits_b.grids.hit != 0;
+    counts.transparent += b.any_transparent(rays) != 0;
+    for (int lane = 0; lane < 16; ++lane) {
+      if ((hits_b.grids.hit >> lane & 1U) == 0) continue;
+      const auto i = static_cast<std::size_t>(lane);
+      EXPECT_EQ(hits_a.placed[i], hits_b.placed[i]);
+      EXPECT_EQ(hits_a.grids[lane].t, hits_b.grids[lane].t);
+      EXPECT_EQ(hits_a.grids[lane].voxel, hits_b.grids[lane].voxel);
+    }
+    const Ray ray{rays.ray(5).origin + origin, rays.ray(5).direction};
+    const auto found_a = first_hit(updated, ray);
+    const auto found_b = first_hit(fresh, ray);
+    ASSERT_EQ(found_a.has_value(), found_b.has_value());
+    if (found_b) {
+      EXPECT_EQ(found_a->instance, found_b->instance);
+      EXPECT_EQ(found_a->voxel, found_b->voxel);
+      EXPECT_EQ(found_a->type, found_b->type);
+    }
+  }
+}
+
+std::vector<SelectedInstance> random_details(const SceneTracer& tracer, ChangingScene& world) {
+  std::vector<SelectedInstance> selected;
+  for (const PlacedGrid& placed : tracer.placed()) {
+    if (world.below(4) == 0) continue;
+    selected.push_back({placed.instance, Detail::Mid, world.below(kCoarsestHalving + 1)});
+  }
+  return selected;
+}
+
+TEST(SceneUpdate, IsAsATracerMadeAnewWhateverHappenedToTheScene) {
+  Counts counts;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(seed);
+    ChangingScene world(seed);
+    const bool hidden = seed % 3 == 0;
+    SceneTracer tracer(world.scene, hidden, {1});
+    for (int round = 0; round < 12; ++round) {
+      SCOPED_TRACE(round);
+      for (int i = world.below(8); i >= 0; --i) world.change();
+      tracer.update({1});
+      const SceneTracer fresh(world.scene, hidden, {1});
+      expect_same_placed(tracer, fresh, false, counts);
+      expect_same_hits(tracer, fresh, world, counts);
+      if (round % 2 == 0) {
+        const auto selected = random_details(fresh, world);
+        const SceneTracer detailed = tracer.with_detail(selected, {1});
+        const SceneTracer fresh_detailed = fresh.with_detail(selected, {1});
+        expect_same_placed(detailed, fresh_detailed, true, counts);
+        expect_same_hits(detailed, fresh_detailed, world, counts);
+      }
+      if (HasFatalFailure()) return;
+    }
+  }
+  EXPECT_GT(counts.hits, 1000);
+  EXPECT_GT(counts.transparent, 100);
+  EXPECT_GT(counts.halved, 200);
+}
+
+struct TwoCubes {
+  Scene scene;
+  GridHandle grid;
+  InstanceHandle near;
+  TwoCubes() {
+    EXPECT_TRUE(scene.types.add({}).has_value());
+    grid = add_cube();
+    near = scene.add_instance({"", grid});
+    scene.add_instance({"", add_cube(), {30, 0, 0}});
+  }
+  GridHandle add_cube() {
+    SceneGrid cube;
+    cube.grid.fill_box({0, 0, 0}, {99, 9, 9}, 1);
+    return scene.add_grid(std::move(cube));
+  }
+};
+
+TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
+  TwoCubes world;
+  SceneTracer tracer(world.scene);
+  const OccupancyTree* first = tracer.placed()[0].opaque;
+  const OccupancyTree* second = tracer.placed()[1].opaque;
+  EXPECT_FALSE(tracer.update());
+  world.scene.instances()[world.near].position = {1, 2, 3};
+  EXPECT_FALSE(tracer.update());
+  world.scene.instances()[world.near].visible = false;
+  EXPECT_FALSE(tracer.update());
+  world.scene.instances()[world.near].visible = true;
+  EXPECT_FALSE(tracer.update()) << "trees outlive their instances";
+  world.scene.grids()[world.grid].grid.set({70, 20, 0}, 1);
+  EXPECT_TRUE(tracer.update());
+  EXPECT_EQ(tracer.placed()[0].opaque, first);
+  EXPECT_EQ(tracer.placed()[1].opaque, second);
+  EXPECT_TRUE(first->is_occupied({70, 20, 0}));
+}
+
+TEST(SceneUpdate, TakesNoDirtFromOthers) {
+  TwoCubes world;
+  SceneTracer tracer(world.scene);
+  Grid& grid = world.scene.grids()[world.grid].grid;
+  (void)grid.take_dirty();
+  grid.set({5, 5, 5}, kAir);
+  tracer.update();
+  EXPECT_EQ(grid.take_dirty(), (std::vector<IVec3>{{0, 0, 0}}));
+  grid.set({6, 5, 5}, kAir);
+  (void)grid.take_dirty();
+  tracer.update();
+  EXPECT_FALSE(tracer.placed()[0].opaque->is_occupied({6, 5, 5}));
+}
+
+}  // namespace
+}  // namespace quoin
