@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "render/far_impostors.h"
 #include "render/impostor_pass.h"
-#include "render/impostor_shelf.h"
 #include "render/picture_request.h"
 #include "render/tile.h"
 
@@ -64,40 +64,25 @@ struct CpuRenderer::Impl {
     return selected;
   }
 
-  // The impostors of the far ones among the selected, which then stay whole where they are traced: shadows onto what
-  // an impostor shows are those of its voxels.
-  std::vector<FarInstance> take_impostors(std::span<SelectedInstance> selected, const RenderOptions& options) {
-    std::vector<const PlacedGrid*> placed;
-    std::vector<SelectedInstance*> far;
-    auto next = tracer.placed().begin();
-    for (SelectedInstance& choice : selected) {
-      if (choice.detail != Detail::Far) continue;
-      next = std::lower_bound(next, tracer.placed().end(), choice.instance,
-                              [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
-      if (next == tracer.placed().end()) break;
-      if (next->instance != choice.instance) continue;
-      placed.push_back(&*next);
-      far.push_back(&choice);
-    }
-    const std::vector<const Impostor*> taken =
-        impostors->take(scene->types, placed, options.threads, options.instructions);
-    std::vector<FarInstance> instances;
-    for (std::size_t i = 0; i < far.size(); ++i) {
-      if (taken[i] == nullptr) continue;
-      far[i]->halvings = 0;
-      instances.push_back({far[i]->instance, taken[i]});
-    }
-    return instances;
-  }
-
   const Scene* scene;
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
-  std::unique_ptr<ImpostorShelf> impostors = std::make_unique<ImpostorShelf>();
+  ImpostorCache impostors{{FarImpostors::kMostBytes}};
 };
 
 namespace {
+
+// Those with impostors stay whole where they are traced: shadows onto what an impostor shows are those of its voxels.
+void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected) {
+  auto next = far.begin();
+  for (SelectedInstance& choice : selected) {
+    if (next == far.end()) return;
+    if (choice.instance != next->instance) continue;
+    choice.halvings = 0;
+    ++next;
+  }
+}
 
 // What a picture is taken of.
 struct Subject {
@@ -121,20 +106,22 @@ CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
 
 void CpuRenderer::update(Threads threads) {
-  const bool are_grids_other = impl_->tracer.update(threads);
+  impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);
-  if (are_grids_other) impl_->impostors = std::make_unique<ImpostorShelf>();
+  impl_->impostors.look_at_types(impl_->scene->types);
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
   std::vector<SelectedInstance> selected = impl_->select(camera, options);
-  const std::vector<FarInstance> far = impl_->take_impostors(selected, options);
+  const FarImpostors far =
+      take_impostors(impl_->impostors, *impl_->scene, selected, options.impostor_seconds, options.threads);
+  keep_whole(far.instances, selected);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position, options.instructions);
-  subject.leave_to_impostors(far, camera, options);
+  subject.leave_to_impostors(far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);
