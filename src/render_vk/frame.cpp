@@ -26,6 +26,11 @@ Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
 }
 
+// What is left when `to_vec4` rounds.
+Vec4 low_vec4(DVec3 v) {
+  return to_vec4(v - DVec3(Vec3(v)));
+}
+
 // A multiple of 64 voxels at a point, not far from the grid.
 IVec3 base_at(DVec3 point, const DevicePlaced& grid) {
   const DVec3 near = glm::clamp(point, grid.low - kNearby, grid.high + kNearby);
@@ -110,12 +115,16 @@ void set_start(const DevicePlaced& grid, const GridSpace& space, const Rays& ray
   out.start = to_vec4(origin - DVec3(base), depth);
   out.start_x = to_vec4(right);
   out.start_y = to_vec4(down);
+  out.start_low = low_vec4(origin - DVec3(base));
+  out.start_x_low = low_vec4(right);
+  out.start_y_low = low_vec4(down);
 }
 
 // `view_origin`: from the camera.
 void set_spaces(const DevicePlaced& grid, const GridSpace& space, DVec3 view_origin, ShaderPlaced& out) {
   for (int axis = 0; axis < 3; ++axis) {
     out.grid_axes[static_cast<std::size_t>(axis)] = to_vec4(space.grid_axes[axis]);
+    out.grid_axes_low[static_cast<std::size_t>(axis)] = low_vec4(space.grid_axes[axis]);
     out.view_axes[static_cast<std::size_t>(axis)] = to_vec4(space.view_axes[axis]);
   }
   const DVec3 origin = space.camera + space.grid_axes * view_origin;
@@ -229,6 +238,10 @@ FrameData make_frame(const DeviceScene& scene, const Camera& camera, const Rende
   frame.down = to_vec4(rays.down);
   frame.corner = to_vec4(rays.corner);
   frame.forward = to_vec4(rays.forward);
+  frame.right_low = low_vec4(rays.right);
+  frame.down_low = low_vec4(rays.down);
+  frame.corner_low = low_vec4(rays.corner);
+  frame.forward_low = low_vec4(rays.forward);
   frame.sky_scale = static_cast<float>(picture.sky_scale());
   frame.width = options.width;
   frame.height = options.height;

@@ -104,6 +104,8 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
   const PixelPoint point = sample_point(sample);
   push.point_x = static_cast<float>(point.x);
   push.point_y = static_cast<float>(point.y);
+  push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
+  push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
   push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
   push.first = sample == 0 ? 1 : 0;
   const bool has_glass = scene_->has_transparent();

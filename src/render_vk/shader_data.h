@@ -45,6 +45,10 @@ struct ShaderPlaced {
   Vec4 start_y{0.0F};
   Vec4 to_sun{0.0F};
   std::array<Vec4, 2> diffuse{};
+  std::array<Vec4, 3> grid_axes_low{};
+  Vec4 start_low{0.0F};
+  Vec4 start_x_low{0.0F};
+  Vec4 start_y_low{0.0F};
 };
 
 // Bits of ShaderFrame::flags.
@@ -78,6 +82,10 @@ struct ShaderFrame {
   Vec4 start{0.0F};
   Vec4 start_x{0.0F};
   Vec4 start_y{0.0F};
+  Vec4 right_low{0.0F};
+  Vec4 down_low{0.0F};
+  Vec4 corner_low{0.0F};
+  Vec4 forward_low{0.0F};
   Vec4 sky_zenith{0.0F};
   Vec4 sky_horizon{0.0F};
   Vec4 sky_ground{0.0F};
@@ -125,6 +133,8 @@ struct ShaderPush {
   std::int32_t size_y = 0;
   float point_x = 0.5F;
   float point_y = 0.5F;
+  float point_low_x = 0.0F;
+  float point_low_y = 0.0F;
   std::uint32_t seed = 0;
   std::uint32_t first = 0;
   std::uint32_t round = 0;
@@ -132,7 +142,7 @@ struct ShaderPush {
 };
 
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
-static_assert(sizeof(ShaderPlaced) == 256 && sizeof(ShaderFrame) == 12 * 16 + 16 * 8 + 16 * 4);
-static_assert(sizeof(ShaderPush) == 48 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderPlaced) == 352 && sizeof(ShaderFrame) == 16 * 16 + 16 * 8 + 16 * 4);
+static_assert(sizeof(ShaderPush) == 56 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -41,8 +41,9 @@ struct VulkanOptions {
 /// Takes the pictures that CpuRenderer takes, on a graphics device.
 ///
 /// Equal:   every option means the same, and so does every error; a channel of a pixel differs by 2 at most but at
-///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand.
-///          Counts of rays differ as little. The exception: `RenderOptions::detail` is Unsupported.
+///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
+///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little. The exception:
+///          `RenderOptions::detail` is Unsupported.
 /// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
 /// Errors:  LimitExceeded when a memory is full; Unsupported when the device was lost, after which a new renderer is

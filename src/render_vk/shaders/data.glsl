@@ -41,6 +41,11 @@ struct Placed {
   vec4 start_y;
   vec4 to_sun;
   vec4 diffuse[2];  // by face
+  // What is left of numbers above when they are rounded.
+  vec4 grid_axes_low[3];
+  vec4 start_low;
+  vec4 start_x_low;
+  vec4 start_y_low;
 };
 
 // What a pixel shows.
@@ -124,6 +129,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 start;  // of pixel (x, y)'s ray: start + x start_x + y start_y
   vec4 start_x;
   vec4 start_y;
+  vec4 right_low;
+  vec4 down_low;
+  vec4 corner_low;
+  vec4 forward_low;
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
@@ -168,6 +177,7 @@ layout(push_constant) uniform Push {
   ivec2 corner;     // of the tile, in pixels
   ivec2 size;       // of the tile
   vec2 point;       // of the sample, within pixels
+  vec2 point_low;   // what is left of that
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample

@@ -2,6 +2,7 @@
 // The bodies of glass before what each pixel shows.
 #include "data.glsl"
 #include "walk.glsl"
+#include "pairs.glsl"
 #include "instances.glsl"
 #include "glass.glsl"
 #include "count.glsl"
@@ -10,6 +11,7 @@
 void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {
   vec2 point = picture_point();
   ViewRay ray = camera_ray(point);
+  Pair direction = exact_direction();
   Point hit = Points(frame().points).at[slot];
   has_hit = hit.voxel.w >= 0;
   float scale = length_a_depth(point);
@@ -24,9 +26,8 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
-    GridRay in_grid = camera_ray_in(placed, point);
-    in_grid.t = (placed.start.w - depth) * scale;
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t)) continue;
+    GridRay in_grid = rounded(placed, exact_ray_in(placed, direction), (placed.start.w - depth) * scale);
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t, -1)) continue;
     find_bodies_in(i, in_grid, placed.ref_view.w / placed.ref_inside.w, max_t, state.weight.w, list, unused);
   }
   first_t = list.count > 0 ? depth * scale + Bodies(list.address).at[list.first].lengths.x : kInfinity;

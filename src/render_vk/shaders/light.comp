@@ -2,6 +2,7 @@
 // The light of what each pixel of a tile shows: light/lighting.h on the processor's side.
 #include "data.glsl"
 #include "walk.glsl"
+#include "pairs.glsl"
 #include "instances.glsl"
 #include "glass.glsl"
 #include "count.glsl"
@@ -77,7 +78,7 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
     }
     is_first = false;
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t) && find_voxel(max_t)) return true;
+    if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) && find_voxel(max_t)) return true;
     if (frame().placed_count == 1) return false;
   }
   return false;
@@ -95,7 +96,7 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = ray;
     if (i != home) in_grid = grid_from_view(placed, in_view);
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t)) continue;
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
     find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, 0.0, list, passed);
   }
   uint i = 0;
@@ -215,13 +216,10 @@ vec3 light_of(Point point, uint slot) {
   return colour * frame().exposure;
 }
 
-Point point_of(Body body, vec2 at) {
-  Placed placed = placed_at(body.voxel.w);
-  GridRay ray = camera_ray_in(placed, at);
-  precise vec3 position = ray.origin + body.lengths.w * ray.direction;
+Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
-  point.inside = vec4(position - vec3(body.voxel.xyz - ray.base), body.lengths.x);
+  point.inside = vec4(exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y), body.lengths.x);
   point.what = uvec4(body.what.xy, body.what.z != 0 ? kGlow : kSurface, 0);
   return point;
 }
@@ -249,7 +247,7 @@ bool light_pixel(uint slot, inout State state) {
       is_first = false;
       bool starts_inside = body.what.z != 0;
       Surface surface = surface_of(body.what.x);
-      point = point_of(body, at);
+      point = point_of(body);
       weight *= own_share(surface, body.lengths.z, starts_inside);
       state.weight.xyz *= passed_by(surface, body.lengths.z, starts_inside);
     } else {

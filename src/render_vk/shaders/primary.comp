@@ -2,6 +2,7 @@
 // The nearest opaque voxel of each pixel of a tile.
 #include "data.glsl"
 #include "walk.glsl"
+#include "pairs.glsl"
 #include "instances.glsl"
 #include "count.glsl"
 
@@ -12,6 +13,7 @@ Point first_hit(vec2 at) {
   point.inside = vec4(0.0, 0.0, 0.0, kInfinity);
   point.what = uvec4(0);
   ViewRay ray = camera_ray(at);
+  Pair direction = exact_direction();
   // Every instance has a start of its own; that of the nearest so far lies at this depth, and the hit `nearest` behind.
   // Differences of depths are exact.
   float scale = length_a_depth(at);
@@ -21,24 +23,32 @@ Point first_hit(vec2 at) {
   for (int i = next_instance(kInfinity); i >= 0;
        i = next_instance((depth - frame().view_depth) * scale + nearest)) {
     Placed placed = placed_at(i);
-    GridRay in_grid = camera_ray_in(placed, at);
+    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
+    ExactRay exact = exact_ray_in(placed, direction);
+    float moved_t;
+    int moved;
+    if (!move_to_bounds(tree, placed, exact, moved_t, moved)) continue;
+    GridRay in_grid = rounded(placed, exact, placed.start.w * scale);
     float limit = (depth - placed.start.w) * scale + nearest;
     float rounding = 1e-6 * max(abs(limit), nearest);
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    float room = limit + rounding;
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room) || !find_voxel(room)) continue;
+    float room = limit + rounding - moved_t;
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved) || !find_voxel(room)) continue;
+    float found_t = moved_t + walk_t;
     // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
-    bool is_equal = point.voxel.w >= 0 && abs(walk_t - limit) <= rounding;
-    if (is_equal ? i > point.voxel.w : walk_t > limit) continue;
+    bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
+    if (is_equal ? i > point.voxel.w : found_t > limit) continue;
     depth = placed.start.w;
-    nearest = walk_t;
-    float t = in_grid.t + walk_t;
-    bool is_inside = walk_axis < 0 && placed.start.w == 0.0;
+    nearest = found_t;
+    float t = in_grid.t + found_t;
+    bool is_inside = walk_axis < 0;
     point.voxel = ivec4(walk_voxel, i);
     uint face = face_found();
-    precise vec3 position = ray_origin + walk_t * ray_direction;
-    point.inside = vec4(position - vec3(walk_voxel - ray_base), t);
-    point.what = uvec4(type_found(), face, is_inside ? kUnlit : kSurface, floatBitsToUint(walk_t));
+    point.inside.w = t;
+    point.what = uvec4(type_found(), face, is_inside ? kUnlit : kSurface, floatBitsToUint(found_t));
+  }
+  // Inside a voxel the place does not count.
+  if (point.voxel.w >= 0 && point.what.z == kSurface) {
+    point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);
   }
   return point;
 }

@@ -16,6 +16,7 @@ vec3 ray_inverse;
 vec3 ray_sign;
 bvec3 ray_forward;
 bvec3 ray_still;
+bool ray_is_moved;
 ivec3 walk_low;  // the tree's bounds
 ivec3 walk_high;
 float walk_exit_t;
@@ -55,7 +56,8 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   bvec3 moves = not(ray_still);
   bvec3 is_short =
       both(either(lessThan(ahead_t, now), both(equal(ahead_t, now), goes_first)), moves);
-  bvec3 was_inside = both(ray_forward, lessThanEqual(behind, ray_origin));
+  bvec3 started_in = ray_is_moved ? lessThan(behind, ray_origin) : lessThanEqual(behind, ray_origin);
+  bvec3 was_inside = both(ray_forward, started_in);
   bvec3 comes_later = axis < 0 ? bvec3(false) : greaterThan(ivec3(0, 1, 2), ivec3(axis));
   bvec3 is_far = both(both(either(lessThan(now, behind_t), both(equal(behind_t, now), comes_later)), moves),
                       both(not(was_inside), not(is_short)));
@@ -64,7 +66,9 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
 }
 
 // Puts a ray at its start, or where it enters the tree's bounds; false when it misses them.
-bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t) {
+//
+// `moved`: the axis of the bounds' plane to which it was moved before; -1 for a ray that starts where it is.
+bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t, int moved) {
   if (any(greaterThanEqual(tree.low.xyz, tree.high.xyz))) return false;
   ivec3 whole = ivec3(clamp(floor(origin), vec3(-1e9), vec3(1e9)));
   ivec3 shift = whole & ~63;
@@ -83,7 +87,11 @@ bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t)
   bvec3 is_high = lessThanEqual(high, ray_origin);
   bvec3 backward = not(ray_forward);
   bvec3 before = both(either(both(ray_forward, is_low), both(backward, is_high)), not(ray_still));
-  bvec3 past = either(either(both(ray_forward, is_high), both(backward, is_low)), both(ray_still, is_high));
+  bvec3 entered = equal(ivec3(0, 1, 2), ivec3(moved));
+  before = either(before, entered);
+  bvec3 past = both(either(both(ray_forward, is_high), both(backward, is_low)), not(entered));
+  past = either(past, both(ray_still, is_high));
+  ray_is_moved = moved >= 0;
   if (any(past)) return false;
   precise vec3 near_t = (mix(high, low, ray_forward) - ray_origin) * ray_inverse;
   near_t = mix(vec3(-1.0), near_t, before);
