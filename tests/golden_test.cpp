@@ -14,66 +14,16 @@
 
 #include "io/glb_for_tests.h"
 #include "tests/golden_for_tests.h"
+#include "tests/golden_views.h"
 
 namespace quoin {
 
 namespace {
 
-constexpr int kWidth = 320;
-constexpr int kHeight = 180;
-constexpr std::int64_t kPixels = kWidth * kHeight;
-
-/// Axes as everywhere, +Y up; the terrain fills 128 x 64 x 128 voxels from the origin, two chunks along x and z.
-struct GoldenView {
-  const char* name;
-  DVec3 position;
-  DVec3 target;
-  double fov_degrees;
-  DVec3 sun;
-};
-
-void PrintTo(const GoldenView& view, std::ostream* out) {
-  *out << view.name;
-}
-
-const DVec3 kUsualSun = LightOptions{}.sun;
-/// From behind the ridge, so that its shadow falls over the slope and the water before it.
-const DVec3 kLowSun{-1.0, 0.9, -0.5};
-
-const std::array<GoldenView, 7> kViews = {{
-    {"front", {64, 60, 230}, {64, 20, 64}, 38, kUsualSun},
-    {"corner", {175, 90, 175}, {63, 12, 63}, 42, kUsualSun},
-    {"top_down", {64, 240, 64}, {64, 0, 64}, 36, kUsualSun},
-    {"boundary", {84, 62, 112}, {62, 22, 64}, 55, kUsualSun},  // the border at x = 64 runs through the middle
-    {"edge", {150, 40, 140}, {118, 14, 100}, 50, kUsualSun},
-    {"shadow", {110, 50, 150}, {60, 16, 70}, 45, kLowSun},
-    {"ao", {74, 44, 104}, {48, 16, 74}, 55, kUsualSun},
-}};
+using namespace golden;
 
 const GoldenView& view_called(const std::string& name) {
   return *std::find_if(kViews.begin(), kViews.end(), [&](const GoldenView& view) { return view.name == name; });
-}
-
-Grid terrain(VoxelRegistry& types) {
-  const TerrainOptions options{.seed = 42, .size = {4, 2, 4}};
-  return generate_terrain(options, add_terrain_types(types).value()).value();
-}
-
-Scene scene_of(VoxelRegistry types, Grid grid) {
-  Scene scene;
-  scene.types = std::move(types);
-  SceneGrid placed;
-  placed.grid = std::move(grid);
-  Instance instance;
-  instance.grid = scene.add_grid(std::move(placed));
-  scene.add_instance(instance);
-  return scene;
-}
-
-Scene terrain_scene() {
-  VoxelRegistry types;
-  Grid grid = terrain(types);
-  return scene_of(std::move(types), std::move(grid));
 }
 
 /// The same terrain without what lies beyond x = 64.
@@ -84,18 +34,8 @@ Scene scene_without_neighbours() {
   return scene_of(std::move(types), std::move(grid));
 }
 
-RenderOptions options_for(const GoldenView& view) {
-  RenderOptions options;
-  options.width = kWidth;
-  options.height = kHeight;
-  options.depth = true;
-  options.light.sun = view.sun;
-  return options;
-}
-
 Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& options) {
-  const Camera camera = look_at(view.position, view.target, view.fov_degrees * std::numbers::pi / 180.0).value();
-  return CpuRenderer(scene).render(camera, options).value();
+  return CpuRenderer(scene).render(camera_for(view), options).value();
 }
 
 GoldenFolders golden_folders() {

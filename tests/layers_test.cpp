@@ -63,10 +63,11 @@ TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
   for (const char* top : {"src", "include/quoin", "apps"}) {
     for (const auto& entry : fs::recursive_directory_iterator(fs::path(QUOIN_SOURCE_DIR) / top)) {
       if (!entry.is_regular_file() || is_test(entry.path())) continue;
-      const std::string folder = entry.path().parent_path().filename().string();
+      const fs::path root = fs::path(QUOIN_SOURCE_DIR) / top;
+      const std::string folder = entry.path().lexically_relative(root).begin()->string();
       const bool is_app = std::string(top) == "apps";
       const auto level = kLevels.find(folder);
-      const bool is_root_header = entry.path().parent_path() == fs::path(QUOIN_SOURCE_DIR) / top;
+      const bool is_root_header = entry.path().parent_path() == root;
       if (!is_app && !is_root_header) {
         ASSERT_NE(level, kLevels.end()) << entry.path() << " lies in no layer";
       }

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -7,6 +9,7 @@
 #include <vector>
 
 #include <quoin/io/picture_files.h>
+#include <quoin/render_vk/vulkan_renderer.h>
 
 #include "tests/tool_for_tests.h"
 
@@ -207,7 +210,11 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--samples 0", "--samples: "},
       {out + "--samples 4097", "--samples: "},
       {out + "--samples 2.5", "--samples: "},
-      {out + "--backend gpu", "--backend: "}};
+      {out + "--backend gpu", "--backend: "},
+      {out + "--device 0", "--device needs --backend vulkan"},
+      {out + "--backend vulkan --device ''", "--device: must be a number or a name"},
+      {out + "--backend vulkan --detail pixels", "--backend vulkan draws everything near"},
+      {out + "--backend vulkan --lod-colours", "--backend vulkan draws everything near"}};
   for (const auto& [arguments, error] : errors) {
     const ToolRun result = run("render " + arguments);
     EXPECT_EQ(result.status, 2) << arguments;
@@ -236,8 +243,7 @@ TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::filesystem::create_directory(folder_.file("folder.png"));
   for (const std::string arguments : {"broken.vox -o out.png", "missing.vox -o out.png", "tiny.vox -o none/out.png",
-                                      "tiny.vox -o folder.png", "tiny.vox -o out.png --depth none/out.pfm",
-                                      "tiny.vox -o out.png --backend vulkan", "tiny.vox -o out.png --device 0"}) {
+                                      "tiny.vox -o folder.png", "tiny.vox -o out.png --depth none/out.pfm"}) {
     const ToolRun result = run("render " + arguments);
     EXPECT_EQ(result.status, 1) << arguments;
     expect_one_error_line(result);
@@ -266,6 +272,48 @@ TEST_F(ToolRender, AFullDiskLeavesNoFile) {
   expect_one_error_line(result);
   EXPECT_TRUE(result.err.starts_with("quoin: d.pfm: ")) << result.err;
   EXPECT_FALSE(exists("d.pfm"));
+}
+
+/// Apart, since drivers keep what sanitizers call leaks.
+class VulkanTool : public ToolRender {};
+
+TEST_F(VulkanTool, ADeviceDrawsTheSamePicture) {
+  const auto devices = vulkan_devices();
+  const ToolRun result = run("render tiny.vox -o device.png --size 160x120 --backend vulkan --json --depth d.pfm");
+  if (!devices) {
+    EXPECT_EQ(result.status, 1);
+    EXPECT_EQ(result.err, "quoin: " + devices.error().message + "\n");
+    GTEST_SKIP() << devices.error().message;
+  }
+  if (std::none_of(devices->begin(), devices->end(), [](const VulkanDevice& d) { return d.missing.empty(); })) {
+    GTEST_SKIP() << devices->front().name << " lacks " << devices->front().missing;
+  }
+  ASSERT_EQ(result.status, 0) << result.err;
+  const Json said = Json::parse(result.out);
+  const Json cpu = drawn("tiny.vox -o cpu.png --size 160x120");
+  EXPECT_EQ(said["backend"], "vulkan");
+  EXPECT_EQ(said["pixels_hit"], cpu["pixels_hit"]);
+  EXPECT_EQ(said["files"], Json({"device.png", "d.pfm"}));
+  const Json named = drawn("tiny.vox -o named.png --size 160x120 --backend vulkan --device '" +
+                           said["device"].get<std::string>() + "'");
+  EXPECT_EQ(named["device"], said["device"]);
+  EXPECT_EQ(bytes("named.png"), bytes("device.png"));
+  const Image a = read_png(folder_.file("device.png")).value();
+  const Image b = read_png(folder_.file("cpu.png")).value();
+  ASSERT_EQ(a.rgb.size(), b.rgb.size());
+  int different = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) different += std::abs(a.rgb[i] - b.rgb[i]) > 2;
+  EXPECT_LE(different, 160 * 120 * 3 / 1000);
+}
+
+TEST_F(VulkanTool, DevicesThatAreNotThereAreOneLineStatus1AndNoFile) {
+  for (const std::string device : {"999", "nobody"}) {
+    const ToolRun result = run("render tiny.vox -o out.png --backend vulkan --device " + device);
+    EXPECT_EQ(result.status, 1) << device;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with("quoin: vulkan: ")) << result.err;
+    EXPECT_FALSE(exists("out.png"));
+  }
 }
 
 TEST_F(ToolRender, ItsHelpHasAnExample) {

@@ -5,6 +5,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
+#include <quoin/render_vk/vulkan_renderer.h>
 
 #include "interrupt.h"
 #include "output.h"
@@ -24,6 +25,7 @@ struct Outcome {
   std::uint64_t bytes = 0;
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   double read = 0, build = 0, trace = 0, write = 0;
+  std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
 };
 
@@ -69,6 +71,37 @@ Status check_input(const std::filesystem::path& path) {
               path.string());
 }
 
+// Takes the picture and puts it, with its times, into the outcome.
+template <class Renderer>
+Status take_picture(Renderer& renderer, const RenderOptions& options, Stopwatch& watch, Outcome& outcome) {
+  outcome.build = watch.lap();
+  ProgressBar bar;
+  auto picture = renderer.render(outcome.camera, options, bar.listener("tracing"));
+  if (!picture) return tl::unexpected<Error>(picture.error());
+  outcome.picture = std::move(*picture);
+  outcome.trace = watch.lap();
+  return {};
+}
+
+Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options, Stopwatch& watch,
+                   Outcome& outcome) {
+  const CpuRenderer renderer(scene, arguments.common.load.hidden, arguments.common.threads);
+  return take_picture(renderer, options, watch, outcome);
+}
+
+Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
+                      Stopwatch& watch, Outcome& outcome) {
+  VulkanOptions vulkan;
+  vulkan.device = arguments.device;
+  auto renderer = VulkanRenderer::create(vulkan);
+  if (!renderer) return tl::unexpected<Error>(renderer.error());
+  outcome.device = renderer->device().name;
+  if (auto updated = renderer->update(scene, arguments.common.load.hidden, arguments.common.threads); !updated) {
+    return updated;
+  }
+  return take_picture(*renderer, options, watch, outcome);
+}
+
 Result<Outcome> render(const RenderArguments& arguments) {
   const bool hidden = arguments.common.load.hidden;
   Stopwatch watch;
@@ -85,17 +118,12 @@ Result<Outcome> render(const RenderArguments& arguments) {
   const auto camera = camera_for(*loaded, arguments);
   if (!camera) return tl::unexpected<Error>(camera.error());
   outcome.camera = *camera;
-  const CpuRenderer renderer(scene, hidden, arguments.common.threads);
-  outcome.build = watch.lap();
-  {
-    ProgressBar bar;
-    RenderOptions options = arguments.render;
-    if (loaded->sun && !arguments.has_sun) options.light.sun = *loaded->sun;
-    auto picture = renderer.render(*camera, options, bar.listener("tracing"));
-    if (!picture) return tl::unexpected<Error>(picture.error());
-    outcome.picture = std::move(*picture);
+  RenderOptions options = arguments.render;
+  if (loaded->sun && !arguments.has_sun) options.light.sun = *loaded->sun;
+  const bool is_vulkan = arguments.backend == "vulkan";
+  if (auto drawn = (is_vulkan ? draw_by_vulkan : draw_by_cpu)(scene, arguments, options, watch, outcome); !drawn) {
+    return tl::unexpected<Error>(drawn.error());
   }
-  outcome.trace = watch.lap();
   warn_of_left_out(scene, hidden, outcome.warnings);
   warn_of_empty_pictures(scene, hidden, outcome.picture, outcome.warnings);
   if (auto written = write_outputs(arguments, outcome); !written) return tl::unexpected<Error>(written.error());
@@ -111,21 +139,23 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   const Camera& camera = outcome.camera;
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
-  return {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
-          {"rays", outcome.picture.rays},
-          {"pixels_hit", outcome.picture.pixels_hit},
-          {"backend", arguments.backend},
-          {"threads", resolve(arguments.common.threads)},
-          {"camera",
-           {{"position", triple(camera.position)},
-            {"forward", triple(camera.forward)},
-            {"up", triple(camera.up)},
-            {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}}},
-          {"bytes", outcome.bytes},
-          {"files", files},
-          {"seconds",
-           {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
-          {"warnings", outcome.warnings}};
+  Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
+               {"rays", outcome.picture.rays},
+               {"pixels_hit", outcome.picture.pixels_hit},
+               {"backend", arguments.backend},
+               {"threads", resolve(arguments.common.threads)},
+               {"camera",
+                {{"position", triple(camera.position)},
+                 {"forward", triple(camera.forward)},
+                 {"up", triple(camera.up)},
+                 {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}}},
+               {"bytes", outcome.bytes},
+               {"files", files},
+               {"seconds",
+                {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
+               {"warnings", outcome.warnings}};
+  if (!outcome.device.empty()) json["device"] = outcome.device;
+  return json;
 }
 
 std::string outcome_text(const Outcome& outcome) {
@@ -136,6 +166,7 @@ std::string outcome_text(const Outcome& outcome) {
                      " pixels show voxels\n";
   text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
           with_thousands(std::llround(per_second)) + " a second\n";
+  if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";
   text += "Wrote ";
   for (const auto& file : outcome.files) text += file.string() + ", ";
   const double seconds = outcome.read + outcome.build + outcome.trace + outcome.write;
@@ -143,14 +174,6 @@ std::string outcome_text(const Outcome& outcome) {
 }
 
 int run_render(const RenderArguments& arguments) {
-  if (!arguments.missing.empty()) {
-    print_error(arguments.missing + " is not supported by this version");
-    return kFailed;
-  }
-  if (arguments.backend != "cpu") {
-    print_error("--backend " + arguments.backend + " is not supported by this version; cpu is");
-    return kFailed;
-  }
   const auto outcome = render(arguments);
   if (!outcome) {
     die_if_interrupted();

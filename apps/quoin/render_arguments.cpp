@@ -97,10 +97,25 @@ void add_detail_options(CLI::App& command, RenderArguments& arguments) {
                    "pixels");
 }
 
-void add_missing_options(CLI::App& command, RenderArguments& arguments) {
-  command.add_option("--backend", arguments.backend, "What draws: cpu (default); vulkan is not in this version")
+void add_backend_options(CLI::App& command, RenderArguments& arguments) {
+  command
+      .add_option("--backend", arguments.backend,
+                  "What draws: cpu, or vulkan, a graphics device, whose pictures are the same but for a pixel here and "
+                  "there (default cpu)")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
-  add_text_option(command, "--device", "N", "Which graphics device draws (not in this version)");
+  command
+      .add_option("--device", arguments.device,
+                  "Which device --backend vulkan uses: its number or a part of its name (default: the best)")
+      ->type_name("NAME|N");
+}
+
+std::string fault_of_backend(const CLI::App& command, const RenderArguments& arguments) {
+  const bool is_vulkan = arguments.backend == "vulkan";
+  if (command.count("--device") > 0 && !is_vulkan) return "--device needs --backend vulkan";
+  if (command.count("--device") > 0 && arguments.device.empty()) return "--device: must be a number or a name";
+  const bool has_detail = command.count("--detail") > 0 ? arguments.detail != "near" : arguments.render.detail_colours;
+  if (is_vulkan && has_detail) return "--backend vulkan draws everything near: no --detail but near, no --lod-colours";
+  return "";
 }
 
 bool has_ending(const std::filesystem::path& path, const std::string& ending) {
@@ -190,15 +205,15 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::Range(1, kMostSamples));
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
   add_detail_options(command, arguments);
-  add_missing_options(command, arguments);
+  add_backend_options(command, arguments);
 }
 
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
-  for (const std::string& fault : {read_texts(command, arguments), fault_of_files(arguments),
-                                   fault_of_camera(command, arguments), fault_of_light(command, arguments)}) {
+  for (const std::string& fault :
+       {read_texts(command, arguments), fault_of_files(arguments), fault_of_camera(command, arguments),
+        fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
     if (!fault.empty()) return fault;
   }
-  if (command.count("--device") > 0) arguments.missing = "--device";
   if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";
   if (arguments.detail != "near") {
     arguments.render.detail.emplace().rule =

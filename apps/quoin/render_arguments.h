@@ -28,8 +28,8 @@ struct RenderArguments {
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";
   std::string backend = "cpu";
+  std::string device;  ///< as VulkanOptions::device
   std::string detail = "near";
-  std::string missing;  ///< an option that this version does not have; empty when none was given
 };
 
 /// Adds the command's options, which fill in what CLI11 can read by itself.

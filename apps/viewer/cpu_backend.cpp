@@ -19,6 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {8, 4, 2, 1};
+constexpr double kImpostorSeconds = 0.01;
 constexpr int kSampleFactor = 4;
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
 
@@ -50,6 +51,8 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
   options.samples = stage.samples;
   options.light = request.light;
   options.threads = threads;
+  // What is shown for a moment does not wait for impostors.
+  if (stage.divisor > 1) options.impostor_seconds = kImpostorSeconds;
   if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;
 }

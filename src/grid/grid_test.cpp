@@ -299,5 +299,18 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
 }
 
+TEST(Grid, ItsIdentityGoesWithTheVoxelsAndIsNoOthers) {
+  Grid grid;
+  const std::uint64_t identity = grid.identity();
+  grid.set({1, 2, 3}, 1);
+  EXPECT_EQ(grid.identity(), identity) << "an edit raises the version alone";
+  EXPECT_NE(grid.clone().identity(), identity);
+  EXPECT_NE(Grid().identity(), identity);
+  Grid other = std::move(grid);
+  EXPECT_EQ(other.identity(), identity);
+  other = Grid();
+  EXPECT_NE(other.identity(), identity);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -3,33 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
-#include <limits>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "light/corner_light.h"
 #include "light/glass.h"
+#include "light/light_model.h"
 
 namespace quoin {
 namespace {
 
-constexpr double kLift = 0.01;  // voxels
-constexpr float kAmbient = 0.15F;
-constexpr float kAmbientWithoutOcclusion = 0.10F;
-constexpr float kLeastOfAll = 0.25F;  // what full occlusion leaves when it darkens everything
-
 std::size_t index_of(Direction face) {
   return static_cast<std::size_t>(face);
-}
-
-// Linear.
-Vec3 colour_of_detail(Detail detail, int halvings) {
-  if (detail == Detail::Near) return {0.10F, 0.55F, 0.12F};
-  if (detail == Detail::Far) return {0.08F, 0.20F, 0.75F};
-  const float share = static_cast<float>(halvings - 1) / static_cast<float>(kCoarsestHalving - 1);
-  return {0.85F, 0.70F - 0.50F * std::clamp(share, 0.0F, 1.0F), 0.03F};
 }
 
 void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
@@ -100,16 +86,13 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       surfaces_(&surfaces),
       options_(options),
       directions_(options.occlusion_rays),
-      // Never infinite: that times black is not a number.
-      exposure_(static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()))) {
-  // Scaled first: the square of a very small or large number is 0 or infinite.
-  const DVec3 size = glm::abs(options.sun);
-  const DVec3 to_sun = glm::normalize(options.sun / std::max({size.x, size.y, size.z}));
+      exposure_(exposure_of(options)) {
+  const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : view.tracer().placed()) {
     if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.halvings);
     Frame& frame = frames_.emplace_back();
     frame.voxels_per_cell = placed.voxels_per_cell();
-    frame.to_sun = glm::transpose(placed.world_axes) * to_sun;
+    frame.to_sun = glm::transpose(placed.world_axes) * sun;
     for (const Direction face : kDirections) {
       const double cosine = glm::dot(DVec3(normal_of(face)), frame.to_sun);
       frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0));
@@ -132,7 +115,7 @@ std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec
     while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
       const SurfacePoint& next = points[order[begin + group.size]];
       if (group.size > 0 && next.placed != group.placed) break;
-      group.add(next, kLift / voxels_per_cell(next.placed));
+      group.add(next, kRayLift / voxels_per_cell(next.placed));
     }
     rays += light_group(group, lit);
     for (std::size_t i = 0; i < group.size; ++i) colours[order[begin + i]] = lit[i];

@@ -27,14 +27,18 @@ class OcclusionDirections {
   /// Requires: not `is_fixed`. `hash`: of the pixel.
   [[nodiscard]] DVec3 spread(std::size_t face, int ray, std::uint32_t hash) const;
 
- private:
-  int count_;
-  bool is_fixed_;
-  std::array<std::array<DVec3, 9>, 6> fixed_{};
+  /// What `spread` is made of: the rings' angles, and those by which pixels turn them; empty where it is not.
   struct Angle {
     double cosine;
     double sine;
   };
+  [[nodiscard]] const std::vector<Angle>& ring_angles() const { return ring_angles_; }
+  [[nodiscard]] const std::vector<Angle>& turns() const { return turns_; }
+
+ private:
+  int count_;
+  bool is_fixed_;
+  std::array<std::array<DVec3, 9>, 6> fixed_{};
   std::vector<Angle> ring_angles_;
   std::vector<Angle> turns_;
 };

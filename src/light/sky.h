@@ -6,23 +6,27 @@
 
 namespace quoin {
 
+/// In linear light. `kGroundBegins`, `kGroundIsFull`: the y of unit directions.
+namespace sky {
+constexpr Vec3 kZenith{0.145F, 0.335F, 0.700F};
+constexpr Vec3 kHorizon{0.640F, 0.780F, 0.900F};
+constexpr Vec3 kGround{0.400F, 0.410F, 0.430F};
+constexpr float kGroundBegins = -0.02F;
+constexpr float kGroundIsFull = -0.60F;
+}  // namespace sky
+
 /// The backdrop in linear light: paler towards the horizon, with ground that fades in below it. A picture's exposure
 /// does not change it, so that a scene can be made brighter without the sky burning out.
 ///
 /// `up`: the y of a unit direction.
 [[nodiscard]] inline Vec3 sky_colour(float up) {
-  constexpr float kGroundBegins = -0.02F;
-  constexpr float kGroundIsFull = -0.60F;
-  const Vec3 zenith{0.145F, 0.335F, 0.700F};
-  const Vec3 horizon{0.640F, 0.780F, 0.900F};
-  const Vec3 ground{0.400F, 0.410F, 0.430F};
   const float y = std::clamp(up, -1.0F, 1.0F);
   if (y >= 0.0F) {
     const float low = (1.0F - y) * (1.0F - y);
-    return zenith + (horizon - zenith) * (low * (1.0F - 0.5F * y));
+    return sky::kZenith + (sky::kHorizon - sky::kZenith) * (low * (1.0F - 0.5F * y));
   }
-  const float s = std::clamp((kGroundBegins - y) / (kGroundBegins - kGroundIsFull), 0.0F, 1.0F);
-  return horizon + (ground - horizon) * (s * s * (3.0F - 2.0F * s));
+  const float s = std::clamp((sky::kGroundBegins - y) / (sky::kGroundBegins - sky::kGroundIsFull), 0.0F, 1.0F);
+  return sky::kHorizon + (sky::kGround - sky::kHorizon) * (s * s * (3.0F - 2.0F * s));
 }
 
 }  // namespace quoin

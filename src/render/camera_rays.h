@@ -31,6 +31,16 @@ class CameraRays {
   /// which are all parallel, show the sky that a perspective camera of 50 degrees would see there.
   [[nodiscard]] float sky_up(const RayPacket& rays, std::size_t lane) const;
 
+  // For renderers that make rays elsewhere: pixel (x, y) lies at corner + x right + y down, a perspective camera's at
+  // a distance of 1.
+  [[nodiscard]] bool is_perspective() const { return is_perspective_; }
+  [[nodiscard]] DVec3 forward() const { return forward_; }
+  [[nodiscard]] DVec3 right() const { return right_; }
+  [[nodiscard]] DVec3 down() const { return down_; }
+  [[nodiscard]] DVec3 corner() const { return corner_; }
+  /// Orthographic: turns the way from the picture's middle into the tangent of an angle.
+  [[nodiscard]] double sky_scale() const { return sky_scale_; }
+
  private:
   int width_;
   int height_;

@@ -2,58 +2,18 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <optional>
 #include <vector>
 
-#include <glm/geometric.hpp>
-
+#include "render/far_impostors.h"
 #include "render/impostor_pass.h"
-#include "render/impostor_shelf.h"
+#include "render/picture_request.h"
 #include "render/tile.h"
 
 namespace quoin {
 namespace {
-
-constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
-
-Status check_camera(const Camera& camera) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
-  if (!is_finite(camera.position)) return refuse("camera: position must be finite");
-  for (const DVec3 axis : {camera.right, camera.up, camera.forward}) {
-    if (!(std::abs(glm::dot(axis, axis) - 1.0) < 1e-3)) return refuse("camera: directions must be unit vectors");
-  }
-  if (camera.projection == Camera::Projection::Perspective) {
-    if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
-      return refuse("camera: field of view must be more than 0 and less than pi radians (180 degrees)");
-    }
-  } else if (!(camera.view_height > 0.0) || !std::isfinite(camera.view_height)) {
-    return refuse("camera: view height must be finite and more than 0");
-  }
-  return {};
-}
-
-Status check(const Camera& camera, const RenderOptions& options) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
-  if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
-  if (std::int64_t{options.width} * options.height > kMostPixels) {
-    return refuse("size: more than 268,435,456 pixels");
-  }
-  if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
-  if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
-  return check(options.light);
-}
-
-Picture empty_picture(const RenderOptions& options) {
-  const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  Picture picture;
-  picture.colour = {options.width, options.height, std::vector<std::uint8_t>(3 * pixels)};
-  if (options.depth) picture.depth = {options.width, options.height, std::vector<float>(pixels)};
-  return picture;
-}
 
 // Counts what is done and tells the listener, one call at a time: after each sample of a tile, since a tile of many
 // samples can take minutes.
@@ -104,40 +64,25 @@ struct CpuRenderer::Impl {
     return selected;
   }
 
-  // The impostors of the far ones among the selected, which then stay whole where they are traced: shadows onto what
-  // an impostor shows are those of its voxels.
-  std::vector<FarInstance> take_impostors(std::span<SelectedInstance> selected, const RenderOptions& options) {
-    std::vector<const PlacedGrid*> placed;
-    std::vector<SelectedInstance*> far;
-    auto next = tracer.placed().begin();
-    for (SelectedInstance& choice : selected) {
-      if (choice.detail != Detail::Far) continue;
-      next = std::lower_bound(next, tracer.placed().end(), choice.instance,
-                              [](const PlacedGrid& grid, InstanceHandle handle) { return grid.instance < handle; });
-      if (next == tracer.placed().end()) break;
-      if (next->instance != choice.instance) continue;
-      placed.push_back(&*next);
-      far.push_back(&choice);
-    }
-    const std::vector<const Impostor*> taken =
-        impostors->take(scene->types, placed, options.threads, options.instructions);
-    std::vector<FarInstance> instances;
-    for (std::size_t i = 0; i < far.size(); ++i) {
-      if (taken[i] == nullptr) continue;
-      far[i]->halvings = 0;
-      instances.push_back({far[i]->instance, taken[i]});
-    }
-    return instances;
-  }
-
   const Scene* scene;
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
-  std::unique_ptr<ImpostorShelf> impostors = std::make_unique<ImpostorShelf>();
+  ImpostorCache impostors{{FarImpostors::kMostBytes}};
 };
 
 namespace {
+
+// Those with impostors stay whole where they are traced: shadows onto what an impostor shows are those of its voxels.
+void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected) {
+  auto next = far.begin();
+  for (SelectedInstance& choice : selected) {
+    if (next == far.end()) return;
+    if (choice.instance != next->instance) continue;
+    choice.halvings = 0;
+    ++next;
+  }
+}
 
 // What a picture is taken of.
 struct Subject {
@@ -165,20 +110,22 @@ const SceneTracer& CpuRenderer::tracer() const {
 }
 
 void CpuRenderer::update(Threads threads) {
-  const bool are_grids_other = impl_->tracer.update(threads);
+  impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);
-  if (are_grids_other) impl_->impostors = std::make_unique<ImpostorShelf>();
+  impl_->impostors.look_at_types(impl_->scene->types);
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
   std::vector<SelectedInstance> selected = impl_->select(camera, options);
-  const std::vector<FarInstance> far = impl_->take_impostors(selected, options);
+  const FarImpostors far =
+      take_impostors(impl_->impostors, *impl_->scene, selected, options.impostor_seconds, options.threads);
+  keep_whole(far.instances, selected);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position, options.instructions);
-  subject.leave_to_impostors(far, camera, options);
+  subject.leave_to_impostors(far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);

@@ -1,17 +1,27 @@
 #include <quoin/render/impostor_cache.h>
 
+#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 namespace quoin {
 namespace {
 
+// Which voxels an impostor was made of.
+struct Origin {
+  std::uint64_t identity = 0;  // of the grid
+  std::uint64_t version = 0;
+  std::uint64_t types = 0;  // how often the transparency of types had changed
+  bool operator==(const Origin&) const = default;
+};
+
 struct Entry {
   std::shared_ptr<const Impostor> impostor;  // null until the first is ready
-  std::uint64_t version = 0;                 // of the grid, when it was taken
+  Origin origin;
   std::uint64_t last_use = 0;
   bool is_waiting = false;
 };
@@ -25,7 +35,9 @@ struct ImpostorCache::Impl {
   std::deque<GridHandle> waiting;
   ImpostorCacheStatistics statistics;
   std::uint64_t built_bytes = 0;
-  std::uint64_t round = 0;  // of build_some
+  std::vector<bool> is_opaque;      // types, when they were looked at
+  std::uint64_t types_changed = 0;  // how often
+  std::uint64_t round = 0;          // of build_some
 
   std::optional<GridHandle> take_waiting() {
     const std::lock_guard lock(mutex);
@@ -80,7 +92,23 @@ struct ImpostorCache::Impl {
     return false;
   }
 
-  void put(GridHandle grid, std::uint64_t version, std::shared_ptr<const Impostor> made) {
+  // Requires: the lock.
+  [[nodiscard]] Origin origin_of(const Grid& grid) const { return {grid.identity(), grid.version(), types_changed}; }
+
+  void look_at(const VoxelRegistry& types) {
+    std::vector<bool> now(types.size());
+    for (std::size_t type = 0; type < now.size(); ++type) now[type] = types.is_opaque(static_cast<VoxelType>(type));
+    const std::lock_guard lock(mutex);
+    // Types that were added since are of no impostor yet.
+    for (std::size_t type = 0; type < std::min(now.size(), is_opaque.size()); ++type) {
+      if (now[type] == is_opaque[type]) continue;
+      ++types_changed;
+      break;
+    }
+    is_opaque = std::move(now);
+  }
+
+  void put(GridHandle grid, const Origin& origin, std::shared_ptr<const Impostor> made) {
     const std::lock_guard lock(mutex);
     const auto entry = entries.try_emplace(grid).first;
     const std::size_t bytes = made->bytes();
@@ -94,7 +122,7 @@ struct ImpostorCache::Impl {
     }
     ++statistics.held;
     statistics.bytes += bytes;
-    entry->second = {std::move(made), version, entry->second.last_use, false};
+    entry->second = {std::move(made), origin, entry->second.last_use, false};
   }
 
   void forget_missing(const Scene& scene) {
@@ -110,7 +138,12 @@ struct ImpostorCache::Impl {
     const SceneGrid* grid = scene.grids().find(handle);
     if (grid == nullptr) return forget(handle);
     if (!has_room(handle)) return;
-    put(handle, grid->grid.version(), std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
+    Origin origin;
+    {
+      const std::lock_guard lock(mutex);
+      origin = origin_of(grid->grid);
+    }
+    put(handle, origin, std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
   }
 };
 
@@ -124,11 +157,10 @@ ImpostorCache::~ImpostorCache() = default;
 std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHandle grid) {
   const SceneGrid* named = scene.grids().find(grid);
   if (named == nullptr) return nullptr;
-  const std::uint64_t version = named->grid.version();
   const std::lock_guard lock(impl_->mutex);
   Entry& entry = impl_->entries[grid];
   entry.last_use = impl_->round;
-  if ((entry.impostor == nullptr || entry.version != version) && !entry.is_waiting) {
+  if ((entry.impostor == nullptr || entry.origin != impl_->origin_of(named->grid)) && !entry.is_waiting) {
     entry.is_waiting = true;
     impl_->waiting.push_back(grid);
   }
@@ -138,6 +170,7 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
 std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds, Threads threads) {
   using Clock = std::chrono::steady_clock;
   const auto begin = Clock::now();
+  impl_->look_at(scene.types);
   const auto is_over = [&] { return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds); };
   const std::size_t count = resolve(threads);
   parallel_for(count, threads, [&](std::size_t i) {
@@ -152,6 +185,10 @@ std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds,
   impl_->forget_missing(scene);
   const std::lock_guard lock(impl_->mutex);
   return impl_->waiting.size();
+}
+
+void ImpostorCache::look_at_types(const VoxelRegistry& types) {
+  impl_->look_at(types);
 }
 
 ImpostorCacheStatistics ImpostorCache::statistics() const {

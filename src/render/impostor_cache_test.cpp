@@ -65,6 +65,28 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_EQ(cache.statistics().bytes, renewed->bytes());
 }
 
+TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
+  World world(1);
+  ImpostorCache cache;
+  const auto ready = [&] {
+    static_cast<void>(cache.find(world.scene, world.grids[0]));
+    EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+    return cache.find(world.scene, world.grids[0]);
+  };
+  const auto first = ready();
+  EXPECT_EQ(ready(), first) << "nothing has changed";
+  Grid other;
+  other.fill_box({0, 0, 0}, {0, 2, 3}, 3);
+  world.scene.grids()[world.grids[0]].grid = std::move(other);
+  const auto second = ready();
+  EXPECT_TRUE(shows(*second, 3)) << "of the same version as the one before";
+  VoxelProperties glass = world.scene.types[3];
+  glass.visibility = Visibility::Transparent;
+  world.scene.types.replace(3, glass);
+  cache.look_at_types(world.scene.types);
+  EXPECT_TRUE(ready()->is_empty());
+}
+
 TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   World world(3);
   const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();

@@ -364,6 +364,21 @@ TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
   EXPECT_EQ(one.depth.values, four.depth.values);
 }
 
+TEST(RenderFar, WhatIsNotReadyInTimeIsTraced) {
+  const World world(Model::Castle);
+  RenderOptions options = sized(148, 148);
+  const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
+  const CpuRenderer renderer(world.scene);
+  const Picture truth = renderer.render(camera, options).value();
+  options.detail = DetailPolicy{};
+  options.impostor_seconds = 0.0;
+  EXPECT_EQ(renderer.render(camera, options)->colour.rgb, truth.colour.rgb);
+  options.impostor_seconds = std::numeric_limits<double>::infinity();
+  EXPECT_NE(renderer.render(camera, options)->colour.rgb, truth.colour.rgb) << "occlusion is that of whole faces";
+  options.impostor_seconds = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(renderer.render(camera, options).has_value());
+}
+
 TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   World world(Model::Castle);
   Instance ground = world.placed();

@@ -16,12 +16,20 @@ Frustum::Frustum(const Camera& camera, int width, int height) {
     if (is_perspective) {
       // Perpendicular to the edge's own ray, in the plane of it and the axis.
       const DVec3 ray = camera.forward + edges[i];
-      planes_[i] = {glm::normalize(ray * glm::dot(outward, ray) - outward * glm::dot(ray, ray)), 0.0};
+      set(i, glm::normalize(ray * glm::dot(outward, ray) - outward * glm::dot(ray, ray)), 0.0);
     } else {
-      planes_[i] = {-outward, -glm::length(edges[i])};
+      set(i, -outward, -glm::length(edges[i]));
     }
   }
-  planes_[4] = {glm::normalize(camera.forward), 0.0};
+  for (const std::size_t plane : {4U, 5U}) set(plane, glm::normalize(camera.forward), 0.0);
+}
+
+void Frustum::set(std::size_t plane, DVec3 inward, double offset) {
+  Planes& planes = planes_[plane / 2];
+  planes.x[plane % 2] = inward.x;
+  planes.y[plane % 2] = inward.y;
+  planes.z[plane % 2] = inward.z;
+  planes.offset[plane % 2] = offset;
 }
 
 }  // namespace quoin

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 #include <quoin/core/vec.h>
 #include <quoin/scene/camera.h>
@@ -23,20 +25,25 @@ class Frustum {
     // Room for rounding, of far centres too.
     constexpr double kRoom = 1e-9;
     const double reach = radius + kRoom * (radius + std::abs(centre.x) + std::abs(centre.y) + std::abs(centre.z));
-    bool is_out = false;
-    for (const Plane& plane : planes_) {
-      const DVec3& inward = plane.inward;
-      is_out |= inward.x * centre.x + inward.y * centre.y + inward.z * centre.z < plane.offset - reach;
+    TwoBits is_out{};
+    for (const Planes& planes : planes_) {
+      const Two along = planes.x * centre.x + planes.y * centre.y + planes.z * centre.z;
+      is_out |= along < planes.offset - reach;
     }
-    return !is_out;
+    return (is_out[0] | is_out[1]) == 0;
   }
 
  private:
-  struct Plane {
-    DVec3 inward{0.0};    ///< unit
-    double offset = 0.0;  ///< points p with dot(inward, p) >= offset are inside
+  using Two = double __attribute__((vector_size(16)));
+  using TwoBits = std::int64_t __attribute__((vector_size(16)));
+  /// Points p with dot(inward, p) >= offset are inside; `inward` is unit.
+  struct Planes {
+    Two x{}, y{}, z{};
+    Two offset{};
   };
-  std::array<Plane, 5> planes_;
+  void set(std::size_t plane, DVec3 inward, double offset);
+
+  std::array<Planes, 3> planes_;  // the last one twice
 };
 
 }  // namespace quoin

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <glm/geometric.hpp>
 
@@ -15,9 +16,10 @@ namespace {
 // As many as keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
   static_assert(kCoarsestHalving == 4);
-  int halvings = 0;
-  for (const double cell : {2.0, 4.0, 8.0, 16.0}) halvings += static_cast<int>(cell * voxel_pixels <= policy.cell_pixels);
-  return halvings;
+  // Halves and doubles are exact: 16 sizes within the limit are one within its sixteenth.
+  const double cell = policy.cell_pixels;
+  return static_cast<int>(voxel_pixels <= 0.5 * cell) + static_cast<int>(voxel_pixels <= 0.25 * cell) +
+         static_cast<int>(voxel_pixels <= 0.125 * cell) + static_cast<int>(voxel_pixels <= 0.0625 * cell);
 }
 
 // What the camera's picture makes of lengths.
@@ -114,7 +116,17 @@ struct DetailSelector::Impl {
   std::vector<Content> contents;  // by the grids' slots
   std::vector<Choice> choices;    // by the instances' slots
 
+  // An instance whose content meets the picture's frustum.
+  struct Seen {
+    InstanceHandle instance;
+    DVec3 centre{0.0};  // of the content, from the camera
+    double radius = 0.0;
+    double voxel_size = 0.0;
+  };
+  std::vector<Seen> seen;  // room for every instance
+
   void look_at_grids(const Scene& scene);
+  std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum, bool hidden);
   Choice choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
                 const DetailPolicy& policy);
 };
@@ -133,6 +145,28 @@ void DetailSelector::Impl::look_at_grids(const Scene& scene) {
     content.is_there = content.sphere.radius > 0.0;
     content.from_pivot = content.sphere.centre - grid.pivot;
   });
+}
+
+// Instances are written before it is known whether they are seen: no processor guesses that (a tenth of the time).
+std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instances(const Scene& scene, DVec3 camera,
+                                                                                    const Frustum& frustum,
+                                                                                    bool hidden) {
+  if (seen.size() < scene.instances().size()) seen.resize(scene.instances().size());
+  std::size_t count = 0;
+  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    if (instance.grid.index >= contents.size() || !(instance.visible || hidden)) return;
+    const Content& content = contents[instance.grid.index];
+    const double voxel_size = instance.voxel_size;
+    if (!content.is_there || content.generation != instance.grid.generation || !(voxel_size > 0.0)) return;
+    DVec3 offset = content.from_pivot * voxel_size;
+    if (instance.mirrored) offset.x = -offset.x;
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 centre = (instance.position - camera) + unit_rotation(instance.rotation) * offset;
+    const double radius = content.sphere.radius * voxel_size;
+    seen[count] = {handle, centre, radius, voxel_size};
+    count += static_cast<std::size_t>(is_finite(centre + radius) && frustum.meets(centre, radius));
+  });
+  return {seen.data(), count};
 }
 
 Choice DetailSelector::Impl::choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
@@ -163,23 +197,12 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
   impl_->look_at_grids(scene);
   const Frustum frustum(camera, width, height);
   const PixelScale pixels(camera, height);
-  const std::vector<Impl::Content>& contents = impl_->contents;
-  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
-    if (instance.grid.index >= contents.size() || !(instance.visible || policy.hidden)) return;
-    const Impl::Content& content = contents[instance.grid.index];
-    const double voxel_size = instance.voxel_size;
-    if (!content.is_there || content.generation != instance.grid.generation || !(voxel_size > 0.0)) return;
-    DVec3 offset = content.from_pivot * voxel_size;
-    if (instance.mirrored) offset.x = -offset.x;
-    // The difference of two far positions is taken first: it is small, and mostly exact.
-    const DVec3 centre = (instance.position - camera.position) + unit_rotation(instance.rotation) * offset;
-    const double radius = content.sphere.radius * voxel_size;
-    if (!is_finite(centre + radius) || !frustum.meets(centre, radius)) return;
-    const double distance = glm::length(centre);
-    const ScreenSize size = pixels.of(distance, radius, voxel_size);
-    const Choice choice = impl_->choose(handle, size, distance, radius, policy);
-    out.push_back({handle, choice.detail, choice.halvings, distance});
-  });
+  for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.hidden)) {
+    const double distance = glm::length(seen.centre);
+    const ScreenSize size = pixels.of(distance, seen.radius, seen.voxel_size);
+    const Choice choice = impl_->choose(seen.instance, size, distance, seen.radius, policy);
+    out.push_back({seen.instance, choice.detail, choice.halvings, distance});
+  }
 }
 
 }  // namespace quoin

@@ -53,8 +53,8 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
   SlabScene expected;
   expected.scene.add_instance(expected.instance(unit));
   const SceneTracer expected_tracer(expected.scene);
-  const Ray ray{{0, 0, 60}, glm::normalize(expected.scene.bounds(false).min + expected.scene.bounds(false).max -
-                                           DVec3(0, 0, 120))};
+  const Ray ray{{0, 0, 60},
+                glm::normalize(expected.scene.bounds(false).min + expected.scene.bounds(false).max - DVec3(0, 0, 120))};
   const auto expected_hit = first_hit(expected_tracer, ray);
   ASSERT_TRUE(expected_hit.has_value());
   for (const double length : {1e-300, 1e-160, 1e-5, 0.5, 3.0, -2.0, 1e160, 1e300}) {
@@ -64,7 +64,8 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
     const SceneTracer tracer(world.scene);
     ASSERT_EQ(tracer.placed().size(), 1U);
     for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_LT(glm::distance(tracer.placed()[0].world_axes[axis], expected_tracer.placed()[0].world_axes[axis]), 1e-12);
+      EXPECT_LT(glm::distance(tracer.placed()[0].world_axes[axis], expected_tracer.placed()[0].world_axes[axis]),
+                1e-12);
     }
     const auto hit = first_hit(tracer, ray);
     ASSERT_TRUE(hit.has_value());

@@ -149,8 +149,8 @@ class PacketTree {
   struct Node {
     FourBoxes boxes;
     std::array<std::uint32_t, 4> children{};  // nodes, or indices of boxes
-    std::uint32_t is_box = 0;   // bit by bit: a child is a box, not a node
-    std::uint32_t present = 0;  // likewise: there is a child
+    std::uint32_t is_box = 0;                 // bit by bit: a child is a box, not a node
+    std::uint32_t present = 0;                // likewise: there is a child
   };
   // What is yet to be looked into: a node, or one of its boxes.
   static constexpr std::uint32_t kWhole = 4;

@@ -22,6 +22,7 @@ SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
   auto detailed = std::make_unique<Impl>();
   detailed->scene = impl_->scene;
+  detailed->hidden = impl_->hidden;
   detailed->placed = impl_->placed;
   detailed->has_transparent = impl_->has_transparent;
   std::vector<InstanceTree::Change> halved;
@@ -37,8 +38,7 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
     const CoarseLevel* level = levels.find(grid, choice.halvings);
     if (level == nullptr) continue;
     level->put_in(*next);
-    halved.push_back(
-        {static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});
+    halved.push_back({static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});
   }
   detailed->instances = impl_->instances;
   detailed->instances.change(halved);

@@ -1,5 +1,5 @@
-// scene/update10000: a tracer of 10,000 instances taken to what was changed in the scene: a tenth of the instances moved,
-// one voxel edited, nothing at all, an instance added; beside making it anew. One thread.
+// scene/update10000: a tracer of 10,000 instances taken to what was changed in the scene: a tenth of the instances
+// moved, one voxel edited, nothing at all, an instance added; beside making it anew. One thread.
 
 #include <cmath>
 #include <cstdio>
@@ -27,7 +27,8 @@ void fail_unless(bool holds, const char* what) {
 void expect_up_to_date(const SceneTracer& tracer, const Scene& scene) {
   fail_unless(tracer.placed().size() == static_cast<std::size_t>(kInstances), "an instance is missing");
   for (const PlacedGrid& placed : tracer.placed()) {
-    fail_unless(placed.position == scene.instances()[placed.instance].position, "an instance is not where it should be");
+    fail_unless(placed.position == scene.instances()[placed.instance].position,
+                "an instance is not where it should be");
     fail_unless(placed.opaque->bounds() == placed.grid->grid.bounds(), "a tree is not of its grid");
   }
 }

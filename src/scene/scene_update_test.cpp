@@ -26,12 +26,18 @@ class ChangingScene {
 
   void change() {
     switch (below(14)) {
-      case 0: return add_grid();
-      case 1: return remove_grid();
-      case 2: return add_instance();
-      case 3: return remove_instance();
-      case 4: return replace_grid();
-      case 5: return change_types();
+      case 0:
+        return add_grid();
+      case 1:
+        return remove_grid();
+      case 2:
+        return add_instance();
+      case 3:
+        return remove_instance();
+      case 4:
+        return replace_grid();
+      case 5:
+        return change_types();
       case 6:
         if (SceneGrid* grid = any_grid()) grid->pivot = vector() * 20.0;
         return;

@@ -88,8 +88,8 @@ struct SceneView::Impl {
   std::vector<Affine> grid_from_view;
   std::vector<Affine> view_from_grid;
   DVec3 origin{0.0};
-  PacketTree instances;  // in view space
-  PacketTree seen;       // of these, those that `first_hits` meets, where not all
+  PacketTree instances;                 // in view space
+  PacketTree seen;                      // of these, those that `first_hits` meets, where not all
   std::vector<bool> left_to_impostors;  // none: sees all
   bool is_alone = false;                // there is one instance
   [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }

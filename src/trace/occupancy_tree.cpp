@@ -277,9 +277,8 @@ struct OccupancyTree::Impl {
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
     flat.origin = chunks.min * kChunkEdge;
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
-    flat.bricks.assign(64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
-                           static_cast<std::size_t>(size.z),
-                       0);
+    flat.bricks.assign(
+        64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
     flat_chunks = chunks;
     for (const auto& [chunk, box] : chunk_bounds) flatten(chunk);
   }

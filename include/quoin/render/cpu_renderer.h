@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -26,6 +27,9 @@ struct RenderOptions {
   /// How instances are drawn; without, all are Near. A picture knows nothing of the one before it: there is no
   /// hysteresis. Whether hidden instances are drawn is for the renderer to say, not the policy.
   std::optional<DetailPolicy> detail;
+  /// For how long impostors that are missing, or older than their grid, may be built; grids whose are not ready then
+  /// are traced, or shown as they were. Only without a limit is a picture the same whenever it is taken.
+  double impostor_seconds = std::numeric_limits<double>::infinity();
   /// Instances in colours that tell their detail instead of their own: Near green, Mid yellow to orange the more often
   /// halved, Far blue.
   bool detail_colours = false;
@@ -66,8 +70,9 @@ class CpuRenderer {
   /// then those of a renderer that was built anew.
   ///
   /// Requires: no picture is being taken.
-  /// Cost:     that of SceneTracer::update, and the types' colours; when a grid was edited, impostors are taken again
-  ///           as they are needed.
+  /// Cost:     that of SceneTracer::update, and the types' colours; impostors of edited grids are built anew as they
+  /// are
+  ///           needed.
   void update(Threads threads = {});
 
   /// One picture. The same bytes for any number of threads and any instruction set.

@@ -28,10 +28,11 @@ struct ImpostorCacheStatistics {
 ///   ...
 ///   cache.build_some(scene, 0.002);  // once a frame
 ///
-/// An edit of a grid asks for a new impostor; the old one is answered until that is ready. When there is no room, the
-/// ones that were asked for longest ago are dropped; whoever holds one keeps it alive. What is asked for within one
-/// round, up to the end of a `build_some`, is never dropped for something else of that round, which then has none.
-/// Threads: any number may call `find`, `statistics` and `build_some` at once, as long as nobody edits the scene
+/// An edit of a grid, or another in its place, asks for a new impostor; the old one is answered until that is ready.
+/// When there is no room, the ones that were asked for longest ago are dropped; whoever holds one keeps it alive. What
+/// is asked for within one round, up to the end of a `build_some`, is never dropped for something else of that round,
+/// which then has none. Threads: any number may call `find`, `statistics` and `build_some` at once, as long as nobody
+/// edits the scene
 ///          meanwhile.
 class ImpostorCache {
  public:
@@ -48,6 +49,10 @@ class ImpostorCache {
   /// so that it comes to an end. Answers how many still wait. Grids that are gone are forgotten.
   /// Cost: the time of one impostor beyond the budget, times one for each thread at most.
   std::size_t build_some(const Scene& scene, double budget_seconds, Threads threads = {1});
+
+  /// Has impostors built anew when types became transparent or opaque since they were; `build_some` does it as well.
+  /// Cost: O(types).
+  void look_at_types(const VoxelRegistry& types);
 
   [[nodiscard]] ImpostorCacheStatistics statistics() const;
 

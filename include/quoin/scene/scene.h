@@ -30,13 +30,13 @@ using GridHandle = Handle<SceneGrid>;
 struct Instance {
   std::string name;
   GridHandle grid;
-  DVec3 position{0.0};                 ///< of the grid's pivot, in world units
+  DVec3 position{0.0};  ///< of the grid's pivot, in world units
   /// World from grid. Of any length: what reads it makes it unit, and takes a zero one as no rotation. Where any
   /// number of an instance is not finite, or its size not positive, it is left out of pictures, queries and bounds.
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
-  double voxel_size = 1.0;             ///< world units a voxel; positive
-  bool mirrored = false;               ///< the grid's x is negated (about the pivot) before the rotation
-  bool visible = true;                 ///< false for hidden layers and nodes; such instances are kept, not drawn
+  double voxel_size = 1.0;  ///< world units a voxel; positive
+  bool mirrored = false;    ///< the grid's x is negated (about the pivot) before the rotation
+  bool visible = true;      ///< false for hidden layers and nodes; such instances are kept, not drawn
 };
 
 using InstanceHandle = Handle<Instance>;

@@ -41,21 +41,23 @@ struct PlacedGrid {
 /// The traversal structures of a scene's instances.
 class SceneTracer {
  public:
-  /// `scene` must outlive it in its place; after an edit `update` it before anything else is asked. Left out are instances that are not visible, unless `hidden`; empty grids; and
-  /// those whose numbers are not finite or whose size is not positive.
+  /// `scene` must outlive it in its place; after an edit of it `update` comes before anything else. Left out are
+  /// instances that are not visible, unless `hidden`; empty grids; and instances whose numbers are not finite or whose
+  /// size is not positive.
   /// Cost: O(chunks of the grids that are placed), on several threads.
   explicit SceneTracer(const Scene& scene, bool hidden = false, Threads threads = {});
   SceneTracer(SceneTracer&&) noexcept;
   SceneTracer& operator=(SceneTracer&&) noexcept;
   ~SceneTracer();
 
-  /// Brings it up to date with its scene, whatever happened to that: instances that came, went, moved, turned, showed or
-  /// hid; grids that came, went, were edited or replaced; types that became transparent or opaque. Then it is as one
+  /// Brings it up to date with its scene, whatever happened to that: instances that came, went, moved, turned, showed
+  /// or hid; grids that came, went, were edited or replaced; types that became transparent or opaque. Then it is as one
   /// that was built anew. Grids' dirty chunks (Grid::take_dirty) are left to those who take them. Answers whether grids
   /// that are traced, or their types' transparency, are other than before: what was made of them is then out of date.
   ///
   /// Requires: nothing reads it meanwhile. SceneViews of it and what `with_detail` answered are good no longer.
-  /// Cost:     a glance at every type, grid and instance, some 10 ns each. Of an edited grid that is placed: its chunks'
+  /// Cost:     a glance at every type, grid and instance, some 10 ns each. Of an edited grid that is placed: its
+  /// chunks'
   ///           versions, and OccupancyTree::update for those that changed; of its halved ones only what the edit can
   ///           have changed, when they are next asked for. For an instance that moved: its transform, and its share of
   ///           the tree of instances, which is built anew, O(n log n), when instances come or go or have moved far.
@@ -63,11 +65,12 @@ class SceneTracer {
   /// Threads:  grids are updated on several.
   bool update(Threads threads = {});
 
-  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, or less often
-  /// where that would change the volume of their voxels by more than an eighth. The others, which are out of the picture
-  /// but may cast shadows into it, stay as they are.
+  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, or less
+  /// often where that would change the volume of their voxels by more than an eighth. The others, which are out of the
+  /// picture but may cast shadows into it, stay as they are.
   ///
-  /// This one must outlive the result, without an update. It keeps the halved grids, so that only the first picture pays for them.
+  /// This one must outlive the result, without an update; the result cannot be updated itself but becomes a tracer of
+  /// whole grids by that. It keeps the halved grids, so that only the first picture pays for them.
   /// Threads: any number may call at once.
   [[nodiscard]] SceneTracer with_detail(std::span<const SelectedInstance> selected, Threads threads = {}) const;
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/render/impostor.h>
+#include <quoin/render/impostor_cache.h>
+
+namespace quoin {
+
+/// The far ones among the instances of one picture that have impostors.
+struct FarImpostors {
+  static constexpr std::size_t kMostBytes = std::size_t{1} << 30;  ///< of all grids; those beyond have none
+
+  std::vector<FarInstance> instances;
+  std::map<GridHandle, std::shared_ptr<const Impostor>> kept;  ///< what they point to
+};
+
+/// Has impostors built for what is Far among `selected`, and takes those that are ready when `seconds` have passed.
+///
+/// Without a limit of time it depends on the scene alone which instances have one: grids are taken in the order of the
+/// instances.
+[[nodiscard]] FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene,
+                                          std::span<const SelectedInstance> selected, double seconds, Threads threads);
+
+}  // namespace quoin

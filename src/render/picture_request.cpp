@@ -1,0 +1,51 @@
+#include "render/picture_request.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+namespace quoin {
+namespace {
+
+constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+
+Status check_camera(const Camera& camera) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  if (!is_finite(camera.position)) return refuse("camera: position must be finite");
+  for (const DVec3 axis : {camera.right, camera.up, camera.forward}) {
+    if (!(std::abs(glm::dot(axis, axis) - 1.0) < 1e-3)) return refuse("camera: directions must be unit vectors");
+  }
+  if (camera.projection == Camera::Projection::Perspective) {
+    if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
+      return refuse("camera: field of view must be more than 0 and less than pi radians (180 degrees)");
+    }
+  } else if (!(camera.view_height > 0.0) || !std::isfinite(camera.view_height)) {
+    return refuse("camera: view height must be finite and more than 0");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check(const Camera& camera, const RenderOptions& options) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
+  if (std::int64_t{options.width} * options.height > kMostPixels) {
+    return refuse("size: more than 268,435,456 pixels");
+  }
+  if (std::isnan(options.impostor_seconds)) return refuse("impostor_seconds: must be a number");
+  if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
+  if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
+  return check(options.light);
+}
+
+Picture empty_picture(const RenderOptions& options) {
+  const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  Picture picture;
+  picture.colour = {options.width, options.height, std::vector<std::uint8_t>(3 * pixels)};
+  if (options.depth) picture.depth = {options.width, options.height, std::vector<float>(pixels)};
+  return picture;
+}
+
+}  // namespace quoin

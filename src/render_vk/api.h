@@ -1,0 +1,87 @@
+#pragma once
+
+#define VK_NO_PROTOTYPES
+#include <vulkan/vulkan.h>
+
+#include <quoin/core/result.h>
+
+namespace quoin::vulkan {
+
+// Vulkan is not linked but looked up at run time, so that a program starts where there is none.
+#define QUOIN_VULKAN_OF_LOADER(X) \
+  X(vkCreateInstance)             \
+  X(vkEnumerateInstanceVersion)   \
+  X(vkEnumerateInstanceLayerProperties)
+
+#define QUOIN_VULKAN_OF_INSTANCE(X)      \
+  X(vkDestroyInstance)                   \
+  X(vkCreateDevice)                      \
+  X(vkEnumeratePhysicalDevices)          \
+  X(vkGetDeviceProcAddr)                 \
+  X(vkGetPhysicalDeviceFeatures2)        \
+  X(vkGetPhysicalDeviceMemoryProperties) \
+  X(vkGetPhysicalDeviceProperties)       \
+  X(vkGetPhysicalDeviceQueueFamilyProperties)
+
+#define QUOIN_VULKAN_OF_DEVICE(X)  \
+  X(vkAllocateCommandBuffers)      \
+  X(vkAllocateMemory)              \
+  X(vkBeginCommandBuffer)          \
+  X(vkBindBufferMemory)            \
+  X(vkCmdBindPipeline)             \
+  X(vkCmdCopyBuffer)               \
+  X(vkCmdDispatch)                 \
+  X(vkCmdFillBuffer)               \
+  X(vkCmdPipelineBarrier)          \
+  X(vkCmdPushConstants)            \
+  X(vkCreateBuffer)                \
+  X(vkCreateCommandPool)           \
+  X(vkCreateComputePipelines)      \
+  X(vkCreateFence)                 \
+  X(vkCreatePipelineLayout)        \
+  X(vkCreateShaderModule)          \
+  X(vkDestroyBuffer)               \
+  X(vkDestroyCommandPool)          \
+  X(vkDestroyDevice)               \
+  X(vkDestroyFence)                \
+  X(vkDestroyPipeline)             \
+  X(vkDestroyPipelineLayout)       \
+  X(vkDestroyShaderModule)         \
+  X(vkDeviceWaitIdle)              \
+  X(vkEndCommandBuffer)            \
+  X(vkFreeMemory)                  \
+  X(vkGetBufferDeviceAddress)      \
+  X(vkGetBufferMemoryRequirements) \
+  X(vkGetDeviceQueue)              \
+  X(vkMapMemory)                   \
+  X(vkQueueSubmit)                 \
+  X(vkResetCommandPool)            \
+  X(vkResetFences)                 \
+  X(vkWaitForFences)
+
+/// One of Vulkan's many structures that begin by saying which they are.
+template <class T>
+[[nodiscard]] T info_of(VkStructureType type) {
+  T info{};
+  info.sType = type;
+  return info;
+}
+
+/// Vulkan's functions, as far as they are looked up.
+struct Api {
+  // NOLINTBEGIN(readability-identifier-naming): Vulkan's own names
+  PFN_vkGetInstanceProcAddr vkGetInstanceProcAddr = nullptr;
+#define QUOIN_VULKAN_MEMBER(name) PFN_##name name = nullptr;
+  QUOIN_VULKAN_OF_LOADER(QUOIN_VULKAN_MEMBER)
+  QUOIN_VULKAN_OF_INSTANCE(QUOIN_VULKAN_MEMBER)
+  QUOIN_VULKAN_OF_DEVICE(QUOIN_VULKAN_MEMBER)
+#undef QUOIN_VULKAN_MEMBER
+  // NOLINTEND(readability-identifier-naming)
+
+  /// Those of the loader. Errors: Unsupported when there is none.
+  [[nodiscard]] static Result<Api> load();
+  void load_instance(VkInstance instance);
+  void load_device(VkDevice device);
+};
+
+}  // namespace quoin::vulkan

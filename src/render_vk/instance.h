@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "render_vk/api.h"
+
+namespace quoin::vulkan {
+
+using MessageListener = std::function<void(const std::string&)>;
+
+/// A device that could be used, or the reason why not.
+struct PhysicalDevice {
+  VkPhysicalDevice handle = VK_NULL_HANDLE;
+  VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
+  std::uint32_t queue_family = 0;
+  VulkanDevice description;
+};
+
+/// Vulkan as this program sees it.
+class VulkanInstance {
+ public:
+  /// With `listener` the validation layer is loaded. Errors: Unsupported.
+  [[nodiscard]] static Result<std::unique_ptr<VulkanInstance>> create(MessageListener listener);
+  ~VulkanInstance();
+  VulkanInstance(const VulkanInstance&) = delete;
+  VulkanInstance& operator=(const VulkanInstance&) = delete;
+
+  [[nodiscard]] const Api& api() const { return api_; }
+  [[nodiscard]] const std::vector<PhysicalDevice>& devices() const { return devices_; }
+  /// As VulkanOptions::device says. Errors: Unsupported.
+  [[nodiscard]] Result<PhysicalDevice> choose(const std::string& wanted) const;
+
+ private:
+  explicit VulkanInstance(const Api& api, MessageListener listener) : api_(api), listener_(std::move(listener)) {}
+  Status open();
+  Status list_devices();
+
+  Api api_;
+  MessageListener listener_;
+  VkInstance handle_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  std::vector<PhysicalDevice> devices_;
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <quoin/core/progress.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "render_vk/device_scene.h"
+#include "render_vk/frame.h"
+#include "render_vk/memory.h"
+#include "render_vk/pipelines.h"
+
+namespace quoin::vulkan {
+
+/// One picture, tile by tile: a tile is drawn in device memory and then read.
+class PicturePass {
+ public:
+  PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene)
+      : device_(&device), memory_(&memory), pipelines_(&pipelines), scene_(&scene) {}
+  ~PicturePass();
+  PicturePass(const PicturePass&) = delete;
+  PicturePass& operator=(const PicturePass&) = delete;
+
+  /// As VulkanRenderer::render, of what is right.
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, const Progress& progress);
+
+ private:
+  struct Tile {
+    std::int32_t x, y, width, height;
+  };
+
+  template <class T>
+  Status upload(const std::vector<T>& values, std::uint64_t& address);
+  Status reserve(std::size_t bytes, std::uint64_t& address);
+  Status put_frame(const Camera& camera, const RenderOptions& options);
+  Status make_tile_buffers(const RenderOptions& options);
+  Status take_sample(const Tile& tile, int sample);
+  Status finish_glass(ShaderPush push);
+  Status read_tile(const Tile& tile, Picture& picture);
+  Status read_counters(ShaderCounters& counters);
+  [[nodiscard]] ShaderPush push_for(const Tile& tile) const;
+
+  Device* device_;
+  DeviceMemory* memory_;
+  const Pipelines* pipelines_;
+  const DeviceScene* scene_;
+  std::vector<Place> places_;
+  ShaderFrame frame_;
+  std::uint64_t frame_address_ = 0;
+  std::int32_t tile_edge_ = 0;
+  Buffer output_;   // colours, depths, counters
+  Buffer results_;  // the same, for the processor
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "render_vk/device.h"
+#include "render_vk/shader_data.h"
+
+namespace quoin::vulkan {
+
+/// The passes of a sample of a tile, in their order, and of a finished tile.
+enum class Pass : std::uint8_t {
+  Primary,  ///< the nearest opaque voxel of each pixel
+  Glass,    ///< the transparent bodies before it
+  Light,
+  LightWithGlass,
+  Resolve,  ///< the samples' mean as bytes
+};
+constexpr std::size_t kPassCount = 5;
+
+class Pipelines {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
+  ~Pipelines();
+  Pipelines(const Pipelines&) = delete;
+  Pipelines& operator=(const Pipelines&) = delete;
+
+  /// Records the pass over a tile, after which its results may be read.
+  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
+
+ private:
+  explicit Pipelines(Device& device) : device_(&device) {}
+  VkResult make(Pass pass);
+
+  Device* device_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  std::array<VkPipeline, kPassCount> pipelines_{};
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,148 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+
+#include <quoin/core/vec.h>
+
+namespace quoin::vulkan {
+
+// What src/render_vk/shaders/data.glsl declares, field by field.
+
+using Vec4 = glm::vec4;
+using IVec4 = glm::ivec4;
+
+/// A node of a sparse tree with 4^3 places a node; see data.glsl.
+struct Node {
+  std::uint64_t mask = 0;      ///< bit x + 4 y + 16 z: that place holds something
+  std::uint64_t children = 0;  ///< the address of the first of those; odd: all is full and there are none
+  bool operator==(const Node&) const = default;
+};
+
+struct ShaderTree {
+  Node root;
+  IVec4 low{0};
+  IVec4 high{0};
+};
+
+struct ShaderGrid {
+  ShaderTree opaque;
+  ShaderTree transparent;
+};
+
+struct ShaderPlaced {
+  std::array<Vec4, 3> grid_axes{};
+  std::array<Vec4, 3> view_axes{};
+  IVec4 ref_base{0};
+  Vec4 ref_inside{0.0F};
+  Vec4 ref_view{0.0F};
+  IVec4 start_base{0};
+  Vec4 start{0.0F};
+  Vec4 start_x{0.0F};
+  Vec4 start_y{0.0F};
+  Vec4 to_sun{0.0F};
+  std::array<Vec4, 2> diffuse{};
+  std::array<Vec4, 3> grid_axes_low{};
+  Vec4 start_low{0.0F};
+  Vec4 start_x_low{0.0F};
+  Vec4 start_y_low{0.0F};
+};
+
+// Bits of ShaderFrame::flags.
+constexpr std::uint32_t kPerspective = 1;
+constexpr std::uint32_t kLit = 2;
+constexpr std::uint32_t kShadows = 4;
+constexpr std::uint32_t kOcclusionRays = 8;
+constexpr std::uint32_t kOcclusionVertex = 16;
+constexpr std::uint32_t kAffectsAll = 32;
+constexpr std::uint32_t kFixedDirections = 64;
+constexpr std::uint32_t kDetailColours = 128;
+
+constexpr std::uint32_t kBodies = 16;
+constexpr std::size_t kPointBytes = 48;
+constexpr std::size_t kBodyBytes = 48;
+constexpr std::size_t kStateBytes = 32;
+constexpr std::size_t kSumBytes = 16;
+
+struct ShaderCounters {
+  std::uint32_t rays_low = 0;
+  std::uint32_t rays_high = 0;
+  std::uint32_t hits = 0;
+  std::uint32_t pending = 0;
+};
+
+struct ShaderFrame {
+  Vec4 right{0.0F};
+  Vec4 down{0.0F};
+  Vec4 corner{0.0F};
+  Vec4 forward{0.0F};
+  Vec4 start{0.0F};
+  Vec4 start_x{0.0F};
+  Vec4 start_y{0.0F};
+  Vec4 right_low{0.0F};
+  Vec4 down_low{0.0F};
+  Vec4 corner_low{0.0F};
+  Vec4 forward_low{0.0F};
+  Vec4 sky_zenith{0.0F};
+  Vec4 sky_horizon{0.0F};
+  Vec4 sky_ground{0.0F};
+  Vec4 detail_colour{0.0F};
+  Vec4 light{0.0F};
+  std::uint64_t placed = 0;
+  std::uint64_t grids = 0;
+  std::uint64_t tree = 0;
+  std::uint64_t leaves = 0;
+  std::uint64_t surfaces = 0;
+  std::uint64_t directions = 0;
+  std::uint64_t turns = 0;
+  std::uint64_t thresholds = 0;
+  std::uint64_t points = 0;
+  std::uint64_t bodies = 0;
+  std::uint64_t sun_bodies = 0;
+  std::uint64_t states = 0;
+  std::uint64_t sums = 0;
+  std::uint64_t colours = 0;
+  std::uint64_t depths = 0;
+  std::uint64_t counters = 0;
+  std::int32_t width = 0;
+  std::int32_t height = 0;
+  std::uint32_t flags = 0;
+  std::uint32_t placed_count = 0;
+  std::uint32_t last_surface = 0;
+  std::int32_t occlusion_count = 0;
+  float occlusion_distance = 0.0F;
+  float shadow_distance = 0.0F;
+  float exposure = 1.0F;
+  float samples = 1.0F;
+  float ground_begins = 0.0F;
+  float ground_is_full = 0.0F;
+  float view_depth = 0.0F;
+  float sky_scale = 0.0F;
+  float lift = 0.0F;
+  std::uint32_t pad = 0;
+};
+
+struct ShaderPush {
+  std::uint64_t frame = 0;
+  std::int32_t corner_x = 0;
+  std::int32_t corner_y = 0;
+  std::int32_t size_x = 0;
+  std::int32_t size_y = 0;
+  float point_x = 0.5F;
+  float point_y = 0.5F;
+  float point_low_x = 0.0F;
+  float point_low_y = 0.0F;
+  std::uint32_t seed = 0;
+  std::uint32_t first = 0;
+  std::uint32_t round = 0;
+  std::uint32_t pad = 0;
+};
+
+static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
+static_assert(sizeof(ShaderPlaced) == 352 && sizeof(ShaderFrame) == 16 * 16 + 16 * 8 + 16 * 4);
+static_assert(sizeof(ShaderPush) == 56 && sizeof(ShaderCounters) == 16);
+
+}  // namespace quoin::vulkan

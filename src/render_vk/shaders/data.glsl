@@ -1,0 +1,206 @@
+// What the shaders read and write; src/render_vk/shader_data.h says the same to the compiler of the processor's side.
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+
+const uint kPerspective = 1;
+const uint kLit = 2;
+const uint kShadows = 4;
+const uint kOcclusionRays = 8;
+const uint kOcclusionVertex = 16;
+const uint kAffectsAll = 32;
+const uint kFixedDirections = 64;
+const uint kDetailColours = 128;
+
+#define kInfinity uintBitsToFloat(0x7F800000u)
+
+const uint kBodies = 16;  // of glass that are kept for a pixel at a time
+
+// A sparse tree whose nodes each have 4^3 places; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
+// voxels, level 1 a brick of 16^3, level 2 a chunk.
+struct Tree {
+  uvec4 root;
+  ivec4 low;   // tight bounds, from the tree's origin; w: the root's level, at least 2
+  ivec4 high;  // w: nothing
+};
+struct GridTrees {
+  Tree opaque;
+  Tree transparent;
+};
+
+// An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
+// everything is far. `ref` is a point of the grid not far from there.
+struct Placed {
+  vec4 grid_axes[3];  // columns: grid from view
+  vec4 view_axes[3];  // columns: view from grid
+  ivec4 ref_base;     // of the tree's coordinates; w: the grid
+  vec4 ref_inside;    // from there; w: world units a voxel
+  vec4 ref_view;      // the same point in view; w: voxels of the full grid a voxel
+  ivec4 start_base;   // of the picture's rays, which start at start + x start_x + y start_y for pixel (x, y)
+  vec4 start;         // w: how far along the rays that is, in lengths of their forward component
+  vec4 start_x;
+  vec4 start_y;
+  vec4 to_sun;
+  vec4 diffuse[2];  // by face
+  // What is left of numbers above when they are rounded.
+  vec4 grid_axes_low[3];
+  vec4 start_low;
+  vec4 start_x_low;
+  vec4 start_y_low;
+};
+
+// What a pixel shows.
+struct Point {
+  ivec4 voxel;  // w: the instance; -1: none
+  vec4 inside;  // where in the voxel; w: t
+  uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
+};
+
+// A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
+// enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside.
+struct Body {
+  ivec4 voxel;
+  vec4 lengths;
+  uvec4 what;
+};
+
+// A pixel on the way: what is still seen past the glass so far, where to go on, and the sample's colour so far.
+struct State {
+  vec4 weight;  // w: t from which on bodies are still to be lit
+  vec4 colour;  // w: 0 once the sample is done, else 1 and the bodies to be lit in this round
+};
+
+const uint kSurface = 0;
+const uint kUnlit = 1;
+const uint kGlow = 2;
+
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Nodes {
+  uvec4 at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Words {
+  uvec2 at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Numbers {
+  uint at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Floats {
+  float at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vectors {
+  vec4 at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Grids {
+  GridTrees at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PlacedGrids {
+  Placed at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Points {
+  Point at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Bodies {
+  Body at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer States {
+  State at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Sums {
+  vec4 at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words32 {
+  uint at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Depths {
+  float at[];
+};
+// Rays in 64 bits, pixels that show a voxel, and pixels with bodies still to be lit.
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters {
+  uint rays_low;
+  uint rays_high;
+  uint hits;
+  uint pending;
+};
+
+// Of a picture. Vectors are read as a whole: see docs/decisions/040.
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
+  vec4 right;  // a pixel to the right and down, and the picture's upper left corner, at a distance of 1
+  vec4 down;
+  vec4 corner;
+  vec4 forward;
+  vec4 start;  // of pixel (x, y)'s ray: start + x start_x + y start_y
+  vec4 start_x;
+  vec4 start_y;
+  vec4 right_low;
+  vec4 down_low;
+  vec4 corner_low;
+  vec4 forward_low;
+  vec4 sky_zenith;
+  vec4 sky_horizon;
+  vec4 sky_ground;
+  vec4 detail_colour;
+  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
+  uvec2 placed;
+  uvec2 grids;
+  uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
+  uvec2 leaves;  // their boxes: low and high, w: the instance
+  uvec2 surfaces;    // three vectors each: colour and log clarity, emitted, log transmittance
+  uvec2 directions;  // of occlusion: nine a face; or the rings' angles
+  uvec2 turns;
+  uvec2 thresholds;  // the least light of each byte
+  uvec2 points;
+  uvec2 bodies;
+  uvec2 sun_bodies;
+  uvec2 states;
+  uvec2 sums;
+  uvec2 colours;
+  uvec2 depths;
+  uvec2 counters;
+  int width;
+  int height;
+  uint flags;
+  uint placed_count;
+  uint last_surface;
+  int occlusion_count;
+  float occlusion_distance;
+  float shadow_distance;
+  float exposure;
+  float samples;
+  float ground_begins;
+  float ground_is_full;
+  float view_depth;  // where view space has its origin
+  float sky_scale;   // turns the way from an orthographic picture's middle into the tangent of an angle
+  float lift;
+  uint pad;
+};
+
+layout(push_constant) uniform Push {
+  uvec2 frame_address;
+  ivec2 corner;     // of the tile, in pixels
+  ivec2 size;       // of the tile
+  vec2 point;       // of the sample, within pixels
+  vec2 point_low;   // what is left of that
+  uint seed;        // of the sample
+  uint first;       // 1: of the pixel's samples
+  uint round;       // of the sample
+  uint pad;
+} push;
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+Frame frame() {
+  return Frame(push.frame_address);
+}
+
+bool has(uint flag) {
+  return (frame().flags & flag) != 0;
+}
+
+// The invocation's place in the tile, and in the buffers of a tile.
+ivec2 tile_pixel() {
+  return ivec2(gl_GlobalInvocationID.xy);
+}
+bool is_in_tile() {
+  return all(lessThan(tile_pixel(), push.size));
+}
+uint slot_of_pixel() {
+  return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
+}

@@ -1,0 +1,58 @@
+#version 460
+// The bodies of glass before what each pixel shows.
+#include "data.glsl"
+#include "walk.glsl"
+#include "pairs.glsl"
+#include "instances.glsl"
+#include "glass.glsl"
+#include "count.glsl"
+
+// Distances count from where view space has its origin, but for `first_t`.
+void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {
+  vec2 point = picture_point();
+  ViewRay ray = camera_ray(point);
+  Pair direction = exact_direction();
+  Point hit = Points(frame().points).at[slot];
+  has_hit = hit.voxel.w >= 0;
+  float scale = length_a_depth(point);
+  float depth = frame().view_depth;
+  float max_t = kInfinity;
+  if (has_hit) {
+    max_t = (placed_at(hit.voxel.w).start.w - depth) * scale + uintBitsToFloat(hit.what.w);
+  }
+  BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
+  vec3 unused = vec3(1.0);
+  start_visit(ray);
+  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
+    Placed placed = placed_at(i);
+    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
+    GridRay in_grid = rounded(placed, exact_ray_in(placed, direction), (placed.start.w - depth) * scale);
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t, -1)) continue;
+    find_bodies_in(i, in_grid, placed.ref_view.w / placed.ref_inside.w, max_t, state.weight.w, list, unused);
+  }
+  first_t = list.count > 0 ? depth * scale + Bodies(list.address).at[list.first].lengths.x : kInfinity;
+  state.weight.w = list.dropped_t;
+  state.colour.w = float(list.count + 1);
+}
+
+void main() {
+  bool is_new_hit = false;
+  bool is_pending = false;
+  if (is_in_tile()) {
+    uint slot = slot_of_pixel();
+    State state = States(frame().states).at[slot];
+    // In later rounds only where bodies were left over.
+    if (push.round == 0 || state.colour.w > 0.0) {
+      float first_t;
+      bool has_hit;
+      find_glass(slot, state, first_t, has_hit);
+      is_pending = state.weight.w < kInfinity;
+      if (push.first != 0 && push.round == 0 && state.colour.w > 1.0) {
+        is_new_hit = !has_hit;
+        Depths(frame().depths).at[slot] = first_t;
+      }
+      States(frame().states).at[slot] = state;
+    }
+  }
+  add_counts(0, is_new_hit, is_pending);
+}

@@ -1,0 +1,122 @@
+// Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list of kBodies for each
+// pixel of the tile, nearest first.
+
+// ln of the share of light below which a body counts as closed.
+const float kClosed = -11.0;
+// Lengths of t within which two bodies touch: the rounding of single precision.
+const float kTouching = 4e-6;
+
+struct Surface {
+  vec3 colour;
+  float log_clarity;
+  vec3 emitted;
+  vec3 log_transmittance;
+};
+
+Surface surface_of(uint type) {
+  uint i = 3 * min(type, frame().last_surface);
+  Vectors surfaces = Vectors(frame().surfaces);
+  vec4 colour = surfaces.at[i];
+  return Surface(colour.xyz, colour.w, surfaces.at[i + 1].xyz, surfaces.at[i + 2].xyz);
+}
+
+vec3 passed_by(Surface surface, float voxels, bool starts_inside) {
+  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+  return length > 0.0 ? exp(surface.log_transmittance * length) : vec3(1.0);
+}
+float own_share(Surface surface, float voxels, bool starts_inside) {
+  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+  return length > 0.0 ? 1.0 - exp(surface.log_clarity * length) : 0.0;
+}
+
+bool continues(Body body, Body next) {
+  return next.what.x == body.what.x && next.lengths.x <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+}
+
+struct BodyList {
+  uvec2 address;
+  uint first;
+  uint count;
+  float dropped_t;  // where the first begins for which there was no room
+};
+
+// Puts a body in its place; when the list is full the furthest gives way, and is answered.
+bool insert_body(inout BodyList list, Body body, out Body dropped) {
+  Bodies bodies = Bodies(list.address);
+  bool is_full = list.count == kBodies;
+  if (is_full) {
+    Body last = bodies.at[list.first + kBodies - 1];
+    if (body.lengths.x >= last.lengths.x) {
+      dropped = body;
+      return true;
+    }
+    dropped = last;
+  } else {
+    ++list.count;
+  }
+  uint i = list.count - 1;
+  for (; i > 0; --i) {
+    Body before = bodies.at[list.first + i - 1];
+    bool stays = before.lengths.x < body.lengths.x ||
+                 (before.lengths.x == body.lengths.x && before.voxel.w <= body.voxel.w);
+    if (stays) break;
+    bodies.at[list.first + i] = before;
+  }
+  bodies.at[list.first + i] = body;
+  return is_full;
+}
+
+// What one more body does to the light of those that found no room.
+void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) {
+  if (body.lengths.x < from_t) return;
+  Body dropped;
+  if (!insert_body(list, body, dropped)) return;
+  list.dropped_t = min(list.dropped_t, dropped.lengths.x);
+  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, dropped.what.z != 0);
+}
+
+// The bodies of one instance, along a ray whose walk has been started. `voxels_a_t`: of the full grid.
+void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
+                    inout vec3 passed) {
+  float room = max_t - ray.t;
+  float clarity = 0.0;
+  bool has_body = false;
+  Body body;
+  while (clarity > kClosed && find_voxel(room)) {
+    Body next;
+    next.voxel = ivec4(walk_voxel, i);
+    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? 1 : 0, 0);
+    float enter_t = walk_t;
+    bool goes_on = leave_block(0, room);
+    float exit_t = min(walk_t, room);
+    next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
+    if (next.lengths.z > 0.0) {
+      clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
+      if (has_body && continues(body, next)) {
+        body.lengths.y = next.lengths.y;
+        body.lengths.z += next.lengths.z;
+      } else {
+        if (has_body) keep_body(list, body, from_t, passed);
+        body = next;
+        has_body = true;
+      }
+    }
+    if (!goes_on) break;
+  }
+  if (has_body) keep_body(list, body, from_t, passed);
+}
+
+// The next body of a list, as one with those that it touches; false at the list's end.
+bool next_body(BodyList list, inout uint i, out Body body) {
+  if (i >= list.count) return false;
+  Bodies bodies = Bodies(list.address);
+  body = bodies.at[list.first + i++];
+  while (i < list.count) {
+    Body next = bodies.at[list.first + i];
+    if (!continues(body, next)) break;
+    body.lengths.y = max(body.lengths.y, next.lengths.y);
+    body.lengths.z += next.lengths.z;
+    ++i;
+  }
+  return true;
+}

@@ -1,0 +1,213 @@
+// Rays among many instances.
+
+struct GridRay {
+  ivec3 base;
+  vec3 origin;
+  vec3 direction;
+  float t;  // of its start
+};
+
+struct ViewRay {
+  vec3 origin;
+  vec3 direction;
+};
+
+const int kVisitDepth = 28;
+
+uint visit_stack[kVisitDepth];
+int visit_height;
+uint visit_next;
+uint visit_end;
+
+vec3 visit_origin;
+vec3 visit_direction;
+vec3 visit_inverse;
+bvec3 visit_still;
+
+// Begins to list the instances whose boxes a ray in view may meet.
+void start_visit(ViewRay ray) {
+  visit_stack[0] = 0;
+  visit_height = frame().placed_count > 0 ? 1 : 0;
+  visit_next = visit_end = 0;
+  visit_origin = ray.origin;
+  visit_direction = ray.direction;
+  visit_still = equal(ray.direction, vec3(0.0));
+  visit_inverse = 1.0 / mix(ray.direction, vec3(1.0), visit_still);
+}
+
+bool may_meet(vec3 low, vec3 high, float max_t) {
+  bvec3 is_outside = either(lessThan(visit_origin, low), greaterThan(visit_origin, high));
+  if (any(both(visit_still, is_outside))) return false;
+  vec3 a = (low - visit_origin) * visit_inverse;
+  vec3 b = (high - visit_origin) * visit_inverse;
+  vec3 near = mix(min(a, b), vec3(0.0), visit_still);
+  vec3 far = mix(max(a, b), vec3(kNever), visit_still);
+  float enter_t = max(max(near.x, near.y), max(near.z, 0.0));
+  float exit_t = min(min(far.x, far.y), min(far.z, max_t));
+  // The boxes have room for rounding; their distances need it too.
+  return enter_t <= exit_t * 1.00001 + 1e-5;
+}
+
+// The next of them up to max_t, nearer ones mostly first; -1 when there is none left.
+int next_instance(float max_t) {
+  Vectors nodes = Vectors(frame().tree);
+  Vectors leaves = Vectors(frame().leaves);
+  for (;;) {
+    while (visit_next < visit_end) {
+      vec4 low = leaves.at[2 * visit_next];
+      vec4 high = leaves.at[2 * visit_next + 1];
+      ++visit_next;
+      if (may_meet(low.xyz, high.xyz, max_t)) return floatBitsToInt(low.w);
+    }
+    if (visit_height == 0) return -1;
+    uint node = visit_stack[--visit_height];
+    vec4 low = nodes.at[2 * node];
+    vec4 high = nodes.at[2 * node + 1];
+    if (!may_meet(low.xyz, high.xyz, max_t)) continue;
+    uint first = floatBitsToUint(low.w);
+    int count = floatBitsToInt(high.w);
+    if (count > 0) {
+      visit_next = first;
+      visit_end = first + uint(count);
+      continue;
+    }
+    bool is_forward = visit_direction[-1 - count] >= 0.0;
+    visit_stack[visit_height] = is_forward ? first : first - 1;
+    visit_stack[visit_height + 1] = is_forward ? first - 1 : first;
+    visit_height += 2;
+  }
+}
+
+vec3 turned(vec4 columns[3], vec3 v) {
+  return columns[0].xyz * v.x + columns[1].xyz * v.y + columns[2].xyz * v.z;
+}
+
+Placed placed_at(int i) {
+  return PlacedGrids(frame().placed).at[i];
+}
+
+GridRay grid_from_view(Placed placed, ViewRay ray) {
+  vec3 origin = placed.ref_inside.xyz + turned(placed.grid_axes, ray.origin - placed.ref_view.xyz);
+  return GridRay(placed.ref_base.xyz, origin, turned(placed.grid_axes, ray.direction), 0.0);
+}
+
+ViewRay view_from_grid(Placed placed, GridRay ray) {
+  vec3 from_ref = vec3(ray.base - placed.ref_base.xyz) + (ray.origin - placed.ref_inside.xyz);
+  return ViewRay(placed.ref_view.xyz + turned(placed.view_axes, from_ref), turned(placed.view_axes, ray.direction));
+}
+
+// Where the invocation's ray crosses the picture, in pixels.
+vec2 picture_point() {
+  return vec2(push.corner + tile_pixel()) + push.point;
+}
+
+vec3 picture_vector(vec2 point) {
+  Frame f = frame();
+  return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+}
+
+// A camera's ray. It starts where view space has its origin, at frame().view_depth times length_a_depth.
+ViewRay camera_ray(vec2 point) {
+  Frame f = frame();
+  vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;
+  if (!has(kPerspective)) return ViewRay(start, f.forward.xyz);
+  vec3 d = picture_vector(point) + f.forward.xyz;
+  return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
+}
+
+// The ray's length by which its forward component grows by 1.
+float length_a_depth(vec2 point) {
+  if (!has(kPerspective)) return 1.0;
+  vec3 d = picture_vector(point) + frame().forward.xyz;
+  return sqrt(dot(d, d));
+}
+
+// A coordinate of the picture, in all three.
+Pair pixel_pair(int axis) {
+  Pair sum = exact_sum(vec3(float(push.corner[axis] + tile_pixel()[axis])), vec3(push.point[axis]));
+  return renewed(sum.high, sum.low + push.point_low[axis]);
+}
+
+// origin + x right + y down at the invocation's point of the picture.
+Pair across(Pair origin, Pair right, Pair down) {
+  return sum_of(sum_of(origin, product_of(right, pixel_pair(0))), product_of(down, pixel_pair(1)));
+}
+
+// A camera's ray in an instance's grid, as exact as in double. It starts near the grid, so that distance costs nothing.
+struct ExactRay {
+  Pair start;  // from start_base
+  Pair direction;
+};
+
+// Of the invocation's ray, in view; a unit vector.
+Pair exact_direction() {
+  Frame f = frame();
+  Pair forward = Pair(f.forward.xyz, f.forward_low.xyz);
+  if (!has(kPerspective)) return forward;
+  Pair in_picture = across(Pair(f.corner.xyz, f.corner_low.xyz), Pair(f.right.xyz, f.right_low.xyz),
+                           Pair(f.down.xyz, f.down_low.xyz));
+  return unit_of(sum_of(in_picture, forward));
+}
+
+// `d`: `exact_direction`.
+ExactRay exact_ray_in(Placed placed, Pair d) {
+  ExactRay ray;
+  ray.start = across(Pair(placed.start.xyz, placed.start_low.xyz), Pair(placed.start_x.xyz, placed.start_x_low.xyz),
+                     Pair(placed.start_y.xyz, placed.start_y_low.xyz));
+  Pair x = product_of(Pair(placed.grid_axes[0].xyz, placed.grid_axes_low[0].xyz), component(d, 0));
+  Pair y = product_of(Pair(placed.grid_axes[1].xyz, placed.grid_axes_low[1].xyz), component(d, 1));
+  Pair z = product_of(Pair(placed.grid_axes[2].xyz, placed.grid_axes_low[2].xyz), component(d, 2));
+  ray.direction = sum_of(sum_of(x, y), z);
+  return ray;
+}
+
+bool is_before(Pair a, Pair b, int axis) {
+  return a.high[axis] != b.high[axis] ? a.high[axis] < b.high[axis] : a.low[axis] < b.low[axis];
+}
+
+// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does before
+// it rounds. `axis`: of the plane through which it enters; -1 where it is left as it is. False when it misses.
+bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float moved_t, out int axis) {
+  vec3 low = vec3(tree.low.xyz - placed.start_base.xyz);
+  vec3 high = vec3(tree.high.xyz - placed.start_base.xyz);
+  moved_t = 0.0;
+  axis = -1;
+  vec3 p = ray.start.high;
+  if (all(lessThanEqual(low - 64.0, p)) && all(lessThanEqual(p, high + 64.0))) return true;
+  Pair planes = Pair(mix(high, low, greaterThan(ray.direction.high, vec3(0.0))), vec3(0.0));
+  Pair t = quotient_of(sum_of(planes, Pair(-ray.start.high, -ray.start.low)), ray.direction);
+  for (int i = 0; i < 3; ++i) {
+    bool is_low = p[i] < low[i];
+    if (!is_low && p[i] < high[i]) continue;
+    float d = ray.direction.high[i];
+    if (is_low ? !(d > 0.0) : !(d < 0.0)) return false;
+    if (axis < 0 || !is_before(component(t, i), component(t, axis), 0)) axis = i;
+  }
+  if (axis < 0) return true;
+  moved_t = t.high[axis];
+  ray.start = sum_of(ray.start, product_of(component(t, axis), ray.direction));
+  ray.start.high[axis] = planes.high[axis];
+  ray.start.low[axis] = 0.0;
+  // The others are inside by now, or never will be.
+  return all(greaterThanEqual(ray.start.high, low - 1e-3)) && all(lessThanEqual(ray.start.high, high + 1e-3));
+}
+
+// From the multiple of 64 voxels next to its start, and then rounded.
+GridRay rounded(Placed placed, ExactRay ray, float t) {
+  vec3 whole = clamp(floor(ray.start.high), vec3(-1e9), vec3(1e9));
+  ivec3 shift = ivec3(whole) & ~63;
+  Pair start = sum_of(ray.start, Pair(-vec3(shift), vec3(0.0)));
+  return GridRay(placed.start_base.xyz + shift, start.high, ray.direction.high, t);
+}
+
+// Where such a ray meets the face through which it enters a voxel, from the voxel's lower corner.
+vec3 exact_place(Placed placed, Pair d, ivec3 voxel, uint face) {
+  ExactRay ray = exact_ray_in(placed, d);
+  int axis = int(face >> 1);
+  vec3 corner = vec3(voxel - placed.start_base.xyz);
+  Pair start = sum_of(ray.start, Pair(-corner, vec3(0.0)));
+  float plane = (face & 1) == 0 ? 1.0 : 0.0;
+  Pair from_plane = sum_of(Pair(vec3(plane), vec3(0.0)), component(Pair(-start.high, -start.low), axis));
+  Pair t = quotient_of(from_plane, component(ray.direction, axis));
+  return sum_of(start, product_of(t, ray.direction)).high;
+}

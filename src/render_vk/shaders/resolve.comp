@@ -1,0 +1,20 @@
+#version 460
+// The samples' mean as sRGB bytes, rounded exactly: the byte is the number of thresholds that the light reaches.
+#include "data.glsl"
+
+uint encoded(float light) {
+  Floats thresholds = Floats(frame().thresholds);
+  uint byte = 0;
+  for (uint step = 128; step > 0; step >>= 1) {
+    if (light >= thresholds.at[byte + step]) byte += step;
+  }
+  return byte;
+}
+
+void main() {
+  if (!is_in_tile()) return;
+  uint slot = slot_of_pixel();
+  vec3 mean = Sums(frame().sums).at[slot].xyz / frame().samples;
+  uint rgb = encoded(mean.x) | encoded(mean.y) << 8 | encoded(mean.z) << 16;
+  Words32(frame().colours).at[slot] = rgb | 0xFF000000u;
+}

@@ -1,0 +1,81 @@
+// render/terrain/1280x720/vulkan: the picture of cpu_renderer_bench.cpp on the best device that there is, and what an
+// edit of one voxel costs. Skipped where there is no device.
+
+#include <cmath>
+
+#include <benchmark/benchmark.h>
+
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "bench/picture_workload.h"
+
+namespace quoin {
+namespace {
+
+using workloads::fail_unless;
+
+void picture(benchmark::State& state, const LightOptions& light) {
+  const Scene scene = workloads::picture_scene();
+  auto renderer = VulkanRenderer::create();
+  if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
+  fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
+  RenderOptions options;
+  options.light = light;
+  std::int64_t rays = 0;
+  for (auto _ : state) {
+    const auto made = renderer->render(workloads::over_the_terrain(), options);
+    fail_unless(made.has_value() && std::abs(made->pixels_hit - workloads::kPixelsHit) < 50, "pixels hit",
+                made ? made->pixels_hit : -1);
+    rays = made->rays;
+  }
+  state.SetLabel(renderer->device().name);
+  state.counters["rays"] = static_cast<double>(rays);
+  state.counters["rays_per_second"] =
+      benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void full(benchmark::State& state) {
+  picture(state, {});
+}
+void unlit(benchmark::State& state) {
+  LightOptions light;
+  light.lit = false;
+  picture(state, light);
+}
+void vertex(benchmark::State& state) {
+  LightOptions light;
+  light.occlusion = OcclusionMode::Vertex;
+  picture(state, light);
+}
+
+void update(benchmark::State& state) {
+  Scene scene = workloads::picture_scene();
+  auto renderer = VulkanRenderer::create();
+  if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
+  fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
+  Grid& grid = scene.grids()[scene.grids().handles().front()].grid;
+  VoxelType type = kAir;
+  for (auto _ : state) {
+    type = type == kAir ? 1 : kAir;
+    grid.set({100, 60, 100}, type);
+    fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
+  }
+  state.SetLabel(renderer->device().name);
+  state.counters["bytes"] = static_cast<double>(renderer->uploaded_bytes());
+}
+
+BENCHMARK(full)->Name("render/terrain/1280x720/vulkan")->Unit(benchmark::kMillisecond)->Iterations(3)->UseRealTime();
+BENCHMARK(unlit)
+    ->Name("render/terrain/1280x720/unlit/vulkan")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(3)
+    ->UseRealTime();
+BENCHMARK(vertex)
+    ->Name("render/terrain/1280x720/vertex/vulkan")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(3)
+    ->UseRealTime();
+BENCHMARK(update)->Name("vulkan/update/one_voxel")->Unit(benchmark::kMicrosecond)->UseRealTime();
+
+}  // namespace
+}  // namespace quoin

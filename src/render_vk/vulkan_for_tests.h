@@ -1,0 +1,141 @@
+#pragma once
+
+// What the tests of the Vulkan renderer share: pictures of one scene by both renderers, and their differences.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/picture_files.h>
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "render/render_test_support.h"
+
+namespace quoin::vulkan_test {
+
+/// Tests are skipped where there is no device, and fail on every message of the validation layer.
+class VulkanTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    VulkanOptions options = test_options();
+    auto made = VulkanRenderer::create(options);
+    if (!made && made.error().message.find("validation") != std::string::npos) {
+      is_validated_ = false;
+      options.on_validation_message = {};
+      made = VulkanRenderer::create(options);
+    }
+    if (!made) GTEST_SKIP() << made.error().message;
+    renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+  }
+  void TearDown() override {
+    renderer_.reset();
+    for (const std::string& message : *messages_) ADD_FAILURE() << message;
+  }
+
+  [[nodiscard]] VulkanOptions test_options() const {
+    VulkanOptions options;
+    options.on_validation_message = [messages = messages_](const std::string& message) {
+      messages->push_back(message);
+    };
+    if (const char* device = std::getenv("QUOIN_VULKAN_DEVICE")) options.device = device;
+    return options;
+  }
+
+  Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options) {
+    const Status updated = renderer_->update(scene);
+    EXPECT_TRUE(updated) << to_string(updated.error());
+    return taken_as_is(camera, options);
+  }
+  Picture taken_as_is(const Camera& camera, const RenderOptions& options) {
+    auto picture = renderer_->render(camera, options);
+    EXPECT_TRUE(picture) << to_string(picture.error());
+    return picture ? std::move(*picture) : Picture{};
+  }
+
+  std::unique_ptr<VulkanRenderer> renderer_;
+  std::shared_ptr<std::vector<std::string>> messages_ = std::make_shared<std::vector<std::string>>();
+  bool is_validated_ = true;
+};
+
+/// A pixel is at a silhouette where the distances around it jump, or where nothing is beside something.
+inline bool is_at_silhouette(const FloatImage& depth, int x, int y) {
+  float least = INFINITY;
+  float greatest = 0.0F;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int u = std::clamp(x + dx, 0, depth.width - 1);
+      const int v = std::clamp(y + dy, 0, depth.height - 1);
+      const float d = depth.values[static_cast<std::size_t>(v) * static_cast<std::size_t>(depth.width) +
+                                   static_cast<std::size_t>(u)];
+      least = std::min(least, d);
+      greatest = std::max(greatest, d);
+    }
+  }
+  return greatest - least > 0.004F * least;
+}
+
+/// What two pictures differ in.
+struct Differences {
+  int pixels = 0;     ///< by more than 2 in a channel
+  int elsewhere = 0;  ///< of these, those that are not at a silhouette
+  int depths = 0;     ///< by more than 1e-4 of the distance
+  int total = 0;
+};
+
+inline Differences differences(const Picture& a, const Picture& b) {
+  Differences found;
+  EXPECT_EQ(a.colour.rgb.size(), b.colour.rgb.size());
+  EXPECT_EQ(a.depth.values.size(), b.depth.values.size());
+  if (a.colour.rgb.size() != b.colour.rgb.size() || a.depth.values.size() != b.depth.values.size()) return found;
+  found.total = a.colour.width * a.colour.height;
+  for (int i = 0; i < found.total; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    int most = 0;
+    for (std::size_t c = 3 * at; c < 3 * at + 3; ++c)
+      most = std::max(most, std::abs(a.colour.rgb[c] - b.colour.rgb[c]));
+    if (most > 2) {
+      if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+        std::printf("  (%d, %d): %d %d %d, not %d %d %d; depth %.9g, not %.9g\n", i % a.colour.width,
+                    i / a.colour.width, a.colour.rgb[3 * at], a.colour.rgb[3 * at + 1], a.colour.rgb[3 * at + 2],
+                    b.colour.rgb[3 * at], b.colour.rgb[3 * at + 1], b.colour.rgb[3 * at + 2],
+                    static_cast<double>(a.depth.values[at]), static_cast<double>(b.depth.values[at]));
+      }
+      ++found.pixels;
+      found.elsewhere += !is_at_silhouette(b.depth, i % a.colour.width, i / a.colour.width);
+    }
+    const float d = a.depth.values[at];
+    const float e = b.depth.values[at];
+    found.depths += d != e && !(std::abs(d - e) <= 1e-4F * std::max(d, e));
+  }
+  return found;
+}
+
+/// The promise of VulkanRenderer. On a failure both pictures are written, for people.
+inline void expect_equal(const Picture& vulkan, const Picture& cpu, const std::string& name) {
+  const Differences found = differences(vulkan, cpu);
+  EXPECT_LE(found.pixels * 1000, found.total) << name;
+  EXPECT_LE(found.depths * 1000, found.total) << name;
+  EXPECT_NEAR(static_cast<double>(vulkan.rays), static_cast<double>(cpu.rays), 0.001 * static_cast<double>(cpu.rays))
+      << name;
+  EXPECT_NEAR(static_cast<double>(vulkan.pixels_hit), static_cast<double>(cpu.pixels_hit), 0.001 * found.total) << name;
+  const bool is_wanted = std::getenv("QUOIN_WRITE_VULKAN") != nullptr;
+  if (is_wanted || ::testing::Test::HasFailure()) {
+    const std::string base = QUOIN_BINARY_DIR "/vulkan_" + name;
+    EXPECT_TRUE(write_png(vulkan.colour, base + ".vulkan.png"));
+    EXPECT_TRUE(write_png(cpu.colour, base + ".cpu.png"));
+  }
+  ::testing::Test::RecordProperty(name, std::to_string(found.pixels) + " pixels, " + std::to_string(found.depths) +
+                                            " depths of " + std::to_string(found.total));
+  if (is_wanted) {
+    std::printf("%s: %d pixels (%d not at silhouettes), %d depths of %d\n", name.c_str(), found.pixels, found.elsewhere,
+                found.depths, found.total);
+  }
+}
+
+}  // namespace quoin::vulkan_test

@@ -1,0 +1,75 @@
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include <algorithm>
+
+#include "render/picture_request.h"
+#include "render_vk/picture_pass.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
+
+}  // namespace
+
+Result<std::vector<VulkanDevice>> vulkan_devices() {
+  const auto instance = vulkan::VulkanInstance::create({});
+  if (!instance) return tl::unexpected(instance.error());
+  std::vector<VulkanDevice> devices;
+  for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
+  return devices;
+}
+
+struct VulkanRenderer::Impl {
+  Impl(std::unique_ptr<vulkan::Device> of_device, std::unique_ptr<vulkan::Pipelines> with_pipelines,
+       std::uint64_t block_bytes)
+      : device(std::move(of_device)),
+        pipelines(std::move(with_pipelines)),
+        memory(*device, std::max(block_bytes, kLeastBlock)),
+        scene(memory) {}
+
+  std::unique_ptr<vulkan::Device> device;
+  std::unique_ptr<vulkan::Pipelines> pipelines;
+  vulkan::DeviceMemory memory;
+  vulkan::DeviceScene scene;
+  std::uint64_t uploaded = 0;
+};
+
+VulkanRenderer::VulkanRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VulkanRenderer::VulkanRenderer(VulkanRenderer&&) noexcept = default;
+VulkanRenderer& VulkanRenderer::operator=(VulkanRenderer&&) noexcept = default;
+VulkanRenderer::~VulkanRenderer() = default;
+
+Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions& options) {
+  auto device = vulkan::Device::create(options);
+  if (!device) return tl::unexpected(device.error());
+  auto pipelines = vulkan::Pipelines::create(**device);
+  if (!pipelines) return tl::unexpected(pipelines.error());
+  return VulkanRenderer(std::make_unique<Impl>(std::move(*device), std::move(*pipelines), options.block_bytes));
+}
+
+const VulkanDevice& VulkanRenderer::device() const {
+  return impl_->device->description();
+}
+
+Status VulkanRenderer::update(const Scene& scene, bool hidden, Threads threads) {
+  const std::uint64_t before = impl_->memory.written();
+  Status done = impl_->scene.update(scene, hidden, threads);
+  impl_->uploaded = impl_->memory.written() - before;
+  return done;
+}
+
+std::uint64_t VulkanRenderer::uploaded_bytes() const {
+  return impl_->uploaded;
+}
+
+Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
+  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  if (options.detail) {
+    return fail(ErrorCode::Unsupported, "vulkan: levels of detail are not drawn on graphics devices yet");
+  }
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene);
+  return pass.render(camera, options, progress);
+}
+
+}  // namespace quoin
