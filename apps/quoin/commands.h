@@ -35,5 +35,6 @@ void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
 void add_render_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
+void add_view_command(CLI::App& app, int& status);
 
 }  // namespace quoin::tool

@@ -98,6 +98,7 @@ int run(int argc, char** argv) {
   add_convert_command(app, status);
   add_render_command(app, status);
   add_generate_command(app, status);
+  add_view_command(app, status);
   const Arguments arguments = readable_arguments(argc, argv);
   try {
     app.parse(Arguments(arguments.rbegin(), arguments.rend()));

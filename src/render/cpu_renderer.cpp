@@ -125,6 +125,10 @@ CpuRenderer::CpuRenderer(CpuRenderer&&) noexcept = default;
 CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
 
+const SceneTracer& CpuRenderer::tracer() const {
+  return impl_->tracer;
+}
+
 void CpuRenderer::update(Threads threads) {
   impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);

@@ -14,6 +14,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
 
@@ -84,6 +85,10 @@ class CpuRenderer {
   ///           every sample of a tile.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {}) const;
+
+  /// What its rays go through, for queries (first_hit, pick) that shall see what pictures show. Out of date after an
+  /// edit until `update`; not to be asked during one.
+  [[nodiscard]] const SceneTracer& tracer() const;
 
  private:
   struct Impl;

@@ -1,0 +1,123 @@
+#include <memory>
+
+#include <quoin/io/formats.h>
+
+#include "commands.h"
+#include "interrupt.h"
+#include "output.h"
+#include "output_files.h"
+#include "parse.h"
+#ifdef QUOIN_HAVE_VIEWER
+#include "viewer/window/viewer.h"
+#endif
+
+namespace quoin::tool {
+
+namespace {
+
+struct ViewArguments {
+  std::filesystem::path input;
+  LoadOptions load;
+  Threads threads;
+  PictureSize size;
+  std::filesystem::path screenshot;
+  bool is_bare = false;
+};
+
+#ifdef QUOIN_HAVE_VIEWER
+
+/// Fails before a window opens where it is clear that the file cannot be shown.
+Status check_input(const std::filesystem::path& path) {
+  if (path.empty()) return {};
+  const auto format = recognise_file(path);
+  if (!format) return tl::unexpected<Error>(format.error());
+  if (!*format) {
+    return fail(ErrorCode::Unsupported, "of no format that is known; there are " + readable_endings(), path.string());
+  }
+  if (!format_info(**format).is_volume) return {};
+  return fail(ErrorCode::Unsupported,
+              "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
+              path.string());
+}
+
+int run_view(const ViewArguments& arguments) {
+  viewer::ViewerOptions options;
+  options.file = arguments.input;
+  options.load = arguments.load;
+  options.threads = arguments.threads;
+  options.width = arguments.size.width;
+  options.height = arguments.size.height;
+  options.is_bare = arguments.is_bare;
+  options.screenshot = arguments.screenshot;
+  Status status = check_input(arguments.input);
+  if (status) status = check_outputs({arguments.screenshot});
+  if (status) {
+    catch_interrupts();
+    status = viewer::run_viewer(options, was_interrupted);
+  }
+  die_if_interrupted();
+  if (status) return kDone;
+  print_error(status.error());
+  return kFailed;
+}
+
+#else
+
+int run_view(const ViewArguments&) {
+  print_error("view: this build has no viewer; it needs the packages " QUOIN_VIEWER_MISSING
+              " (`quoin render` draws pictures without them)");
+  return kFailed;
+}
+
+#endif
+
+/// Answers what is wrong with the usage, or "".
+std::string settle(const CLI::App& command, ViewArguments& arguments) {
+  constexpr PictureSize kSmallest{320, 240};
+  constexpr int kLongestSide = 16'384;
+  if (command.count("--size") > 0) {
+    const std::string text = command.get_option("--size")->results().back();
+    const auto size = parse_size(text);
+    const bool fits = size && size->width >= kSmallest.width && size->height >= kSmallest.height &&
+                      size->width <= kLongestSide && size->height <= kLongestSide;
+    if (!fits) {
+      return "--size: must be WIDTHxHEIGHT of at least 320x240 and at most 16384 a side, as in 1280x720, not \"" +
+             text + "\"";
+    }
+    arguments.size = *size;
+  }
+  if (!arguments.screenshot.empty() && arguments.screenshot.extension() != ".png") {
+    return "--screenshot: the picture's name must end in .png, not \"" + arguments.screenshot.string() + "\"";
+  }
+  if (!arguments.screenshot.empty() && arguments.input.empty()) return "--screenshot needs a file to show";
+  return "";
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& app, int& status) {
+  CLI::App* command = app.add_subcommand("view", "Look at a file in a window, fly through it, edit it");
+  const auto arguments = std::make_shared<ViewArguments>();
+  command->add_option("IN", arguments->input, "File to open (default: an empty window, to drop files on)")
+      ->check(file_name());
+  command->add_flag("--hidden", arguments->load.hidden, "Include hidden layers and nodes");
+  command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
+      ->check(not_negative_whole());
+  command->add_option("--size", "Of the window (default: as it was last)")->type_name("WxH");
+  command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
+  command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
+      ->check(file_name());
+  command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
+      ->check(CLI::Range(1U, 1024U));
+  command->footer("F1 in the window says what keys and mouse do.\nExample: quoin view castle.vox");
+  command->callback([command, arguments, &status] {
+    if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
+      print_error(fault + " (try --help)");
+      status = kWrongUsage;
+      return;
+    }
+    status = run_view(*arguments);
+  });
+}
+
+}  // namespace quoin::tool

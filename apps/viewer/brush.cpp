@@ -1,0 +1,93 @@
+#include "brush.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace quoin::viewer {
+
+namespace {
+
+// The outermost chunk on each side stays air.
+constexpr int kGreatest = std::numeric_limits<int>::max() - 2 * kChunkEdge;
+constexpr double kFarthestLayer = 1e5;  // voxels along the ray
+
+VoxelType outcome(const Brush& brush, VoxelType current) {
+  switch (brush.action) {
+    case BrushAction::Place:
+      return current == kAir ? brush.type : current;
+    case BrushAction::Remove:
+      return kAir;
+    case BrushAction::Paint:
+      return current == kAir ? kAir : brush.type;
+  }
+  return current;
+}
+
+}  // namespace
+
+IBox reach_of(const Brush& brush, IVec3 centre) {
+  const int radius = std::clamp(brush.radius, 0, kLargestBrush);
+  const IVec3 middle = glm::clamp(centre, IVec3{-kGreatest}, IVec3{kGreatest});
+  if (middle != centre) return {};
+  return {middle - radius, middle + radius + 1};
+}
+
+std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid) {
+  const IBox box = reach_of(brush, centre);
+  if (box.empty()) return 0;
+  // Half a voxel more than the radius, so that spheres look round rather than pointed.
+  const double reach = std::clamp(brush.radius, 0, kLargestBrush) + 0.5;
+  const bool is_sphere = brush.shape == BrushShape::Sphere;
+  return grid.edit(box, [&](IVec3 voxel, VoxelType current) {
+    const DVec3 offset(voxel - centre);
+    if (is_sphere && glm::dot(offset, offset) > reach * reach) return current;
+    return outcome(brush, current);
+  });
+}
+
+IVec3 target_of(BrushAction action, IVec3 voxel, Direction face) {
+  return action == BrushAction::Place ? voxel + normal_of(face) : voxel;
+}
+
+std::optional<Ray> ray_in_grid(const Instance& instance, const SceneGrid& grid, const Ray& ray_in_world) {
+  if (!std::isfinite(instance.voxel_size) || !(instance.voxel_size > 0.0)) return std::nullopt;
+  // The images of the grid's axes say all there is to know of the transform; taken at the origin, where they are exact.
+  Instance at_origin = instance;
+  at_origin.position = DVec3{0.0};
+  const DVec3 from_pivot = ray_in_world.origin - instance.position;
+  Ray ray{grid.pivot, DVec3{0.0}};
+  for (int axis = 0; axis < 3; ++axis) {
+    DVec3 unit{0.0};
+    unit[axis] = 1.0;
+    const DVec3 image = world_from_grid(at_origin, grid, grid.pivot + unit);
+    const double scale = glm::dot(image, image);
+    if (!(scale > 0.0) || !std::isfinite(scale)) return std::nullopt;
+    ray.origin[axis] += glm::dot(from_pivot, image) / scale;
+    ray.direction[axis] = glm::dot(ray_in_world.direction, image) / scale;
+  }
+  if (!is_finite(ray.origin) || !is_finite(ray.direction)) return std::nullopt;
+  return ray;
+}
+
+std::optional<IVec3> StrokeLayer::at(const Ray& ray_in_grid) const {
+  const int axis = frame_of(face).axis;
+  // The layer's surface on the side from which it was touched: where the mouse seems to be.
+  const double plane = voxel[axis] + (frame_of(face).sign > 0 ? 1.0 : 0.0);
+  const double slope = ray_in_grid.direction[axis];
+  const double length = glm::length(ray_in_grid.direction);
+  if (!(std::abs(slope) > 1e-3 * length)) return std::nullopt;
+  const double t = (plane - ray_in_grid.origin[axis]) / slope;
+  if (!(t > 0.0) || t * length > kFarthestLayer) return std::nullopt;
+  const DVec3 point = ray_in_grid.origin + t * ray_in_grid.direction;
+  if (glm::any(glm::greaterThan(glm::abs(point), DVec3(kGreatest)))) return std::nullopt;
+  IVec3 found(glm::floor(point));
+  found[axis] = voxel[axis];
+  return found;
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,256 @@
+#include "cpu_backend.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <new>
+#include <thread>
+#include <utility>
+
+#include <quoin/render/cpu_renderer.h>
+
+namespace quoin::viewer {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::array kDivisors = {8, 4, 2, 1};
+constexpr int kSampleFactor = 4;
+constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// One of the pictures that lead to the settled one.
+struct Stage {
+  int divisor = 1;
+  int samples = 1;
+
+  [[nodiscard]] int width(const ViewRequest& request) const { return (request.width + divisor - 1) / divisor; }
+  [[nodiscard]] int height(const ViewRequest& request) const { return (request.height + divisor - 1) / divisor; }
+  [[nodiscard]] double pixels(const ViewRequest& request) const {
+    return static_cast<double>(width(request)) * height(request);
+  }
+  [[nodiscard]] bool is_last(const ViewRequest& request) const { return divisor == 1 && samples >= request.samples; }
+  [[nodiscard]] Stage next(const ViewRequest& request) const {
+    if (divisor > 1) return {divisor / 2, 1};
+    return {1, std::min(samples * kSampleFactor, request.samples)};
+  }
+};
+
+RenderOptions options_for(const ViewRequest& request, const Stage& stage, Threads threads) {
+  RenderOptions options;
+  options.width = stage.width(request);
+  options.height = stage.height(request);
+  options.samples = stage.samples;
+  options.light = request.light;
+  options.threads = threads;
+  if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  return options;
+}
+
+}  // namespace
+
+struct CpuBackend::Impl {
+  Impl(const Scene& scene, const CpuBackendOptions& given, std::function<void()> listener)
+      : options(given), on_frame(std::move(listener)), renderer(scene, given.hidden, given.threads) {
+    worker = std::thread([this] { work(); });
+  }
+
+  ~Impl() {
+    {
+      const std::lock_guard lock(mutex);
+      is_stopped = true;
+      halt = true;
+    }
+    wake.notify_all();
+    worker.join();
+  }
+
+  void work();
+  [[nodiscard]] bool has_work() const {
+    const bool can_draw = request && !is_done && request->width > 0 && request->height > 0;
+    return is_stopped || (!is_paused && !is_broken && (is_stale || can_draw));
+  }
+  void update(std::unique_lock<std::mutex>& lock);
+  void draw(std::unique_lock<std::mutex>& lock);
+  void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
+  [[nodiscard]] Stage first_stage() const;
+  void tell() const {
+    if (on_frame) on_frame();
+  }
+
+  CpuBackendOptions options;
+  std::function<void()> on_frame;
+  CpuRenderer renderer;
+
+  std::mutex mutex;  // guards what follows, but for the atomic ones
+  std::condition_variable wake;
+  std::condition_variable idle;
+  std::optional<ViewRequest> request;
+  std::optional<Stage> stage;  // the next one; none where the first has not been chosen
+  bool is_done = false;
+  bool is_camera_new = true;
+  bool is_paused = false;
+  bool is_stale = false;
+  bool is_busy = false;  // reads the scene
+  bool is_stopped = false;
+  bool is_broken = false;  // there was not memory enough: nothing is done until the scene has changed again
+  std::optional<ViewFrame> frame;
+  std::optional<Error> error;
+  double seconds_per_pixel = 0.0;  // 0: not known
+
+  std::atomic<std::uint64_t> request_number{0};
+  std::atomic<bool> halt{false};
+
+  std::thread worker;
+};
+
+void CpuBackend::Impl::work() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    wake.wait(lock, [this] { return has_work(); });
+    if (is_stopped) return;
+    is_busy = true;
+    try {
+      is_stale ? update(lock) : draw(lock);
+    } catch (const std::bad_alloc&) {
+      if (!lock.owns_lock()) lock.lock();
+      error = Error{ErrorCode::LimitExceeded, "out of memory", "", std::nullopt};
+      is_broken = true;
+    }
+    is_busy = false;
+    idle.notify_all();
+    lock.unlock();
+    tell();
+    lock.lock();
+  }
+}
+
+void CpuBackend::Impl::update(std::unique_lock<std::mutex>& lock) {
+  lock.unlock();
+  renderer.update(options.threads);
+  lock.lock();
+  is_stale = false;
+}
+
+Stage CpuBackend::Impl::first_stage() const {
+  const double patience = options.first_frame_seconds * (is_camera_new ? 1.0 : kPatienceAfterEdits);
+  Stage chosen{kDivisors.front(), 1};
+  if (seconds_per_pixel <= 0.0) return chosen;
+  for (const int divisor : kDivisors) {
+    const Stage finer{divisor, 1};
+    if (finer.pixels(*request) * seconds_per_pixel <= patience) chosen = finer;
+  }
+  return chosen;
+}
+
+void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
+  const bool is_first = !stage.has_value();
+  if (is_first) stage = first_stage();
+  const ViewRequest wanted = *request;
+  const Stage now = *stage;
+  const std::uint64_t number = request_number;
+  lock.unlock();
+  const Clock::time_point start = Clock::now();
+  auto picture = renderer.render(wanted.camera, options_for(wanted, now, options.threads),
+                                 [&](double) { return !halt && (is_first || request_number == number); });
+  const double seconds = seconds_since(start);
+  lock.lock();
+  if (!picture && picture.error().code == ErrorCode::Cancelled) return;
+  publish(std::move(picture), wanted, now, seconds);
+  if (request_number != number) {
+    if (frame) frame->is_settled = false;
+    return;
+  }
+  is_done = error.has_value() || now.is_last(wanted);
+  is_camera_new = false;
+  stage = now.next(wanted);
+}
+
+void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, const Stage& drawn, double seconds) {
+  if (!picture) {
+    error = picture.error();
+    return;
+  }
+  const bool is_whole = drawn.divisor == 1;
+  frame = ViewFrame{std::move(picture->colour), drawn.samples, is_whole, drawn.is_last(of), seconds, picture->rays};
+  if (drawn.samples == 1) seconds_per_pixel = seconds / drawn.pixels(of);
+}
+
+CpuBackend::CpuBackend(const Scene& scene, const CpuBackendOptions& options, std::function<void()> on_frame)
+    : impl_(std::make_unique<Impl>(scene, options, std::move(on_frame))) {}
+CpuBackend::~CpuBackend() = default;
+
+std::string CpuBackend::name() const {
+  return "processor";
+}
+
+void CpuBackend::show(const ViewRequest& request) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (impl_->request && is_same(*impl_->request, request)) return;
+    impl_->is_camera_new = !impl_->request || !is_same(impl_->request->camera, request.camera) || impl_->is_camera_new;
+    impl_->request = request;
+    impl_->stage.reset();
+    impl_->is_done = false;
+    impl_->error.reset();
+    ++impl_->request_number;
+  }
+  impl_->wake.notify_all();
+}
+
+std::optional<ViewFrame> CpuBackend::take() {
+  const std::lock_guard lock(impl_->mutex);
+  return std::exchange(impl_->frame, std::nullopt);
+}
+
+std::optional<Error> CpuBackend::fault() {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->error;
+}
+
+double CpuBackend::pause() {
+  const Clock::time_point start = Clock::now();
+  std::unique_lock lock(impl_->mutex);
+  impl_->is_paused = true;
+  impl_->halt = true;
+  impl_->idle.wait(lock, [this] { return !impl_->is_busy; });
+  return seconds_since(start);
+}
+
+void CpuBackend::resume(bool changed) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->is_paused = false;
+    impl_->halt = impl_->is_stopped;
+    if (changed) {
+      impl_->is_stale = true;
+      impl_->is_broken = false;
+      impl_->is_done = false;
+      impl_->stage.reset();
+      impl_->frame.reset();
+      impl_->error.reset();
+      ++impl_->request_number;
+    }
+  }
+  impl_->wake.notify_all();
+}
+
+std::optional<SceneHit> CpuBackend::pick(const Camera& camera, double x, double y, int width, int height) {
+  // Only `resume`, on this thread, asks for an update of the tracer: without one under way it stays as it is.
+  if (width <= 0 || height <= 0 || !is_up_to_date()) return std::nullopt;
+  return quoin::pick(impl_->renderer.tracer(), camera, x, y, width, height);
+}
+
+bool CpuBackend::is_up_to_date() {
+  const std::lock_guard lock(impl_->mutex);
+  return !impl_->is_stale;
+}
+
+}  // namespace quoin::viewer

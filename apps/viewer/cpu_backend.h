@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+
+#include <quoin/core/parallel.h>
+
+#include "view_backend.h"
+
+namespace quoin::viewer {
+
+struct CpuBackendOptions {
+  bool hidden = false;  ///< hidden instances are drawn too
+  Threads threads;
+  /// How long the first picture after a change of the camera may take, by the time that pixels have taken so far: it
+  /// is as fine as that allows. 0: always the coarsest, an eighth of the size.
+  double first_frame_seconds = 0.03;
+};
+
+/// Pictures by CpuRenderer on a thread of its own: an eighth of the size, a quarter, half, whole; then of 4, 16 ...
+/// samples a pixel up to what was asked for. A settled frame is CpuRenderer's picture to the byte.
+///
+/// A new request ends what is under way, but for the coarsest picture: however fast requests come, some are seen.
+class CpuBackend final : public ViewBackend {
+ public:
+  /// `scene` must outlive it in its place. `on_frame` is called from the backend's thread when there is a frame to take
+  /// or something went wrong; it may be empty. Cost: that of a CpuRenderer.
+  CpuBackend(const Scene& scene, const CpuBackendOptions& options, std::function<void()> on_frame);
+  /// Waits for the end of what is under way, which is stopped.
+  ~CpuBackend() override;
+
+  [[nodiscard]] std::string name() const override;
+  void show(const ViewRequest& request) override;
+  [[nodiscard]] std::optional<ViewFrame> take() override;
+  [[nodiscard]] std::optional<Error> fault() override;
+  double pause() override;
+  void resume(bool changed) override;
+  [[nodiscard]] std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width, int height) override;
+  [[nodiscard]] bool is_up_to_date() override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin::viewer

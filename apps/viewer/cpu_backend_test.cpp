@@ -1,0 +1,263 @@
+#include "cpu_backend.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "loader.h"
+#include "viewer_fixture.h"
+
+namespace quoin::viewer {
+namespace {
+
+/// Counts calls from another thread and waits for them.
+class Bell {
+ public:
+  void ring() {
+    const std::lock_guard lock(mutex_);
+    ++rings_;
+    rung_.notify_all();
+  }
+  /// False when none came for a minute.
+  bool wait() {
+    std::unique_lock lock(mutex_);
+    const bool came = rung_.wait_for(lock, std::chrono::seconds(60), [this] { return rings_ > 0; });
+    rings_ = 0;
+    return came;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable rung_;
+  int rings_ = 0;
+};
+
+ViewRequest request_for(const Scene& scene, View view, int width = 90, int height = 61) {
+  ViewRequest request;
+  request.width = width;
+  request.height = height;
+  request.camera = frame_scene(scene, view, static_cast<double>(width) / height);
+  request.samples = 4;
+  return request;
+}
+
+Image expected(const Scene& scene, const ViewRequest& request) {
+  RenderOptions options;
+  options.width = request.width;
+  options.height = request.height;
+  options.samples = request.samples;
+  options.light = request.light;
+  return CpuRenderer(scene).render(request.camera, options).value().colour;
+}
+
+/// Everything about a backend that a test needs.
+struct Watched {
+  explicit Watched(const Scene& scene, double first_frame_seconds = 0.0)
+      : backend(scene, {false, {2}, first_frame_seconds}, [this] { bell.ring(); }) {}
+
+  /// The frames until the picture has settled; empty when it did not.
+  std::vector<ViewFrame> settle() {
+    std::vector<ViewFrame> frames;
+    while (bell.wait()) {
+      auto frame = backend.take();
+      if (!frame) continue;
+      frames.push_back(std::move(*frame));
+      if (frames.back().is_settled) return frames;
+    }
+    return {};
+  }
+
+  Bell bell;
+  CpuBackend backend;
+};
+
+TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  for (const View view : {View::Iso, View::Top}) {
+    ViewRequest request = request_for(loaded.scene, view);
+    request.light.sun = {-0.5, 0.6, 0.1};
+    watched.backend.show(request);
+    const auto frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    EXPECT_EQ(frames.back().colour.rgb, expected(loaded.scene, request).rgb);
+    EXPECT_TRUE(frames.back().is_whole);
+    EXPECT_EQ(frames.back().samples, 4);
+    EXPECT_GT(frames.back().rays, 0);
+  }
+}
+
+TEST(CpuBackend, PicturesBecomeFiner) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  watched.backend.show(request_for(loaded.scene, View::Iso, 400, 300));
+  const auto frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    EXPECT_GE(frames[i].colour.width, frames[i - 1].colour.width);
+    EXPECT_GE(frames[i].samples, frames[i - 1].samples);
+  }
+  EXPECT_FALSE(watched.backend.take()) << "a frame is taken once";
+}
+
+TEST(CpuBackend, TheSameRequestAgainChangesNothing) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  const ViewRequest request = request_for(loaded.scene, View::Iso);
+  watched.backend.show(request);
+  ASSERT_FALSE(watched.settle().empty());
+  watched.backend.show(request);
+  watched.backend.pause();
+  watched.backend.resume(false);
+  EXPECT_FALSE(watched.backend.take());
+}
+
+TEST(CpuBackend, ManyRequestsEndWithTheLast) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene, 0.01);
+  ViewRequest request;
+  for (int i = 0; i < 200; ++i) {
+    request = request_for(loaded.scene, static_cast<View>(i % 6), 80 + i % 7, 60 + i % 5);
+    watched.backend.show(request);
+  }
+  while (watched.bell.wait()) {
+    const auto frame = watched.backend.take();
+    if (!frame || !frame->is_settled) continue;
+    EXPECT_EQ(frame->colour.rgb, expected(loaded.scene, request).rgb);
+    return;
+  }
+  FAIL() << "never settled";
+}
+
+TEST(CpuBackend, EditsAreDrawn) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  Document document = small_document();
+  Watched watched(document.scene());
+  const ViewRequest request = request_for(document.scene(), View::Iso);
+  watched.backend.show(request);
+  for (int edit = 0; edit < 12; ++edit) {
+    {
+      const ScenePause pause(watched.backend);
+      SceneHit hit;
+      hit.instance = document.scene().instances().handles().front();
+      hit.voxel = {static_cast<int>(random() % 70), 4, static_cast<int>(random() % 40)};
+      const Brush brush{static_cast<BrushAction>(random() % 3), BrushShape::Sphere, 4, 3};
+      ASSERT_TRUE(document.begin_stroke(brush, hit));
+      document.end_stroke();
+    }
+    if (edit % 4 != 3) continue;
+    const auto frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    EXPECT_EQ(frames.back().colour.rgb, expected(document.scene(), request).rgb);
+  }
+}
+
+TEST(CpuBackend, PicksWhatIsSeen) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  const ViewRequest request = request_for(loaded.scene, View::Top);
+  const auto hit = watched.backend.pick(request.camera, 45.0, 30.5, request.width, request.height);
+  const auto same = pick(SceneTracer(loaded.scene), request.camera, 45.0, 30.5, request.width, request.height);
+  ASSERT_EQ(hit.has_value(), same.has_value());
+  if (hit) {
+    EXPECT_EQ(hit->voxel, same->voxel);
+  }
+  EXPECT_FALSE(watched.backend.pick(request.camera, 0.5, 0.5, request.width, request.height));
+  EXPECT_FALSE(watched.backend.pick(request.camera, 0.5, 0.5, 0, 0));
+}
+
+TEST(CpuBackend, NothingIsPickedWhileAnEditIsTakenOver) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  EXPECT_TRUE(watched.backend.is_up_to_date());
+  watched.backend.pause();
+  watched.backend.resume(true);
+  while (!watched.backend.is_up_to_date()) ASSERT_TRUE(watched.bell.wait());
+  const ViewRequest request = request_for(loaded.scene, View::Front);
+  int hits = 0;
+  for (int y = 0; y < request.height; ++y) {
+    hits += watched.backend.pick(request.camera, 30.5, y + 0.5, request.width, request.height).has_value() ? 1 : 0;
+  }
+  EXPECT_GT(hits, 0);
+}
+
+TEST(CpuBackend, ImpossibleRequestsAreFaults) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  ViewRequest request = request_for(loaded.scene, View::Iso);
+  request.light.exposure = -1.0;
+  watched.backend.show(request);
+  while (!watched.backend.fault()) ASSERT_TRUE(watched.bell.wait());
+  EXPECT_NE(watched.backend.fault()->message.find("exposure"), std::string::npos);
+  request.light.exposure = 1.0;
+  watched.backend.show(request);
+  ASSERT_FALSE(watched.settle().empty());
+  EXPECT_FALSE(watched.backend.fault());
+}
+
+TEST(CpuBackend, StopsInTheMiddle) {
+  const LoadedScene loaded = small_scene();
+  for (int i = 0; i < 30; ++i) {
+    Watched watched(loaded.scene);
+    watched.backend.show(request_for(loaded.scene, View::Iso, 640, 480));
+    if (i % 2 == 0) watched.bell.wait();
+    if (i % 3 == 0) watched.backend.pause();
+  }
+}
+
+TEST(CpuBackend, AnEmptySceneIsSky) {
+  const Scene empty;
+  Watched watched(empty);
+  watched.backend.show(request_for(empty, View::Iso, 20, 10));
+  EXPECT_FALSE(watched.settle().empty());
+}
+
+MakeBackend by_processor() {
+  return [](const Document& document) {
+    return std::make_unique<CpuBackend>(document.scene(), CpuBackendOptions{}, nullptr);
+  };
+}
+
+TEST(Loader, ReadsOnItsOwnThread) {
+  const ScratchFolder folder("loader");
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
+  Bell bell;
+  Loader loader(folder.file("hill.vox"), {}, by_processor(), [&bell] { bell.ring(); });
+  ASSERT_TRUE(bell.wait());
+  ASSERT_TRUE(loader.is_done());
+  auto opened = loader.take();
+  ASSERT_TRUE(opened) << to_string(opened.error());
+  EXPECT_EQ(opened->document->scene().voxel_count(), small_scene().scene.voxel_count());
+  EXPECT_EQ(opened->backend->name(), "processor");
+}
+
+TEST(Loader, ErrorsArriveToo) {
+  Bell bell;
+  Loader loader("/nowhere/a.vox", {}, by_processor(), [&bell] { bell.ring(); });
+  ASSERT_TRUE(bell.wait());
+  EXPECT_EQ(loader.take().error().code, ErrorCode::CannotRead);
+}
+
+TEST(Saver, WritesWhatTheDocumentHolds) {
+  const ScratchFolder folder("saver");
+  const Document document = small_document();
+  Bell bell;
+  {
+    Saver saver(document, folder.file("a.glb"), [&bell] { bell.ring(); });
+    ASSERT_TRUE(bell.wait());
+    ASSERT_TRUE(saver.is_done());
+    EXPECT_TRUE(saver.status());
+    EXPECT_EQ(saver.fraction(), 1.0);
+  }
+  EXPECT_GT(std::filesystem::file_size(folder.file("a.glb")), 1'000U);
+}
+
+}  // namespace
+}  // namespace quoin::viewer

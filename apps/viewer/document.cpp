@@ -1,0 +1,164 @@
+#include "document.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/gltf.h>
+
+namespace quoin::viewer {
+
+namespace {
+
+const char* name_of(BrushAction action) {
+  switch (action) {
+    case BrushAction::Place:
+      return "place";
+    case BrushAction::Remove:
+      return "remove";
+    case BrushAction::Paint:
+      return "paint";
+  }
+  return "";
+}
+
+Status write_as_vox(const Scene& scene, const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  auto bytes = write_vox(scene, warnings);
+  if (!bytes) {
+    if (bytes.error().path.empty()) bytes.error().path = path.string();
+    return tl::unexpected<Error>(bytes.error());
+  }
+  return write_file(path, *bytes);
+}
+
+Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const Progress& progress) {
+  const auto half = [&progress](double offset) -> Progress {
+    if (!progress) return {};
+    return [&progress, offset](double fraction) { return progress(offset + 0.5 * fraction); };
+  };
+  const auto meshes = mesh_scene(scene, {}, false, {}, half(0.0));
+  if (!meshes) return tl::unexpected<Error>(meshes.error());
+  const auto written = write_glb(scene, *meshes, path, half(0.5));
+  if (!written) return tl::unexpected<Error>(written.error());
+  return {};
+}
+
+Result<FileFormat> format_to_write(const std::filesystem::path& path) {
+  const auto format = format_for_writing(path);
+  if (format && (format->format == FileFormat::Vox || format->format == FileFormat::Glb)) return format->format;
+  return fail(ErrorCode::Unsupported, "the viewer saves .vox and .glb; `quoin convert` writes the others",
+              path.string());
+}
+
+}  // namespace
+
+bool can_write(const std::filesystem::path& path) {
+  return format_to_write(path).has_value();
+}
+
+Document::Document(LoadedScene loaded, std::filesystem::path path)
+    : loaded_(std::move(loaded)), path_(std::move(path)) {}
+
+Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options) {
+  auto loaded = load_scene(path, options);
+  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  return std::make_unique<Document>(std::move(*loaded), path);
+}
+
+std::string Document::name() const {
+  return path_.empty() ? "empty scene" : path_.filename().string();
+}
+
+bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
+  end_stroke();
+  const Instance* instance = loaded_.scene.instances().find(hit.instance);
+  if (instance == nullptr || loaded_.scene.grids().find(instance->grid) == nullptr) return false;
+  const bool needs_type = brush.action != BrushAction::Remove;
+  if (needs_type && (brush.type == kAir || brush.type >= loaded_.scene.types.size())) return false;
+  const IVec3 target = target_of(brush.action, hit.voxel, hit.face);
+  stroke_ = Stroke{brush, instance->grid, hit.instance, {hit.voxel, hit.face}, target};
+  history_.begin(name_of(brush.action));
+  touch(target);
+  return true;
+}
+
+std::int64_t Document::touch(IVec3 voxel) {
+  Grid& grid = loaded_.scene.grids()[stroke_->grid].grid;
+  history_.touch(stroke_->grid, grid, reach_of(stroke_->brush, voxel));
+  return apply(stroke_->brush, voxel, grid);
+}
+
+std::int64_t Document::drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit) {
+  if (!stroke_) return 0;
+  const Instance* instance = loaded_.scene.instances().find(stroke_->instance);
+  const SceneGrid* grid = loaded_.scene.grids().find(stroke_->grid);
+  if (instance == nullptr || grid == nullptr) return 0;
+  if (stroke_->brush.action == BrushAction::Paint) {
+    const bool is_same_grid = hit && hit->instance == stroke_->instance;
+    if (!is_same_grid || hit->voxel == stroke_->last) return 0;
+    stroke_->last = hit->voxel;
+    return touch(hit->voxel);
+  }
+  const auto ray = ray_in_grid(*instance, *grid, ray_in_world);
+  const auto met = ray ? stroke_->layer.at(*ray) : std::nullopt;
+  if (!met) return 0;
+  const IVec3 target = target_of(stroke_->brush.action, *met, stroke_->layer.face);
+  const IVec3 way = target - stroke_->last;
+  const int steps = std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)});
+  constexpr int kLongestWay = 512;  // a leap beyond that is no drag of a hand
+  if (steps > kLongestWay) return 0;
+  std::int64_t changed = 0;
+  const IVec3 from = stroke_->last;
+  const int stride = std::max(1, stroke_->brush.radius / 2);
+  for (int step = std::min(stride, steps); steps > 0; step = std::min(step + stride, steps)) {
+    changed += touch(from + IVec3(glm::round(DVec3(way) * (static_cast<double>(step) / steps))));
+    if (step == steps) break;
+  }
+  stroke_->last = target;
+  return changed;
+}
+
+void Document::end_stroke() {
+  if (!stroke_) return;
+  stroke_.reset();
+  history_.end(loaded_.scene);
+}
+
+bool Document::undo() {
+  return !stroke_ && history_.undo(loaded_.scene);
+}
+
+bool Document::redo() {
+  return !stroke_ && history_.redo(loaded_.scene);
+}
+
+Result<VoxelType> Document::type_of_colour(Rgba8 colour) {
+  for (std::size_t type = 1; type < loaded_.scene.types.size(); ++type) {
+    const VoxelProperties& known = loaded_.scene.types[static_cast<VoxelType>(type)];
+    if (known.colour == colour && known.visibility == Visibility::Opaque && known.emission == 0.0F) {
+      return static_cast<VoxelType>(type);
+    }
+  }
+  VoxelProperties properties;
+  properties.colour = colour;
+  return loaded_.scene.types.add(std::move(properties));
+}
+
+Status Document::write(const std::filesystem::path& path, std::vector<std::string>& warnings,
+                       const Progress& progress) const {
+  const auto format = format_to_write(path);
+  if (!format) return tl::unexpected<Error>(format.error());
+  if (*format == FileFormat::Vox) return write_as_vox(loaded_.scene, path, warnings);
+  return write_as_glb(loaded_.scene, path, progress);
+}
+
+void Document::note_written(const std::filesystem::path& path, std::uint64_t state) {
+  const auto format = format_to_write(path);
+  if (!format || *format != FileFormat::Vox) return;
+  path_ = path;
+  saved_state_ = state;
+}
+
+}  // namespace quoin::viewer

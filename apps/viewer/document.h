@@ -1,0 +1,87 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/core/progress.h>
+#include <quoin/io/vox.h>
+#include <quoin/scene/scene_query.h>
+
+#include "brush.h"
+#include "edit_history.h"
+
+namespace quoin::viewer {
+
+/// A scene under edit, where it came from, and what can be undone.
+///
+/// Edits need the scene to themselves; whoever draws it must have stopped (ViewBackend::pause).
+class Document {
+ public:
+  /// An empty scene without a name.
+  Document() = default;
+  Document(LoadedScene loaded, std::filesystem::path path);
+
+  /// Reads any file that `load_scene` reads. Errors: those of load_scene.
+  [[nodiscard]] static Result<std::unique_ptr<Document>> open(const std::filesystem::path& path,
+                                                              const LoadOptions& options = {});
+
+  [[nodiscard]] const Scene& scene() const { return loaded_.scene; }
+  [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
+  /// Empty for a scene that came from nowhere.
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// For titles: the file's name, or "empty scene".
+  [[nodiscard]] std::string name() const;
+  [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
+
+  /// Begins a stroke with its first touch, where the user points. False, without a stroke, when the instance or its
+  /// grid is gone, or the brush's type is not registered.
+  bool begin_stroke(const Brush& brush, const SceneHit& hit);
+  /// Goes on to where a ray of the world meets the layer of the first touch, without gaps; to `hit` when painting.
+  /// Answers how many voxels changed.
+  std::int64_t drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit);
+  /// The whole stroke is one step to undo.
+  void end_stroke();
+  [[nodiscard]] bool is_in_stroke() const { return stroke_.has_value(); }
+  [[nodiscard]] const Brush* stroke_brush() const { return stroke_ ? &stroke_->brush : nullptr; }
+
+  [[nodiscard]] const EditHistory& history() const { return history_; }
+  /// False when there is nothing to undo (redo), or in a stroke.
+  bool undo();
+  bool redo();
+
+  /// A type of that colour, new if there is none. Errors: LimitExceeded.
+  [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour);
+
+  /// Writes .vox or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings; those
+  /// of write_vox, mesh_scene and write_glb; Cancelled.
+  [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
+                             const Progress& progress = {}) const;
+  /// What was written is what the state `state` held: not dirty while it is in force. A .vox becomes the document's
+  /// own file; a mesh is a copy only, which loses voxels, and changes nothing.
+  void note_written(const std::filesystem::path& path, std::uint64_t state);
+
+ private:
+  struct Stroke {
+    Brush brush;
+    GridHandle grid;
+    InstanceHandle instance;
+    StrokeLayer layer;
+    IVec3 last{0};
+  };
+
+  std::int64_t touch(IVec3 voxel);
+
+  LoadedScene loaded_;
+  std::filesystem::path path_;
+  EditHistory history_;
+  std::uint64_t saved_state_ = 0;
+  std::optional<Stroke> stroke_;
+};
+
+/// Whether a document can be saved under that name: it ends in .vox or .glb.
+[[nodiscard]] bool can_write(const std::filesystem::path& path);
+
+}  // namespace quoin::viewer

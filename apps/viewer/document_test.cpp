@@ -1,0 +1,264 @@
+#include "document.h"
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+
+#include "viewer_fixture.h"
+
+namespace quoin::viewer {
+namespace {
+
+std::vector<std::byte> vox_bytes(const Scene& scene) {
+  std::vector<std::string> warnings;
+  return write_vox(scene, warnings).value();
+}
+
+const Grid& only_grid(const Document& document) {
+  return document.scene().grids()[document.scene().grids().handles().front()].grid;
+}
+
+SceneHit hit_at(const Document& document, IVec3 voxel, Direction face) {
+  SceneHit hit;
+  hit.instance = document.scene().instances().handles().front();
+  hit.voxel = voxel;
+  hit.face = face;
+  hit.type = only_grid(document).get(voxel);
+  return hit;
+}
+
+TEST(Brush, CoversWhatItsShapeSays) {
+  for (const BrushShape shape : {BrushShape::Box, BrushShape::Sphere}) {
+    for (const int radius : {0, 1, 3}) {
+      Grid grid;
+      const IVec3 centre{-2, 63, 7};
+      const std::int64_t changed = apply({BrushAction::Place, shape, radius, 3}, centre, grid);
+      std::int64_t expected = 0;
+      for (int z = -radius; z <= radius; ++z) {
+        for (int y = -radius; y <= radius; ++y) {
+          for (int x = -radius; x <= radius; ++x) {
+            const bool is_in = shape == BrushShape::Box || x * x + y * y + z * z <= (radius + 0.5) * (radius + 0.5);
+            expected += is_in ? 1 : 0;
+            EXPECT_EQ(grid.get(centre + IVec3{x, y, z}), is_in ? 3 : kAir);
+          }
+        }
+      }
+      EXPECT_EQ(changed, expected);
+      EXPECT_EQ(grid.voxel_count(), expected);
+    }
+  }
+}
+
+TEST(Brush, ActionsTouchWhatTheyName) {
+  Grid grid;
+  grid.set({0, 0, 0}, 1);
+  EXPECT_EQ(apply({BrushAction::Paint, BrushShape::Box, 1, 2}, {0, 0, 0}, grid), 1);
+  EXPECT_EQ(grid.get({0, 0, 0}), 2);
+  EXPECT_EQ(grid.voxel_count(), 1) << "paint adds nothing";
+  EXPECT_EQ(apply({BrushAction::Place, BrushShape::Box, 1, 3}, {0, 0, 0}, grid), 26);
+  EXPECT_EQ(grid.get({0, 0, 0}), 2) << "placing replaces nothing";
+  EXPECT_EQ(apply({BrushAction::Remove, BrushShape::Box, 1, 3}, {0, 0, 0}, grid), 27);
+  EXPECT_EQ(grid.voxel_count(), 0);
+}
+
+TEST(Brush, WhereCoordinatesEndItDoesNothing) {
+  Grid grid;
+  const int most = std::numeric_limits<int>::max();
+  EXPECT_EQ(apply({BrushAction::Place, BrushShape::Box, 9, 3}, {most, 0, 0}, grid), 0);
+  EXPECT_EQ(apply({BrushAction::Place, BrushShape::Sphere, 9, 3}, {0, std::numeric_limits<int>::min(), 0}, grid), 0);
+}
+
+TEST(Brush, ARayInAGridIsTheRayInTheWorld) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::normal_distribution<double> number;
+  for (int i = 0; i < 200; ++i) {
+    SceneGrid grid;
+    grid.pivot = {number(random) * 10, number(random) * 10, number(random) * 10};
+    Instance instance;
+    instance.position = {number(random) * 1e6, number(random) * 100, number(random)};
+    instance.rotation = glm::normalize(DQuat{number(random), number(random), number(random), number(random)});
+    instance.voxel_size = std::exp(number(random));
+    instance.mirrored = (i & 1) != 0;
+    const Ray world{{number(random), number(random), number(random)}, {number(random), number(random), number(random)}};
+    const auto ray = ray_in_grid(instance, grid, world);
+    ASSERT_TRUE(ray);
+    for (const double t : {0.0, 1.0, 17.0}) {
+      const DVec3 back = world_from_grid(instance, grid, ray->origin + t * ray->direction);
+      EXPECT_LT(glm::length(back - (world.origin + t * world.direction)), 1e-6);
+    }
+  }
+}
+
+TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  Document document = small_document();
+  std::vector<std::vector<std::byte>> states{vox_bytes(document.scene())};
+  const auto pick = [&random](int from, int to) { return std::uniform_int_distribution<int>(from, to)(random); };
+  for (int edit = 0; edit < 30; ++edit) {
+    const Brush brush{static_cast<BrushAction>(pick(0, 2)), static_cast<BrushShape>(pick(0, 1)), pick(0, 6),
+                      static_cast<VoxelType>(pick(1, 4))};
+    const IVec3 start{pick(-5, 75), pick(-3, 14), pick(-5, 45)};
+    ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, start, static_cast<Direction>(pick(0, 5)))));
+    for (int move = pick(0, 4); move > 0; --move) {
+      const DVec3 origin{pick(-50, 100), pick(20, 60), pick(-50, 100)};
+      const DVec3 aim{pick(0, 70), pick(0, 10), pick(0, 40)};
+      document.drag_to({origin, aim - origin}, hit_at(document, IVec3(aim), Direction::PosY));
+    }
+    EXPECT_FALSE(document.undo()) << "in a stroke";
+    document.end_stroke();
+    auto bytes = vox_bytes(document.scene());
+    if (document.history().steps() >= states.size()) states.push_back(std::move(bytes));
+  }
+  ASSERT_EQ(document.history().steps() + 1, states.size());
+  ASSERT_GT(states.size(), 10U);
+  EXPECT_TRUE(document.is_dirty());
+  for (std::size_t i = states.size() - 1; i > 0; --i) {
+    ASSERT_EQ(vox_bytes(document.scene()), states[i]) << i;
+    ASSERT_TRUE(document.undo());
+  }
+  EXPECT_EQ(vox_bytes(document.scene()), states[0]);
+  EXPECT_FALSE(document.undo());
+  EXPECT_FALSE(document.is_dirty()) << "back where it was saved";
+  for (std::size_t i = 1; i < states.size(); ++i) {
+    ASSERT_TRUE(document.redo());
+    ASSERT_EQ(vox_bytes(document.scene()), states[i]) << i;
+  }
+  EXPECT_FALSE(document.redo());
+}
+
+TEST(Document, AnEditAfterAnUndoForgetsWhatWasUndone) {
+  Document document = small_document();
+  const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};
+  for (const int x : {5, 9}) {
+    ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {x, 3, 5}, Direction::PosY)));
+    document.end_stroke();
+  }
+  ASSERT_TRUE(document.undo());
+  EXPECT_EQ(document.history().redo_name(), "place");
+  ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {20, 3, 5}, Direction::PosY)));
+  document.end_stroke();
+  EXPECT_FALSE(document.redo());
+  EXPECT_EQ(document.history().steps(), 2U);
+  EXPECT_EQ(only_grid(document).get({9, 4, 5}), kAir);
+  EXPECT_EQ(only_grid(document).get({20, 4, 5}), 3);
+}
+
+TEST(Document, AStrokeThatChangesNothingLeavesNoTrace) {
+  Document document = small_document();
+  ASSERT_TRUE(
+      document.begin_stroke({BrushAction::Paint, BrushShape::Box, 0, 1}, hit_at(document, {0, 3, 0}, Direction::PosY)));
+  document.end_stroke();
+  EXPECT_EQ(document.history().steps(), 0U);
+  EXPECT_FALSE(document.is_dirty());
+}
+
+TEST(Document, AStrokeStaysInItsLayerAndHasNoGaps) {
+  Document document = small_document();
+  const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};
+  ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {2, 3, 2}, Direction::PosY)));
+  const auto from_above = [](double x, double z) { return Ray{{x, 50.0, z}, {0.0, -1.0, 0.0}}; };
+  EXPECT_EQ(document.drag_to(from_above(12.5, 2.5), std::nullopt), 10);
+  EXPECT_EQ(document.drag_to(from_above(12.5, 2.5), std::nullopt), 0) << "nothing piles up";
+  EXPECT_EQ(document.drag_to({{0.0, 50.0, 0.0}, {1.0, 0.0, 0.0}}, std::nullopt), 0) << "along the layer";
+  document.end_stroke();
+  for (int x = 2; x <= 12; ++x) {
+    EXPECT_EQ(only_grid(document).get({x, 4, 2}), 3);
+    EXPECT_EQ(only_grid(document).get({x, 5, 2}), kAir);
+  }
+  EXPECT_EQ(document.history().steps(), 1U) << "a drag is one step";
+}
+
+TEST(Document, WrongTargetsBeginNoStroke) {
+  Document document = small_document();
+  SceneHit gone = hit_at(document, {0, 0, 0}, Direction::PosY);
+  gone.instance.generation += 1;
+  EXPECT_FALSE(document.begin_stroke({}, gone));
+  const Brush unknown{BrushAction::Place, BrushShape::Box, 0, 99};
+  EXPECT_FALSE(document.begin_stroke(unknown, hit_at(document, {0, 0, 0}, Direction::PosY)));
+  EXPECT_EQ(document.drag_to({}, std::nullopt), 0);
+}
+
+TEST(EditHistory, ForgetsTheOldestBeyondItsLimit) {
+  LoadedScene loaded = small_scene();
+  Scene& scene = loaded.scene;
+  const GridHandle handle = scene.grids().handles().front();
+  EditHistory history(64'000);
+  std::mt19937 random(3);
+  for (int edit = 0; edit < 60; ++edit) {
+    history.begin("edit");
+    Grid& grid = scene.grids()[handle].grid;
+    const IVec3 centre{static_cast<int>(random() % 60), 8, static_cast<int>(random() % 40)};
+    const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
+    history.touch(handle, grid, reach_of(brush, centre));
+    apply(brush, centre, grid);
+    history.end(scene);
+    EXPECT_LE(history.bytes(), 64'000U);
+  }
+  EXPECT_LT(history.steps(), 60U);
+  EXPECT_GT(history.steps(), 0U);
+  std::size_t undone = 0;
+  while (history.undo(scene)) ++undone;
+  EXPECT_EQ(undone, history.steps());
+}
+
+TEST(Document, SavesAndKnowsWhatIsSaved) {
+  const ScratchFolder folder("document");
+  Document document = small_document();
+  ASSERT_TRUE(document.begin_stroke({BrushAction::Place, BrushShape::Sphere, 3, 3},
+                                    hit_at(document, {20, 3, 20}, Direction::PosY)));
+  document.end_stroke();
+  std::vector<std::string> warnings;
+  const auto mesh = folder.file("hill.glb");
+  ASSERT_TRUE(document.write(mesh, warnings));
+  document.note_written(mesh, document.history().state());
+  EXPECT_TRUE(document.is_dirty()) << "a mesh is a copy";
+  const auto path = folder.file("saved.VOX");
+  ASSERT_TRUE(document.write(path, warnings));
+  document.note_written(path, document.history().state());
+  EXPECT_FALSE(document.is_dirty());
+  EXPECT_EQ(document.name(), "saved.VOX");
+  ASSERT_TRUE(document.undo());
+  EXPECT_TRUE(document.is_dirty());
+  ASSERT_TRUE(document.redo());
+  EXPECT_FALSE(document.is_dirty());
+  const auto again = Document::open(path);
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_EQ((*again)->scene().voxel_count(), document.scene().voxel_count());
+  EXPECT_EQ((*again)->scene().bounds(false).max, document.scene().bounds(false).max);
+}
+
+TEST(Document, WhatCannotBeDoneIsAnError) {
+  const ScratchFolder folder("errors");
+  Document document = small_document();
+  std::vector<std::string> warnings;
+  EXPECT_EQ(document.write(folder.file("a.obj"), warnings).error().code, ErrorCode::Unsupported);
+  EXPECT_EQ(document.write(folder.file("none") / "a.vox", warnings).error().code, ErrorCode::CannotWrite);
+  EXPECT_EQ(document.write(folder.file("a.glb"), warnings, [](double) { return false; }).error().code,
+            ErrorCode::Cancelled);
+  EXPECT_FALSE(std::filesystem::exists(folder.file("a.glb")));
+  EXPECT_EQ(Document::open(folder.file("absent.vox")).error().code, ErrorCode::CannotRead);
+  const std::string text = "not a voxel in sight";
+  ASSERT_TRUE(write_file(folder.file("text.vox"), std::as_bytes(std::span(text))));
+  EXPECT_FALSE(Document::open(folder.file("text.vox")));
+}
+
+TEST(Document, ColoursBecomeTypesOnce) {
+  Document document = small_document();
+  EXPECT_EQ(document.type_of_colour({200, 40, 40, 255}).value(), 3);
+  const VoxelType fresh = document.type_of_colour({1, 2, 3, 255}).value();
+  EXPECT_EQ(fresh, 5);
+  EXPECT_EQ(document.type_of_colour({1, 2, 3, 255}).value(), fresh);
+}
+
+}  // namespace
+}  // namespace quoin::viewer

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/scene/scene.h>
+
+namespace quoin::viewer {
+
+/// What edits to the grids of a scene replaced, a step a stroke of the brush, so that they can be undone and redone.
+///
+/// Kept are the chunks that a step changed, before and after; the oldest steps go when they take more than the limit.
+class EditHistory {
+ public:
+  explicit EditHistory(std::size_t most_bytes = std::size_t{256} << 20) : most_bytes_(most_bytes) {}
+
+  /// Begins a step, ending the one under way.
+  void begin(std::string name);
+  /// Says that voxels of a box are about to be changed. Requires: a step is under way, `grid` is the scene's `handle`.
+  void touch(GridHandle handle, const Grid& grid, const IBox& box);
+  /// Ends the step; one that changed nothing leaves no trace. Steps that were undone before are forgotten otherwise.
+  void end(const Scene& scene);
+  [[nodiscard]] bool is_under_way() const { return open_.has_value(); }
+
+  [[nodiscard]] bool can_undo() const { return done_ > 0; }
+  [[nodiscard]] bool can_redo() const { return done_ < steps_.size(); }
+  /// The names of what would be undone or redone; empty when nothing would.
+  [[nodiscard]] std::string undo_name() const;
+  [[nodiscard]] std::string redo_name() const;
+  /// False when there is nothing to undo (redo). Requires: no step is under way.
+  bool undo(Scene& scene);
+  bool redo(Scene& scene);
+  void clear();
+
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] std::size_t steps() const { return steps_.size(); }
+  /// Tells the states of the scene apart: the same number after an undo as before what was undone.
+  [[nodiscard]] std::uint64_t state() const { return done_ == 0 ? base_state_ : steps_[done_ - 1].state; }
+
+ private:
+  struct ChangedChunk {
+    GridHandle grid;
+    IVec3 place{0};
+    std::uint64_t version = 0;
+    Chunk before{kAir};
+    Chunk after{kAir};
+  };
+  struct Step {
+    std::string name;
+    std::uint64_t state = 0;
+    std::vector<ChangedChunk> chunks;
+    std::size_t bytes = 0;
+  };
+
+  void keep(Step step);
+
+  std::size_t most_bytes_;
+  std::deque<Step> steps_;
+  std::size_t done_ = 0;  // steps that are in force; those from here on can be redone
+  std::size_t bytes_ = 0;
+  std::uint64_t base_state_ = 0;
+  std::uint64_t last_state_ = 0;
+  std::optional<Step> open_;
+};
+
+}  // namespace quoin::viewer

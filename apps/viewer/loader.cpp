@@ -1,0 +1,83 @@
+#include "loader.h"
+
+#include <chrono>
+#include <new>
+#include <utility>
+
+namespace quoin::viewer {
+
+namespace {
+
+Error out_of_memory(const std::filesystem::path& path) {
+  return {ErrorCode::LimitExceeded, "out of memory", path.string(), std::nullopt};
+}
+
+}  // namespace
+
+Loader::Loader(std::filesystem::path path, LoadOptions options, MakeBackend make_backend, std::function<void()> on_done)
+    : path_(std::move(path)) {
+  thread_ = std::thread([this, options, make = std::move(make_backend), done = std::move(on_done)] {
+    try {
+      work(options, make);
+    } catch (const std::bad_alloc&) {
+      result_ = tl::unexpected<Error>(out_of_memory(path_));
+    }
+    is_done_ = true;
+    if (!is_abandoned_ && done) done();
+  });
+}
+
+Loader::~Loader() {
+  is_abandoned_ = true;
+  thread_.join();
+}
+
+void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
+  auto document = Document::open(path_, options);
+  if (!document) {
+    result_ = tl::unexpected<Error>(document.error());
+    return;
+  }
+  is_read_ = true;
+  if (is_abandoned_) {
+    result_ = fail(ErrorCode::Cancelled, "cancelled", path_.string());
+    return;
+  }
+  OpenDocument opened;
+  opened.document = std::move(*document);
+  opened.backend = make_backend(*opened.document);
+  result_ = std::move(opened);
+}
+
+double Loader::seconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+Result<OpenDocument> Loader::take() {
+  Result<OpenDocument> taken = std::move(*result_);
+  result_.reset();
+  return taken;
+}
+
+Saver::Saver(const Document& document, std::filesystem::path path, std::function<void()> on_done)
+    : path_(std::move(path)), state_(document.history().state()) {
+  thread_ = std::thread([this, &document, done = std::move(on_done)] {
+    try {
+      status_ = document.write(path_, warnings_, [this](double fraction) {
+        fraction_ = fraction;
+        return !is_cancelled_;
+      });
+    } catch (const std::bad_alloc&) {
+      status_ = tl::unexpected<Error>(out_of_memory(path_));
+    }
+    is_done_ = true;
+    if (done) done();
+  });
+}
+
+Saver::~Saver() {
+  is_cancelled_ = true;
+  thread_.join();
+}
+
+}  // namespace quoin::viewer

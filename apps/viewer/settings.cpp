@@ -1,0 +1,155 @@
+#include "settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include <quoin/io/file.h>
+
+namespace quoin::viewer {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostRecent = 10;
+constexpr std::size_t kMostBytes = std::size_t{1} << 20;
+
+const Json* find(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found == object.end() ? nullptr : &*found;
+}
+
+void read_flag(const Json& object, const char* key, bool& value) {
+  const Json* found = find(object, key);
+  if (found != nullptr && found->is_boolean()) value = found->get<bool>();
+}
+
+void read_number(const Json& object, const char* key, double least, double most, double& value) {
+  const Json* found = find(object, key);
+  if (found == nullptr || !found->is_number()) return;
+  const auto number = found->get<double>();
+  if (number >= least && number <= most) value = number;
+}
+
+void read_whole(const Json& object, const char* key, int least, int most, int& value) {
+  double number = value;
+  read_number(object, key, least, most, number);
+  if (number == std::floor(number)) value = static_cast<int>(number);
+}
+
+void read_sun(const Json& object, DVec3& sun) {
+  const Json* found = find(object, "sun");
+  if (found == nullptr || !found->is_array() || found->size() != 3) return;
+  DVec3 direction{0.0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Json& number = (*found)[static_cast<std::size_t>(axis)];
+    if (!number.is_number()) return;
+    direction[axis] = number.get<double>();
+    if (!(std::abs(direction[axis]) <= 1e6)) return;
+  }
+  if (direction != DVec3{0.0}) sun = direction;
+}
+
+void read_light(const Json& object, LightOptions& light) {
+  read_sun(object, light.sun);
+  read_flag(object, "lit", light.lit);
+  read_flag(object, "shadows", light.shadows);
+  read_number(object, "exposure", 0.0, 100.0, light.exposure);
+  bool has_occlusion = light.occlusion != OcclusionMode::Off;
+  read_flag(object, "occlusion", has_occlusion);
+  light.occlusion = has_occlusion ? OcclusionMode::Rays : OcclusionMode::Off;
+  bool is_all = light.occlusion_affects == OcclusionAffects::All;
+  read_flag(object, "occlusion_darkens_all", is_all);
+  light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
+}
+
+void read_recent(const Json& object, std::vector<std::string>& recent) {
+  const Json* found = find(object, "recent");
+  if (found == nullptr || !found->is_array()) return;
+  for (const Json& file : *found) {
+    if (file.is_string() && !file.get<std::string>().empty() && recent.size() < kMostRecent) recent.push_back(file);
+  }
+}
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+void Settings::note_recent(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const std::string name = std::filesystem::absolute(file, ignored).lexically_normal().string();
+  if (name.empty()) return;
+  std::erase(recent, name);
+  recent.insert(recent.begin(), name);
+  if (recent.size() > kMostRecent) recent.resize(kMostRecent);
+}
+
+std::filesystem::path settings_path() {
+  // The specification says that a relative path there counts for nothing.
+  const std::filesystem::path config = environment("XDG_CONFIG_HOME");
+  if (config.is_absolute()) return config / "quoin" / "viewer.json";
+  const std::filesystem::path home = environment("HOME");
+  return home.is_absolute() ? home / ".config" / "quoin" / "viewer.json" : std::filesystem::path();
+}
+
+Settings parse_settings(std::string_view json) {
+  Settings settings;
+  const Json object = Json::parse(json, nullptr, false);
+  if (!object.is_object()) return settings;
+  read_whole(object, "width", 320, 16'384, settings.width);
+  read_whole(object, "height", 240, 16'384, settings.height);
+  read_flag(object, "panel", settings.is_panel_shown);
+  bool is_fly = false;
+  read_flag(object, "fly", is_fly);
+  settings.camera_mode = is_fly ? CameraMode::Fly : CameraMode::Orbit;
+  if (find(object, "ui_scale") != nullptr) read_number(object, "ui_scale", 0.5, 4.0, settings.ui_scale);
+  read_whole(object, "samples", 1, 256, settings.samples);
+  read_flag(object, "detail_by_pixels", settings.detail_by_pixels);
+  if (const Json* light = find(object, "light"); light != nullptr && light->is_object()) {
+    read_light(*light, settings.light);
+  }
+  read_recent(object, settings.recent);
+  return settings;
+}
+
+std::string to_json(const Settings& settings) {
+  const LightOptions& light = settings.light;
+  Json object = {{"width", settings.width},
+                 {"height", settings.height},
+                 {"panel", settings.is_panel_shown},
+                 {"fly", settings.camera_mode == CameraMode::Fly},
+                 {"samples", settings.samples},
+                 {"detail_by_pixels", settings.detail_by_pixels},
+                 {"light",
+                  {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
+                   {"lit", light.lit},
+                   {"shadows", light.shadows},
+                   {"occlusion", light.occlusion != OcclusionMode::Off},
+                   {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
+                   {"exposure", light.exposure}}},
+                 {"recent", settings.recent}};
+  if (settings.ui_scale > 0.0) object["ui_scale"] = settings.ui_scale;
+  return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Settings read_settings(const std::filesystem::path& path) {
+  const auto bytes = read_file_beginning(path, kMostBytes);
+  if (!bytes) return {};
+  return parse_settings({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+}
+
+Status write_settings(const Settings& settings, const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path.parent_path(), error);
+  if (error) return fail(ErrorCode::CannotWrite, "cannot make the folder: " + error.message(), path.string());
+  const std::string text = to_json(settings);
+  return write_file(path, std::as_bytes(std::span(text)));
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,35 @@
+#include "sun.h"
+
+#include <random>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+namespace quoin::viewer {
+namespace {
+
+TEST(Sun, AnglesAndDirectionsAgree) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> number;
+  for (int i = 0; i < 200; ++i) {
+    const DVec3 sun{number(random), number(random), number(random)};
+    EXPECT_LT(glm::length(sun_direction(sun_angles(sun)) - glm::normalize(sun)), 1e-12);
+  }
+  EXPECT_NEAR(sun_angles({1.0, 0.0, 0.0}).azimuth, 90.0, 1e-9);
+  EXPECT_NEAR(sun_angles({0.0, 3.0, 0.0}).elevation, 90.0, 1e-9);
+}
+
+TEST(Sun, DraggingKeepsItInTheSky) {
+  DVec3 sun{0.3, 0.7, 0.2};
+  std::mt19937 random(2);
+  std::normal_distribution<double> pixels(0.0, 200.0);
+  for (int i = 0; i < 500; ++i) {
+    sun = drag_sun(sun, pixels(random), pixels(random));
+    EXPECT_NEAR(glm::length(sun), 1.0, 1e-9);
+    EXPECT_GT(sun.y, 0.0);
+  }
+  EXPECT_GT(drag_sun({0.0, 0.5, 1.0}, 0.0, -50.0).y, drag_sun({0.0, 0.5, 1.0}, 0.0, 0.0).y) << "up is up";
+}
+
+}  // namespace
+}  // namespace quoin::viewer

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <quoin/core/image.h>
+#include <quoin/light/light_options.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_query.h>
+
+namespace quoin::viewer {
+
+/// What the window wants to show.
+struct ViewRequest {
+  Camera camera;
+  int width = 0;  ///< pixels; nothing is drawn unless both are positive
+  int height = 0;
+  LightOptions light;
+  bool detail_by_pixels = false;  ///< far models in coarser cells
+  int samples = 16;               ///< a pixel, once the picture has settled
+};
+
+/// Whether both want the same picture.
+[[nodiscard]] bool is_same(const ViewRequest& a, const ViewRequest& b);
+[[nodiscard]] bool is_same(const Camera& a, const Camera& b);
+
+/// A picture of what was asked for last, or of what was asked for a moment before.
+struct ViewFrame {
+  Image colour;             ///< perhaps smaller than was asked for: to be stretched
+  int samples = 0;          ///< a pixel
+  bool is_whole = false;    ///< as large as was asked for
+  bool is_settled = false;  ///< nothing better will come of this request
+  double seconds = 0.0;
+  std::int64_t rays = 0;
+};
+
+/// What makes the picture of a scene: the processor here, a graphics card elsewhere.
+///
+/// Threads: all calls come from one thread, the window's. None but `pause` ever waits for a picture.
+class ViewBackend {
+ public:
+  ViewBackend() = default;
+  ViewBackend(const ViewBackend&) = delete;
+  ViewBackend& operator=(const ViewBackend&) = delete;
+  virtual ~ViewBackend() = default;
+
+  /// For people: "processor".
+  [[nodiscard]] virtual std::string name() const = 0;
+
+  /// From now on this is wanted. The same request again changes nothing.
+  virtual void show(const ViewRequest& request) = 0;
+
+  /// The newest frame, if it has not been taken yet.
+  [[nodiscard]] virtual std::optional<ViewFrame> take() = 0;
+
+  /// What went wrong with the last request, if anything.
+  [[nodiscard]] virtual std::optional<Error> fault() = 0;
+
+  /// Stops what is under way and answers once nothing reads the scene any more, which may then be edited. Answers how
+  /// many seconds that took.
+  virtual double pause() = 0;
+  /// The scene is left alone again, until the next `pause`; everything is drawn anew if it `changed`.
+  virtual void resume(bool changed) = 0;
+
+  /// What is seen at a point of the picture that `request` asks for. Nothing where there is sky, and nothing while an
+  /// edit is being taken over: `is_up_to_date` tells the two apart.
+  [[nodiscard]] virtual std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width,
+                                                     int height) = 0;
+  [[nodiscard]] virtual bool is_up_to_date() = 0;
+};
+
+/// Edits the scene of a backend: pauses it now, and lets it go on at the end of the scope.
+class ScenePause {
+ public:
+  explicit ScenePause(ViewBackend& backend) : backend_(&backend), waited_(backend.pause()) {}
+  ScenePause(const ScenePause&) = delete;
+  ScenePause& operator=(const ScenePause&) = delete;
+  ~ScenePause() { backend_->resume(changed); }
+
+  [[nodiscard]] double waited_seconds() const { return waited_; }
+  bool changed = true;
+
+ private:
+  ViewBackend* backend_;
+  double waited_;
+};
+
+}  // namespace quoin::viewer

@@ -1,0 +1,299 @@
+#include "app.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "outline.h"
+#include "wake.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+constexpr int kFramesAfterEvents = 3;  // what the GUI needs to come to rest
+constexpr int kPatience = 250;         // milliseconds: how soon an interrupt is noticed
+constexpr int kPatienceOfBars = 60;
+constexpr double kFrameSeconds = 1.0 / 60.0;
+
+double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+std::optional<View> view_of(Command command) {
+  switch (command) {
+    case Command::ViewFront:
+      return View::Front;
+    case Command::ViewBack:
+      return View::Back;
+    case Command::ViewLeft:
+      return View::Left;
+    case Command::ViewRight:
+      return View::Right;
+    case Command::ViewTop:
+      return View::Top;
+    case Command::ViewIso:
+      return View::Iso;
+    default:
+      return std::nullopt;
+  }
+}
+
+std::optional<Tool> tool_of(Command command) {
+  switch (command) {
+    case Command::ToolLook:
+      return Tool::Look;
+    case Command::ToolPlace:
+      return Tool::Place;
+    case Command::ToolRemove:
+      return Tool::Remove;
+    case Command::ToolPaint:
+      return Tool::Paint;
+    default:
+      return std::nullopt;
+  }
+}
+
+void change_brush(Command command, Brush& brush) {
+  if (command == Command::BrushSmaller) brush.radius = std::max(brush.radius - 1, 0);
+  if (command == Command::BrushLarger) brush.radius = std::min(brush.radius + 1, kLargestBrush);
+  if (command != Command::BrushShape) return;
+  brush.shape = brush.shape == BrushShape::Box ? BrushShape::Sphere : BrushShape::Box;
+}
+
+}  // namespace
+
+App::App(const ViewerOptions& options, Settings settings, SdlWindow window)
+    : options_(options),
+      window_(std::move(window)),
+      gui_(window_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(window_)) {
+  state_.camera.mode = settings.camera_mode;
+  state_.settings = std::move(settings);
+  if (!options_.file.empty()) load(options_.file);
+}
+
+App::~App() {
+  // The window goes first to the user's eye; threads may take a moment to end.
+  SDL_HideWindow(window_.window());
+  state_.saver.reset();
+}
+
+Status App::run(const std::function<bool()>& is_interrupted) {
+  while (is_running_) {
+    wait_and_process();
+    if (is_interrupted && is_interrupted()) break;
+    if (frames_left_ > 0 || is_animating()) {
+      frame();
+      frames_left_ = std::max(frames_left_ - 1, 0);
+    }
+  }
+  note_size();
+  return status_;
+}
+
+void App::note_size() {
+  const bool is_given = options_.width > 0;
+  const Uint32 odd = SDL_WINDOW_MAXIMIZED | SDL_WINDOW_MINIMIZED | SDL_WINDOW_FULLSCREEN;
+  if (is_given || (SDL_GetWindowFlags(window_.window()) & odd) != 0) return;
+  SDL_GetWindowSize(window_.window(), &state_.settings.width, &state_.settings.height);
+}
+
+bool App::is_animating() const {
+  if (window_.is_minimised()) return false;
+  return state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy() || state_.loader ||
+         state_.saver || state_.message || ImGui::GetIO().WantTextInput;
+}
+
+int App::patience_milliseconds() const {
+  if (frames_left_ > 0 && !window_.is_minimised()) return 0;
+  if (!is_animating()) return kPatience;
+  const bool is_moving = state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
+  return is_moving ? 0 : kPatienceOfBars;
+}
+
+void App::wait_and_process() {
+  const int patience = postponed_ ? 0 : patience_milliseconds();
+  was_idle_ = patience > 0;
+  SDL_Event event;
+  bool has_event = true;
+  if (postponed_) {
+    event = *std::exchange(postponed_, std::nullopt);
+  } else {
+    has_event = patience > 0 ? SDL_WaitEventTimeout(&event, patience) != 0 : SDL_PollEvent(&event) != 0;
+  }
+  std::set<SDL_Scancode> pressed;
+  bool is_mouse_moved = false;
+  for (; has_event; has_event = SDL_PollEvent(&event) != 0) {
+    // The GUI looks at keys once a frame: one that is let go at once would never have been down. It also learns there
+    // what the mouse is over, which whoever presses a button has to know.
+    const bool is_let_go = event.type == SDL_KEYUP && pressed.contains(event.key.keysym.scancode);
+    if (is_let_go || (event.type == SDL_MOUSEBUTTONDOWN && is_mouse_moved)) {
+      postponed_ = event;
+      return;
+    }
+    if (event.type == SDL_KEYDOWN) pressed.insert(event.key.keysym.scancode);
+    is_mouse_moved |= event.type == SDL_MOUSEMOTION;
+    process(event);
+  }
+}
+
+void App::process(const SDL_Event& event) {
+  frames_left_ = std::max(frames_left_, is_wake(event) ? 1 : kFramesAfterEvents);
+  // With Tab the GUI would take the keyboard for the first number in the panel, and flight would end.
+  const bool is_tab = event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_TAB;
+  if (!is_tab || gui_.wants_keys()) gui_.process(event);
+  if (event.type == SDL_QUIT) leave({true, {}});
+  if (event.type == SDL_DROPFILE) {
+    const std::filesystem::path file = event.drop.file;
+    SDL_free(event.drop.file);
+    leave({false, file});
+  }
+  std::vector<Command> asked;
+  const bool is_modal = chooser_.is_shown() || leaving_ || state_.loader;
+  input_.process(event, state_, gui_.wants_mouse() || is_modal, gui_.wants_keys() || is_modal, asked);
+  for (const Command command : asked) run_command(command);
+}
+
+void App::frame() {
+  const Clock::time_point now = Clock::now();
+  const double elapsed = seconds_between(last_frame_, now);
+  last_frame_ = now;
+  // After a rest the first step is a usual one, however long the rest was.
+  const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
+  take_loaded();
+  take_saved();
+  if (window_.is_minimised()) return;
+  state_.camera.advance(step, input_.push(), input_.boost());
+  input_.editing.advance(state_);
+  state_.pixels_per_unit = window_.pixels_per_unit();
+  take_picture();
+  gui_.begin_frame();
+  input_.find_mouse(state_, gui_.wants_mouse());
+  draw_gui();
+  ask_for_picture();
+  window_.draw_picture(state_.picture_place);
+  gui_.end_frame();
+  SDL_RenderPresent(window_.renderer());
+  update_title();
+  state_.frame_seconds += 0.1 * (seconds_between(last_frame_, Clock::now()) - state_.frame_seconds);
+  pace();
+}
+
+void App::pace() {
+  if (window_.has_vsync()) return;
+  const double left = kFrameSeconds - seconds_between(last_frame_, Clock::now());
+  if (left > 0.001) std::this_thread::sleep_for(std::chrono::duration<double>(left));
+}
+
+void App::place_picture(float top, float right, float bottom) {
+  const SDL_Point output = window_.output_size();
+  const auto pixels = [this](float units) { return static_cast<int>(std::lround(units * state_.pixels_per_unit)); };
+  state_.picture_place = {0, pixels(top), std::max(output.x - pixels(right), 0),
+                          std::max(output.y - pixels(top) - pixels(bottom), 0)};
+}
+
+void App::ask_for_picture() {
+  if (!state_.open.backend || !state_.has_picture_place()) return;
+  ViewRequest request;
+  request.camera = state_.camera.camera();
+  request.width = state_.picture_place.w;
+  request.height = state_.picture_place.h;
+  request.light = state_.settings.light;
+  request.samples = state_.settings.samples;
+  request.detail_by_pixels = state_.settings.detail_by_pixels;
+  state_.open.backend->show(request);
+}
+
+void App::take_picture() {
+  if (!state_.open.backend) return;
+  if (auto frame = state_.open.backend->take()) {
+    state_.facts = {frame->colour.width, frame->colour.height, frame->samples,
+                    frame->is_settled,   frame->seconds,       frame->rays};
+    state_.picture = std::move(frame->colour);
+    window_.set_picture(state_.picture);
+  }
+  if (const auto fault = state_.open.backend->fault(); fault && !state_.message) {
+    state_.tell(*fault);
+    if (!options_.screenshot.empty()) end_with(*fault);
+  }
+  const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
+                          state_.facts.height == state_.picture_place.h;
+  if (!is_current) return;
+  if (is_screenshot_wanted_) save_screenshot();
+  if (!options_.screenshot.empty() && is_running_) {
+    is_running_ = false;
+    write_screenshot(options_.screenshot);
+  }
+}
+
+void App::end_with(const Error& error) {
+  status_ = tl::unexpected<Error>(error);
+  is_running_ = false;
+}
+
+void App::update_hover() {
+  if (!state_.open.backend || input_.editing.is_busy()) return;
+  if (!state_.mouse.is_over) {
+    state_.hover.reset();
+    return;
+  }
+  if (!state_.open.backend->is_up_to_date()) return;
+  state_.hover = state_.open.backend->pick(state_.camera.camera(), state_.mouse.x, state_.mouse.y,
+                                           state_.picture_place.w, state_.picture_place.h);
+}
+
+void App::update_title() {
+  window_.set_title(std::string(state_.open.document->is_dirty() ? "* " : "") + state_.open.document->name() +
+                    " - Quoin");
+}
+
+void App::run_command(Command command) {
+  if (const auto view = view_of(command)) return show_from(*view);
+  if (const auto tool = tool_of(command)) {
+    state_.tool = *tool;
+    return;
+  }
+  switch (command) {
+    case Command::Undo:
+      return undo(state_);
+    case Command::Redo:
+      return redo(state_);
+    case Command::BrushSmaller:
+    case Command::BrushLarger:
+    case Command::BrushShape:
+      return change_brush(command, state_.brush);
+    case Command::PickType:
+      return pick_type();
+    case Command::CameraMode:
+      state_.camera.mode = state_.camera.mode == CameraMode::Fly ? CameraMode::Orbit : CameraMode::Fly;
+      state_.settings.camera_mode = state_.camera.mode;
+      return;
+    case Command::Focus:
+      if (state_.hover) state_.camera.face(state_.hover->position);
+      return;
+    case Command::Panel:
+      state_.settings.is_panel_shown = !state_.settings.is_panel_shown;
+      return;
+    case Command::Help:
+      state_.is_help_shown = !state_.is_help_shown;
+      return;
+    default:
+      return run_file_command(command);
+  }
+}
+
+void App::show_from(View view) {
+  if (!state_.open.backend || !state_.has_picture_place()) return;
+  const double aspect = static_cast<double>(state_.picture_place.w) / state_.picture_place.h;
+  const bool hidden = options_.load.hidden;
+  state_.camera.set(frame_scene(state_.scene(), view, aspect, hidden), state_.scene().bounds(hidden));
+}
+
+void App::pick_type() {
+  if (!state_.hover) return state_.tell("no voxel under the mouse");
+  state_.brush.type = state_.hover->type;
+}
+
+}  // namespace quoin::viewer

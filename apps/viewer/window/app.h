@@ -1,0 +1,93 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "file_chooser.h"
+#include "gui.h"
+#include "input.h"
+#include "panels.h"
+#include "sdl_window.h"
+#include "viewer.h"
+
+namespace quoin::viewer {
+
+/// The viewer in its window: events in, a frame out.
+class App {
+ public:
+  App(const ViewerOptions& options, Settings settings, SdlWindow window);
+  ~App();
+  App(const App&) = delete;
+  App& operator=(const App&) = delete;
+
+  /// Until the user quits, or `is_interrupted`.
+  [[nodiscard]] Status run(const std::function<bool()>& is_interrupted);
+  [[nodiscard]] const Settings& settings() const { return state_.settings; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// What to do once unsaved changes are saved or given up.
+  struct Leaving {
+    bool is_quit = false;
+    std::filesystem::path open;  ///< empty: ask which
+  };
+
+  // Events and frames.
+  void wait_and_process();
+  [[nodiscard]] int patience_milliseconds() const;
+  [[nodiscard]] bool is_animating() const;
+  void process(const SDL_Event& event);
+  void frame();
+  void place_picture(float left_top, float right, float bottom);
+  void ask_for_picture();
+  void take_picture();
+  void end_with(const Error& error);
+  void pace();
+  void draw_gui();
+  void draw_bars();
+  void draw_loading();
+  void draw_saving();
+  void draw_leaving();
+  void update_hover();
+  void update_title();
+  void note_size();
+
+  // What commands do.
+  void run_command(Command command);
+  void run_file_command(Command command);
+  void show_from(View view);
+  void pick_type();
+
+  // Files.
+  void leave(Leaving leaving);
+  void go_on_leaving();
+  void load(const std::filesystem::path& path);
+  void take_loaded();
+  void adopt(OpenDocument opened);
+  void save(const std::filesystem::path& path);
+  void take_saved();
+  void ask_where_to_save();
+  void save_screenshot();
+  void write_screenshot(const std::filesystem::path& path);
+
+  ViewerOptions options_;
+  SdlWindow window_;
+  Gui gui_;
+  ViewState state_;
+  Input input_;
+  FileChooser chooser_;
+  std::optional<Leaving> leaving_;
+  bool is_leaving_asked_ = false;
+  std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
+  bool is_running_ = true;
+  bool is_screenshot_wanted_ = false;
+  std::optional<SDL_Event> postponed_;
+  int frames_left_ = 3;
+  Clock::time_point last_frame_ = Clock::now();
+  bool was_idle_ = true;
+  Status status_;
+};
+
+}  // namespace quoin::viewer

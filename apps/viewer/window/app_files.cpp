@@ -1,0 +1,160 @@
+#include "app.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <quoin/io/picture_files.h>
+
+#include "wake.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+/// The first name of that pattern in the working folder that no file has.
+std::filesystem::path free_name(const std::string& stem) {
+  std::error_code ignored;
+  for (int number = 1; number < 10'000; ++number) {
+    std::filesystem::path path = stem + "-" + std::to_string(number) + ".png";
+    if (!std::filesystem::exists(path, ignored)) return path;
+  }
+  return stem + ".png";
+}
+
+}  // namespace
+
+void App::run_file_command(Command command) {
+  switch (command) {
+    case Command::Open:
+      return leave({false, {}});
+    case Command::Quit:
+      return leave({true, {}});
+    case Command::Screenshot:
+      if (state_.open.backend) is_screenshot_wanted_ = true;
+      if (!state_.facts.is_settled) state_.tell("the picture is saved once it is done");
+      return;
+    case Command::Save:
+      if (!state_.can_edit()) return;
+      if (state_.open.document->path().empty() || !can_write(state_.open.document->path())) return ask_where_to_save();
+      return save(state_.open.document->path());
+    case Command::SaveAs:
+      return ask_where_to_save();
+    default:
+      return;
+  }
+}
+
+void App::leave(Leaving leaving) {
+  if (leaving_ || state_.saver) return;
+  input_.editing.abandon(state_);
+  leaving_ = std::move(leaving);
+  if (!state_.open.document->is_dirty()) go_on_leaving();
+}
+
+void App::go_on_leaving() {
+  const Leaving leaving = *std::exchange(leaving_, std::nullopt);
+  is_leaving_asked_ = false;
+  if (leaving.is_quit) {
+    is_running_ = false;
+  } else if (!leaving.open.empty()) {
+    load(leaving.open);
+  } else {
+    const auto& recent = state_.settings.recent;
+    std::filesystem::path near = state_.open.document->path();
+    if (near.empty() && !recent.empty()) near = recent.front();
+    chooser_.show(FileChooser::Purpose::Open, near);
+  }
+}
+
+void App::load(const std::filesystem::path& path) {
+  if (state_.loader) abandoned_.push_back(std::move(state_.loader));
+  const CpuBackendOptions backend{options_.load.hidden, options_.threads, CpuBackendOptions{}.first_frame_seconds};
+  const auto make = [backend](const Document& document) -> std::unique_ptr<ViewBackend> {
+    return std::make_unique<CpuBackend>(document.scene(), backend, wake_window);
+  };
+  state_.loader = std::make_unique<Loader>(path, options_.load, make, wake_window);
+}
+
+void App::take_loaded() {
+  std::erase_if(abandoned_, [](const std::unique_ptr<Loader>& loader) { return loader->is_done(); });
+  if (!state_.loader || !state_.loader->is_done()) return;
+  const std::unique_ptr<Loader> loader = std::move(state_.loader);
+  auto opened = loader->take();
+  if (opened) {
+    adopt(std::move(*opened));
+    return;
+  }
+  state_.tell(opened.error());
+  if (!options_.screenshot.empty()) end_with(opened.error());
+}
+
+void App::adopt(OpenDocument opened) {
+  input_.editing = {};
+  state_.hover.reset();
+  state_.open.backend.reset();  // before the document that it reads
+  state_.open = std::move(opened);
+  state_.facts = {};
+  state_.message.reset();
+  window_.forget_picture();
+  const LoadedScene& loaded = state_.open.document->loaded();
+  state_.settings.note_recent(state_.open.document->path());
+  if (loaded.sun) state_.settings.light.sun = *loaded.sun;
+  state_.brush.type = 1;
+  const SDL_Point output = window_.output_size();
+  if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
+  if (loaded.camera) {
+    state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.load.hidden));
+  } else {
+    show_from(View::Iso);
+  }
+  if (!loaded.warnings.empty()) {
+    const std::size_t more = loaded.warnings.size() - 1;
+    state_.tell(loaded.warnings.front() + (more > 0 ? " (and " + std::to_string(more) + " more warnings)" : ""));
+  }
+}
+
+void App::ask_where_to_save() {
+  if (!state_.can_edit()) return;
+  std::filesystem::path start = state_.open.document->path();
+  if (!can_write(start)) start.replace_extension(".vox");
+  chooser_.show(FileChooser::Purpose::Save, start);
+}
+
+void App::save(const std::filesystem::path& path) {
+  if (!state_.can_edit()) return;
+  input_.editing.abandon(state_);
+  state_.saver = std::make_unique<Saver>(*state_.open.document, path, wake_window);
+}
+
+void App::take_saved() {
+  if (!state_.saver || !state_.saver->is_done()) return;
+  const std::unique_ptr<Saver> saver = std::move(state_.saver);
+  if (!saver->status()) {
+    leaving_.reset();
+    is_leaving_asked_ = false;
+    state_.tell(saver->status().error());
+    return;
+  }
+  state_.open.document->note_written(saver->path(), saver->state());
+  const std::string warning = saver->warnings().empty() ? "" : " (" + saver->warnings().front() + ")";
+  state_.tell("saved " + saver->path().string() + warning);
+  if (leaving_ && !state_.open.document->is_dirty()) go_on_leaving();
+}
+
+void App::save_screenshot() {
+  is_screenshot_wanted_ = false;
+  const std::filesystem::path name = state_.open.document->path().stem();
+  write_screenshot(free_name(name.empty() ? "quoin" : name.string()));
+}
+
+void App::write_screenshot(const std::filesystem::path& path) {
+  const auto written = write_png(state_.picture, path);
+  if (!written) {
+    state_.tell(written.error());
+    if (!options_.screenshot.empty()) end_with(written.error());
+    return;
+  }
+  state_.tell("saved " + path.string());
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <SDL.h>
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace quoin::viewer {
+
+/// What keys and menus can ask for.
+enum class Command : std::uint8_t {
+  Open,
+  Save,
+  SaveAs,
+  Screenshot,
+  Quit,
+  Undo,
+  Redo,
+  ToolLook,
+  ToolPlace,
+  ToolRemove,
+  ToolPaint,
+  BrushSmaller,
+  BrushLarger,
+  BrushShape,
+  PickType,
+  CameraMode,
+  Focus,
+  ViewFront,
+  ViewBack,
+  ViewLeft,
+  ViewRight,
+  ViewTop,
+  ViewIso,
+  Panel,
+  Help,
+};
+
+struct CommandInfo {
+  Command command;
+  const char* name;  ///< as menus say it
+  const char* keys;  ///< as people read them
+  SDL_Keycode key;
+  bool with_control;
+  bool with_shift;
+};
+
+/// All of them, in the order of the help.
+[[nodiscard]] std::span<const CommandInfo> commands();
+[[nodiscard]] const CommandInfo& info_of(Command command);
+
+/// What a key asks for, if anything.
+[[nodiscard]] std::optional<Command> command_of(const SDL_Keysym& key);
+
+}  // namespace quoin::viewer

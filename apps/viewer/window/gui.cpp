@@ -1,0 +1,171 @@
+#include "gui.h"
+
+#include <imgui_impl_sdl.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+namespace quoin::viewer {
+
+namespace {
+
+constexpr float kFontSize = 15.0F;
+
+// Debian, Fedora and Arch keep fonts in different places; without any of these ImGui has a small one of its own.
+constexpr std::array kFonts = {
+    "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", "/usr/share/fonts/dejavu-sans-fonts/DejaVuSans.ttf",
+    "/usr/share/fonts/TTF/DejaVuSans.ttf", "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf",
+    "/usr/share/fonts/truetype/liberation/LiberationSans-Regular.ttf"};
+
+const char* find_font() {
+  std::error_code ignored;
+  for (const char* path : kFonts) {
+    if (std::filesystem::is_regular_file(path, ignored)) return path;
+  }
+  return nullptr;
+}
+
+void set_style(float scale) {
+  ImGui::StyleColorsDark();
+  ImGuiStyle& style = ImGui::GetStyle();
+  style.WindowRounding = 0.0F;
+  style.PopupRounding = 5.0F;
+  style.FrameRounding = 4.0F;
+  style.GrabRounding = 4.0F;
+  style.ScrollbarRounding = 4.0F;
+  style.WindowBorderSize = 0.0F;
+  style.WindowPadding = {12.0F, 10.0F};
+  style.FramePadding = {8.0F, 4.0F};
+  style.ItemSpacing = {8.0F, 6.0F};
+  style.Colors[ImGuiCol_TextDisabled] = {0.62F, 0.65F, 0.70F, 1.0F};
+  const ImVec4 accent{0.28F, 0.49F, 0.79F, 1.0F};
+  style.Colors[ImGuiCol_WindowBg] = {0.105F, 0.115F, 0.135F, 1.0F};
+  style.Colors[ImGuiCol_PopupBg] = {0.13F, 0.14F, 0.165F, 1.0F};
+  style.Colors[ImGuiCol_MenuBarBg] = {0.14F, 0.15F, 0.175F, 1.0F};
+  style.Colors[ImGuiCol_FrameBg] = {0.19F, 0.205F, 0.24F, 1.0F};
+  style.Colors[ImGuiCol_TitleBgActive] = {0.17F, 0.19F, 0.23F, 1.0F};
+  style.Colors[ImGuiCol_Header] = {0.19F, 0.21F, 0.25F, 1.0F};
+  style.Colors[ImGuiCol_Button] = {0.23F, 0.26F, 0.31F, 1.0F};
+  style.Colors[ImGuiCol_ButtonHovered] = {0.30F, 0.36F, 0.45F, 1.0F};
+  for (const ImGuiCol colour : {ImGuiCol_ButtonActive, ImGuiCol_SliderGrab, ImGuiCol_CheckMark,
+                                ImGuiCol_SliderGrabActive, ImGuiCol_PlotHistogram}) {
+    style.Colors[colour] = accent;
+  }
+  style.ScaleAllSizes(scale);
+}
+
+}  // namespace
+
+double scale_of_display(const SdlWindow& window) {
+  // Where the output has more pixels than the window has units, the display's scale is in that ratio already.
+  float dots_per_inch = 96.0F;
+  const int display = SDL_GetWindowDisplayIndex(window.window());
+  if (window.pixels_per_unit() > 1.01 || display < 0) return 1.0;
+  if (SDL_GetDisplayDPI(display, nullptr, &dots_per_inch, nullptr) != 0) return 1.0;
+  const double scale = std::round(dots_per_inch / 96.0 * 4.0) / 4.0;
+  // Displays lie about their size; what looks right nearly everywhere is left alone.
+  return scale < 1.5 ? 1.0 : std::min(scale, 3.0);
+}
+
+Gui::Gui(SdlWindow& window, double scale) : window_(&window), scale_(scale) {
+  ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;
+  io.LogFilename = nullptr;
+  io.BackendRendererName = "quoin_sdl_renderer";
+  io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;
+  io.ConfigWindowsMoveFromTitleBarOnly = true;
+  set_style(static_cast<float>(scale));
+  ImGui_ImplSDL2_InitForSDLRenderer(window.window());
+  load_font();
+}
+
+Gui::~Gui() {
+  ImGui_ImplSDL2_Shutdown();
+  ImGui::DestroyContext();
+}
+
+void Gui::load_font() {
+  ImGuiIO& io = ImGui::GetIO();
+  // Drawn in pixels, so that letters are sharp, and placed in the window's units.
+  const auto pixels_per_unit = static_cast<float>(window_->pixels_per_unit());
+  const float size = std::round(kFontSize * static_cast<float>(scale_) * pixels_per_unit);
+  static const std::array<ImWchar, 7> kRanges = {0x20, 0x17F, 0x370, 0x52F, 0x2010, 0x2193, 0};
+  const char* path = find_font();
+  if (path == nullptr || io.Fonts->AddFontFromFileTTF(path, size, nullptr, kRanges.data()) == nullptr) {
+    ImFontConfig config;
+    config.SizePixels = size;
+    io.Fonts->AddFontDefault(&config);
+  }
+  io.FontGlobalScale = 1.0F / pixels_per_unit;
+  unsigned char* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+  io.Fonts->GetTexDataAsRGBA32(&pixels, &width, &height);
+  font_.reset(
+      SDL_CreateTexture(window_->renderer(), SDL_PIXELFORMAT_ABGR8888, SDL_TEXTUREACCESS_STATIC, width, height));
+  if (!font_) return;
+  SDL_UpdateTexture(font_.get(), nullptr, pixels, 4 * width);
+  SDL_SetTextureBlendMode(font_.get(), SDL_BLENDMODE_BLEND);
+  SDL_SetTextureScaleMode(font_.get(), SDL_ScaleModeLinear);
+  io.Fonts->SetTexID(font_.get());
+}
+
+void Gui::process(const SDL_Event& event) {
+  ImGui_ImplSDL2_ProcessEvent(&event);
+  if (event.type == SDL_MOUSEMOTION) mouse_ = {static_cast<float>(event.motion.x), static_cast<float>(event.motion.y)};
+  if (event.type == SDL_MOUSEBUTTONDOWN) {
+    mouse_ = {static_cast<float>(event.button.x), static_cast<float>(event.button.y)};
+  }
+  if (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_LEAVE) mouse_ = {-1e6F, -1e6F};
+}
+
+void Gui::begin_frame() {
+  ImGui_ImplSDL2_NewFrame();
+  // The backend asks OpenGL for the output's size, which the renderer need not be.
+  const auto ratio = static_cast<float>(window_->pixels_per_unit());
+  ImGui::GetIO().DisplayFramebufferScale = {ratio, ratio};
+  // It also asks the display where the mouse is, which may not know yet what the events say.
+  ImGui::GetIO().MousePos = mouse_;
+  ImGui::NewFrame();
+}
+
+void Gui::end_frame() {
+  ImGui::Render();
+  draw(*ImGui::GetDrawData());
+}
+
+void Gui::draw(const ImDrawData& data) {
+  SDL_Renderer* renderer = window_->renderer();
+  SDL_RenderSetScale(renderer, data.FramebufferScale.x, data.FramebufferScale.y);
+  for (int i = 0; i < data.CmdListsCount; ++i) {
+    const ImDrawList& list = *data.CmdLists[i];
+    for (const ImDrawCmd& command : list.CmdBuffer) {
+      if (command.UserCallback == nullptr) draw(list, command, data);
+    }
+  }
+  SDL_RenderSetClipRect(renderer, nullptr);
+  SDL_RenderSetScale(renderer, 1.0F, 1.0F);
+}
+
+void Gui::draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data) {
+  const float left = std::max(command.ClipRect.x - data.DisplayPos.x, 0.0F);
+  const float top = std::max(command.ClipRect.y - data.DisplayPos.y, 0.0F);
+  const float right = std::min(command.ClipRect.z - data.DisplayPos.x, data.DisplaySize.x);
+  const float bottom = std::min(command.ClipRect.w - data.DisplayPos.y, data.DisplaySize.y);
+  if (right <= left || bottom <= top) return;
+  const int x = static_cast<int>(left);
+  const int y = static_cast<int>(top);
+  const SDL_Rect clip{x, y, static_cast<int>(std::ceil(right)) - x, static_cast<int>(std::ceil(bottom)) - y};
+  SDL_RenderSetClipRect(window_->renderer(), &clip);
+  const ImDrawVert* vertices = list.VtxBuffer.Data + command.VtxOffset;
+  const ImDrawIdx* indices = list.IdxBuffer.Data + command.IdxOffset;
+  SDL_RenderGeometryRaw(window_->renderer(), static_cast<SDL_Texture*>(command.GetTexID()), &vertices->pos.x,
+                        sizeof(ImDrawVert), reinterpret_cast<const SDL_Color*>(&vertices->col), sizeof(ImDrawVert),
+                        &vertices->uv.x, sizeof(ImDrawVert), list.VtxBuffer.Size - static_cast<int>(command.VtxOffset),
+                        indices, static_cast<int>(command.ElemCount), sizeof(ImDrawIdx));
+}
+
+}  // namespace quoin::viewer

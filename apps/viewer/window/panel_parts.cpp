@@ -1,0 +1,253 @@
+#include "panel_parts.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include <unistd.h>
+
+#include "viewer/sun.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+/// A heading that can be folded. Answers whether what follows is shown.
+bool heading(const char* name) {
+  return ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
+}
+
+bool command_button(Command command, const char* label, MenuChoice& choice) {
+  const bool is_pressed = ImGui::Button(label);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s (%s)", info_of(command).name, info_of(command).keys);
+  if (is_pressed) choice.commands.push_back(command);
+  return is_pressed;
+}
+
+ImVec4 colour_of(const VoxelProperties& properties) {
+  const Rgba8 c = properties.colour;
+  return {static_cast<float>(c.r) / 255.0F, static_cast<float>(c.g) / 255.0F, static_cast<float>(c.b) / 255.0F, 1.0F};
+}
+
+void describe_type(const Scene& scene, VoxelType type) {
+  const VoxelProperties& properties = scene.types[type];
+  const Rgba8 c = properties.colour;
+  ImGui::BeginTooltip();
+  ImGui::Text("type %d   #%02X%02X%02X %s", type, c.r, c.g, c.b, properties.name.c_str());
+  if (properties.visibility == Visibility::Transparent) ImGui::TextUnformatted("transparent");
+  if (properties.emission > 0.0F) ImGui::TextUnformatted("glows");
+  ImGui::EndTooltip();
+}
+
+void draw_palette(ViewState& state) {
+  const Scene& scene = state.scene();
+  if (scene.types.size() <= 1) {
+    ImGui::TextDisabled("no types yet");
+    return;
+  }
+  const float edge = ImGui::GetFrameHeight() * 0.78F;
+  const float gap = 3.0F;
+  const int across = std::max(1, static_cast<int>((ImGui::GetContentRegionAvail().x - 16.0F) / (edge + gap)));
+  const std::size_t shown = std::min<std::size_t>(scene.types.size() - 1, 1'024);
+  const int rows = static_cast<int>((shown + static_cast<std::size_t>(across) - 1) / static_cast<std::size_t>(across));
+  const float height = static_cast<float>(std::min(rows, 4)) * (edge + gap) + 2.0F;
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {gap, gap});
+  ImGui::BeginChild("palette", {0.0F, height});
+  for (std::size_t i = 1; i <= shown; ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    if ((i - 1) % static_cast<std::size_t>(across) != 0) ImGui::SameLine();
+    ImGui::PushID(static_cast<int>(i));
+    const ImGuiColorEditFlags flags = ImGuiColorEditFlags_NoTooltip | ImGuiColorEditFlags_NoDragDrop;
+    if (ImGui::ColorButton("type", colour_of(scene.types[type]), flags, {edge, edge})) state.brush.type = type;
+    if (ImGui::IsItemHovered()) describe_type(scene, type);
+    if (type == state.brush.type) {
+      ImGui::GetWindowDrawList()->AddRect(ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), IM_COL32_WHITE, 3.0F, 0,
+                                          2.0F);
+    }
+    ImGui::PopID();
+  }
+  ImGui::EndChild();
+  ImGui::PopStyleVar();
+}
+
+/// A colour that the palette lacks. The registry is part of the scene: it changes only while nothing is drawn.
+void draw_new_colour(ViewState& state) {
+  static constexpr const char* kPopup = "new colour";
+  static std::array<float, 3> colour{0.8F, 0.5F, 0.3F};
+  if (ImGui::Button("New colour...") && state.can_edit()) ImGui::OpenPopup(kPopup);
+  if (!ImGui::BeginPopup(kPopup)) return;
+  ImGui::ColorPicker3("##colour", colour.data(), ImGuiColorEditFlags_NoSidePreview);
+  if (ImGui::Button("Add") && state.can_edit()) {
+    const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround(value * 255.0F)); };
+    ScenePause pause(*state.open.backend);
+    const auto type = state.open.document->type_of_colour({byte(colour[0]), byte(colour[1]), byte(colour[2]), 255});
+    type ? void(state.brush.type = *type) : state.tell(type.error());
+    ImGui::CloseCurrentPopup();
+  }
+  ImGui::EndPopup();
+}
+
+/// The total memory of the process; 0 where the system does not say.
+double resident_megabytes() {
+  std::ifstream in("/proc/self/statm");
+  long long total = 0;
+  long long resident = 0;
+  in >> total >> resident;
+  return static_cast<double>(resident) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+void row(const char* name, const char* format, double value) {
+  ImGui::TextDisabled("%s", name);
+  ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
+  ImGui::Text(format, value);
+}
+
+}  // namespace
+
+void draw_tool_part(ViewState& state, MenuChoice& choice) {
+  if (!heading("Tool")) return;
+  constexpr std::array<std::pair<Tool, const char*>, 4> kTools = {
+      {{Tool::Look, "Look"}, {Tool::Place, "Place"}, {Tool::Remove, "Remove"}, {Tool::Paint, "Paint"}}};
+  for (const auto& [tool, name] : kTools) {
+    if (tool != Tool::Look) ImGui::SameLine(0.0F, 4.0F);
+    const bool is_chosen = state.tool == tool;
+    if (is_chosen) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+    if (ImGui::Button(name)) state.tool = tool;
+    if (is_chosen) ImGui::PopStyleColor();
+  }
+  int shape = static_cast<int>(state.brush.shape);
+  if (ImGui::Combo("shape", &shape, "box\0sphere\0")) state.brush.shape = static_cast<BrushShape>(shape);
+  ImGui::SliderInt("radius", &state.brush.radius, 0, kLargestBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
+  draw_palette(state);
+  draw_new_colour(state);
+  ImGui::SameLine();
+  const EditHistory& history = state.open.document->history();
+  ImGui::BeginDisabled(!history.can_undo());
+  command_button(Command::Undo, "Undo", choice);
+  ImGui::EndDisabled();
+  ImGui::SameLine();
+  ImGui::BeginDisabled(!history.can_redo());
+  command_button(Command::Redo, "Redo", choice);
+  ImGui::EndDisabled();
+}
+
+void draw_camera_part(ViewState& state, MenuChoice& choice) {
+  if (!heading("Camera")) return;
+  if (ImGui::RadioButton("orbit", state.camera.mode == CameraMode::Orbit)) state.camera.mode = CameraMode::Orbit;
+  ImGui::SameLine();
+  if (ImGui::RadioButton("fly", state.camera.mode == CameraMode::Fly)) state.camera.mode = CameraMode::Fly;
+  constexpr std::array<std::pair<Command, const char*>, 6> kViews = {{{Command::ViewIso, "All"},
+                                                                      {Command::ViewFront, "Front"},
+                                                                      {Command::ViewBack, "Back"},
+                                                                      {Command::ViewLeft, "Left"},
+                                                                      {Command::ViewRight, "Right"},
+                                                                      {Command::ViewTop, "Top"}}};
+  for (std::size_t i = 0; i < kViews.size(); ++i) {
+    if (i % 3 != 0) ImGui::SameLine();
+    command_button(kViews[i].first, kViews[i].second, choice);
+  }
+  constexpr std::array kSamples = {1, 4, 16, 64};
+  const auto* const chosen = std::find(kSamples.begin(), kSamples.end(), state.settings.samples);
+  int index = chosen == kSamples.end() ? -1 : static_cast<int>(chosen - kSamples.begin());
+  if (ImGui::Combo("samples", &index, "1\0004\00016\00064\0")) {
+    state.settings.samples = kSamples[static_cast<std::size_t>(index)];
+  }
+  ImGui::Checkbox("coarser far away", &state.settings.detail_by_pixels);
+}
+
+void draw_light_part(ViewState& state) {
+  if (!heading("Light")) return;
+  LightOptions& light = state.settings.light;
+  ImGui::Checkbox("lit", &light.lit);
+  ImGui::BeginDisabled(!light.lit);
+  ImGui::SameLine();
+  ImGui::Checkbox("shadows", &light.shadows);
+  bool has_occlusion = light.occlusion != OcclusionMode::Off;
+  if (ImGui::Checkbox("occlusion", &has_occlusion)) {
+    light.occlusion = has_occlusion ? OcclusionMode::Rays : OcclusionMode::Off;
+  }
+  bool is_all = light.occlusion_affects == OcclusionAffects::All;
+  ImGui::SameLine();
+  if (ImGui::Checkbox("of all light", &is_all)) {
+    light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
+  }
+  SunAngles sun = sun_angles(light.sun);
+  auto azimuth = static_cast<float>(sun.azimuth);
+  auto elevation = static_cast<float>(sun.elevation);
+  const bool is_turned =
+      ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  const bool is_raised = ImGui::SliderFloat("height", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  if (is_turned || is_raised) {
+    // Straight up there is no azimuth to come back to.
+    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), 0.5, 89.5)});
+  }
+  auto exposure = static_cast<float>(light.exposure);
+  if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",
+                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
+    light.exposure = exposure;
+  }
+  ImGui::EndDisabled();
+  if (ImGui::Button("As at first")) light = LightOptions{};
+}
+
+void draw_statistics_part(const ViewState& state) {
+  if (!heading("Statistics")) return;
+  const FrameFacts& facts = state.facts;
+  row("frame", "%.1f ms", state.frame_seconds * 1e3);
+  row("picture", "%.1f ms", facts.seconds * 1e3);
+  row("rays a second", "%.1f million",
+      facts.seconds > 0.0 ? static_cast<double>(facts.rays) / facts.seconds / 1e6 : 0.0);
+  row("samples a pixel", "%.0f", facts.samples);
+  row("flight a second", "%.3g voxels", state.camera.speed());
+  row("memory", "%.0f MB", resident_megabytes());
+  row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
+  row("wait of edits", "%.2f ms", state.last_wait_seconds * 1e3);
+  row("longest wait", "%.2f ms", state.longest_wait_seconds * 1e3);
+  ImGui::TextDisabled("drawn by");
+  ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
+  ImGui::TextUnformatted(state.open.backend ? state.open.backend->name().c_str() : "-");
+}
+
+void draw_help_table(float scale) {
+  constexpr std::array<std::pair<const char*, const char*>, 9> kMouse = {
+      {{"Left button", "the tool; with Look, and with Alt, turns"},
+       {"Right button", "turns: about what is under the mouse, or the head"},
+       {"Middle button", "moves sideways"},
+       {"Shift + right button", "moves the sun"},
+       {"Wheel", "orbit: nearer and farther; fly: faster and slower"},
+       {"W A S D or arrows", "forward, left, back, right"},
+       {"Q E", "down, up"},
+       {"Shift", "four times as fast"},
+       {"Drop a file", "opens it"}}};
+  const float column = 170.0F * scale;
+  for (const auto& [what, does] : kMouse) {
+    ImGui::TextUnformatted(what);
+    ImGui::SameLine(column);
+    ImGui::TextDisabled("%s", does);
+  }
+  ImGui::Separator();
+  // In two columns, to fit small windows.
+  if (!ImGui::BeginTable("keys", 4, ImGuiTableFlags_SizingFixedFit)) return;
+  const auto all = commands();
+  const std::size_t rows = (all.size() + 1) / 2;
+  for (std::size_t i = 0; i < rows; ++i) {
+    ImGui::TableNextRow();
+    for (std::size_t side = 0; side < 2; ++side) {
+      const std::size_t index = i + side * rows;
+      if (index >= all.size()) continue;
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(all[index].keys);
+      ImGui::TableNextColumn();
+      ImGui::TextDisabled("%s   ", all[index].name);
+    }
+  }
+  ImGui::EndTable();
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,214 @@
+#include "panels.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+
+#include "panel_parts.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+constexpr double kMessageSeconds = 6.0;
+
+void menu_item(Command command, MenuChoice& choice, bool is_enabled = true, bool is_checked = false) {
+  const CommandInfo& info = info_of(command);
+  if (ImGui::MenuItem(info.name, info.keys, is_checked, is_enabled)) choice.commands.push_back(command);
+}
+
+void draw_file_menu(const ViewState& state, MenuChoice& choice) {
+  if (!ImGui::BeginMenu("File")) return;
+  menu_item(Command::Open, choice);
+  if (ImGui::BeginMenu("Open again", !state.settings.recent.empty())) {
+    for (const std::string& file : state.settings.recent) {
+      if (ImGui::MenuItem(file.c_str())) choice.recent = file;
+    }
+    ImGui::EndMenu();
+  }
+  ImGui::Separator();
+  menu_item(Command::Save, choice, state.can_edit());
+  menu_item(Command::SaveAs, choice, state.can_edit());
+  menu_item(Command::Screenshot, choice, state.open.backend != nullptr);
+  ImGui::Separator();
+  menu_item(Command::Quit, choice);
+  ImGui::EndMenu();
+}
+
+void draw_edit_menu(const ViewState& state, MenuChoice& choice) {
+  if (!ImGui::BeginMenu("Edit")) return;
+  const EditHistory& history = state.open.document->history();
+  menu_item(Command::Undo, choice, state.can_edit() && history.can_undo());
+  menu_item(Command::Redo, choice, state.can_edit() && history.can_redo());
+  ImGui::Separator();
+  for (const Command command : {Command::ToolLook, Command::ToolPlace, Command::ToolRemove, Command::ToolPaint}) {
+    const int index = static_cast<int>(command) - static_cast<int>(Command::ToolLook);
+    menu_item(command, choice, true, static_cast<int>(state.tool) == index);
+  }
+  ImGui::Separator();
+  for (const Command command : {Command::BrushSmaller, Command::BrushLarger, Command::BrushShape, Command::PickType}) {
+    menu_item(command, choice);
+  }
+  ImGui::EndMenu();
+}
+
+void draw_view_menu(const ViewState& state, MenuChoice& choice) {
+  if (!ImGui::BeginMenu("View")) return;
+  for (const Command command : {Command::ViewIso, Command::ViewFront, Command::ViewBack, Command::ViewLeft,
+                                Command::ViewRight, Command::ViewTop}) {
+    menu_item(command, choice, state.open.backend != nullptr);
+  }
+  ImGui::Separator();
+  menu_item(Command::CameraMode, choice);
+  menu_item(Command::Focus, choice);
+  menu_item(Command::Panel, choice, true, state.settings.is_panel_shown);
+  ImGui::EndMenu();
+}
+
+std::string hover_text(const ViewState& state) {
+  if (!state.hover) return state.open.backend ? "" : "no file";
+  const SceneHit& hit = *state.hover;
+  const Instance* instance = state.scene().instances().find(hit.instance);
+  if (instance == nullptr) return "";
+  const SceneGrid* grid = state.scene().grids().find(instance->grid);
+  if (grid == nullptr) return "";
+  const VoxelType type = grid->grid.get(hit.voxel);
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "voxel %d, %d, %d   type %d", hit.voxel.x, hit.voxel.y, hit.voxel.z, type);
+  std::string line = text.data();
+  if (type < state.scene().types.size() && type != kAir) {
+    const VoxelProperties& properties = state.scene().types[type];
+    const Rgba8 colour = properties.colour;
+    std::snprintf(text.data(), text.size(), " #%02X%02X%02X", colour.r, colour.g, colour.b);
+    line += text.data();
+    if (!properties.name.empty()) line += " " + properties.name;
+  }
+  const std::string& name = instance->name.empty() ? grid->name : instance->name;
+  return name.empty() ? line : line + "   in " + name;
+}
+
+std::string picture_text(const ViewState& state) {
+  if (!state.open.backend) return "";
+  const FrameFacts& facts = state.facts;
+  if (facts.is_settled) return "done";
+  if (facts.width < state.picture_place.w) return "drawing";
+  return "refining (" + std::to_string(facts.samples) + ")";
+}
+
+ImGuiWindowFlags bar_flags() {
+  return ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+         ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
+}
+
+}  // namespace
+
+float draw_menu(ViewState& state, MenuChoice& choice) {
+  if (!ImGui::BeginMainMenuBar()) return 0.0F;
+  draw_file_menu(state, choice);
+  draw_edit_menu(state, choice);
+  draw_view_menu(state, choice);
+  if (ImGui::BeginMenu("Help")) {
+    menu_item(Command::Help, choice, true, state.is_help_shown);
+    ImGui::EndMenu();
+  }
+  const float height = ImGui::GetWindowSize().y;
+  ImGui::EndMainMenuBar();
+  return height;
+}
+
+float draw_status(const ViewState& state) {
+  const ImVec2 room = ImGui::GetIO().DisplaySize;
+  const float height = ImGui::GetTextLineHeight() + 10.0F;
+  ImGui::SetNextWindowPos({0.0F, room.y - height});
+  ImGui::SetNextWindowSize({room.x, height});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {10.0F, 5.0F});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, {1.0F, 1.0F});
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, ImGui::GetStyleColorVec4(ImGuiCol_MenuBarBg));
+  ImGui::Begin("status", nullptr, bar_flags());
+  ImGui::TextUnformatted(hover_text(state).c_str());
+  const std::string right = picture_text(state) + (state.camera.mode == CameraMode::Fly ? "   fly" : "   orbit");
+  ImGui::SameLine(room.x - ImGui::CalcTextSize(right.c_str()).x - 12.0F);
+  ImGui::TextDisabled("%s", right.c_str());
+  ImGui::End();
+  ImGui::PopStyleColor();
+  ImGui::PopStyleVar(2);
+  return height;
+}
+
+float draw_panel(ViewState& state, float scale, float top, float bottom, MenuChoice& choice) {
+  const ImVec2 room = ImGui::GetIO().DisplaySize;
+  const float width = std::min(272.0F * scale, 0.6F * room.x);
+  ImGui::SetNextWindowPos({room.x - width, top});
+  ImGui::SetNextWindowSize({width, std::max(room.y - top - bottom, 1.0F)});
+  ImGui::Begin("panel", nullptr, bar_flags() & ~ImGuiWindowFlags_NoScrollbar);
+  ImGui::PushItemWidth(-0.36F * width);
+  draw_tool_part(state, choice);
+  draw_camera_part(state, choice);
+  draw_light_part(state);
+  draw_statistics_part(state);
+  ImGui::PopItemWidth();
+  ImGui::End();
+  return width;
+}
+
+void draw_help(ViewState& state, float scale) {
+  if (!state.is_help_shown) return;
+  const ImVec2 room = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Appearing, {0.5F, 0.5F});
+  ImGui::SetNextWindowSizeConstraints({0.0F, 0.0F}, {room.x - 8.0F, room.y - 8.0F});
+  const ImGuiWindowFlags flags =
+      ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_HorizontalScrollbar;
+  if (ImGui::Begin("Keys and mouse", &state.is_help_shown, flags)) draw_help_table(scale);
+  ImGui::End();
+}
+
+void draw_message(ViewState& state, float bottom) {
+  const Message& message = *state.message;
+  const double age = std::chrono::duration<double>(std::chrono::steady_clock::now() - message.since).count();
+  if (age > (message.is_error ? 3.0 : 1.0) * kMessageSeconds) {
+    state.message.reset();
+    return;
+  }
+  const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
+  const SDL_Rect& place = state.picture_place;
+  const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;
+  ImGui::SetNextWindowPos({middle, ImGui::GetIO().DisplaySize.y - bottom - 12.0F}, ImGuiCond_Always, {0.5F, 1.0F});
+  ImGui::SetNextWindowBgAlpha(0.92F);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 6.0F);
+  const ImVec4 colour = message.is_error ? ImVec4{0.45F, 0.13F, 0.12F, 1.0F} : ImVec4{0.16F, 0.2F, 0.27F, 1.0F};
+  ImGui::PushStyleColor(ImGuiCol_WindowBg, colour);
+  ImGui::Begin("message", nullptr,
+               bar_flags() | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing);
+  ImGui::PushTextWrapPos(std::max(static_cast<float>(place.w) * unit - 60.0F, 120.0F));
+  ImGui::TextUnformatted(message.text.c_str());
+  ImGui::PopTextWrapPos();
+  const bool is_clicked = ImGui::IsWindowHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Left);
+  ImGui::End();
+  ImGui::PopStyleColor();
+  ImGui::PopStyleVar();
+  if (is_clicked) state.message.reset();
+}
+
+void draw_welcome(const ViewState& state, MenuChoice& choice) {
+  const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
+  const SDL_Rect& place = state.picture_place;
+  ImGui::SetNextWindowPos({(static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit,
+                           (static_cast<float>(place.y) + 0.5F * static_cast<float>(place.h)) * unit},
+                          ImGuiCond_Always, {0.5F, 0.5F});
+  ImGui::SetNextWindowBgAlpha(0.0F);
+  ImGui::Begin("welcome", nullptr, bar_flags() | ImGuiWindowFlags_AlwaysAutoResize);
+  ImGui::TextUnformatted("Drop a file here, or open one.");
+  ImGui::Spacing();
+  if (ImGui::Button("Open a file (Ctrl+O)")) choice.commands.push_back(Command::Open);
+  for (const std::string& file : state.settings.recent) {
+    const std::string name = std::filesystem::path(file).filename().string();
+    if (ImGui::Selectable((name + "##" + file).c_str())) choice.recent = file;
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", file.c_str());
+  }
+  ImGui::End();
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "commands.h"
+#include "view_state.h"
+
+namespace quoin::viewer {
+
+/// What the menus ask for beyond commands.
+struct MenuChoice {
+  std::vector<Command> commands;
+  std::optional<std::string> recent;  ///< a file to open
+};
+
+/// The bar at the top. Answers its height, in the window's units.
+float draw_menu(ViewState& state, MenuChoice& choice);
+/// The line at the bottom. Answers its height.
+float draw_status(const ViewState& state);
+/// What stands at the right, `top` and `bottom` units off the edges. Answers its width.
+float draw_panel(ViewState& state, float scale, float top, float bottom, MenuChoice& choice);
+/// Keys and mouse, if shown.
+void draw_help(ViewState& state, float scale);
+/// A note over the picture: errors, what was saved. Requires: `state.message`.
+void draw_message(ViewState& state, float bottom);
+/// What an empty window says.
+void draw_welcome(const ViewState& state, MenuChoice& choice);
+
+}  // namespace quoin::viewer

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <SDL.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/loader.h"
+#include "viewer/settings.h"
+
+namespace quoin::viewer {
+
+/// What the left mouse button does.
+enum class Tool : std::uint8_t { Look, Place, Remove, Paint };
+
+/// One line that tells the user something.
+struct Message {
+  std::string text;
+  bool is_error = false;
+  std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();
+};
+
+/// Facts about the picture that is shown.
+struct FrameFacts {
+  int width = 0;
+  int height = 0;
+  int samples = 0;
+  bool is_settled = false;
+  double seconds = 0.0;
+  std::int64_t rays = 0;
+};
+
+/// Where the mouse is, in pixels of the picture from its upper left corner.
+struct MousePlace {
+  double x = 0.0;
+  double y = 0.0;
+  bool is_over = false;  ///< the picture, with nothing before it
+};
+
+/// All that the window knows; its parts read and change it.
+struct ViewState {
+  Settings settings;
+  CameraControl camera;
+  Tool tool = Tool::Look;
+  Brush brush;
+  OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
+
+  SDL_Rect picture_place{0, 0, 0, 0};  ///< in pixels of the output
+  double pixels_per_unit = 1.0;
+  MousePlace mouse;
+  std::optional<SceneHit> hover;  ///< what is under the mouse
+
+  Image picture;  ///< the last that arrived
+  FrameFacts facts;
+  double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
+  double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop
+  double last_wait_seconds = 0.0;
+
+  std::optional<Message> message;
+  bool is_help_shown = false;
+  std::unique_ptr<Loader> loader;
+  std::unique_ptr<Saver> saver;
+
+  [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
+  [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
+  /// Whether the document may be changed now.
+  [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
+  void tell(std::string text) { message = Message{std::move(text), false}; }
+  void tell(const Error& error) { message = Message{to_string(error), true}; }
+};
+
+}  // namespace quoin::viewer

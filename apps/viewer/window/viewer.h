@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/result.h>
+#include <quoin/io/vox.h>
+
+namespace quoin::viewer {
+
+struct ViewerOptions {
+  std::filesystem::path file;  ///< empty: an empty window
+  LoadOptions load;
+  Threads threads;
+  int width = 0;  ///< of the window; 0: as it was last
+  int height = 0;
+  bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
+  std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer
+};
+
+/// Opens a window on a file and comes back when the user closes it.
+///
+/// `is_interrupted` is asked some times a second whether to end at once.
+/// Errors: Unsupported without a display; those of reading `file` and of writing `screenshot`. Whatever goes wrong
+/// later is shown in the window.
+[[nodiscard]] Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_interrupted = {});
+
+}  // namespace quoin::viewer

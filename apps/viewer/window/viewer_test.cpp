@@ -1,0 +1,155 @@
+#include "viewer.h"
+
+#include <SDL.h>
+#include <cstdlib>
+#include <fstream>
+#include <utility>
+
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <quoin/io/picture_files.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "viewer/viewer_fixture.h"
+
+namespace quoin::viewer {
+namespace {
+
+/// A viewer whose window nobody sees.
+class ViewerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ::setenv("SDL_VIDEODRIVER", "dummy", 1);
+    ::setenv("SDL_RENDER_DRIVER", "software", 1);
+    std::vector<std::string> warnings;
+    ASSERT_TRUE(small_document().write(folder_.file("hill.vox"), warnings));
+  }
+
+  [[nodiscard]] ViewerOptions options(int width, int height) {
+    ViewerOptions options;
+    options.file = folder_.file("hill.vox");
+    options.width = width;
+    options.height = height;
+    options.is_bare = true;
+    options.screenshot = folder_.file("shot.png");
+    return options;
+  }
+
+  ScratchFolder folder_{"window"};
+};
+
+std::size_t open_files() {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}));
+}
+
+std::size_t threads() {
+  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
+}
+
+double resident_megabytes() {
+  std::ifstream in("/proc/self/statm");
+  long long total = 0;
+  long long resident = 0;
+  in >> total >> resident;
+  return static_cast<double>(resident) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+TEST_F(ViewerTest, TheScreenshotIsTheRenderersPicture) {
+  const ViewerOptions given = options(333, 250);
+  const Status status = run_viewer(given);
+  ASSERT_TRUE(status) << to_string(status.error());
+  const auto document = Document::open(given.file);
+  ASSERT_TRUE(document);
+  const Scene& scene = (*document)->scene();
+  RenderOptions render;
+  render.width = 333;
+  render.height = 250;
+  render.samples = 16;
+  const auto picture = CpuRenderer(scene).render(frame_scene(scene, View::Iso, 333.0 / 250.0), render);
+  ASSERT_TRUE(picture);
+  const auto shot = read_png(given.screenshot);
+  ASSERT_TRUE(shot) << to_string(shot.error());
+  EXPECT_EQ(shot->rgb, picture->colour.rgb);
+}
+
+TEST_F(ViewerTest, FiftyStartsLeaveNothingBehind) {
+  const ViewerOptions given = options(64, 48);
+  for (int start = 0; start < 5; ++start) ASSERT_TRUE(run_viewer(given));
+  const std::size_t files = open_files();
+  const std::size_t threads_before = threads();
+  const double memory = resident_megabytes();
+  for (int start = 0; start < 50; ++start) {
+    std::filesystem::remove(given.screenshot);
+    const Status status = run_viewer(given);
+    ASSERT_TRUE(status) << to_string(status.error());
+    ASSERT_TRUE(std::filesystem::exists(given.screenshot));
+  }
+  EXPECT_EQ(open_files(), files);
+  EXPECT_LE(threads(), threads_before) << "a thread of a window that is closed still runs";
+  // A window's fonts and pictures alone take more than 1 MB: fifty of them would show.
+  EXPECT_LT(resident_megabytes() - memory, 25.0);
+}
+
+TEST_F(ViewerTest, PanelsAreDrawnInWindowsOfAnySize) {
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  for (const auto& [width, height] : {std::pair{320, 240}, std::pair{900, 500}}) {
+    ViewerOptions given = options(width, height);
+    given.is_bare = false;
+    const Status status = run_viewer(given);
+    ASSERT_TRUE(status) << to_string(status.error());
+    const auto shot = read_png(given.screenshot);
+    ASSERT_TRUE(shot);
+    EXPECT_LT(shot->width, width) << "the panel stands beside the picture";
+    EXPECT_GT(shot->width, 0);
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("config/quoin/viewer.json")));
+}
+
+TEST_F(ViewerTest, ADroppedFileIsOpened) {
+  ViewerOptions given = options(320, 240);
+  const std::string file = std::exchange(given.file, {}).string();
+  int asked = 0;
+  const Status status = run_viewer(given, [&] {
+    if (asked++ == 0) {
+      SDL_Event drop{};
+      drop.type = SDL_DROPFILE;
+      drop.drop.file = SDL_strdup(file.c_str());
+      SDL_PushEvent(&drop);
+    }
+    return false;
+  });
+  ASSERT_TRUE(status) << to_string(status.error());
+  EXPECT_TRUE(std::filesystem::exists(given.screenshot));
+}
+
+TEST_F(ViewerTest, EndsAtOnceWhenInterrupted) {
+  ViewerOptions given = options(200, 100);
+  given.screenshot.clear();
+  int asked = 0;
+  EXPECT_TRUE(run_viewer(given, [&asked] { return ++asked > 3; }));
+  EXPECT_EQ(asked, 4);
+}
+
+TEST_F(ViewerTest, FilesThatCannotBeReadAreErrors) {
+  ViewerOptions given = options(200, 100);
+  given.file = folder_.file("absent.vox");
+  const Status absent = run_viewer(given);
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().code, ErrorCode::CannotRead);
+  given = options(200, 100);
+  given.screenshot = folder_.file("no/folder/shot.png");
+  const Status unwritable = run_viewer(given);
+  ASSERT_FALSE(unwritable);
+  EXPECT_EQ(unwritable.error().code, ErrorCode::CannotWrite);
+}
+
+TEST_F(ViewerTest, NoDisplayIsAnError) {
+  ::setenv("SDL_VIDEODRIVER", "no_such_driver", 1);
+  const Status status = run_viewer(options(200, 100));
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find("no display"), std::string::npos) << status.error().message;
+}
+
+}  // namespace
+}  // namespace quoin::viewer

@@ -1,0 +1,25 @@
+#include "wake.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+Uint32 wake_type() {
+  static const Uint32 type = SDL_RegisterEvents(1);
+  return type;
+}
+
+}  // namespace
+
+void wake_window() {
+  SDL_Event event{};
+  event.type = wake_type();
+  // A full queue holds events enough to wake whoever sleeps.
+  SDL_PushEvent(&event);
+}
+
+bool is_wake(const SDL_Event& event) {
+  return event.type == wake_type();
+}
+
+}  // namespace quoin::viewer

@@ -1,0 +1,159 @@
+#!/usr/bin/env bash
+# Uses the viewer as a user does: a real window under Xvfb, real keys and a real mouse by xdotool.
+# Usage: window.sh QUOIN QUOIN_DEMO_WORLD. Exits with 77, and says so, where xvfb-run or xdotool is not installed.
+set -euo pipefail
+quoin="$(realpath "$1")" demo_world="$(realpath "$2")"
+
+for program in xvfb-run xauth xdotool; do
+  command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
+done
+if [ -z "${QUOIN_WINDOW_TEST_INNER:-}" ]; then
+  export QUOIN_WINDOW_TEST_INNER=1
+  exec xvfb-run -a -s '-screen 0 1024x640x24' "$0" "$@"
+fi
+
+work="$(mktemp -d)"
+viewer=
+finish() {
+  [ -z "$viewer" ] || kill "$viewer" 2>/dev/null || true
+  rm -rf "$work"
+}
+trap finish EXIT
+cd "$work"
+export XDG_CONFIG_HOME="$work/config" SDL_RENDER_DRIVER=software LC_ALL=C
+unset WAYLAND_DISPLAY SDL_VIDEODRIVER
+
+fail() { echo "FAILED: $*"; cat viewer.log 2>/dev/null || true; exit 1; }
+
+# Usage: until_true SECONDS COMMAND...
+until_true() {
+  local left=$(($1 * 5))
+  shift
+  until "$@"; do
+    left=$((left - 1))
+    [ "$left" -gt 0 ] || return 1
+    sleep 0.2
+  done
+}
+title_is() { [ "$(xdotool getwindowname "$window" 2>/dev/null)" = "$1" ]; }
+voxels() { "$quoin" info "$1" --json | sed -n 's/^  "voxels": \([0-9]*\).*/\1/p'; }
+
+start() {
+  "$quoin" view "$@" >viewer.log 2>&1 &
+  viewer=$!
+  window="$(timeout 60 xdotool search --sync --onlyvisible --pid "$viewer" 2>/dev/null | head -n 1)" || true
+  [ -n "$window" ] || window="$(timeout 30 xdotool search --sync --onlyvisible --name 'Quoin' | head -n 1)"
+  until_true 60 title_is "$(basename "$1") - Quoin" || fail "the file did not open: $(xdotool getwindowname "$window")"
+  xdotool windowmove --sync "$window" 0 0 2>/dev/null || true
+  xdotool windowfocus "$window" 2>/dev/null || true
+  sleep 0.5
+}
+stop() {
+  xdotool key --delay 80 ctrl+q
+  until_true 30 gone || fail "Ctrl+Q does not end the viewer"
+  wait "$viewer" || fail "the viewer ended with $?"
+  viewer=
+}
+gone() { ! kill -0 "$viewer" 2>/dev/null; }
+# Usage: picture NAME: saves the finished picture as NAME
+picture() {
+  rm -f world-*.png
+  xdotool key --delay 80 F12
+  until_true 120 test -s world-1.png || fail "F12 gives no picture ($1)"
+  mv world-1.png "$1"
+}
+# Usage: drag BUTTON DX DY
+drag() {
+  xdotool mousedown "$1"
+  local i
+  for i in 1 2 3 4 5 6; do
+    xdotool mousemove_relative -- "$2" "$3"
+    sleep 0.05
+  done
+  xdotool mouseup "$1"
+  sleep 0.3
+}
+
+mkdir -p config/quoin
+echo '{"width": 640, "height": 400}' >config/quoin/viewer.json
+"$demo_world" castle.vox
+"$quoin" generate terrain world.vox --chunks 2x2x2 >/dev/null
+
+echo "open"
+start world.vox
+picture opened.png
+
+echo "fly"
+xdotool keydown w; sleep 0.5; xdotool keyup w; sleep 0.7
+picture flown.png
+! cmp -s opened.png flown.png || fail "W does not move the camera"
+xdotool key --delay 80 Home
+picture home.png
+cmp -s opened.png home.png || fail "Home does not come back to the first view"
+
+echo "orbit"
+xdotool mousemove 180 220
+drag 3 15 3
+picture turned.png
+! cmp -s home.png turned.png || fail "the right button does not turn"
+xdotool key --delay 80 Home
+xdotool mousemove 180 220
+sleep 0.5
+
+echo "edit, undo, redo"
+xdotool key --delay 80 3 bracketright bracketright
+drag 1 6 2
+title_is "* world.vox - Quoin" || fail "the edit leaves no mark in the title"
+picture edited.png
+! cmp -s home.png edited.png || fail "the edit is not seen"
+xdotool key --delay 80 ctrl+z
+until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state"
+picture undone.png
+cmp -s home.png undone.png || fail "undo does not bring back the picture"
+xdotool key --delay 80 ctrl+y
+picture redone.png
+cmp -s edited.png redone.png || fail "redo does not bring back the edit"
+
+xdotool key --delay 80 ctrl+z
+
+echo "choose a colour in the panel, paint"
+xdotool key --delay 80 4
+xdotool mousemove 493 158
+sleep 0.3
+xdotool click 1
+xdotool mousemove 180 220
+drag 1 6 2
+picture painted.png
+! cmp -s home.png painted.png || fail "the paint is not seen"
+! cmp -s edited.png painted.png || fail "painting removes"
+xdotool key --delay 80 ctrl+z
+until_true 20 title_is "world.vox - Quoin" || fail "painting cannot be undone"
+xdotool key --delay 80 ctrl+y ctrl+z 3
+xdotool mousemove 180 220
+drag 1 6 2
+title_is "* world.vox - Quoin" || fail "the second edit leaves no mark in the title"
+
+echo "save"
+before="$(voxels world.vox)"
+xdotool key --delay 80 ctrl+s
+until_true 30 title_is "world.vox - Quoin" || fail "Ctrl+S does not save"
+after="$(voxels world.vox)"
+[ "$after" -lt "$before" ] || fail "the saved file has $after voxels, the first one $before: nothing was removed"
+
+echo "resize, help, panel"
+xdotool windowsize "$window" 500 300
+sleep 0.5
+xdotool key --delay 80 F1 F1 F2
+picture small.png
+stop
+
+echo "settings are remembered"
+grep -q '"panel": false' config/quoin/viewer.json || fail "the panel's state is not remembered"
+grep -q '"width": 500' config/quoin/viewer.json || fail "the window's size is not remembered"
+grep -q 'world.vox' config/quoin/viewer.json || fail "the file is not among the recent ones"
+
+echo "another file, and the picture of the settled window is the renderer's"
+"$quoin" view castle.vox --bare --size 320x240 --screenshot window.png
+"$quoin" render castle.vox --size 320x240 --samples 16 -o render.png >/dev/null
+cmp window.png render.png || fail "the window shows another picture than quoin render"
+echo "passed"
