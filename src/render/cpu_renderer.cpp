@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "render/far_impostors.h"
@@ -64,11 +67,28 @@ struct CpuRenderer::Impl {
     return selected;
   }
 
+  // One picture at a time has impostors built: another would find some of them being built, and go on without. It waits
+  // where it has all the time there is, else takes what is there.
+  [[nodiscard]] FarImpostors take_far(std::span<const SelectedInstance> selected, const RenderOptions& options) {
+    const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
+    if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
+    std::unique_lock lock(building, std::defer_lock);
+    const bool may_wait = options.impostor_seconds == std::numeric_limits<double>::infinity();
+    if (may_wait) {
+      lock.lock();
+    } else {
+      static_cast<void>(lock.try_lock());
+    }
+    const double seconds = lock.owns_lock() ? options.impostor_seconds : 0.0;
+    return take_impostors(impostors, *scene, selected, seconds, options.threads);
+  }
+
   const Scene* scene;
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
   ImpostorCache impostors{{FarImpostors::kMostBytes}};
+  std::mutex building;  // impostors
 };
 
 namespace {
@@ -119,8 +139,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
   std::vector<SelectedInstance> selected = impl_->select(camera, options);
-  const FarImpostors far =
-      take_impostors(impl_->impostors, *impl_->scene, selected, options.impostor_seconds, options.threads);
+  const FarImpostors far = impl_->take_far(selected, options);
   keep_whole(far.instances, selected);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(selected, options.threads));

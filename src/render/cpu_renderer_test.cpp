@@ -245,52 +245,63 @@ TEST(CameraRays, AreThoseThatPickThePixel) {
   }
 }
 
-// Whatever is changed, between pictures of every kind.
-TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
-  Scene scene = lively_scene();
-  CpuRenderer renderer(scene);
-  const Camera camera = towards({25, 18, 30}, {0, 2, 0});
-  RenderOptions options = sized(90, 60);
-  Picture last;
-  const auto expect_as_new = [&](const char* what) {
+// A renderer that is updated, beside one that is made anew for each picture.
+class UpdatedRenderer {
+ public:
+  explicit UpdatedRenderer(const Scene& scene) : scene_(scene), renderer_(scene) {}
+
+  void expect_as_new(const char* what) {
     SCOPED_TRACE(what);
-    renderer.update();
+    const Camera camera = towards({25, 18, 30}, {0, 2, 0});
+    RenderOptions options = sized(90, 60);
+    renderer_.update();
     for (const bool detail : {true, false}) {
       options.detail.reset();
       // Far all of them: drawn from impostors.
       if (detail) options.detail.emplace().far_pixels = 1000;
-      const auto updated = renderer.render(camera, options);
-      const Picture fresh = taken(scene, camera, options);
+      const auto updated = renderer_.render(camera, options);
+      const Picture fresh = taken(scene_, camera, options);
       ASSERT_TRUE(updated.has_value());
       EXPECT_EQ(updated->colour.rgb, fresh.colour.rgb);
       EXPECT_EQ(updated->depth.values, fresh.depth.values);
-      EXPECT_NE(updated->colour.rgb, last.colour.rgb) << "the change does not show";
-      last = fresh;
+      EXPECT_NE(updated->colour.rgb, last_.colour.rgb) << "the change does not show";
+      last_ = fresh;
     }
-  };
-  expect_as_new("nothing");
+  }
+
+ private:
+  const Scene& scene_;
+  CpuRenderer renderer_;
+  Picture last_;
+};
+
+// Whatever is changed, between pictures of every kind.
+TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
+  Scene scene = lively_scene();
+  UpdatedRenderer renderer(scene);
+  renderer.expect_as_new("nothing");
   const InstanceHandle first = scene.instances().handles()[0];
   const GridHandle grid = scene.grids().handles()[0];
   scene.instances()[first].position += DVec3(3, 1, 0);
-  expect_as_new("moved");
+  renderer.expect_as_new("moved");
   scene.grids()[grid].grid.fill_sphere({4, 3, 4}, 6.0, 1);
-  expect_as_new("edited");
+  renderer.expect_as_new("edited");
   VoxelProperties stone = scene.types[1];
   stone.colour = {20, 200, 30, 255};
   scene.types.replace(1, stone);
-  expect_as_new("coloured");
+  renderer.expect_as_new("coloured");
   stone.colour.a = 60;
   stone.visibility = Visibility::Transparent;
   scene.types.replace(1, stone);
-  expect_as_new("transparent");
+  renderer.expect_as_new("transparent");
   scene.types.replace(1, {});
   scene.grids()[grid].grid = scene.grids()[grid].grid.clone();
   place(scene, scene.grids()[grid].grid.clone(), {-10, 4, 6});
-  expect_as_new("more");
+  renderer.expect_as_new("more");
   scene.remove_instance(first);
-  expect_as_new("fewer");
+  renderer.expect_as_new("fewer");
   scene.grids()[grid].grid.clear();
-  expect_as_new("emptied");
+  renderer.expect_as_new("emptied");
 }
 
 }  // namespace

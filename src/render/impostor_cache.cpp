@@ -35,9 +35,9 @@ struct ImpostorCache::Impl {
   std::deque<GridHandle> waiting;
   ImpostorCacheStatistics statistics;
   std::uint64_t built_bytes = 0;
-  std::vector<bool> is_opaque;      // types, when they were looked at
-  std::uint64_t types_changed = 0;  // how often
-  std::uint64_t round = 0;          // of build_some
+  std::vector<VoxelType> transparent;  // when types were looked at; all others are opaque, unregistered ones too
+  std::uint64_t types_changed = 0;     // how often
+  std::uint64_t round = 0;             // of build_some
 
   std::optional<GridHandle> take_waiting() {
     const std::lock_guard lock(mutex);
@@ -96,16 +96,14 @@ struct ImpostorCache::Impl {
   [[nodiscard]] Origin origin_of(const Grid& grid) const { return {grid.identity(), grid.version(), types_changed}; }
 
   void look_at(const VoxelRegistry& types) {
-    std::vector<bool> now(types.size());
-    for (std::size_t type = 0; type < now.size(); ++type) now[type] = types.is_opaque(static_cast<VoxelType>(type));
-    const std::lock_guard lock(mutex);
-    // Types that were added since are of no impostor yet.
-    for (std::size_t type = 0; type < std::min(now.size(), is_opaque.size()); ++type) {
-      if (now[type] == is_opaque[type]) continue;
-      ++types_changed;
-      break;
+    std::vector<VoxelType> now;
+    for (std::size_t type = 0; type < types.size(); ++type) {
+      if (types.is_transparent(static_cast<VoxelType>(type))) now.push_back(static_cast<VoxelType>(type));
     }
-    is_opaque = std::move(now);
+    const std::lock_guard lock(mutex);
+    if (now == transparent) return;
+    ++types_changed;
+    transparent = std::move(now);
   }
 
   void put(GridHandle grid, const Origin& origin, std::shared_ptr<const Impostor> made) {

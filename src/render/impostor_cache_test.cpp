@@ -87,6 +87,24 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   EXPECT_TRUE(ready()->is_empty());
 }
 
+TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
+  World world(1);
+  const auto type = static_cast<VoxelType>(world.scene.types.size());
+  world.scene.grids()[world.grids[0]].grid.fill_box({0, 0, 0}, {0, 2, 3}, type);
+  ImpostorCache cache;
+  const auto is_empty = [&] {
+    cache.look_at_types(world.scene.types);
+    static_cast<void>(cache.find(world.scene, world.grids[0]));
+    EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
+    return cache.find(world.scene, world.grids[0])->is_empty();
+  };
+  EXPECT_FALSE(is_empty());
+  VoxelProperties glass;
+  glass.visibility = Visibility::Transparent;
+  EXPECT_EQ(world.scene.types.add(glass).value(), type);
+  EXPECT_TRUE(is_empty());
+}
+
 TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   World world(3);
   const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();

@@ -29,7 +29,7 @@ struct ImpostorFaces {
   /// What the snapshots of one size show: arrays over faces, by direction, each direction's number rounded up to whole
   /// groups with faces that no view saw.
   struct Level {
-    std::array<std::vector<float>, 3> centre;  ///< of the face, voxels from the content's centre: exact
+    std::array<std::vector<float>, 3> centre;  ///< of the face, voxels from the content's centre
     std::vector<std::uint32_t> views;          ///< bit i: view i saw it
     std::vector<std::uint32_t> face;           ///< index into `faces`
     std::array<std::uint32_t, 7> begin{};      ///< of each direction; the end of the last

@@ -30,8 +30,8 @@ std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle inst
   return static_cast<std::int32_t>(found - placed.begin());
 }
 
-// The pixels from the middle that a sphere of radius 1 at (across, deep) may reach to one side: never less than it
-// does. Requires: the sphere is in front of the camera's plane.
+// How far to one side of a camera a sphere at (across, deep) may be seen, at a distance of 1: never less than it is.
+// Requires: the sphere is in front of the camera's plane.
 double upper_tangent(double across, double deep, double radius) {
   const double edge = across + radius;
   return edge / (edge > 0.0 ? deep - radius : deep + radius);
@@ -54,7 +54,7 @@ std::uint32_t nearest_views(DVec3 direction, int count) {
   return views;
 }
 
-// The coarsest level with as many texels as the content spans pixels.
+// The coarsest level with kTexelsAPixel texels for each pixel that the content spans; the finest where none has.
 std::size_t level_for(int edge, double diameter_pixels) {
   int level = 0;
   while (level + 1 < ImpostorFaces::kLevels && (edge >> (level + 1)) >= kTexelsAPixel * diameter_pixels) ++level;

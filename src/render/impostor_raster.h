@@ -9,7 +9,7 @@
 #include "render/impostor_faces.h"
 
 /// Draws the faces of an impostor into a square of a picture: in single precision relative to the content's centre, in
-/// voxels, sixteen pixels at once.
+/// voxels, a register of faces at once.
 namespace quoin::raster {
 
 inline constexpr int kTile = 32;  ///< pixels a side
@@ -86,7 +86,8 @@ struct Canvas {
   void clear();
 };
 
-/// Puts each face where a pixel's ray meets it, if it is nearer than what is there, or as near and of a lower id.
+/// Puts each face where a pixel's ray meets it, if it is nearer than what is there, or as near and of a lower id, or
+/// the lower face of that id.
 using Draw = void (*)(const Job& job, Canvas& canvas);
 
 extern const Draw kDrawPlain;

@@ -67,11 +67,14 @@ inline void project(const Job& job, const F (&q)[3], const F (&half)[3], Areas& 
 }
 
 inline void put(std::size_t pixel, float depth, std::int32_t id, std::uint32_t face, Canvas& canvas) {
+  const auto index = static_cast<std::int32_t>(face);
   const float nearest = canvas.depth[pixel];
-  if (!(depth < nearest) && !(depth == nearest && id < canvas.id[pixel])) return;
+  // Squares of one plane may overlap, and wide registers come to them in another order than narrow ones.
+  const bool is_lower = id < canvas.id[pixel] || (id == canvas.id[pixel] && index < canvas.face[pixel]);
+  if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
   canvas.depth[pixel] = depth;
   canvas.id[pixel] = id;
-  canvas.face[pixel] = static_cast<std::int32_t>(face);
+  canvas.face[pixel] = index;
 }
 
 // Of each lane's face one pixel: where its ray meets the face's plane.

@@ -13,12 +13,14 @@ IVec3 floor_of(IVec3 v, int shift) {
   return {v.x >> shift, v.y >> shift, v.z >> shift};
 }
 
+// How many cells along each axis touch the box or lie beside one that does.
+IVec3 cells_around(const IBox& box) {
+  return floor_of(box.max - 1, 2) - floor_of(box.min, 2) + 3;
+}
+
 }  // namespace
 
-ImpostorShell::ImpostorShell(const IBox& box) {
-  const IVec3 first = floor_of(box.min, 2) - 1;
-  size_ = floor_of(box.max - 1, 2) + 2 - first;
-  origin_ = first * 4;
+ImpostorShell::ImpostorShell(const IBox& box) : origin_((floor_of(box.min, 2) - 1) * 4), size_(cells_around(box)) {
   cells_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
                 static_cast<std::size_t>(size_.z));
 }
@@ -26,12 +28,10 @@ ImpostorShell::ImpostorShell(const IBox& box) {
 std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std::int64_t most_voxels,
                                                   std::int64_t most_faces) {
   const IBox box = tree.bounds();
-  std::int64_t voxels = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int64_t side = std::int64_t{box.max[axis]} - box.min[axis];
-    if (side > most_voxels / voxels) return std::nullopt;
-    voxels *= side;
-  }
+  const IVec3 size = cells_around(box);
+  std::int64_t most_cells = most_voxels / 64;
+  for (int axis = 0; axis < 3; ++axis) most_cells /= size[axis];
+  if (most_cells == 0) return std::nullopt;
   ImpostorShell shell(box);
   const IVec3 low = floor_of(box.min, 6);
   const IVec3 high = floor_of(box.max - 1, 6);

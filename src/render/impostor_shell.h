@@ -19,10 +19,10 @@ struct VoxelFace {
 
 /// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
 ///
-/// Memory: a bit a voxel of the box.
+/// Memory: a bit a voxel of the box and of what lies within four voxels of it.
 class ImpostorShell {
  public:
-  /// None where the box has more than `most_voxels`, or more than `most_faces` lie in it.
+  /// None where the box and what it keeps around it have more than `most_voxels`, or there are more than `most_faces`.
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t most_voxels,
                                             std::int64_t most_faces);
 

@@ -80,6 +80,12 @@ TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
   EXPECT_TRUE(ImpostorShell::build(world.tree, kPlenty, count).has_value());
   EXPECT_FALSE(ImpostorShell::build(world.tree, kPlenty, count - 1).has_value());
   EXPECT_FALSE(ImpostorShell::build(world.tree, 1000, kPlenty).has_value());
+  // A row of few voxels, around which much is empty.
+  Grid row;
+  row.set({0, 0, 0}, 1);
+  row.set({20'000'000, 0, 0}, 1);
+  const OccupancyTree row_tree = OccupancyTree::build(row, world.types, Occupancy::Opaque);
+  EXPECT_FALSE(ImpostorShell::build(row_tree, 1 << 26, kPlenty).has_value());
   Grid wide;
   wide.set({-2'000'000'000, -2'000'000'000, -2'000'000'000}, 1);
   wide.set({2'000'000'000, 2'000'000'000, 2'000'000'000}, 1);

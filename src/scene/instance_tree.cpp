@@ -61,7 +61,10 @@ void InstanceTree::build() {
   std::vector<Item> items;
   items.reserve(boxes_.size());
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    if (!boxes_[i].empty()) items.push_back({boxes_[i].min + boxes_[i].max, i});
+    if (boxes_[i].empty()) continue;
+    const DVec3 twice_centre = boxes_[i].min + boxes_[i].max;
+    // What is endless to both sides has no centre, but has to be sorted.
+    items.push_back({is_finite(twice_centre) ? twice_centre : DVec3(0.0), i});
   }
   if (items.empty()) return;
   order_.resize(items.size());

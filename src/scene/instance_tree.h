@@ -44,7 +44,7 @@ class InstanceTree {
   /// Puts other boxes in place. Only the nodes above them are fitted anew; the tree is built from scratch once these
   /// have grown so much that it would be slow to search, or when a box became empty or was.
   ///
-  /// Cost: O(changes * log n) at most; O(n log n) when built from scratch.
+  /// Cost: O(changes * log n) at most, and a bit for each node; O(n log n) when built from scratch.
   void change(std::span<const Change> changes);
 
   /// Calls `visit(index)` for every box that the ray may meet from 0 to `max_t`, nearer ones mostly first, until it

@@ -60,23 +60,18 @@ ScreenSize scaled(const ScreenSize& size, double by) {
   return {size.voxel_pixels * by, size.diameter_pixels * by};
 }
 
-Detail by_pixels(const ScreenSize& size, const DetailPolicy& policy) {
-  if (is_far(size, policy)) return Detail::Far;
-  return size.voxel_pixels < policy.voxel_pixels ? Detail::Mid : Detail::Near;
-}
-
 // The last choice stays while a size within the hysteresis of this one would give it.
 Choice chosen_by_pixels(const ScreenSize& size, const DetailPolicy& policy, const Choice* last) {
   const bool has_room = last != nullptr && policy.hysteresis > 0.0;
   const double room = has_room ? 1.0 + policy.hysteresis : 1.0;
   const ScreenSize larger = scaled(size, room);
   Choice choice;
-  choice.detail = by_pixels(larger, policy);
+  choice.detail = detail_by_pixels(larger, policy);
   int halvings = halvings_for(larger.voxel_pixels, policy);
   if (has_room) {
     const ScreenSize smaller = scaled(size, 1.0 / room);
     if (choice.detail != Detail::Far) {
-      choice.detail = std::clamp(last->detail, choice.detail, by_pixels(smaller, policy));
+      choice.detail = std::clamp(last->detail, choice.detail, detail_by_pixels(smaller, policy));
     }
     halvings = std::clamp<int>(last->halvings, halvings, halvings_for(smaller.voxel_pixels, policy));
   }

@@ -27,8 +27,9 @@ struct RenderOptions {
   /// How instances are drawn; without, all are Near. A picture knows nothing of the one before it: there is no
   /// hysteresis. Whether hidden instances are drawn is for the renderer to say, not the policy.
   std::optional<DetailPolicy> detail;
-  /// For how long impostors that are missing, or older than their grid, may be built; grids whose are not ready then
-  /// are traced, or shown as they were. Only without a limit is a picture the same whenever it is taken.
+  /// For how long impostors that are missing, or older than their grid, may be built, and not at all while another
+  /// picture has some built; grids whose are not ready then are traced, or shown as they were. Only without a limit is
+  /// a picture the same whenever it is taken. Their occlusion by rays is that of nine rays of 6 voxels within the grid.
   double impostor_seconds = std::numeric_limits<double>::infinity();
   /// Instances in colours that tell their detail instead of their own: Near green, Mid yellow to orange the more often
   /// halved, Far blue.
@@ -57,6 +58,7 @@ struct Picture {
 /// Solid:       from inside an opaque voxel everything is that voxel's own colour, unlit.
 ///
 /// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.
+/// Threads: any number may take pictures at once.
 class CpuRenderer {
  public:
   /// Copies nothing of the voxels but what traversal and shading need; `scene` must outlive it in its place, and after
@@ -70,9 +72,8 @@ class CpuRenderer {
   /// then those of a renderer that was built anew.
   ///
   /// Requires: no picture is being taken.
-  /// Cost:     that of SceneTracer::update, and the types' colours; impostors of edited grids are built anew as they
-  /// are
-  ///           needed.
+  /// Cost:     that of SceneTracer::update, and the types' colours. Impostors of edited grids are built anew when they
+  ///           are needed.
   void update(Threads threads = {});
 
   /// One picture. The same bytes for any number of threads and any instruction set.

@@ -31,9 +31,9 @@ struct ImpostorCacheStatistics {
 /// An edit of a grid, or another in its place, asks for a new impostor; the old one is answered until that is ready.
 /// When there is no room, the ones that were asked for longest ago are dropped; whoever holds one keeps it alive. What
 /// is asked for within one round, up to the end of a `build_some`, is never dropped for something else of that round,
-/// which then has none. Threads: any number may call `find`, `statistics` and `build_some` at once, as long as nobody
-/// edits the scene
-///          meanwhile.
+/// which then has none.
+/// Threads: any number may call `find`, `statistics` and `build_some` at once, as long as nobody edits the scene
+///          meanwhile. One that finds nothing waiting does not wait for what others are building.
 class ImpostorCache {
  public:
   explicit ImpostorCache(const ImpostorCacheOptions& options = {});

@@ -56,11 +56,11 @@ class SceneTracer {
   /// that are traced, or their types' transparency, are other than before: what was made of them is then out of date.
   ///
   /// Requires: nothing reads it meanwhile. SceneViews of it and what `with_detail` answered are good no longer.
-  /// Cost:     a glance at every type, grid and instance, some 10 ns each. Of an edited grid that is placed: its
-  /// chunks'
-  ///           versions, and OccupancyTree::update for those that changed; of its halved ones only what the edit can
-  ///           have changed, when they are next asked for. For an instance that moved: its transform, and its share of
-  ///           the tree of instances, which is built anew, O(n log n), when instances come or go or have moved far.
+  /// Cost:     a glance at every type, grid and instance, some 10 ns each. Of an edited grid that is placed: the
+  ///           versions of its chunks, and OccupancyTree::update for those that changed; of its halved ones only what
+  ///           the edit can have changed, when they are next asked for. For an instance that moved: its transform, and
+  ///           its share of the tree of instances, which is built anew, O(n log n), when instances come or go or have
+  ///           moved far.
   ///           A change of a type's transparency: all trees that hold such voxels.
   /// Threads:  grids are updated on several.
   bool update(Threads threads = {});

@@ -1,0 +1,151 @@
+#pragma once
+
+// Models, their impostors, and how like their pictures are to those that are traced.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+
+#include <glm/geometric.hpp>
+
+#include <quoin/render/impostor.h>
+
+#include "bench/workloads.h"
+#include "render/render_test_support.h"
+
+namespace quoin::render_test {
+
+inline constexpr double kDegree = std::numbers::pi / 180.0;
+
+struct Likeness {
+  double overlap = 1.0;     // intersection over union of the silhouettes
+  double difference = 0.0;  // mean absolute, over the union
+  std::int64_t pixels = 0;
+};
+
+inline Likeness likeness(const Picture& truth, const Picture& picture) {
+  std::int64_t both = 0;
+  Likeness found;
+  for (std::size_t i = 0; i < truth.depth.values.size(); ++i) {
+    const bool in_truth = std::isfinite(truth.depth.values[i]);
+    const bool in_picture = std::isfinite(picture.depth.values[i]);
+    if (!in_truth && !in_picture) continue;
+    ++found.pixels;
+    both += in_truth && in_picture;
+    for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) {
+      found.difference += std::abs(truth.colour.rgb[c] - picture.colour.rgb[c]) / 3.0;
+    }
+  }
+  if (found.pixels == 0) return found;
+  found.overlap = static_cast<double>(both) / static_cast<double>(found.pixels);
+  found.difference /= static_cast<double>(found.pixels);
+  return found;
+}
+
+// A few models in one scene, one grid each, with their pivots at the contents' centres.
+enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb };
+
+inline Grid castle() {
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {44, 0, 44}, 2);
+  for (const IVec3 corner : {IVec3{0, 1, 0}, {36, 1, 0}, {0, 1, 36}, {36, 1, 36}}) {
+    grid.fill_box(corner, corner + IVec3{8, 27, 8}, 1);
+    grid.fill_box(corner + IVec3{2, 20, 2}, corner + IVec3{6, 27, 6}, kAir);
+  }
+  grid.fill_box({8, 1, 3}, {36, 14, 5}, 3);
+  grid.fill_box({8, 1, 39}, {36, 14, 41}, 3);
+  grid.fill_box({16, 1, 16}, {28, 22, 28}, 3);
+  return grid;
+}
+
+inline Grid ship() {
+  Grid grid;
+  for (int z = 0; z < 48; ++z) {
+    const int half = std::min({6, z / 2 + 1, (47 - z) / 3 + 2});
+    grid.fill_box({-half, 0, z}, {half, 5, z}, 1);
+    grid.fill_box({1 - half, 4, z}, {half - 1, 5, z}, kAir);
+  }
+  for (const int z : {12, 24, 36}) {
+    grid.fill_box({0, 5, z}, {0, 34, z}, 2);
+    grid.fill_box({-9, 26, z}, {9, 26, z}, 2);
+    grid.fill_box({-8, 12, z}, {8, 25, z}, 3);
+  }
+  return grid;
+}
+
+inline VoxelType terrain_at(IVec3 v) {
+  const double height = 25 + 12 * std::sin(0.11 * v.x) * std::cos(0.07 * v.z) + 5 * std::sin(0.31 * v.x + 0.2 * v.z);
+  return v.y <= height ? static_cast<VoxelType>(v.y > height - 1 ? 1 : v.y > height - 4 ? 2 : 3) : kAir;
+}
+
+inline Grid voxels_of(Model model) {
+  if (model == Model::Castle) return castle();
+  if (model == Model::Ship) return ship();
+  Grid grid;
+  if (model == Model::Ball) grid.put_chunk({0, 0, 0}, workloads::blocky_chunk(workloads::Blocky::W4));
+  if (model == Model::Box) {
+    grid.edit({IVec3(0), IVec3(41)},
+              [](IVec3 v, VoxelType) { return static_cast<VoxelType>(1 + (v.x / 5 + v.y / 5 + v.z / 5) % 2); });
+  }
+  if (model == Model::Blobs) {
+    std::mt19937 random(9);
+    for (int i = 0; i < 40; ++i) {
+      const auto coordinate = [&] { return static_cast<int>(random() % 41); };
+      const IVec3 at{coordinate(), coordinate(), coordinate()};
+      grid.fill_box(at, at + IVec3(static_cast<int>(random() % 9)), static_cast<VoxelType>(1 + random() % 3));
+    }
+  }
+  if (model == Model::Terrain) {
+    grid.edit({IVec3(0), IVec3(200, 60, 200)}, [](IVec3 v, VoxelType) { return terrain_at(v); });
+  }
+  if (model == Model::Comb) {
+    grid.fill_box({0, 0, 0}, {40, 2, 30}, 2);
+    for (int x = 0; x <= 40; x += 2) grid.fill_box({x, 3, 0}, {x, 24, 30}, x % 4 == 0 ? 1 : 3);
+  }
+  return grid;
+}
+
+struct ImpostorWorld {
+  Scene scene;
+  InstanceHandle instance;
+  Impostor impostor;
+  double radius = 0.0;
+
+  explicit ImpostorWorld(Model model) {
+    scene.types = workloads::three_types();
+    SceneGrid grid;
+    grid.grid = voxels_of(model);
+    const ContentSphere content = content_sphere(grid.grid);
+    radius = content.radius;
+    grid.pivot = content.centre;
+    impostor = Impostor::build(grid.grid, scene.types);
+    instance = scene.add_instance({"", scene.add_grid(std::move(grid))});
+  }
+  Instance& placed() { return scene.instances()[instance]; }
+
+  [[nodiscard]] Picture drawn(const Camera& camera, const RenderOptions& options) const {
+    Picture picture = taken(Scene(), camera, options);
+    draw_impostors(SceneTracer(scene), scene.types, std::array{FarInstance{instance, &impostor}}, camera, options,
+                   picture);
+    return picture;
+  }
+};
+
+// From a distance at which the sphere spans `pixels` of a square picture a little larger.
+inline Camera orbiting(const ImpostorWorld& world, double azimuth, double elevation, double roll, double pixels,
+                       int size) {
+  const double distance = 12.0 * world.radius;
+  const DVec3 eye =
+      DVec3{std::cos(elevation) * std::cos(azimuth), std::sin(elevation), std::cos(elevation) * std::sin(azimuth)} *
+      distance;
+  Camera camera = towards(eye, {0, 0, 0}, 2.0 * std::atan(size / 24.0 / (pixels / 2.0)));
+  const DVec3 right = camera.right;
+  camera.right = right * std::cos(roll) + camera.up * std::sin(roll);
+  camera.up = camera.up * std::cos(roll) - right * std::sin(roll);
+  return camera;
+}
+
+}  // namespace quoin::render_test
