@@ -93,7 +93,15 @@ echo '{"width": 640, "height": 400}' >config/quoin/viewer.json
 
 echo "open"
 start world.vox
+# On a busy machine the window may not have its size yet.
 picture opened.png
+for _ in 1 2 3 4 5 6 7 8; do
+  xdotool key --delay 80 Home
+  sleep 0.5
+  picture again.png
+  ! cmp -s opened.png again.png || break
+  mv again.png opened.png
+done
 
 echo "fly"
 xdotool keydown w; sleep 0.5; xdotool keyup w; sleep 0.7
