@@ -1,101 +1,25 @@
-// Eight lanes in AVX2 registers. Included within a namespace and a target region.
+// What smooth meshing adds to core/lanes_avx2.h. Included within a namespace and a target region.
 
-constexpr int kWidth = 8;
+#include "core/lanes_avx2.h"
 
-struct Mask {
-  __m256i v;
-};
-struct F {
-  __m256 v;
-};
-struct I {
-  __m256i v;
-};
-
-inline F all(float x) {
-  return {_mm256_set1_ps(x)};
-}
-inline I all(int x) {
-  return {_mm256_set1_epi32(x)};
-}
-inline F operator+(F a, F b) {
-  return {_mm256_add_ps(a.v, b.v)};
-}
-inline F operator-(F a, F b) {
-  return {_mm256_sub_ps(a.v, b.v)};
-}
-inline F operator*(F a, F b) {
-  return {_mm256_mul_ps(a.v, b.v)};
-}
-inline F operator/(F a, F b) {
-  return {_mm256_div_ps(a.v, b.v)};
-}
-inline F min(F a, F b) {
-  return {_mm256_min_ps(a.v, b.v)};
-}
-inline F abs(F a) {
-  return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)};
-}
-inline F floor(F a) {
-  return {_mm256_floor_ps(a.v)};
-}
-inline Mask operator<(F a, F b) {
-  return {_mm256_castps_si256(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ))};
-}
 inline Mask operator>(I a, I b) {
-  return {_mm256_cmpgt_epi32(a.v, b.v)};
+  return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(a.v, b.v))};
 }
 inline Mask equal(I a, I b) {
-  return {_mm256_cmpeq_epi32(a.v, b.v)};
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))};
 }
 // Lanes whose signs differ.
 inline Mask signs_differ(F a, F b) {
-  return {_mm256_srai_epi32(_mm256_castps_si256(_mm256_xor_ps(a.v, b.v)), 31)};
-}
-inline F select(Mask m, F a, F b) {
-  return {_mm256_blendv_ps(b.v, a.v, _mm256_castsi256_ps(m.v))};
-}
-inline I select(Mask m, I a, I b) {
-  return {_mm256_blendv_epi8(b.v, a.v, m.v)};
+  return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_castps_si256(_mm256_xor_ps(a.v, b.v)), 31))};
 }
 inline F only(Mask m, F a) {
-  return {_mm256_and_ps(a.v, _mm256_castsi256_ps(m.v))};
-}
-inline I operator+(I a, I b) {
-  return {_mm256_add_epi32(a.v, b.v)};
-}
-inline I operator-(I a, I b) {
-  return {_mm256_sub_epi32(a.v, b.v)};
-}
-inline I operator*(I a, I b) {
-  return {_mm256_mullo_epi32(a.v, b.v)};
-}
-inline I operator&(I a, I b) {
-  return {_mm256_and_si256(a.v, b.v)};
+  return {_mm256_and_ps(a.v, m.v)};
 }
 inline I operator|(I a, I b) {
   return {_mm256_or_si256(a.v, b.v)};
 }
 inline I min(I a, I b) {
   return {_mm256_min_epi32(a.v, b.v)};
-}
-template <int kBits>
-inline I shift_left(I a) {
-  return {_mm256_slli_epi32(a.v, kBits)};
-}
-template <int kBits>
-inline I shift_right(I a) {
-  return {_mm256_srli_epi32(a.v, kBits)};
-}
-template <int kBits>
-inline I shift_right_signed(I a) {
-  return {_mm256_srai_epi32(a.v, kBits)};
-}
-inline I to_int(F a) {
-  return {_mm256_cvttps_epi32(a.v)};
-}
-inline F to_float(I a) {
-  return {_mm256_cvtepi32_ps(a.v)};
 }
 inline I as_int(F a) {
   return {_mm256_castps_si256(a.v)};
@@ -107,21 +31,12 @@ inline F as_float(I a) {
 inline I load_words(const std::uint16_t* from) {
   return {_mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)))};
 }
-inline F load(const float* from) {
-  return {_mm256_loadu_ps(from)};
-}
-inline void store(float* to, F a) {
-  _mm256_storeu_ps(to, a.v);
-}
 inline void store(void* to, I a) {
   _mm256_storeu_si256(static_cast<__m256i*>(to), a.v);
 }
 // The pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), place.v, 2)};
-}
-inline I gather(const std::uint32_t* base, I place) {
-  return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), place.v, 4)};
 }
 inline F gather(const float* base, I place) {
   return {_mm256_i32gather_ps(base, place.v, 4)};

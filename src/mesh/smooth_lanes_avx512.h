@@ -1,47 +1,7 @@
-// Sixteen lanes in AVX-512 registers (F, BW, DQ, VL, VBMI2). Included within a namespace and a target region.
+// What smooth meshing adds to core/lanes_avx512.h (VBMI2 too). Included within a namespace and a target region.
 
-constexpr int kWidth = 16;
+#include "core/lanes_avx512.h"
 
-struct Mask {
-  __mmask16 m;
-};
-struct F {
-  __m512 v;
-};
-struct I {
-  __m512i v;
-};
-
-inline F all(float x) {
-  return {_mm512_set1_ps(x)};
-}
-inline I all(int x) {
-  return {_mm512_set1_epi32(x)};
-}
-inline F operator+(F a, F b) {
-  return {_mm512_add_ps(a.v, b.v)};
-}
-inline F operator-(F a, F b) {
-  return {_mm512_sub_ps(a.v, b.v)};
-}
-inline F operator*(F a, F b) {
-  return {_mm512_mul_ps(a.v, b.v)};
-}
-inline F operator/(F a, F b) {
-  return {_mm512_div_ps(a.v, b.v)};
-}
-inline F min(F a, F b) {
-  return {_mm512_min_ps(a.v, b.v)};
-}
-inline F abs(F a) {
-  return {_mm512_abs_ps(a.v)};
-}
-inline F floor(F a) {
-  return {_mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC)};
-}
-inline Mask operator<(F a, F b) {
-  return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)};
-}
 inline Mask operator>(I a, I b) {
   return {_mm512_cmpgt_epi32_mask(a.v, b.v)};
 }
@@ -52,50 +12,14 @@ inline Mask equal(I a, I b) {
 inline Mask signs_differ(F a, F b) {
   return {_mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(a.v, b.v)))};
 }
-inline F select(Mask m, F a, F b) {
-  return {_mm512_mask_blend_ps(m.m, b.v, a.v)};
-}
-inline I select(Mask m, I a, I b) {
-  return {_mm512_mask_blend_epi32(m.m, b.v, a.v)};
-}
 inline F only(Mask m, F a) {
   return {_mm512_maskz_mov_ps(m.m, a.v)};
-}
-inline I operator+(I a, I b) {
-  return {_mm512_add_epi32(a.v, b.v)};
-}
-inline I operator-(I a, I b) {
-  return {_mm512_sub_epi32(a.v, b.v)};
-}
-inline I operator*(I a, I b) {
-  return {_mm512_mullo_epi32(a.v, b.v)};
-}
-inline I operator&(I a, I b) {
-  return {_mm512_and_si512(a.v, b.v)};
 }
 inline I operator|(I a, I b) {
   return {_mm512_or_si512(a.v, b.v)};
 }
 inline I min(I a, I b) {
   return {_mm512_min_epi32(a.v, b.v)};
-}
-template <int kBits>
-inline I shift_left(I a) {
-  return {_mm512_slli_epi32(a.v, kBits)};
-}
-template <int kBits>
-inline I shift_right(I a) {
-  return {_mm512_srli_epi32(a.v, kBits)};
-}
-template <int kBits>
-inline I shift_right_signed(I a) {
-  return {_mm512_srai_epi32(a.v, kBits)};
-}
-inline I to_int(F a) {
-  return {_mm512_cvttps_epi32(a.v)};
-}
-inline F to_float(I a) {
-  return {_mm512_cvtepi32_ps(a.v)};
 }
 inline I as_int(F a) {
   return {_mm512_castps_si512(a.v)};
@@ -107,21 +31,12 @@ inline F as_float(I a) {
 inline I load_words(const std::uint16_t* from) {
   return {_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
-inline F load(const float* from) {
-  return {_mm512_loadu_ps(from)};
-}
-inline void store(float* to, F a) {
-  _mm512_storeu_ps(to, a.v);
-}
 inline void store(void* to, I a) {
   _mm512_storeu_si512(to, a.v);
 }
 // The pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm512_i32gather_epi32(place.v, base, 2)};
-}
-inline I gather(const std::uint32_t* base, I place) {
-  return {_mm512_i32gather_epi32(place.v, base, 4)};
 }
 inline F gather(const float* base, I place) {
   return {_mm512_i32gather_ps(place.v, base, 4)};
