@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <quoin/core/result.h>
+#include <quoin/light/light_options.h>
+#include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/live_meshes.h>
+#include <quoin/scene/scene.h>
+
+namespace quoin {
+
+enum class MeshShading : std::uint8_t {
+  Lit,        ///< colours in the reference model of light, without shadows
+  Occlusion,  ///< the ambient occlusion alone, in grey
+  Normals,    ///< in colours: 0.5 + 0.5 n, in the world
+};
+
+enum class Wireframe : std::uint8_t {
+  Off,
+  Over,  ///< the edges of triangles over the surfaces
+  Only,  ///< the edges alone; hidden ones too
+};
+
+struct MeshPictureOptions {
+  int width = 1280;
+  int height = 720;
+  int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
+  /// `shadows` and `occlusion_rays` mean nothing here: any occlusion but Off is that of the meshes' vertices.
+  LightOptions light;
+  MeshShading shading = MeshShading::Lit;
+  Wireframe wireframe = Wireframe::Off;
+};
+
+/// Draws chunks' meshes by rasterisation, on the device of a VulkanRenderer: a quad of a blocky mesh takes 8 bytes
+/// there, and its corners are made when it is drawn.
+///
+/// Equal: a blocky mesh lit without shadows is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at
+///        silhouettes and where glass is seen: glass counts as one voxel thick, drawn from back to front.
+/// Must not outlive the renderer it was made for. Threads: that renderer's. Errors: as there.
+class VulkanMeshRenderer {
+ public:
+  /// Errors: Unsupported when the device's queue draws no triangles.
+  [[nodiscard]] static Result<VulkanMeshRenderer> create(VulkanRenderer& renderer);
+  VulkanMeshRenderer(VulkanMeshRenderer&&) noexcept;
+  VulkanMeshRenderer& operator=(VulkanMeshRenderer&&) noexcept;
+  ~VulkanMeshRenderer();
+
+  /// Takes over instances and types. Cost: O(instances + types).
+  [[nodiscard]] Status update(const Scene& scene, bool hidden = false);
+  /// Takes over surfaces; cost: the upload of these.
+  [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
+  void clear();
+
+  /// Draws all there is. Errors also: InvalidArgument for sizes and samples that cannot be, and for cameras as
+  /// CpuRenderer::render; Unsupported for wireframes where the device has no lines.
+  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
+
+  struct Facts {
+    std::size_t chunks = 0;            ///< with a surface
+    std::int64_t triangles = 0;        ///< in memory, each once
+    std::int64_t drawn_triangles = 0;  ///< of the last picture, after leaving out chunks beside it
+    std::size_t bytes = 0;             ///< of surfaces, in device memory
+  };
+  [[nodiscard]] Facts facts() const;
+
+ private:
+  struct Impl;
+  explicit VulkanMeshRenderer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin

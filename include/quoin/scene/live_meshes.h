@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/vec.h>
+#include <quoin/mesh/quad.h>
+#include <quoin/mesh/smooth_mesh.h>
+#include <quoin/scene/scene.h>
+
+namespace quoin {
+
+enum class SurfaceStyle : std::uint8_t { Blocky, Smooth };
+
+/// The surface of one chunk as it is drawn; never changed once it was made.
+struct ChunkSurface {
+  SurfaceStyle style = SurfaceStyle::Blocky;
+  /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last.
+  QuadBuffer quads;
+  std::size_t opaque_quads = 0;
+  /// Smooth: point p of the mesh is point p + 0.5 + 64 * chunk of the grid; a colour (linear) and a type a vertex.
+  SmoothChunkMesh smooth;
+  std::vector<LinearRgba16> albedo;
+  std::vector<VoxelType> types;
+
+  [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
+  [[nodiscard]] std::int64_t triangles() const;
+  [[nodiscard]] std::size_t bytes() const;
+};
+
+/// What replaces the surface of a chunk.
+struct SurfaceUpdate {
+  GridHandle grid;
+  IVec3 chunk{0};
+  std::shared_ptr<const ChunkSurface> surface;  ///< null: nothing of the chunk is seen any more
+};
+
+struct LiveMeshOptions {
+  SurfaceStyle style = SurfaceStyle::Blocky;
+  bool merge = true;                 ///< blocky: neighbouring faces become one quad
+  SmoothOcclusionOptions occlusion;  ///< of smooth surfaces
+  bool hidden = false;               ///< grids of instances that are not visible are meshed too
+  Threads threads;                   ///< workers; 0: one less than the machine has, at least one
+  /// Called from a worker when there is something to take; may be empty.
+  std::function<void()> on_ready;
+};
+
+/// The meshes of a scene's chunks, kept up to date by worker threads while the scene is edited.
+///
+/// Only `update` reads the scene: it copies the chunks that meshing needs, so edits never wait for workers. A chunk is
+/// meshed again only when an edit could have changed its mesh; of several edits before its turn the last counts, and
+/// results of what was removed meanwhile are dropped.
+/// Threads: all calls come from one thread.
+class LiveMeshes {
+ public:
+  explicit LiveMeshes(const LiveMeshOptions& options);
+  /// Waits for the chunks that are being meshed; others are given up.
+  ~LiveMeshes();
+  LiveMeshes(const LiveMeshes&) = delete;
+  LiveMeshes& operator=(const LiveMeshes&) = delete;
+
+  /// Takes over whatever was changed: voxels, grids, types whose visibility changed, instances that first show a grid
+  /// or last showed it. Chunks nearest to `eye` (world) come first. Call it after edits and once a frame while
+  /// `pending` is not 0: no more chunks are copied ahead than keep the workers busy.
+  ///
+  /// Cost: O(chunks of grids whose version changed), and copies of at most 27 chunks for each that is to be meshed.
+  void update(const Scene& scene, DVec3 eye);
+
+  /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
+  [[nodiscard]] std::vector<SurfaceUpdate> take();
+
+  /// Chunks whose newest surface was not taken yet.
+  [[nodiscard]] std::size_t pending() const;
+  /// Calls `update` until nothing is left to mesh. For tests and screenshots.
+  void finish(const Scene& scene, DVec3 eye);
+
+  struct Facts {
+    std::int64_t chunks_meshed = 0;     ///< in all
+    double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
+    double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
+    std::size_t copied_bytes = 0;       ///< of chunks that wait for workers
+  };
+  [[nodiscard]] Facts facts() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin
