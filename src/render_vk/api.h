@@ -18,6 +18,7 @@ namespace quoin::vulkan {
   X(vkCreateDevice)                      \
   X(vkEnumeratePhysicalDevices)          \
   X(vkGetDeviceProcAddr)                 \
+  X(vkGetPhysicalDeviceFeatures)         \
   X(vkGetPhysicalDeviceFeatures2)        \
   X(vkGetPhysicalDeviceMemoryProperties) \
   X(vkGetPhysicalDeviceProperties)       \
@@ -28,24 +29,45 @@ namespace quoin::vulkan {
   X(vkAllocateMemory)              \
   X(vkBeginCommandBuffer)          \
   X(vkBindBufferMemory)            \
+  X(vkBindImageMemory)             \
+  X(vkCmdBeginRenderPass)          \
+  X(vkCmdBindIndexBuffer)          \
   X(vkCmdBindPipeline)             \
   X(vkCmdCopyBuffer)               \
+  X(vkCmdCopyImageToBuffer)        \
   X(vkCmdDispatch)                 \
+  X(vkCmdDraw)                     \
+  X(vkCmdDrawIndexed)              \
+  X(vkCmdEndRenderPass)            \
   X(vkCmdFillBuffer)               \
   X(vkCmdPipelineBarrier)          \
   X(vkCmdPushConstants)            \
+  X(vkCmdSetDepthBias)             \
+  X(vkCmdSetScissor)               \
+  X(vkCmdSetViewport)              \
   X(vkCreateBuffer)                \
   X(vkCreateCommandPool)           \
   X(vkCreateComputePipelines)      \
   X(vkCreateFence)                 \
+  X(vkCreateFramebuffer)           \
+  X(vkCreateGraphicsPipelines)     \
+  X(vkCreateImage)                 \
+  X(vkCreateImageView)             \
   X(vkCreatePipelineLayout)        \
+  X(vkCreateRenderPass)            \
+  X(vkCreateSemaphore)             \
   X(vkCreateShaderModule)          \
   X(vkDestroyBuffer)               \
   X(vkDestroyCommandPool)          \
   X(vkDestroyDevice)               \
   X(vkDestroyFence)                \
+  X(vkDestroyFramebuffer)          \
+  X(vkDestroyImage)                \
+  X(vkDestroyImageView)            \
   X(vkDestroyPipeline)             \
   X(vkDestroyPipelineLayout)       \
+  X(vkDestroyRenderPass)           \
+  X(vkDestroySemaphore)            \
   X(vkDestroyShaderModule)         \
   X(vkDeviceWaitIdle)              \
   X(vkEndCommandBuffer)            \
@@ -53,6 +75,7 @@ namespace quoin::vulkan {
   X(vkGetBufferDeviceAddress)      \
   X(vkGetBufferMemoryRequirements) \
   X(vkGetDeviceQueue)              \
+  X(vkGetImageMemoryRequirements)  \
   X(vkMapMemory)                   \
   X(vkQueueSubmit)                 \
   X(vkResetCommandPool)            \

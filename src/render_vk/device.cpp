@@ -17,7 +17,7 @@ Result<std::unique_ptr<Device>> Device::create(const VulkanOptions& options) {
 
 Status Device::open(const PhysicalDevice& physical) {
   api_ = instance_->api();
-  description_ = physical.description;
+  physical_ = physical;
   api_.vkGetPhysicalDeviceMemoryProperties(physical.handle, &memory_);
   const float priority = 1.0F;
   auto queue = info_of<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
@@ -31,6 +31,9 @@ Status Device::open(const PhysicalDevice& physical) {
   info.pNext = &addresses;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
+  VkPhysicalDeviceFeatures features{};
+  features.fillModeNonSolid = physical.draws_lines ? VK_TRUE : VK_FALSE;
+  info.pEnabledFeatures = &features;
   VkResult result = api_.vkCreateDevice(physical.handle, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
   api_.load_device(handle_);
@@ -61,7 +64,7 @@ Device::~Device() {
 }
 
 Error Device::error_of(VkResult result, const std::string& doing) const {
-  const std::string who = "vulkan: " + description_.name + ": ";
+  const std::string who = "vulkan: " + description().name + ": ";
   switch (result) {
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
       return {ErrorCode::LimitExceeded, who + "out of its memory while " + doing, {}, {}};

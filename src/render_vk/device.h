@@ -21,7 +21,9 @@ class Device {
 
   [[nodiscard]] const Api& api() const { return api_; }
   [[nodiscard]] VkDevice handle() const { return handle_; }
-  [[nodiscard]] const VulkanDevice& description() const { return description_; }
+  [[nodiscard]] const VulkanDevice& description() const { return physical_.description; }
+  /// What it can do, and how it is known to Vulkan.
+  [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
   [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
 
   /// What a failed call comes to. `doing`: as in "drawing".
@@ -45,7 +47,7 @@ class Device {
 
   std::unique_ptr<VulkanInstance> instance_;
   Api api_;
-  VulkanDevice description_;
+  PhysicalDevice physical_;
   VkPhysicalDeviceMemoryProperties memory_{};
   VkDevice handle_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;

@@ -63,13 +63,14 @@ int rank_of(const PhysicalDevice& device) {
   return static_cast<int>(std::find(kOrder.begin(), kOrder.end(), device.type) - kOrder.begin());
 }
 
-std::optional<std::uint32_t> compute_family(const Api& api, VkPhysicalDevice device) {
+// The first family whose queues can do all that `wanted` says.
+std::optional<std::uint32_t> queue_family(const Api& api, VkPhysicalDevice device, VkQueueFlags wanted) {
   std::uint32_t count = 0;
   api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
-  const auto found = std::find_if(families.begin(), families.end(), [](const VkQueueFamilyProperties& family) {
-    return (family.queueFlags & VK_QUEUE_COMPUTE_BIT) != 0 && family.queueCount > 0;
+  const auto found = std::find_if(families.begin(), families.end(), [=](const VkQueueFamilyProperties& family) {
+    return (family.queueFlags & wanted) == wanted && family.queueCount > 0;
   });
   if (found == families.end()) return std::nullopt;
   return static_cast<std::uint32_t>(found - families.begin());
@@ -86,8 +87,13 @@ bool has_addresses(const Api& api, VkPhysicalDevice device) {
 PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
   VkPhysicalDeviceProperties properties{};
   api.vkGetPhysicalDeviceProperties(handle, &properties);
-  PhysicalDevice device{handle, properties.deviceType, 0, {properties.deviceName, kind_of(properties.deviceType), ""}};
-  const auto family = compute_family(api, handle);
+  PhysicalDevice device;
+  device.handle = handle;
+  device.type = properties.deviceType;
+  device.description = {properties.deviceName, kind_of(properties.deviceType), ""};
+  auto family = queue_family(api, handle, VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT);
+  device.draws_triangles = family.has_value();
+  if (!family) family = queue_family(api, handle, VK_QUEUE_COMPUTE_BIT);
   if (properties.apiVersion < VK_API_VERSION_1_2) {
     device.description.missing = "Vulkan 1.2";
   } else if (!family) {
@@ -95,6 +101,9 @@ PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
   } else if (!has_addresses(api, handle)) {
     device.description.missing = "bufferDeviceAddress";
   }
+  VkPhysicalDeviceFeatures features{};
+  api.vkGetPhysicalDeviceFeatures(handle, &features);
+  device.draws_lines = device.draws_triangles && features.fillModeNonSolid != VK_FALSE;
   device.queue_family = family.value_or(0);
   return device;
 }

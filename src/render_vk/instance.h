@@ -18,6 +18,8 @@ struct PhysicalDevice {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
   std::uint32_t queue_family = 0;
+  bool draws_triangles = false;  ///< that queue
+  bool draws_lines = false;      ///< for the edges of triangles
   VulkanDevice description;
 };
 

@@ -4,14 +4,9 @@
 
 #include "render/picture_request.h"
 #include "render_vk/picture_pass.h"
+#include "render_vk/renderer_impl.h"
 
 namespace quoin {
-namespace {
-
-constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
-
-}  // namespace
-
 Result<std::vector<VulkanDevice>> vulkan_devices() {
   const auto instance = vulkan::VulkanInstance::create({});
   if (!instance) return tl::unexpected(instance.error());
@@ -19,21 +14,6 @@ Result<std::vector<VulkanDevice>> vulkan_devices() {
   for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
   return devices;
 }
-
-struct VulkanRenderer::Impl {
-  Impl(std::unique_ptr<vulkan::Device> of_device, std::unique_ptr<vulkan::Pipelines> with_pipelines,
-       std::uint64_t block_bytes)
-      : device(std::move(of_device)),
-        pipelines(std::move(with_pipelines)),
-        memory(*device, std::max(block_bytes, kLeastBlock)),
-        scene(memory) {}
-
-  std::unique_ptr<vulkan::Device> device;
-  std::unique_ptr<vulkan::Pipelines> pipelines;
-  vulkan::DeviceMemory memory;
-  vulkan::DeviceScene scene;
-  std::uint64_t uploaded = 0;
-};
 
 VulkanRenderer::VulkanRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 VulkanRenderer::VulkanRenderer(VulkanRenderer&&) noexcept = default;

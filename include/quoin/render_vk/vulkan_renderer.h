@@ -74,8 +74,10 @@ class VulkanRenderer {
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {});
 
- private:
   struct Impl;
+  [[nodiscard]] Impl& impl() { return *impl_; }
+
+ private:
   explicit VulkanRenderer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

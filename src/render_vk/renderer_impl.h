@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "render_vk/device.h"
+#include "render_vk/device_scene.h"
+#include "render_vk/memory.h"
+#include "render_vk/pipelines.h"
+
+namespace quoin {
+
+/// What the renderers and pictures of one device share.
+struct VulkanRenderer::Impl {
+  static constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
+
+  Impl(std::unique_ptr<vulkan::Device> of_device, std::unique_ptr<vulkan::Pipelines> with_pipelines,
+       std::uint64_t block_bytes)
+      : device(std::move(of_device)),
+        pipelines(std::move(with_pipelines)),
+        memory(*device, std::max(block_bytes, kLeastBlock)),
+        scene(memory) {}
+
+  std::unique_ptr<vulkan::Device> device;
+  std::unique_ptr<vulkan::Pipelines> pipelines;
+  vulkan::DeviceMemory memory;
+  vulkan::DeviceScene scene;
+  std::uint64_t uploaded = 0;
+};
+
+}  // namespace quoin
