@@ -7,6 +7,12 @@
 
 namespace quoin {
 
+namespace {
+
+const char* const kDoing = "making room for a picture";
+
+}  // namespace
+
 VulkanPicture::VulkanPicture(VulkanRenderer& renderer) : impl_(std::make_unique<Impl>(*renderer.impl().device)) {}
 VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
 VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
@@ -17,13 +23,24 @@ Status VulkanPicture::Impl::resize(int new_width, int new_height) {
   width = height = samples = 0;
   rays = 0;
   colours = {};
+  sums = {};
   const VkDeviceSize bytes =
       VkDeviceSize{4} * static_cast<VkDeviceSize>(new_width) * static_cast<VkDeviceSize>(new_height);
-  auto made = vulkan::Buffer::create(*device, bytes, vulkan::Buffer::Where::Device, "making room for a picture");
+  auto made = vulkan::Buffer::create(*device, bytes, vulkan::Buffer::Where::Device, kDoing);
   if (!made) return tl::unexpected(made.error());
   colours = std::move(*made);
   width = new_width;
   height = new_height;
+  return {};
+}
+
+Status VulkanPicture::Impl::begin_sums() {
+  samples = 0;
+  rays = 0;
+  if (sums.handle() != VK_NULL_HANDLE) return {};
+  auto made = vulkan::Buffer::create(*device, colours.size() * 4, vulkan::Buffer::Where::Device, kDoing);
+  if (!made) return tl::unexpected(made.error());
+  sums = std::move(*made);
   return {};
 }
 
@@ -40,7 +57,7 @@ std::int64_t VulkanPicture::rays() const {
   return impl_->rays;
 }
 std::size_t VulkanPicture::bytes() const {
-  return static_cast<std::size_t>(impl_->colours.size());
+  return static_cast<std::size_t>(impl_->colours.size() + impl_->sums.size());
 }
 
 Result<Image> VulkanPicture::read() const {

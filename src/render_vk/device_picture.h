@@ -14,6 +14,8 @@ struct VulkanPicture::Impl {
 
   /// Room for that many pixels, whose contents mean nothing then if the size is another. Errors: LimitExceeded.
   [[nodiscard]] Status resize(int new_width, int new_height);
+  /// The same for `sums`, and nothing was drawn so far. Errors: LimitExceeded.
+  [[nodiscard]] Status begin_sums();
 
   vulkan::Device* device;
   int width = 0;
@@ -21,6 +23,7 @@ struct VulkanPicture::Impl {
   int samples = 0;
   std::int64_t rays = 0;
   vulkan::Buffer colours;
+  vulkan::Buffer sums;  ///< of the samples' light, four floats a pixel; only where samples are added one by one
 };
 
 }  // namespace quoin

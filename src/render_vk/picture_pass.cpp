@@ -10,19 +10,32 @@
 namespace quoin::vulkan {
 namespace {
 
-constexpr std::int32_t kTileEdge = 256;
-constexpr std::int32_t kTileEdgeWithGlass = 128;
-// A batch of commands should be over before anything thinks that the device hangs.
+// What commands do should be over before anything thinks that the device hangs: of one tile, and of one batch.
 constexpr std::int64_t kMostRays = std::int64_t{1} << 22;
+constexpr std::int64_t kMostRaysAtOnce = std::int64_t{1} << 24;
 const char* const kDoing = "drawing";
 
-// The edge of the tiles, a power of two.
-std::int32_t tile_edge(const RenderOptions& options, bool has_glass) {
+std::int64_t rays_of_pixel(const RenderOptions& options) {
   const LightOptions& light = options.light;
-  const std::int64_t rays = 2 + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
-  std::int32_t edge = has_glass ? kTileEdgeWithGlass : kTileEdge;
-  while (edge > 16 && std::int64_t{edge} * edge * rays > kMostRays) edge /= 2;
+  return 2 + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
+}
+
+// The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass
+// take 1.5 kB a pixel.
+std::int32_t tile_edge(const RenderOptions& options, bool has_glass, bool is_processor) {
+  std::int32_t edge = is_processor ? 256 : 1024;
+  if (has_glass) edge = is_processor ? 128 : 256;
+  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options) > kMostRays) edge /= 2;
   return edge;
+}
+
+std::int64_t rays_in(const ShaderCounters& counters) {
+  return static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
+}
+
+const std::vector<float>& thresholds() {
+  static const std::vector<float> shared = srgb_thresholds();
+  return shared;
 }
 
 }  // namespace
@@ -58,7 +71,7 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   if (done) done = upload(data.leaves, frame_.leaves);
   if (done) done = upload(data.directions, frame_.directions);
   if (done) done = upload(data.turns, frame_.turns);
-  if (done) done = upload(srgb_thresholds(), frame_.thresholds);
+  if (done) done = upload(thresholds(), frame_.thresholds);
   if (done) done = make_tile_buffers(options);
   if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
   if (done) done = memory_->flush();
@@ -67,10 +80,10 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
 
 Status PicturePass::make_tile_buffers(const RenderOptions& options) {
   const bool has_glass = scene_->has_transparent();
-  tile_edge_ = tile_edge(options, has_glass);
+  tile_edge_ = tile_edge(options, has_glass, device_->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
                       static_cast<std::size_t>(std::min(tile_edge_, options.height));
-  const VkDeviceSize bytes = pixels * 8 + sizeof(ShaderCounters) + 16;
+  const VkDeviceSize bytes = (target_ == nullptr ? pixels * 8 : 0) + sizeof(ShaderCounters) + 16;
   for (Buffer* buffer : {&output_, &results_}) {
     const auto where = buffer == &output_ ? Buffer::Where::Device : Buffer::Where::Read;
     auto made = Buffer::create(*device_, bytes, where, kDoing);
@@ -82,7 +95,13 @@ Status PicturePass::make_tile_buffers(const RenderOptions& options) {
   frame_.depths = frame_.colours + pixels * 4;
   Status done = reserve(pixels * kPointBytes, frame_.points);
   if (done) done = reserve(pixels * kStateBytes, frame_.states);
-  if (done) done = reserve(pixels * kSumBytes, frame_.sums);
+  if (target_ != nullptr) {
+    frame_.colours = target_->colours.address();
+    frame_.sums = target_->sums.address();
+    if (done) done = reserve(pixels * 4, frame_.depths);
+  } else if (done) {
+    done = reserve(pixels * kSumBytes, frame_.sums);
+  }
   if (!has_glass) return done;
   if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.bodies);
   if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.sun_bodies);
@@ -96,10 +115,13 @@ ShaderPush PicturePass::push_for(const Tile& tile) const {
   push.corner_y = tile.y;
   push.size_x = tile.width;
   push.size_y = tile.height;
+  push.pitch = static_cast<std::uint32_t>(target_ == nullptr ? tile.width : target_->width);
+  if (target_ != nullptr)
+    push.base = static_cast<std::uint32_t>(tile.y) * push.pitch + static_cast<std::uint32_t>(tile.x);
   return push;
 }
 
-Status PicturePass::take_sample(const Tile& tile, int sample) {
+ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   ShaderPush push = push_for(tile);
   const PixelPoint point = sample_point(sample);
   push.point_x = static_cast<float>(point.x);
@@ -108,6 +130,11 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
   push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
   push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
   push.first = sample == 0 ? 1 : 0;
+  return push;
+}
+
+Status PicturePass::take_sample(const Tile& tile, int sample) {
+  const ShaderPush push = push_for_sample(tile, sample);
   const bool has_glass = scene_->has_transparent();
   Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     pipelines_->dispatch(commands, Pass::Primary, push);
@@ -169,35 +196,99 @@ Status PicturePass::read_counters(ShaderCounters& counters) {
   return done;
 }
 
-Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
-  Status done = put_frame(camera, options);
-  if (done) {
-    done = device_->run(kDoing, [&](VkCommandBuffer commands) {
-      device_->api().vkCmdFillBuffer(commands, output_.handle(), 0, sizeof(ShaderCounters), 0);
-    });
+std::vector<PicturePass::Tile> PicturePass::tiles_of(const RenderOptions& options) const {
+  std::vector<Tile> tiles;
+  for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
+    for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
+      tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y)});
+    }
   }
+  return tiles;
+}
+
+Status PicturePass::begin(const Camera& camera, const RenderOptions& options) {
+  if (Status done = put_frame(camera, options); !done) return done;
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    device_->api().vkCmdFillBuffer(commands, output_.handle(), 0, sizeof(ShaderCounters), 0);
+  });
+}
+
+Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
+  Status done = begin(camera, options);
+  if (!done) return tl::unexpected(done.error());
   Picture picture = empty_picture(options);
-  const std::int64_t across = (options.width + tile_edge_ - 1) / std::max(tile_edge_, 1);
-  const std::int64_t down = (options.height + tile_edge_ - 1) / std::max(tile_edge_, 1);
-  const auto all = static_cast<double>(across * down * options.samples);
-  for (std::int64_t i = 0; i < across * down && done; ++i) {
-    const auto x = static_cast<std::int32_t>(i % across) * tile_edge_;
-    const auto y = static_cast<std::int32_t>(i / across) * tile_edge_;
-    const Tile tile{x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y)};
+  const std::vector<Tile> tiles = tiles_of(options);
+  const double all = static_cast<double>(tiles.size()) * options.samples;
+  double count = 0.0;
+  for (const Tile& tile : tiles) {
     for (int sample = 0; sample < options.samples && done; ++sample) {
       done = take_sample(tile, sample);
-      if (!done || !progress) continue;
-      const auto count = static_cast<double>(i * options.samples + sample + 1);
-      if (!progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+      count += 1.0;
+      if (done && progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
     }
     if (done) done = read_tile(tile, picture);
   }
   ShaderCounters counters;
   if (done) done = read_counters(counters);
   if (!done) return tl::unexpected(done.error());
-  picture.rays = static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
+  picture.rays = rays_in(counters);
   picture.pixels_hit = counters.hits;
   return picture;
+}
+
+// One sample of some tiles; without glass, which the processor counts rounds for, all in one batch.
+Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
+  if (scene_->has_transparent()) {
+    for (const Tile& tile : tiles) {
+      if (Status done = take_sample(tile, sample); !done) return done;
+    }
+    return {};
+  }
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    for (const Tile& tile : tiles) {
+      const ShaderPush push = push_for_sample(tile, sample);
+      pipelines_->dispatch(commands, Pass::Primary, push);
+      pipelines_->dispatch(commands, Pass::Light, push);
+    }
+  });
+}
+
+Status PicturePass::resolve(std::span<const Tile> tiles) {
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    for (const Tile& tile : tiles) pipelines_->dispatch(commands, Pass::Resolve, push_for(tile));
+  });
+}
+
+Status PicturePass::add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress) {
+  const std::vector<Tile> tiles = tiles_of(options);
+  const std::int64_t rays_of_tile = rays_of_pixel(options) * tile_edge_ * tile_edge_;
+  const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMostRaysAtOnce / rays_of_tile, 1));
+  const double all = static_cast<double>(tiles.size()) * options.samples;
+  double count = 0.0;
+  for (int sample = 0; sample < options.samples; ++sample) {
+    for (std::size_t first = 0; first < tiles.size(); first += at_once) {
+      const auto some = std::span(tiles).subspan(first, std::min(at_once, tiles.size() - first));
+      if (Status done = take_sample(some, picture.samples + sample); !done) return done;
+      count += static_cast<double>(some.size());
+      if (progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+    }
+  }
+  return resolve(tiles);
+}
+
+Status PicturePass::draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+                         const Progress& progress) {
+  target_ = &picture;
+  RenderOptions all = options;
+  all.samples += picture.samples;  // what the sums are divided by
+  Status done = begin(camera, all);
+  if (done) done = add_samples(picture, options, progress);
+  ShaderCounters counters;
+  if (done) done = read_counters(counters);
+  // Sums to which not every tile was added are of no use.
+  picture.samples = done ? all.samples : 0;
+  picture.rays = done ? picture.rays + rays_in(counters) : 0;
+  return done;
 }
 
 }  // namespace quoin::vulkan

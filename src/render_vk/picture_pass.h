@@ -1,8 +1,12 @@
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include <quoin/core/progress.h>
 #include <quoin/render/cpu_renderer.h>
 
+#include "render_vk/device_picture.h"
 #include "render_vk/device_scene.h"
 #include "render_vk/frame.h"
 #include "render_vk/memory.h"
@@ -10,7 +14,7 @@
 
 namespace quoin::vulkan {
 
-/// One picture, tile by tile: a tile is drawn in device memory and then read.
+/// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
 class PicturePass {
  public:
   PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene)
@@ -22,6 +26,10 @@ class PicturePass {
   /// As VulkanRenderer::render, of what is right.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, const Progress& progress);
 
+  /// As VulkanRenderer::draw, of what is right.
+  [[nodiscard]] Status draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+                            const Progress& progress);
+
  private:
   struct Tile {
     std::int32_t x, y, width, height;
@@ -31,8 +39,14 @@ class PicturePass {
   Status upload(const std::vector<T>& values, std::uint64_t& address);
   Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame(const Camera& camera, const RenderOptions& options);
+  Status begin(const Camera& camera, const RenderOptions& options);
   Status make_tile_buffers(const RenderOptions& options);
+  [[nodiscard]] std::vector<Tile> tiles_of(const RenderOptions& options) const;
+  [[nodiscard]] ShaderPush push_for_sample(const Tile& tile, int sample) const;
   Status take_sample(const Tile& tile, int sample);
+  Status add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress);
+  Status take_sample(std::span<const Tile> tiles, int sample);
+  Status resolve(std::span<const Tile> tiles);
   Status finish_glass(ShaderPush push);
   Status read_tile(const Tile& tile, Picture& picture);
   Status read_counters(ShaderCounters& counters);
@@ -42,6 +56,7 @@ class PicturePass {
   DeviceMemory* memory_;
   const Pipelines* pipelines_;
   const DeviceScene* scene_;
+  const VulkanPicture::Impl* target_ = nullptr;  // null: what is drawn is read
   std::vector<Place> places_;
   ShaderFrame frame_;
   std::uint64_t frame_address_ = 0;

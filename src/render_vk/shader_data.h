@@ -138,11 +138,13 @@ struct ShaderPush {
   std::uint32_t seed = 0;
   std::uint32_t first = 0;
   std::uint32_t round = 0;
+  std::uint32_t base = 0;
+  std::uint32_t pitch = 0;
   std::uint32_t pad = 0;
 };
 
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
 static_assert(sizeof(ShaderPlaced) == 352 && sizeof(ShaderFrame) == 16 * 16 + 16 * 8 + 16 * 4);
-static_assert(sizeof(ShaderPush) == 56 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderPush) == 64 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -7,6 +7,16 @@
 #include "render_vk/renderer_impl.h"
 
 namespace quoin {
+namespace {
+
+Status check_request(const Camera& camera, const RenderOptions& options) {
+  if (Status status = check(camera, options); !status) return status;
+  if (!options.detail) return {};
+  return fail(ErrorCode::Unsupported, "vulkan: levels of detail are not drawn on graphics devices yet");
+}
+
+}  // namespace
+
 Result<std::vector<VulkanDevice>> vulkan_devices() {
   const auto instance = vulkan::VulkanInstance::create({});
   if (!instance) return tl::unexpected(instance.error());
@@ -44,12 +54,25 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 }
 
 Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
-  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
-  if (options.detail) {
-    return fail(ErrorCode::Unsupported, "vulkan: levels of detail are not drawn on graphics devices yet");
-  }
+  if (const Status status = check_request(camera, options); !status) return tl::unexpected(status.error());
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene);
   return pass.render(camera, options, progress);
+}
+
+Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
+                            const Progress& progress) {
+  constexpr int kMostSamples = 4096;
+  if (Status status = check_request(camera, options); !status) return status;
+  VulkanPicture::Impl& target = picture.impl();
+  if (Status status = target.resize(options.width, options.height); !status) return status;
+  if (is_new || target.samples == 0) {
+    if (Status status = target.begin_sums(); !status) return status;
+  }
+  if (target.samples + options.samples > kMostSamples) {
+    return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
+  }
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene);
+  return pass.draw(target, camera, options, progress);
 }
 
 }  // namespace quoin

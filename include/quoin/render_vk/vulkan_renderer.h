@@ -10,6 +10,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
@@ -73,6 +74,15 @@ class VulkanRenderer {
   /// One picture, as CpuRenderer::render; `options.threads` and `instructions` mean nothing.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {});
+
+  /// Draws into a picture that stays on the device: adds `options.samples` samples a pixel to those that it has, or
+  /// begins it anew where `is_new` or the size is another. Sample after sample it becomes the picture that `render`
+  /// takes with as many; after an error, Cancelled too, it has none.
+  ///
+  /// Requires: unless it begins anew, camera, light and scene are those of its other samples.
+  /// Errors:   those of `render`, and LimitExceeded for more than 4,096 samples; `options.depth` means nothing.
+  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
+                            const Progress& progress = {});
 
   struct Impl;
   [[nodiscard]] Impl& impl() { return *impl_; }

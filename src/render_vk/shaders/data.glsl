@@ -181,6 +181,8 @@ layout(push_constant) uniform Push {
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample
+  uint base;        // of the tile's first pixel in sums and colours, and from one row there to the next
+  uint pitch;
   uint pad;
 } push;
 
@@ -203,4 +205,8 @@ bool is_in_tile() {
 }
 uint slot_of_pixel() {
   return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
+}
+// Its place where the picture comes together.
+uint place_of_pixel() {
+  return push.base + gl_GlobalInvocationID.y * push.pitch + gl_GlobalInvocationID.x;
 }

@@ -276,8 +276,9 @@ void main() {
         vec3 sample_colour = min(max(vec3(0.0), state.colour.xyz), vec3(1.0));
         sample_colour = mix(sample_colour, vec3(0.0), isnan(state.colour.xyz));
         Sums sums = Sums(frame().sums);
-        vec3 before = push.first != 0 ? vec3(0.0) : sums.at[slot].xyz;
-        sums.at[slot] = vec4(before + sample_colour, 0.0);
+        uint place = place_of_pixel();
+        vec3 before = push.first != 0 ? vec3(0.0) : sums.at[place].xyz;
+        sums.at[place] = vec4(before + sample_colour, 0.0);
       }
       state.colour.w = is_last ? 0.0 : 1.0;
       States(frame().states).at[slot] = state;

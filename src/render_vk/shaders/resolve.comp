@@ -13,8 +13,8 @@ uint encoded(float light) {
 
 void main() {
   if (!is_in_tile()) return;
-  uint slot = slot_of_pixel();
-  vec3 mean = Sums(frame().sums).at[slot].xyz / frame().samples;
+  uint place = place_of_pixel();
+  vec3 mean = Sums(frame().sums).at[place].xyz / frame().samples;
   uint rgb = encoded(mean.x) | encoded(mean.y) << 8 | encoded(mean.z) << 16;
-  Words32(frame().colours).at[slot] = rgb | 0xFF000000u;
+  Words32(frame().colours).at[place] = rgb | 0xFF000000u;
 }
