@@ -8,23 +8,31 @@
 namespace quoin::vulkan {
 
 // Vulkan is not linked but looked up at run time, so that a program starts where there is none.
-#define QUOIN_VULKAN_OF_LOADER(X) \
-  X(vkCreateInstance)             \
-  X(vkEnumerateInstanceVersion)   \
-  X(vkEnumerateInstanceLayerProperties)
+#define QUOIN_VULKAN_OF_LOADER(X)           \
+  X(vkCreateInstance)                       \
+  X(vkEnumerateInstanceExtensionProperties) \
+  X(vkEnumerateInstanceLayerProperties)     \
+  X(vkEnumerateInstanceVersion)
 
-#define QUOIN_VULKAN_OF_INSTANCE(X)      \
-  X(vkDestroyInstance)                   \
-  X(vkCreateDevice)                      \
-  X(vkEnumeratePhysicalDevices)          \
-  X(vkGetDeviceProcAddr)                 \
-  X(vkGetPhysicalDeviceFeatures)         \
-  X(vkGetPhysicalDeviceFeatures2)        \
-  X(vkGetPhysicalDeviceMemoryProperties) \
-  X(vkGetPhysicalDeviceProperties)       \
-  X(vkGetPhysicalDeviceQueueFamilyProperties)
+#define QUOIN_VULKAN_OF_INSTANCE(X)            \
+  X(vkCreateDevice)                            \
+  X(vkDestroyInstance)                         \
+  X(vkDestroySurfaceKHR)                       \
+  X(vkEnumerateDeviceExtensionProperties)      \
+  X(vkEnumeratePhysicalDevices)                \
+  X(vkGetDeviceProcAddr)                       \
+  X(vkGetPhysicalDeviceFeatures)               \
+  X(vkGetPhysicalDeviceFeatures2)              \
+  X(vkGetPhysicalDeviceMemoryProperties)       \
+  X(vkGetPhysicalDeviceProperties)             \
+  X(vkGetPhysicalDeviceQueueFamilyProperties)  \
+  X(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
+  X(vkGetPhysicalDeviceSurfaceFormatsKHR)      \
+  X(vkGetPhysicalDeviceSurfacePresentModesKHR) \
+  X(vkGetPhysicalDeviceSurfaceSupportKHR)
 
 #define QUOIN_VULKAN_OF_DEVICE(X)  \
+  X(vkAcquireNextImageKHR)         \
   X(vkAllocateCommandBuffers)      \
   X(vkAllocateMemory)              \
   X(vkBeginCommandBuffer)          \
@@ -57,6 +65,7 @@ namespace quoin::vulkan {
   X(vkCreateRenderPass)            \
   X(vkCreateSemaphore)             \
   X(vkCreateShaderModule)          \
+  X(vkCreateSwapchainKHR)          \
   X(vkDestroyBuffer)               \
   X(vkDestroyCommandPool)          \
   X(vkDestroyDevice)               \
@@ -69,6 +78,7 @@ namespace quoin::vulkan {
   X(vkDestroyRenderPass)           \
   X(vkDestroySemaphore)            \
   X(vkDestroyShaderModule)         \
+  X(vkDestroySwapchainKHR)         \
   X(vkDeviceWaitIdle)              \
   X(vkEndCommandBuffer)            \
   X(vkFreeMemory)                  \
@@ -76,7 +86,9 @@ namespace quoin::vulkan {
   X(vkGetBufferMemoryRequirements) \
   X(vkGetDeviceQueue)              \
   X(vkGetImageMemoryRequirements)  \
+  X(vkGetSwapchainImagesKHR)       \
   X(vkMapMemory)                   \
+  X(vkQueuePresentKHR)             \
   X(vkQueueSubmit)                 \
   X(vkResetCommandPool)            \
   X(vkResetFences)                 \

@@ -5,7 +5,7 @@
 namespace quoin::vulkan {
 
 Result<std::unique_ptr<Device>> Device::create(const VulkanOptions& options) {
-  auto instance = VulkanInstance::create(options.on_validation_message);
+  auto instance = VulkanInstance::create(options.on_validation_message, options.surface);
   if (!instance) return tl::unexpected(instance.error());
   const auto physical = (*instance)->choose(options.device);
   if (!physical) return tl::unexpected(physical.error());
@@ -34,6 +34,11 @@ Status Device::open(const PhysicalDevice& physical) {
   VkPhysicalDeviceFeatures features{};
   features.fillModeNonSolid = physical.draws_lines ? VK_TRUE : VK_FALSE;
   info.pEnabledFeatures = &features;
+  const char* const swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
+  if (surface() != VK_NULL_HANDLE) {
+    info.enabledExtensionCount = 1;
+    info.ppEnabledExtensionNames = &swapchain;
+  }
   VkResult result = api_.vkCreateDevice(physical.handle, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
   api_.load_device(handle_);
@@ -74,6 +79,8 @@ Error Device::error_of(VkResult result, const std::string& doing) const {
       return {ErrorCode::LimitExceeded, who + "out of blocks of memory while " + doing, {}, {}};
     case VK_ERROR_DEVICE_LOST:
       return {ErrorCode::Unsupported, who + "the device was lost while " + doing, {}, {}};
+    case VK_ERROR_SURFACE_LOST_KHR:
+      return {ErrorCode::Unsupported, who + "the window was lost while " + doing, {}, {}};
     default:
       return {
           ErrorCode::Unsupported, who + "failed while " + doing + " (VkResult " + std::to_string(result) + ")", {}, {}};

@@ -25,6 +25,9 @@ class Device {
   /// What it can do, and how it is known to Vulkan.
   [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
   [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
+  [[nodiscard]] VkQueue queue() const { return queue_; }
+  /// Of the window that pictures are shown in; null where there is none.
+  [[nodiscard]] VkSurfaceKHR surface() const { return instance_->surface(); }
 
   /// What a failed call comes to. `doing`: as in "drawing".
   [[nodiscard]] Error error_of(VkResult result, const std::string& doing) const;

@@ -84,7 +84,21 @@ bool has_addresses(const Api& api, VkPhysicalDevice device) {
   return addresses.bufferDeviceAddress != VK_FALSE;
 }
 
-PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
+// Whether queues of the family can show pictures in the window.
+bool can_present(const Api& api, VkPhysicalDevice device, std::uint32_t family, VkSurfaceKHR surface) {
+  std::uint32_t count = 0;
+  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
+  const bool has_swapchain = std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties& one) {
+    return std::strcmp(one.extensionName, VK_KHR_SWAPCHAIN_EXTENSION_NAME) == 0;
+  });
+  VkBool32 can = VK_FALSE;
+  return has_swapchain && api.vkGetPhysicalDeviceSurfaceSupportKHR(device, family, surface, &can) == VK_SUCCESS &&
+         can != VK_FALSE;
+}
+
+PhysicalDevice describe(const Api& api, VkPhysicalDevice handle, VkSurfaceKHR surface) {
   VkPhysicalDeviceProperties properties{};
   api.vkGetPhysicalDeviceProperties(handle, &properties);
   PhysicalDevice device;
@@ -100,6 +114,8 @@ PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
     device.description.missing = "a queue that computes";
   } else if (!has_addresses(api, handle)) {
     device.description.missing = "bufferDeviceAddress";
+  } else if (surface != VK_NULL_HANDLE && !(device.draws_triangles && can_present(api, handle, *family, surface))) {
+    device.description.missing = "a way to show pictures in this window";
   }
   VkPhysicalDeviceFeatures features{};
   api.vkGetPhysicalDeviceFeatures(handle, &features);
@@ -120,17 +136,18 @@ bool is_number(const std::string& text) {
 
 }  // namespace
 
-Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener) {
+Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener, const VulkanSurface& window) {
   auto api = Api::load();
   if (!api) return tl::unexpected(api.error());
   std::unique_ptr<VulkanInstance> instance(new VulkanInstance(*api, std::move(listener)));
-  if (Status opened = instance->open(); !opened) return tl::unexpected(opened.error());
+  if (Status opened = instance->open(window); !opened) return tl::unexpected(opened.error());
   if (Status listed = instance->list_devices(); !listed) return tl::unexpected(listed.error());
   return instance;
 }
 
 VulkanInstance::~VulkanInstance() {
   if (handle_ == VK_NULL_HANDLE) return;
+  if (surface_ != VK_NULL_HANDLE) api_.vkDestroySurfaceKHR(handle_, surface_, nullptr);
   if (messenger_ != VK_NULL_HANDLE) {
     const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
         api_.vkGetInstanceProcAddr(handle_, "vkDestroyDebugUtilsMessengerEXT"));
@@ -139,7 +156,7 @@ VulkanInstance::~VulkanInstance() {
   api_.vkDestroyInstance(handle_, nullptr);
 }
 
-Status VulkanInstance::open() {
+Status VulkanInstance::open(const VulkanSurface& window) {
   std::uint32_t version = 0;
   if (api_.vkEnumerateInstanceVersion(&version) != VK_SUCCESS || version < VK_API_VERSION_1_2) {
     return refuse("the loader here is older than version 1.2");
@@ -148,22 +165,35 @@ Status VulkanInstance::open() {
   auto application = info_of<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
   application.pApplicationName = application.pEngineName = "quoin";
   application.apiVersion = VK_API_VERSION_1_2;
-  const char* const extension = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
+  std::vector<const char*> extensions;
+  for (const std::string& name : window.extensions) extensions.push_back(name.c_str());
   VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
   auto info = info_of<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = &application;
   if (listener_) {
     info.pNext = &messenger;
-    info.enabledLayerCount = info.enabledExtensionCount = 1;
+    info.enabledLayerCount = 1;
     info.ppEnabledLayerNames = &kValidationLayer;
-    info.ppEnabledExtensionNames = &extension;
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
+  info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &handle_); result != VK_SUCCESS) {
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("there is no driver for any graphics device here");
+    if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver here shows pictures in windows");
     return refuse("no instance can be made (VkResult " + std::to_string(result) + ")");
   }
   api_.load_instance(handle_);
+  if (Status heard = listen(); !heard || !window.make) return heard;
+  const std::uint64_t surface = window.make(handle_);
+  if (surface == 0) return refuse("the window cannot show pictures");
+  std::memcpy(&surface_, &surface, sizeof surface_);
+  return {};
+}
+
+Status VulkanInstance::listen() {
   if (!listener_) return {};
+  const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
   const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
       api_.vkGetInstanceProcAddr(handle_, "vkCreateDebugUtilsMessengerEXT"));
   if (create(handle_, &messenger, nullptr, &messenger_) != VK_SUCCESS) return refuse("validation cannot be heard");
@@ -179,7 +209,7 @@ Status VulkanInstance::list_devices() {
     handles.resize(count);
   }
   if (handles.empty()) return refuse("there is no driver for any graphics device here");
-  for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle));
+  for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle, surface_));
   return {};
 }
 

@@ -28,6 +28,13 @@ struct VulkanDevice {
 /// Errors: Unsupported when the library was built without Vulkan, when there is no loader, or no driver.
 [[nodiscard]] Result<std::vector<VulkanDevice>> vulkan_devices();
 
+/// A window that a device is to show pictures in, as a library for windows knows it.
+struct VulkanSurface {
+  std::vector<std::string> extensions;  ///< that the library wants of Vulkan's instance
+  /// Makes the window's VkSurfaceKHR for a VkInstance; 0 where that fails. The renderer destroys it.
+  std::function<std::uint64_t(void* instance)> make;
+};
+
 struct VulkanOptions {
   /// A number counts in `vulkan_devices`, anything else is a part of a name, in capitals or not. Empty: the first of
   /// the best kind (discrete, integrated, virtual, cpu, other) that lacks nothing.
@@ -37,6 +44,8 @@ struct VulkanOptions {
   /// Told what the validation layer says, which is then loaded: each message is a mistake in Quoin. May be called from
   /// any thread that uses the renderer.
   std::function<void(const std::string& message)> on_validation_message;
+  /// For VulkanWindow: only devices that can show pictures there will do. Without `make`, none.
+  VulkanSurface surface;
 };
 
 /// Takes the pictures that CpuRenderer takes, on a graphics device.
