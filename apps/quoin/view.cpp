@@ -22,6 +22,8 @@ struct ViewArguments {
   PictureSize size;
   std::filesystem::path screenshot;
   bool is_bare = false;
+  std::string backend = "auto";
+  std::string device;
 };
 
 #ifdef QUOIN_HAVE_VIEWER
@@ -49,6 +51,9 @@ int run_view(const ViewArguments& arguments) {
   options.height = arguments.size.height;
   options.is_bare = arguments.is_bare;
   options.screenshot = arguments.screenshot;
+  options.device = arguments.device;
+  if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
+  if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
   Status status = check_input(arguments.input);
   if (status) status = check_outputs({arguments.screenshot});
   if (status) {
@@ -107,6 +112,12 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
       ->check(file_name());
+  command
+      ->add_option("--backend", arguments->backend,
+                   "What marches rays: a graphics card if there is one, the processor, or any device")
+      ->check(CLI::IsMember({"auto", "cpu", "vulkan"}))
+      ->capture_default_str();
+  command->add_option("--device", arguments->device, "Device of Vulkan: its number or a part of its name");
   command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command->footer("F1 in the window says what keys and mouse do.\nExample: quoin view castle.vox");

@@ -53,6 +53,7 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
   options.threads = threads;
   // What is shown for a moment does not wait for impostors.
   if (stage.divisor > 1) options.impostor_seconds = kImpostorSeconds;
+  options.detail_colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;
 }
@@ -182,7 +183,8 @@ void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, c
     return;
   }
   const bool is_whole = drawn.divisor == 1;
-  frame = ViewFrame{std::move(picture->colour), drawn.samples, is_whole, drawn.is_last(of), seconds, picture->rays};
+  frame = ViewFrame{std::move(picture->colour), nullptr, drawn.samples, is_whole,
+                    drawn.is_last(of),          seconds, picture->rays};
   if (drawn.samples == 1) seconds_per_pixel = seconds / drawn.pixels(of);
 }
 

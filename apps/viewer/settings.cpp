@@ -1,6 +1,7 @@
 #include "settings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -66,6 +67,16 @@ void read_light(const Json& object, LightOptions& light) {
   light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
 }
 
+constexpr std::array kModes = {"rays", "blocks", "smooth"};
+
+void read_mode(const Json& object, DrawMode& mode) {
+  const Json* found = find(object, "mode");
+  if (found == nullptr || !found->is_string()) return;
+  for (std::size_t i = 0; i < kModes.size(); ++i) {
+    if (*found == kModes[i]) mode = static_cast<DrawMode>(i);
+  }
+}
+
 void read_recent(const Json& object, std::vector<std::string>& recent) {
   const Json* found = find(object, "recent");
   if (found == nullptr || !found->is_array()) return;
@@ -111,6 +122,7 @@ Settings parse_settings(std::string_view json) {
   if (find(object, "ui_scale") != nullptr) read_number(object, "ui_scale", 0.5, 4.0, settings.ui_scale);
   read_whole(object, "samples", 1, 256, settings.samples);
   read_flag(object, "detail_by_pixels", settings.detail_by_pixels);
+  read_mode(object, settings.mode);
   if (const Json* light = find(object, "light"); light != nullptr && light->is_object()) {
     read_light(*light, settings.light);
   }
@@ -126,6 +138,7 @@ std::string to_json(const Settings& settings) {
                  {"fly", settings.camera_mode == CameraMode::Fly},
                  {"samples", settings.samples},
                  {"detail_by_pixels", settings.detail_by_pixels},
+                 {"mode", kModes[static_cast<std::size_t>(settings.mode)]},
                  {"light",
                   {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
                    {"lit", light.lit},

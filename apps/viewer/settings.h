@@ -9,6 +9,7 @@
 #include <quoin/light/light_options.h>
 
 #include "camera_control.h"
+#include "view_backend.h"
 
 namespace quoin::viewer {
 
@@ -21,6 +22,10 @@ struct Settings {
   double ui_scale = 0.0;  ///< 0: by the display
   int samples = 16;
   bool detail_by_pixels = false;
+  bool detail_colours = false;  ///< not remembered, as the two after it
+  MeshShading shading = MeshShading::Lit;
+  Wireframe wireframe = Wireframe::Off;
+  DrawMode mode = DrawMode::Rays;
   LightOptions light;
   std::vector<std::string> recent;  ///< files, the newest first
 

@@ -20,7 +20,9 @@ bool is_same(const Camera& a, const Camera& b) {
 
 bool is_same(const ViewRequest& a, const ViewRequest& b) {
   return a.width == b.width && a.height == b.height && a.samples == b.samples &&
-         a.detail_by_pixels == b.detail_by_pixels && is_same(a.camera, b.camera) && is_same(a.light, b.light);
+         a.detail_by_pixels == b.detail_by_pixels && a.detail_colours == b.detail_colours && a.mode == b.mode &&
+         a.shading == b.shading && a.wireframe == b.wireframe && is_same(a.camera, b.camera) &&
+         is_same(a.light, b.light);
 }
 
 }  // namespace quoin::viewer

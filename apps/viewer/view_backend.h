@@ -2,16 +2,27 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <quoin/core/image.h>
 #include <quoin/light/light_options.h>
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 
 namespace quoin::viewer {
+
+/// What the scene is drawn as.
+enum class DrawMode : std::uint8_t {
+  Rays,    ///< a ray-marched picture
+  Blocks,  ///< blocky meshes of its chunks
+  Smooth,  ///< smooth meshes of its chunks
+};
 
 /// What the window wants to show.
 struct ViewRequest {
@@ -20,7 +31,11 @@ struct ViewRequest {
   int height = 0;
   LightOptions light;
   bool detail_by_pixels = false;  ///< far models in coarser cells
-  int samples = 16;               ///< a pixel, once the picture has settled
+  bool detail_colours = false;    ///< rays: instances in colours that tell their detail
+  int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted
+  DrawMode mode = DrawMode::Rays;
+  MeshShading shading = MeshShading::Lit;  ///< of meshes
+  Wireframe wireframe = Wireframe::Off;    ///< of meshes
 };
 
 /// Whether both want the same picture.
@@ -29,7 +44,9 @@ struct ViewRequest {
 
 /// A picture of what was asked for last, or of what was asked for a moment before.
 struct ViewFrame {
-  Image colour;             ///< perhaps smaller than was asked for: to be stretched
+  Image colour;  ///< perhaps smaller than was asked for: to be stretched
+  /// Instead of `colour` where the picture stays on a graphics device. The next frame may be drawn into it.
+  std::shared_ptr<const VulkanPicture> on_device;
   int samples = 0;          ///< a pixel
   bool is_whole = false;    ///< as large as was asked for
   bool is_settled = false;  ///< nothing better will come of this request
@@ -39,7 +56,8 @@ struct ViewFrame {
 
 /// What makes the picture of a scene: the processor here, a graphics card elsewhere.
 ///
-/// Threads: all calls come from one thread, the window's. None but `pause` ever waits for a picture.
+/// Threads: all calls come from one thread, the window's. None but `pause` ever waits for the processor's pictures;
+/// those of a graphics device are drawn in `take`.
 class ViewBackend {
  public:
   ViewBackend() = default;
@@ -50,11 +68,20 @@ class ViewBackend {
   /// For people: "processor".
   [[nodiscard]] virtual std::string name() const = 0;
 
+  /// Whether there is a way to draw that; asked again after a fault.
+  [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return mode == DrawMode::Rays; }
+
   /// From now on this is wanted. The same request again changes nothing.
   virtual void show(const ViewRequest& request) = 0;
 
   /// The newest frame, if it has not been taken yet.
   [[nodiscard]] virtual std::optional<ViewFrame> take() = 0;
+
+  /// Whether `take` would have something to draw, so that it should be called soon. Other frames are told of.
+  [[nodiscard]] virtual bool wants_frames() const { return false; }
+
+  /// What people may want to know of it: names and values.
+  [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> facts() const { return {}; }
 
   /// What went wrong with the last request, if anything.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;
@@ -70,6 +97,9 @@ class ViewBackend {
   [[nodiscard]] virtual std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width,
                                                      int height) = 0;
   [[nodiscard]] virtual bool is_up_to_date() = 0;
+
+  /// Lets go of its graphics device, if it has one: for one that was lost.
+  virtual void forget_device() {}
 };
 
 /// Edits the scene of a backend: pauses it now, and lets it go on at the end of the scope.

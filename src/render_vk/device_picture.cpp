@@ -80,4 +80,25 @@ Result<Image> VulkanPicture::read() const {
   return image;
 }
 
+Status VulkanPicture::write(const Image& image) {
+  const bool has_pixels = image.width > 0 && image.height > 0;
+  const std::size_t pixels =
+      has_pixels ? static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) : 0;
+  if (pixels == 0 || image.rgb.size() != 3 * pixels) {
+    return fail(ErrorCode::InvalidArgument, "vulkan: a picture without pixels");
+  }
+  if (Status sized = impl_->resize(image.width, image.height); !sized) return sized;
+  vulkan::Device& device = *impl_->device;
+  auto staging = vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Upload, kDoing);
+  if (!staging) return tl::unexpected(staging.error());
+  for (std::size_t i = 0; i < pixels; ++i) std::memcpy(staging->mapped() + 4 * i, image.rgb.data() + 3 * i, 3);
+  Status done = device.run("uploading a picture", [&](VkCommandBuffer commands) {
+    const VkBufferCopy all{0, 0, staging->size()};
+    device.api().vkCmdCopyBuffer(commands, staging->handle(), impl_->colours.handle(), 1, &all);
+  });
+  impl_->samples = done ? 1 : 0;
+  impl_->rays = 0;
+  return done;
+}
+
 }  // namespace quoin

@@ -65,10 +65,10 @@ void change_brush(Command command, Brush& brush) {
 
 }  // namespace
 
-App::App(const ViewerOptions& options, Settings settings, SdlWindow window)
+App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen> screen)
     : options_(options),
-      window_(std::move(window)),
-      gui_(window_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(window_)) {
+      screen_(std::move(screen)),
+      gui_(std::make_unique<Gui>(*screen_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(*screen_))) {
   state_.camera.mode = settings.camera_mode;
   state_.settings = std::move(settings);
   if (!options_.file.empty()) load(options_.file);
@@ -76,7 +76,7 @@ App::App(const ViewerOptions& options, Settings settings, SdlWindow window)
 
 App::~App() {
   // The window goes first to the user's eye; threads may take a moment to end.
-  SDL_HideWindow(window_.window());
+  SDL_HideWindow(screen_->window());
   state_.saver.reset();
 }
 
@@ -96,20 +96,23 @@ Status App::run(const std::function<bool()>& is_interrupted) {
 void App::note_size() {
   const bool is_given = options_.width > 0;
   const Uint32 odd = SDL_WINDOW_MAXIMIZED | SDL_WINDOW_MINIMIZED | SDL_WINDOW_FULLSCREEN;
-  if (is_given || (SDL_GetWindowFlags(window_.window()) & odd) != 0) return;
-  SDL_GetWindowSize(window_.window(), &state_.settings.width, &state_.settings.height);
+  if (is_given || (SDL_GetWindowFlags(screen_->window()) & odd) != 0) return;
+  SDL_GetWindowSize(screen_->window(), &state_.settings.width, &state_.settings.height);
 }
 
 bool App::is_animating() const {
-  if (window_.is_minimised()) return false;
-  return state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy() || state_.loader ||
-         state_.saver || state_.message || ImGui::GetIO().WantTextInput;
+  if (screen_->is_minimised()) return false;
+  const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
+  return is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy() ||
+         state_.loader || state_.saver || state_.message || ImGui::GetIO().WantTextInput;
 }
 
 int App::patience_milliseconds() const {
-  if (frames_left_ > 0 && !window_.is_minimised()) return 0;
+  if (frames_left_ > 0 && !screen_->is_minimised()) return 0;
   if (!is_animating()) return kPatience;
-  const bool is_moving = state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
+  const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
+  const bool is_moving =
+      is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
   return is_moving ? 0 : kPatienceOfBars;
 }
 
@@ -143,7 +146,7 @@ void App::process(const SDL_Event& event) {
   frames_left_ = std::max(frames_left_, is_wake(event) ? 1 : kFramesAfterEvents);
   // With Tab the GUI would take the keyboard for the first number in the panel, and flight would end.
   const bool is_tab = event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_TAB;
-  if (!is_tab || gui_.wants_keys()) gui_.process(event);
+  if (!is_tab || gui_->wants_keys()) gui_->process(event);
   if (event.type == SDL_QUIT) leave({true, {}});
   if (event.type == SDL_DROPFILE) {
     const std::filesystem::path file = event.drop.file;
@@ -152,7 +155,7 @@ void App::process(const SDL_Event& event) {
   }
   std::vector<Command> asked;
   const bool is_modal = chooser_.is_shown() || leaving_ || state_.loader;
-  input_.process(event, state_, gui_.wants_mouse() || is_modal, gui_.wants_keys() || is_modal, asked);
+  input_.process(event, state_, gui_->wants_mouse() || is_modal, gui_->wants_keys() || is_modal, asked);
   for (const Command command : asked) run_command(command);
 }
 
@@ -164,31 +167,29 @@ void App::frame() {
   const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
   take_loaded();
   take_saved();
-  if (window_.is_minimised()) return;
+  if (screen_->is_minimised()) return;
   state_.camera.advance(step, input_.push(), input_.boost());
   input_.editing.advance(state_);
-  state_.pixels_per_unit = window_.pixels_per_unit();
-  take_picture();
-  gui_.begin_frame();
-  input_.find_mouse(state_, gui_.wants_mouse());
+  state_.pixels_per_unit = screen_->pixels_per_unit();
+  gui_->begin_frame();
+  input_.find_mouse(state_, gui_->wants_mouse());
   draw_gui();
   ask_for_picture();
-  window_.draw_picture(state_.picture_place);
-  gui_.end_frame();
-  SDL_RenderPresent(window_.renderer());
+  take_picture();
+  if (Status shown = screen_->show(state_.picture_place, gui_->end_frame()); !shown) stand_in(shown.error());
   update_title();
   state_.frame_seconds += 0.1 * (seconds_between(last_frame_, Clock::now()) - state_.frame_seconds);
   pace();
 }
 
 void App::pace() {
-  if (window_.has_vsync()) return;
+  if (screen_->has_vsync()) return;
   const double left = kFrameSeconds - seconds_between(last_frame_, Clock::now());
   if (left > 0.001) std::this_thread::sleep_for(std::chrono::duration<double>(left));
 }
 
 void App::place_picture(float top, float right, float bottom) {
-  const SDL_Point output = window_.output_size();
+  const SDL_Point output = screen_->output_size();
   const auto pixels = [this](float units) { return static_cast<int>(std::lround(units * state_.pixels_per_unit)); };
   state_.picture_place = {0, pixels(top), std::max(output.x - pixels(right), 0),
                           std::max(output.y - pixels(top) - pixels(bottom), 0)};
@@ -203,21 +204,17 @@ void App::ask_for_picture() {
   request.light = state_.settings.light;
   request.samples = state_.settings.samples;
   request.detail_by_pixels = state_.settings.detail_by_pixels;
+  request.detail_colours = state_.settings.detail_colours;
+  request.mode = state_.settings.mode;
+  request.shading = state_.settings.shading;
+  request.wireframe = state_.settings.wireframe;
   state_.open.backend->show(request);
 }
 
 void App::take_picture() {
   if (!state_.open.backend) return;
-  if (auto frame = state_.open.backend->take()) {
-    state_.facts = {frame->colour.width, frame->colour.height, frame->samples,
-                    frame->is_settled,   frame->seconds,       frame->rays};
-    state_.picture = std::move(frame->colour);
-    window_.set_picture(state_.picture);
-  }
-  if (const auto fault = state_.open.backend->fault(); fault && !state_.message) {
-    state_.tell(*fault);
-    if (!options_.screenshot.empty()) end_with(*fault);
-  }
+  if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
+  if (const auto fault = state_.open.backend->fault(); fault && !state_.message) take_fault(*fault);
   const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
                           state_.facts.height == state_.picture_place.h;
   if (!is_current) return;
@@ -226,6 +223,55 @@ void App::take_picture() {
     is_running_ = false;
     write_screenshot(options_.screenshot);
   }
+}
+
+void App::take_frame(ViewFrame frame) {
+  const int width = frame.on_device ? frame.on_device->width() : frame.colour.width;
+  const int height = frame.on_device ? frame.on_device->height() : frame.colour.height;
+  state_.facts = {width, height, frame.samples, frame.is_settled, frame.seconds, frame.rays};
+  if (Status taken = screen_->set_picture(frame); !taken) {
+    screen_->forget_picture();
+    state_.tell(taken.error());
+  }
+  state_.picture = std::move(frame);
+}
+
+void App::take_fault(const Error& fault) {
+  state_.tell(fault);
+  if (!options_.screenshot.empty()) end_with(fault);
+  if (!state_.open.backend->can_draw(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
+}
+
+Result<std::shared_ptr<VulkanRenderer>> App::open_device() {
+  if (auto of_screen = screen_->renderer()) return of_screen;
+  if (renderer_) return renderer_;
+  VulkanOptions options;
+  options.device = options_.device;
+  auto made = VulkanRenderer::create(options);
+  if (!made) return tl::unexpected<Error>(made.error());
+  renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
+  return renderer_;
+}
+
+// The device that shows the window has failed: SDL shows it from now on, and the processor draws.
+void App::stand_in(const Error& why) {
+  if (!screen_->renderer()) return end_with(why);
+  const SDL_Point size = [this] {
+    SDL_Point now{0, 0};
+    SDL_GetWindowSize(screen_->window(), &now.x, &now.y);
+    return now;
+  }();
+  auto other = open_sdl_screen(size.x, size.y);
+  if (!other) return end_with(other.error());
+  const double scale = gui_->scale();
+  state_.picture = {};
+  state_.facts = {};
+  if (state_.open.backend) state_.open.backend->forget_device();
+  gui_.reset();
+  screen_ = std::move(*other);
+  gui_ = std::make_unique<Gui>(*screen_, scale);
+  state_.settings.mode = DrawMode::Rays;
+  state_.tell(why);
 }
 
 void App::end_with(const Error& error) {
@@ -245,11 +291,52 @@ void App::update_hover() {
 }
 
 void App::update_title() {
-  window_.set_title(std::string(state_.open.document->is_dirty() ? "* " : "") + state_.open.document->name() +
-                    " - Quoin");
+  screen_->set_title(std::string(state_.open.document->is_dirty() ? "* " : "") + state_.open.document->name() +
+                     " - Quoin");
+}
+
+void App::draw_as(DrawMode mode) {
+  if (state_.open.backend && !state_.open.backend->can_draw(mode))
+    return state_.tell("there is no device to draw meshes");
+  state_.settings.mode = mode;
+}
+
+bool App::run_draw_command(Command command) {
+  Settings& settings = state_.settings;
+  const auto next = [](auto value, int count) {
+    return static_cast<decltype(value)>((static_cast<int>(value) + 1) % count);
+  };
+  switch (command) {
+    case Command::DrawRays:
+      draw_as(DrawMode::Rays);
+      return true;
+    case Command::DrawBlocks:
+      draw_as(DrawMode::Blocks);
+      return true;
+    case Command::DrawSmooth:
+      draw_as(DrawMode::Smooth);
+      return true;
+    case Command::NextWireframe:
+      settings.wireframe = next(settings.wireframe, 3);
+      break;
+    case Command::NextShading:
+      settings.shading = next(settings.shading, 3);
+      break;
+    case Command::DetailColours:
+      settings.detail_colours = !settings.detail_colours;
+      if (settings.detail_colours) settings.detail_by_pixels = true;
+      draw_as(DrawMode::Rays);
+      return true;
+    default:
+      return false;
+  }
+  // Only meshes have edges and shadings.
+  if (settings.mode == DrawMode::Rays) draw_as(DrawMode::Blocks);
+  return true;
 }
 
 void App::run_command(Command command) {
+  if (run_draw_command(command)) return;
   if (const auto view = view_of(command)) return show_from(*view);
   if (const auto tool = tool_of(command)) {
     state_.tool = *tool;

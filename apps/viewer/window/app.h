@@ -9,7 +9,7 @@
 #include "gui.h"
 #include "input.h"
 #include "panels.h"
-#include "sdl_window.h"
+#include "screen.h"
 #include "viewer.h"
 
 namespace quoin::viewer {
@@ -17,7 +17,7 @@ namespace quoin::viewer {
 /// The viewer in its window: events in, a frame out.
 class App {
  public:
-  App(const ViewerOptions& options, Settings settings, SdlWindow window);
+  App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen> screen);
   ~App();
   App(const App&) = delete;
   App& operator=(const App&) = delete;
@@ -43,6 +43,10 @@ class App {
   void place_picture(float left_top, float right, float bottom);
   void ask_for_picture();
   void take_picture();
+  void take_frame(ViewFrame frame);
+  void take_fault(const Error& fault);
+  void stand_in(const Error& why);
+  [[nodiscard]] Result<std::shared_ptr<VulkanRenderer>> open_device();
   void end_with(const Error& error);
   void pace();
   void draw_gui();
@@ -56,6 +60,8 @@ class App {
 
   // What commands do.
   void run_command(Command command);
+  bool run_draw_command(Command command);
+  void draw_as(DrawMode mode);
   void run_file_command(Command command);
   void show_from(View view);
   void pick_type();
@@ -73,8 +79,9 @@ class App {
   void write_screenshot(const std::filesystem::path& path);
 
   ViewerOptions options_;
-  SdlWindow window_;
-  Gui gui_;
+  std::unique_ptr<Screen> screen_;
+  std::unique_ptr<Gui> gui_;
+  std::shared_ptr<VulkanRenderer> renderer_;  // for meshes, where the screen has none; opened when it is needed
   ViewState state_;
   Input input_;
   FileChooser chooser_;

@@ -5,6 +5,7 @@
 
 #include <quoin/io/picture_files.h>
 
+#include "viewer/device_backend.h"
 #include "wake.h"
 
 namespace quoin::viewer {
@@ -68,9 +69,12 @@ void App::go_on_leaving() {
 
 void App::load(const std::filesystem::path& path) {
   if (state_.loader) abandoned_.push_back(std::move(state_.loader));
-  const CpuBackendOptions backend{options_.load.hidden, options_.threads, CpuBackendOptions{}.first_frame_seconds};
-  const auto make = [backend](const Document& document) -> std::unique_ptr<ViewBackend> {
-    return std::make_unique<CpuBackend>(document.scene(), backend, wake_window);
+  DeviceBackendOptions backend;
+  backend.cpu = {options_.load.hidden, options_.threads, CpuBackendOptions{}.first_frame_seconds};
+  backend.rays_on_device = screen_->renderer() != nullptr;
+  const auto make = [this, backend](const Document& document) -> std::unique_ptr<ViewBackend> {
+    return std::make_unique<DeviceBackend>(
+        document.scene(), backend, [this] { return open_device(); }, wake_window);
   };
   state_.loader = std::make_unique<Loader>(path, options_.load, make, wake_window);
 }
@@ -94,13 +98,14 @@ void App::adopt(OpenDocument opened) {
   state_.open.backend.reset();  // before the document that it reads
   state_.open = std::move(opened);
   state_.facts = {};
+  state_.picture = {};
   state_.message.reset();
-  window_.forget_picture();
+  screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
   if (loaded.sun) state_.settings.light.sun = *loaded.sun;
   state_.brush.type = 1;
-  const SDL_Point output = window_.output_size();
+  const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (loaded.camera) {
     state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.load.hidden));
@@ -148,7 +153,9 @@ void App::save_screenshot() {
 }
 
 void App::write_screenshot(const std::filesystem::path& path) {
-  const auto written = write_png(state_.picture, path);
+  const ViewFrame& shown = state_.picture;
+  const auto image = shown.on_device ? shown.on_device->read() : Result<Image>(shown.colour);
+  const auto written = image ? write_png(*image, path) : tl::unexpected<Error>(image.error());
   if (!written) {
     state_.tell(written.error());
     if (!options_.screenshot.empty()) end_with(written.error());

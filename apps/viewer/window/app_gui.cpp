@@ -56,14 +56,14 @@ void App::draw_gui() {
   draw_loading();
   draw_saving();
   draw_leaving();
-  if (const auto path = chooser_.draw(static_cast<float>(gui_.scale()))) {
+  if (const auto path = chooser_.draw(static_cast<float>(gui_->scale()))) {
     chooser_.purpose() == FileChooser::Purpose::Open ? load(*path) : save(*path);
   }
 }
 
 void App::draw_bars() {
   MenuChoice choice;
-  const auto scale = static_cast<float>(gui_.scale());
+  const auto scale = static_cast<float>(gui_->scale());
   const float top = draw_menu(state_, choice);
   const float bottom = draw_status(state_);
   const float right = state_.settings.is_panel_shown ? draw_panel(state_, scale, top, bottom, choice) : 0.0F;
@@ -78,7 +78,7 @@ void App::draw_bars() {
 
 void App::draw_loading() {
   if (!state_.loader || state_.loader->seconds() < 0.15) return;
-  const float width = 280.0F * static_cast<float>(gui_.scale());
+  const float width = 280.0F * static_cast<float>(gui_->scale());
   begin_box("loading");
   ImGui::Text("%s %s", state_.loader->stage().c_str(), state_.loader->path().filename().string().c_str());
   waiting_bar(state_.loader->seconds(), width);
@@ -95,7 +95,7 @@ void App::draw_saving() {
   if (!state_.saver) return;
   begin_box("saving");
   ImGui::Text("saving %s", state_.saver->path().filename().string().c_str());
-  const float width = 280.0F * static_cast<float>(gui_.scale());
+  const float width = 280.0F * static_cast<float>(gui_->scale());
   ImGui::ProgressBar(static_cast<float>(state_.saver->fraction()), {width, 0.0F});
   if (ImGui::Button("Cancel")) state_.saver->cancel();
   end_box();

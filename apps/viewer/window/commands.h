@@ -33,6 +33,12 @@ enum class Command : std::uint8_t {
   ViewRight,
   ViewTop,
   ViewIso,
+  DrawRays,
+  DrawBlocks,
+  DrawSmooth,
+  NextWireframe,
+  NextShading,
+  DetailColours,
   Panel,
   Help,
 };

@@ -58,28 +58,28 @@ void set_style(float scale) {
 
 }  // namespace
 
-double scale_of_display(const SdlWindow& window) {
+double scale_of_display(const Screen& screen) {
   // Where the output has more pixels than the window has units, the display's scale is in that ratio already.
   float dots_per_inch = 96.0F;
-  const int display = SDL_GetWindowDisplayIndex(window.window());
-  if (window.pixels_per_unit() > 1.01 || display < 0) return 1.0;
+  const int display = SDL_GetWindowDisplayIndex(screen.window());
+  if (screen.pixels_per_unit() > 1.01 || display < 0) return 1.0;
   if (SDL_GetDisplayDPI(display, nullptr, &dots_per_inch, nullptr) != 0) return 1.0;
   const double scale = std::round(dots_per_inch / 96.0 * 4.0) / 4.0;
   // Displays lie about their size; what looks right nearly everywhere is left alone.
   return scale < 1.5 ? 1.0 : std::min(scale, 3.0);
 }
 
-Gui::Gui(SdlWindow& window, double scale) : window_(&window), scale_(scale) {
+Gui::Gui(Screen& screen, double scale) : screen_(&screen), scale_(scale) {
   ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
   io.IniFilename = nullptr;
   io.LogFilename = nullptr;
-  io.BackendRendererName = "quoin_sdl_renderer";
+  io.BackendRendererName = "quoin";
   io.BackendFlags |= ImGuiBackendFlags_RendererHasVtxOffset;
   io.ConfigWindowsMoveFromTitleBarOnly = true;
   set_style(static_cast<float>(scale));
-  ImGui_ImplSDL2_InitForSDLRenderer(window.window());
-  load_font();
+  ImGui_ImplSDL2_InitForSDLRenderer(screen.window());
+  status_ = load_font();
 }
 
 Gui::~Gui() {
@@ -87,10 +87,10 @@ Gui::~Gui() {
   ImGui::DestroyContext();
 }
 
-void Gui::load_font() {
+Status Gui::load_font() {
   ImGuiIO& io = ImGui::GetIO();
   // Drawn in pixels, so that letters are sharp, and placed in the window's units.
-  const auto pixels_per_unit = static_cast<float>(window_->pixels_per_unit());
+  const auto pixels_per_unit = static_cast<float>(screen_->pixels_per_unit());
   const float size = std::round(kFontSize * static_cast<float>(scale_) * pixels_per_unit);
   static const std::array<ImWchar, 7> kRanges = {0x20, 0x17F, 0x370, 0x52F, 0x2010, 0x2193, 0};
   const char* path = find_font();
@@ -100,17 +100,12 @@ void Gui::load_font() {
     io.Fonts->AddFontDefault(&config);
   }
   io.FontGlobalScale = 1.0F / pixels_per_unit;
-  unsigned char* pixels = nullptr;
+  unsigned char* opacity = nullptr;
   int width = 0;
   int height = 0;
-  io.Fonts->GetTexDataAsRGBA32(&pixels, &width, &height);
-  font_.reset(
-      SDL_CreateTexture(window_->renderer(), SDL_PIXELFORMAT_ABGR8888, SDL_TEXTUREACCESS_STATIC, width, height));
-  if (!font_) return;
-  SDL_UpdateTexture(font_.get(), nullptr, pixels, 4 * width);
-  SDL_SetTextureBlendMode(font_.get(), SDL_BLENDMODE_BLEND);
-  SDL_SetTextureScaleMode(font_.get(), SDL_ScaleModeLinear);
-  io.Fonts->SetTexID(font_.get());
+  io.Fonts->GetTexDataAsAlpha8(&opacity, &width, &height);
+  return screen_->set_font(width, height,
+                           {opacity, static_cast<std::size_t>(width) * static_cast<std::size_t>(height)});
 }
 
 void Gui::process(const SDL_Event& event) {
@@ -125,47 +120,16 @@ void Gui::process(const SDL_Event& event) {
 void Gui::begin_frame() {
   ImGui_ImplSDL2_NewFrame();
   // The backend asks OpenGL for the output's size, which the renderer need not be.
-  const auto ratio = static_cast<float>(window_->pixels_per_unit());
+  const auto ratio = static_cast<float>(screen_->pixels_per_unit());
   ImGui::GetIO().DisplayFramebufferScale = {ratio, ratio};
   // It also asks the display where the mouse is, which may not know yet what the events say.
   ImGui::GetIO().MousePos = mouse_;
   ImGui::NewFrame();
 }
 
-void Gui::end_frame() {
+const ImDrawData& Gui::end_frame() {
   ImGui::Render();
-  draw(*ImGui::GetDrawData());
-}
-
-void Gui::draw(const ImDrawData& data) {
-  SDL_Renderer* renderer = window_->renderer();
-  SDL_RenderSetScale(renderer, data.FramebufferScale.x, data.FramebufferScale.y);
-  for (int i = 0; i < data.CmdListsCount; ++i) {
-    const ImDrawList& list = *data.CmdLists[i];
-    for (const ImDrawCmd& command : list.CmdBuffer) {
-      if (command.UserCallback == nullptr) draw(list, command, data);
-    }
-  }
-  SDL_RenderSetClipRect(renderer, nullptr);
-  SDL_RenderSetScale(renderer, 1.0F, 1.0F);
-}
-
-void Gui::draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data) {
-  const float left = std::max(command.ClipRect.x - data.DisplayPos.x, 0.0F);
-  const float top = std::max(command.ClipRect.y - data.DisplayPos.y, 0.0F);
-  const float right = std::min(command.ClipRect.z - data.DisplayPos.x, data.DisplaySize.x);
-  const float bottom = std::min(command.ClipRect.w - data.DisplayPos.y, data.DisplaySize.y);
-  if (right <= left || bottom <= top) return;
-  const int x = static_cast<int>(left);
-  const int y = static_cast<int>(top);
-  const SDL_Rect clip{x, y, static_cast<int>(std::ceil(right)) - x, static_cast<int>(std::ceil(bottom)) - y};
-  SDL_RenderSetClipRect(window_->renderer(), &clip);
-  const ImDrawVert* vertices = list.VtxBuffer.Data + command.VtxOffset;
-  const ImDrawIdx* indices = list.IdxBuffer.Data + command.IdxOffset;
-  SDL_RenderGeometryRaw(window_->renderer(), static_cast<SDL_Texture*>(command.GetTexID()), &vertices->pos.x,
-                        sizeof(ImDrawVert), reinterpret_cast<const SDL_Color*>(&vertices->col), sizeof(ImDrawVert),
-                        &vertices->uv.x, sizeof(ImDrawVert), list.VtxBuffer.Size - static_cast<int>(command.VtxOffset),
-                        indices, static_cast<int>(command.ElemCount), sizeof(ImDrawIdx));
+  return *ImGui::GetDrawData();
 }
 
 }  // namespace quoin::viewer

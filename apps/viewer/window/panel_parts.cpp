@@ -152,13 +152,39 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
     if (i % 3 != 0) ImGui::SameLine();
     command_button(kViews[i].first, kViews[i].second, choice);
   }
+}
+
+void draw_picture_part(ViewState& state) {
+  if (!heading("Picture")) return;
+  Settings& settings = state.settings;
+  int mode = static_cast<int>(settings.mode);
+  if (ImGui::Combo("drawn as", &mode, "marched rays\0blocky meshes\0smooth meshes\0")) {
+    const auto wanted = static_cast<DrawMode>(mode);
+    const bool can = !state.open.backend || state.open.backend->can_draw(wanted);
+    can ? void(settings.mode = wanted) : state.tell("there is no device to draw meshes");
+  }
+  if (settings.mode == DrawMode::Rays) {
+    ImGui::Checkbox("coarser far away", &settings.detail_by_pixels);
+    ImGui::BeginDisabled(!settings.detail_by_pixels);
+    ImGui::SameLine();
+    ImGui::Checkbox("in colours", &settings.detail_colours);
+    ImGui::EndDisabled();
+  } else {
+    int shading = static_cast<int>(settings.shading);
+    if (ImGui::Combo("shading", &shading, "lit\0occlusion alone\0normals\0")) {
+      settings.shading = static_cast<MeshShading>(shading);
+    }
+    int edges = static_cast<int>(settings.wireframe);
+    if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
+      settings.wireframe = static_cast<Wireframe>(edges);
+    }
+  }
   constexpr std::array kSamples = {1, 4, 16, 64};
   const auto* const chosen = std::find(kSamples.begin(), kSamples.end(), state.settings.samples);
   int index = chosen == kSamples.end() ? -1 : static_cast<int>(chosen - kSamples.begin());
   if (ImGui::Combo("samples", &index, "1\0004\00016\00064\0")) {
     state.settings.samples = kSamples[static_cast<std::size_t>(index)];
   }
-  ImGui::Checkbox("coarser far away", &state.settings.detail_by_pixels);
 }
 
 void draw_light_part(ViewState& state) {
@@ -209,6 +235,13 @@ void draw_statistics_part(const ViewState& state) {
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
   row("wait of edits", "%.2f ms", state.last_wait_seconds * 1e3);
   row("longest wait", "%.2f ms", state.longest_wait_seconds * 1e3);
+  if (state.open.backend) {
+    for (const auto& [what, value] : state.open.backend->facts()) {
+      ImGui::TextDisabled("%s", what.c_str());
+      ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
+      ImGui::TextUnformatted(value.c_str());
+    }
+  }
   ImGui::TextDisabled("drawn by");
   ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
   ImGui::TextUnformatted(state.open.backend ? state.open.backend->name().c_str() : "-");

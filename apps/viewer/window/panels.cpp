@@ -62,6 +62,14 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
     menu_item(command, choice, state.open.backend != nullptr);
   }
   ImGui::Separator();
+  for (const Command command : {Command::DrawRays, Command::DrawBlocks, Command::DrawSmooth}) {
+    const int index = static_cast<int>(command) - static_cast<int>(Command::DrawRays);
+    menu_item(command, choice, state.open.backend != nullptr, static_cast<int>(state.settings.mode) == index);
+  }
+  menu_item(Command::NextWireframe, choice, true, state.settings.wireframe != Wireframe::Off);
+  menu_item(Command::NextShading, choice, true, state.settings.shading != MeshShading::Lit);
+  menu_item(Command::DetailColours, choice, true, state.settings.detail_colours);
+  ImGui::Separator();
   menu_item(Command::CameraMode, choice);
   menu_item(Command::Focus, choice);
   menu_item(Command::Panel, choice, true, state.settings.is_panel_shown);
@@ -146,6 +154,7 @@ float draw_panel(ViewState& state, float scale, float top, float bottom, MenuCho
   ImGui::Begin("panel", nullptr, bar_flags() & ~ImGuiWindowFlags_NoScrollbar);
   ImGui::PushItemWidth(-0.36F * width);
   draw_tool_part(state, choice);
+  draw_picture_part(state);
   draw_camera_part(state, choice);
   draw_light_part(state);
   draw_statistics_part(state);

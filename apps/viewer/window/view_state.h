@@ -53,7 +53,7 @@ struct ViewState {
   MousePlace mouse;
   std::optional<SceneHit> hover;  ///< what is under the mouse
 
-  Image picture;  ///< the last that arrived
+  ViewFrame picture;  ///< the last that arrived
   FrameFacts facts;
   double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
   double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop

@@ -2,7 +2,31 @@
 
 #include "app.h"
 
+#include <algorithm>
+
 namespace quoin::viewer {
+
+namespace {
+
+/// Whether there is a device that is no processor in truth.
+bool has_graphics_card() {
+  const auto devices = vulkan_devices();
+  return devices && std::any_of(devices->begin(), devices->end(), [](const VulkanDevice& device) {
+           return device.missing.empty() && device.kind != "cpu";
+         });
+}
+
+Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int width, int height) {
+  if (options.backend == ViewerBackend::Vulkan) return open_vulkan_screen(width, height, options.device);
+  if (options.backend == ViewerBackend::Auto && has_graphics_card()) {
+    auto screen = open_vulkan_screen(width, height, options.device);
+    // A card that does not reach this display is no reason not to start; a device of that name is the user's wish.
+    if (screen || !options.device.empty()) return screen;
+  }
+  return open_sdl_screen(width, height);
+}
+
+}  // namespace
 
 Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_interrupted) {
   const std::filesystem::path path = options.is_bare ? std::filesystem::path() : settings_path();
@@ -10,9 +34,10 @@ Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_
   auto video = SdlVideo::start();
   if (!video) return tl::unexpected<Error>(video.error());
   const bool has_size = options.width > 0 && options.height > 0;
-  auto window = SdlWindow::open(has_size ? options.width : settings.width, has_size ? options.height : settings.height);
-  if (!window) return tl::unexpected<Error>(window.error());
-  App app(options, std::move(settings), std::move(*window));
+  auto screen =
+      open_screen(options, has_size ? options.width : settings.width, has_size ? options.height : settings.height);
+  if (!screen) return tl::unexpected<Error>(screen.error());
+  App app(options, std::move(settings), std::move(*screen));
   if (Status status = app.run(is_interrupted); !status) return status;
   if (path.empty()) return {};
   return write_settings(app.settings(), path);

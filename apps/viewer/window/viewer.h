@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
@@ -9,11 +10,20 @@
 
 namespace quoin::viewer {
 
+/// What marches rays and shows the window.
+enum class ViewerBackend : std::uint8_t {
+  Auto,       ///< a graphics card where there is one, else the processor
+  Processor,  ///< meshes are still drawn by a device
+  Vulkan,     ///< whatever device there is, processors that act as one too
+};
+
 struct ViewerOptions {
   std::filesystem::path file;  ///< empty: an empty window
   LoadOptions load;
   Threads threads;
-  int width = 0;  ///< of the window; 0: as it was last
+  ViewerBackend backend = ViewerBackend::Auto;
+  std::string device;  ///< of Vulkan, as VulkanOptions::device
+  int width = 0;       ///< of the window; 0: as it was last
   int height = 0;
   bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
   std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer
@@ -22,8 +32,8 @@ struct ViewerOptions {
 /// Opens a window on a file and comes back when the user closes it.
 ///
 /// `is_interrupted` is asked some times a second whether to end at once.
-/// Errors: Unsupported without a display; those of reading `file` and of writing `screenshot`. Whatever goes wrong
-/// later is shown in the window.
+/// Errors: Unsupported without a display, or without a device that was asked for; those of reading `file` and of
+/// writing `screenshot`. Whatever goes wrong later is shown in the window.
 [[nodiscard]] Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_interrupted = {});
 
 }  // namespace quoin::viewer

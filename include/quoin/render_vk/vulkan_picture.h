@@ -30,6 +30,10 @@ class VulkanPicture {
   /// Errors: InvalidArgument when nothing was drawn; those of VulkanRenderer.
   [[nodiscard]] Result<Image> read() const;
 
+  /// Becomes a picture that was drawn elsewhere. Errors: InvalidArgument for one without pixels; those of
+  /// VulkanRenderer.
+  [[nodiscard]] Status write(const Image& image);
+
   struct Impl;
   [[nodiscard]] Impl& impl() { return *impl_; }
   [[nodiscard]] const Impl& impl() const { return *impl_; }

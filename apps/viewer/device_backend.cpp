@@ -1,0 +1,318 @@
+#include "device_backend.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/scene/live_meshes.h>
+
+namespace quoin::viewer {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::array kDivisors = {8, 4, 2, 1};
+constexpr int kMeshSamples = 4;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::string text(const char* format, double value) {
+  std::array<char, 64> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), format, value);
+  return buffer.data();
+}
+
+}  // namespace
+
+struct DeviceBackend::Impl {
+  /// Meshes of one style, and what draws them.
+  struct Meshes {
+    SurfaceStyle style;
+    LiveMeshes live;
+    VulkanMeshRenderer renderer;
+    bool is_scene_new = true;
+  };
+
+  Impl(const Scene& of_scene, const DeviceBackendOptions& given, OpenDevice opener, std::function<void()> listener)
+      : scene(&of_scene),
+        options(given),
+        open_device(std::move(opener)),
+        on_frame(std::move(listener)),
+        cpu(of_scene, given.cpu, on_frame) {}
+
+  [[nodiscard]] bool uses_device() const {
+    if (!request || request->mode != DrawMode::Rays) return request.has_value();
+    // Levels of detail are the processor's.
+    return options.rays_on_device && !is_device_gone && !request->detail_by_pixels;
+  }
+  [[nodiscard]] bool can_draw_now() const {
+    return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
+  }
+  Status prepare();
+  Status prepare_meshes(SurfaceStyle style);
+  Result<bool> draw_meshes();
+  Result<bool> draw_rays();
+  Status draw_stage();
+  [[nodiscard]] int first_divisor() const;
+  [[nodiscard]] int samples_now() const;
+  [[nodiscard]] ViewFrame frame(double seconds) const;
+  void fail_with(const Error& error);
+
+  const Scene* scene;
+  DeviceBackendOptions options;
+  OpenDevice open_device;
+  std::function<void()> on_frame;
+  CpuBackend cpu;
+
+  std::optional<ViewRequest> request;
+  bool is_request_new = false;
+  bool is_camera_new = true;
+  bool is_paused = false;
+  bool is_settled = false;
+  bool is_device_gone = false;
+  std::optional<Error> error;
+
+  std::shared_ptr<VulkanRenderer> renderer;
+  bool is_scene_new = true;  // to the renderer
+  std::shared_ptr<VulkanPicture> picture;
+  std::unique_ptr<Meshes> meshes;
+  int divisor = 1;
+  double seconds_per_sample = 0.0;  // and pixel; 0: not known
+};
+
+DeviceBackend::DeviceBackend(const Scene& scene, const DeviceBackendOptions& options, OpenDevice open_device,
+                             std::function<void()> on_frame)
+    : impl_(std::make_unique<Impl>(scene, options, std::move(open_device), std::move(on_frame))) {}
+
+DeviceBackend::~DeviceBackend() = default;
+
+Status DeviceBackend::Impl::prepare() {
+  if (renderer) return {};
+  auto opened = open_device();
+  if (!opened) return tl::unexpected<Error>(opened.error());
+  renderer = std::move(*opened);
+  picture = std::make_shared<VulkanPicture>(*renderer);
+  is_scene_new = true;
+  return {};
+}
+
+Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
+  if (meshes && meshes->style == style) return {};
+  meshes.reset();
+  auto drawer = VulkanMeshRenderer::create(*renderer);
+  if (!drawer) return tl::unexpected<Error>(drawer.error());
+  LiveMeshOptions live;
+  live.style = style;
+  live.hidden = options.cpu.hidden;
+  live.threads = options.cpu.threads;
+  live.on_ready = on_frame;
+  meshes.reset(new Meshes{style, LiveMeshes(live), std::move(*drawer)});
+  is_request_new = true;
+  return {};
+}
+
+Result<bool> DeviceBackend::Impl::draw_meshes() {
+  const bool is_smooth = request->mode == DrawMode::Smooth;
+  if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) {
+    return tl::unexpected<Error>(ready.error());
+  }
+  bool is_new = std::exchange(is_request_new, false);
+  if (std::exchange(meshes->is_scene_new, false)) {
+    is_new = true;
+    if (Status taken = meshes->renderer.update(*scene, options.cpu.hidden); !taken)
+      return tl::unexpected(taken.error());
+    meshes->live.update(*scene, request->camera.position);
+  } else if (meshes->live.pending() > 0) {
+    meshes->live.update(*scene, request->camera.position);
+  }
+  const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
+  if (!surfaces.empty()) {
+    is_new = true;
+    if (Status put = meshes->renderer.put(surfaces); !put) return tl::unexpected(put.error());
+  }
+  const bool was_settled = std::exchange(is_settled, meshes->live.pending() == 0);
+  if (!is_new && was_settled == is_settled) return false;
+  MeshPictureOptions wanted;
+  wanted.width = request->width;
+  wanted.height = request->height;
+  wanted.samples = std::min(request->samples, kMeshSamples);
+  wanted.light = request->light;
+  wanted.shading = request->shading;
+  wanted.wireframe = request->wireframe;
+  divisor = 1;
+  if (Status drawn = meshes->renderer.draw(*picture, request->camera, wanted); !drawn) {
+    return tl::unexpected(drawn.error());
+  }
+  return true;
+}
+
+int DeviceBackend::Impl::first_divisor() const {
+  const double pixels = static_cast<double>(request->width) * request->height;
+  int chosen = kDivisors.front();
+  for (const int finer : kDivisors) {
+    if (pixels / (finer * finer) * seconds_per_sample <= options.frame_seconds) chosen = finer;
+  }
+  return chosen;
+}
+
+// As many as the time of a frame allows, so that fast devices settle soon.
+int DeviceBackend::Impl::samples_now() const {
+  if (divisor > 1 || picture->samples() == 0) return 1;
+  const double whole = static_cast<double>(request->width) * request->height * seconds_per_sample;
+  const int affordable = whole > 0.0 ? static_cast<int>(std::min(options.frame_seconds / whole, 64.0)) : 1;
+  return std::clamp(affordable, 1, request->samples - picture->samples());
+}
+
+Status DeviceBackend::Impl::draw_stage() {
+  const bool is_first = std::exchange(is_request_new, false);
+  if (is_first) {
+    divisor = first_divisor();
+  } else if (divisor > 1) {
+    divisor /= 2;
+  }
+  const bool is_new = is_first || picture->width() != (request->width + divisor - 1) / divisor;
+  RenderOptions wanted;
+  wanted.width = (request->width + divisor - 1) / divisor;
+  wanted.height = (request->height + divisor - 1) / divisor;
+  wanted.samples = is_new ? 1 : samples_now();
+  wanted.light = request->light;
+  wanted.detail_colours = request->detail_colours;
+  const Clock::time_point start = Clock::now();
+  if (Status drawn = renderer->draw(*picture, request->camera, wanted, is_new); !drawn) return drawn;
+  seconds_per_sample = seconds_since(start) / (static_cast<double>(wanted.width) * wanted.height * wanted.samples);
+  is_settled = divisor == 1 && picture->samples() >= request->samples;
+  return {};
+}
+
+Result<bool> DeviceBackend::Impl::draw_rays() {
+  if (std::exchange(is_scene_new, false)) {
+    is_request_new = true;
+    if (Status taken = renderer->update(*scene, options.cpu.hidden, options.cpu.threads); !taken) {
+      return tl::unexpected(taken.error());
+    }
+  }
+  if (is_request_new) is_settled = false;
+  if (is_settled) return false;
+  if (Status drawn = draw_stage(); !drawn) return tl::unexpected(drawn.error());
+  return true;
+}
+
+ViewFrame DeviceBackend::Impl::frame(double seconds) const {
+  ViewFrame made;
+  made.on_device = picture;
+  made.samples = picture->samples();
+  made.is_whole = divisor == 1;
+  made.is_settled = is_settled;
+  made.seconds = seconds;
+  made.rays = picture->rays();
+  return made;
+}
+
+void DeviceBackend::Impl::fail_with(const Error& what) {
+  error = what;
+  is_device_gone = true;
+}
+
+void DeviceBackend::forget_device() {
+  impl_->meshes.reset();
+  impl_->picture.reset();
+  impl_->renderer.reset();
+  impl_->is_device_gone = true;
+}
+
+std::string DeviceBackend::name() const {
+  if (!impl_->uses_device() || !impl_->renderer) return impl_->cpu.name();
+  return impl_->renderer->device().name;
+}
+
+bool DeviceBackend::can_draw(DrawMode mode) const {
+  return mode == DrawMode::Rays || !impl_->is_device_gone;
+}
+
+void DeviceBackend::show(const ViewRequest& request) {
+  Impl& me = *impl_;
+  if (me.request && is_same(*me.request, request)) return;
+  me.request = request;
+  me.is_request_new = true;
+  me.error.reset();
+  ViewRequest of_cpu = request;
+  // It rests while the device draws.
+  if (me.uses_device()) of_cpu.width = of_cpu.height = 0;
+  me.cpu.show(of_cpu);
+}
+
+std::optional<ViewFrame> DeviceBackend::take() {
+  Impl& me = *impl_;
+  if (!me.uses_device()) return me.cpu.take();
+  if (!me.can_draw_now()) return std::nullopt;
+  const Clock::time_point start = Clock::now();
+  Result<bool> drawn = false;
+  if (Status ready = me.prepare(); !ready) {
+    drawn = tl::unexpected<Error>(ready.error());
+  } else {
+    drawn = me.request->mode == DrawMode::Rays ? me.draw_rays() : me.draw_meshes();
+  }
+  if (!drawn) {
+    me.fail_with(drawn.error());
+    return std::nullopt;
+  }
+  if (!*drawn) return std::nullopt;
+  return me.frame(seconds_since(start));
+}
+
+bool DeviceBackend::wants_frames() const {
+  const Impl& me = *impl_;
+  if (!me.can_draw_now()) return false;
+  const bool is_stale =
+      me.request->mode == DrawMode::Rays ? me.is_scene_new || !me.is_settled : !me.meshes || me.meshes->is_scene_new;
+  return me.is_request_new || is_stale;
+}
+
+std::vector<std::pair<std::string, std::string>> DeviceBackend::facts() const {
+  const Impl& me = *impl_;
+  if (!me.uses_device() || !me.meshes || me.request->mode == DrawMode::Rays) return {};
+  const VulkanMeshRenderer::Facts drawn = me.meshes->renderer.facts();
+  const LiveMeshes::Facts live = me.meshes->live.facts();
+  return {{"triangles", text("%.0f", static_cast<double>(drawn.triangles))},
+          {"of these drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
+          {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},
+          {"still to mesh", text("%.0f", static_cast<double>(me.meshes->live.pending()))},
+          {"meshes", text("%.1f MB", static_cast<double>(drawn.bytes) / 1e6)},
+          {"last chunk took", text("%.2f ms", live.last_mesh_seconds * 1e3)},
+          {"edit to mesh", text("%.2f ms", live.last_latency_seconds * 1e3)}};
+}
+
+std::optional<Error> DeviceBackend::fault() {
+  return impl_->error ? impl_->error : impl_->cpu.fault();
+}
+
+double DeviceBackend::pause() {
+  impl_->is_paused = true;
+  return impl_->cpu.pause();
+}
+
+void DeviceBackend::resume(bool changed) {
+  impl_->is_paused = false;
+  if (changed) {
+    impl_->is_scene_new = true;
+    if (impl_->meshes) impl_->meshes->is_scene_new = true;
+  }
+  impl_->cpu.resume(changed);
+}
+
+std::optional<SceneHit> DeviceBackend::pick(const Camera& camera, double x, double y, int width, int height) {
+  return impl_->cpu.pick(camera, x, y, width, height);
+}
+
+bool DeviceBackend::is_up_to_date() {
+  return impl_->cpu.is_up_to_date();
+}
+
+}  // namespace quoin::viewer

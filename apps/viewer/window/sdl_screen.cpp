@@ -1,0 +1,138 @@
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "screen.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+class SdlScreen final : public Screen {
+ public:
+  /// Errors: Unsupported.
+  Status open(int width, int height);
+
+  [[nodiscard]] SDL_Point output_size() const override;
+  [[nodiscard]] bool has_vsync() const override { return has_vsync_; }
+  Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
+  Status set_picture(const ViewFrame& frame) override;
+  void forget_picture() override { picture_.reset(); }
+  Status show(const SDL_Rect& place, const ImDrawData& gui) override;
+
+ private:
+  Status set_image(const Image& image);
+  void draw(const ImDrawData& data);
+  void draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data);
+
+  SdlPointer<SDL_Renderer> renderer_;
+  SdlPointer<SDL_Texture> picture_;
+  SdlPointer<SDL_Texture> font_;
+  SDL_Point picture_size_{0, 0};
+  bool has_vsync_ = false;
+};
+
+tl::unexpected<Error> cannot(const std::string& what) {
+  return fail(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
+}
+
+Status SdlScreen::open(int width, int height) {
+  if (Status opened = open_window(width, height, 0); !opened) return opened;
+  renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_PRESENTVSYNC));
+  if (!renderer_) renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_SOFTWARE));
+  if (!renderer_) return cannot("draw in a window");
+  SDL_RendererInfo info{};
+  SDL_GetRendererInfo(renderer_.get(), &info);
+  has_vsync_ = (info.flags & SDL_RENDERER_PRESENTVSYNC) != 0 && (info.flags & SDL_RENDERER_SOFTWARE) == 0;
+  return {};
+}
+
+SDL_Point SdlScreen::output_size() const {
+  SDL_Point size{0, 0};
+  if (SDL_GetRendererOutputSize(renderer_.get(), &size.x, &size.y) != 0) return {0, 0};
+  return size;
+}
+
+Status SdlScreen::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
+  font_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_ABGR8888, SDL_TEXTUREACCESS_STATIC, width, height));
+  if (!font_) return cannot("keep a font");
+  std::vector<std::uint32_t> pixels;
+  for (const std::uint8_t one : opacity) pixels.push_back(std::uint32_t{one} << 24 | 0x00FF'FFFFU);
+  SDL_UpdateTexture(font_.get(), nullptr, pixels.data(), 4 * width);
+  SDL_SetTextureBlendMode(font_.get(), SDL_BLENDMODE_BLEND);
+  SDL_SetTextureScaleMode(font_.get(), SDL_ScaleModeLinear);
+  return {};
+}
+
+Status SdlScreen::set_picture(const ViewFrame& frame) {
+  if (!frame.on_device) return set_image(frame.colour);
+  const auto read = frame.on_device->read();
+  if (!read) return tl::unexpected<Error>(read.error());
+  return set_image(*read);
+}
+
+Status SdlScreen::set_image(const Image& image) {
+  if (image.width <= 0 || image.height <= 0) return {};
+  if (!picture_ || picture_size_.x != image.width || picture_size_.y != image.height) {
+    picture_.reset(SDL_CreateTexture(renderer_.get(), SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STREAMING, image.width,
+                                     image.height));
+    if (!picture_) return cannot("keep a picture");
+    picture_size_ = {image.width, image.height};
+    SDL_SetTextureScaleMode(picture_.get(), SDL_ScaleModeLinear);
+  }
+  if (SDL_UpdateTexture(picture_.get(), nullptr, image.rgb.data(), 3 * image.width) != 0)
+    return cannot("show a picture");
+  return {};
+}
+
+Status SdlScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
+  SDL_SetRenderDrawColor(renderer_.get(), 24, 26, 30, 255);
+  SDL_RenderClear(renderer_.get());
+  if (picture_ && place.w > 0 && place.h > 0) SDL_RenderCopy(renderer_.get(), picture_.get(), nullptr, &place);
+  draw(gui);
+  SDL_RenderPresent(renderer_.get());
+  return {};
+}
+
+void SdlScreen::draw(const ImDrawData& data) {
+  SDL_Renderer* renderer = renderer_.get();
+  SDL_RenderSetScale(renderer, data.FramebufferScale.x, data.FramebufferScale.y);
+  for (int i = 0; i < data.CmdListsCount; ++i) {
+    const ImDrawList& list = *data.CmdLists[i];
+    for (const ImDrawCmd& command : list.CmdBuffer) {
+      if (command.UserCallback == nullptr) draw(list, command, data);
+    }
+  }
+  SDL_RenderSetClipRect(renderer, nullptr);
+  SDL_RenderSetScale(renderer, 1.0F, 1.0F);
+}
+
+void SdlScreen::draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data) {
+  const float left = std::max(command.ClipRect.x - data.DisplayPos.x, 0.0F);
+  const float top = std::max(command.ClipRect.y - data.DisplayPos.y, 0.0F);
+  const float right = std::min(command.ClipRect.z - data.DisplayPos.x, data.DisplaySize.x);
+  const float bottom = std::min(command.ClipRect.w - data.DisplayPos.y, data.DisplaySize.y);
+  if (right <= left || bottom <= top) return;
+  const int x = static_cast<int>(left);
+  const int y = static_cast<int>(top);
+  const SDL_Rect clip{x, y, static_cast<int>(std::ceil(right)) - x, static_cast<int>(std::ceil(bottom)) - y};
+  SDL_RenderSetClipRect(renderer_.get(), &clip);
+  const ImDrawVert* vertices = list.VtxBuffer.Data + command.VtxOffset;
+  const ImDrawIdx* indices = list.IdxBuffer.Data + command.IdxOffset;
+  SDL_RenderGeometryRaw(renderer_.get(), font_.get(), &vertices->pos.x, sizeof(ImDrawVert),
+                        reinterpret_cast<const SDL_Color*>(&vertices->col), sizeof(ImDrawVert), &vertices->uv.x,
+                        sizeof(ImDrawVert), list.VtxBuffer.Size - static_cast<int>(command.VtxOffset), indices,
+                        static_cast<int>(command.ElemCount), sizeof(ImDrawIdx));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Screen>> open_sdl_screen(int width, int height) {
+  auto screen = std::make_unique<SdlScreen>();
+  if (Status opened = screen->open(width, height); !opened) return tl::unexpected<Error>(opened.error());
+  return screen;
+}
+
+}  // namespace quoin::viewer

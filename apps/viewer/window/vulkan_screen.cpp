@@ -1,0 +1,135 @@
+#include <SDL_vulkan.h>
+#include <imgui.h>
+
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include <quoin/render_vk/vulkan_window.h>
+
+#include "screen.h"
+
+namespace quoin::viewer {
+
+namespace {
+
+class VulkanScreen final : public Screen {
+ public:
+  /// Errors: Unsupported.
+  Status open(int width, int height, const std::string& device);
+
+  [[nodiscard]] SDL_Point output_size() const override;
+  [[nodiscard]] bool has_vsync() const override { return true; }
+  [[nodiscard]] std::shared_ptr<VulkanRenderer> renderer() const override { return renderer_; }
+  Status set_font(int width, int height, std::span<const std::uint8_t> opacity) override;
+  Status set_picture(const ViewFrame& frame) override;
+  void forget_picture() override { picture_.reset(); }
+  Status show(const SDL_Rect& place, const ImDrawData& gui) override;
+
+ private:
+  void collect(const ImDrawData& gui);
+
+  std::shared_ptr<VulkanRenderer> renderer_;
+  std::unique_ptr<VulkanWindow> shown_in_;
+  std::shared_ptr<const VulkanPicture> picture_;
+  std::shared_ptr<VulkanPicture> uploaded_;  // pictures of the processor
+  std::vector<OverlayVertex> vertices_;
+  std::vector<std::uint16_t> indices_;
+  std::vector<OverlayDraw> draws_;
+};
+
+Status VulkanScreen::open(int width, int height, const std::string& device) {
+  if (Status opened = open_window(width, height, SDL_WINDOW_VULKAN); !opened) return opened;
+  VulkanOptions options;
+  options.device = device;
+  unsigned count = 0;
+  if (SDL_Vulkan_GetInstanceExtensions(window(), &count, nullptr) == SDL_FALSE) {
+    return fail(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
+  }
+  std::vector<const char*> names(count);
+  SDL_Vulkan_GetInstanceExtensions(window(), &count, names.data());
+  options.surface.extensions.assign(names.begin(), names.end());
+  options.surface.make = [this](void* instance) {
+    VkSurfaceKHR surface{};
+    std::uint64_t number = 0;
+    if (SDL_Vulkan_CreateSurface(window(), static_cast<VkInstance>(instance), &surface) == SDL_FALSE) return number;
+    static_assert(sizeof surface == sizeof number);
+    std::memcpy(&number, &surface, sizeof number);
+    return number;
+  };
+  auto made = VulkanRenderer::create(options);
+  if (!made) return tl::unexpected<Error>(made.error());
+  renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
+  auto shown = VulkanWindow::create(*renderer_);
+  if (!shown) return tl::unexpected<Error>(shown.error());
+  shown_in_ = std::make_unique<VulkanWindow>(std::move(*shown));
+  return {};
+}
+
+SDL_Point VulkanScreen::output_size() const {
+  SDL_Point size{0, 0};
+  SDL_Vulkan_GetDrawableSize(window(), &size.x, &size.y);
+  return size;
+}
+
+Status VulkanScreen::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
+  return shown_in_->set_font(width, height, opacity);
+}
+
+Status VulkanScreen::set_picture(const ViewFrame& frame) {
+  if (frame.on_device) {
+    picture_ = frame.on_device;
+    return {};
+  }
+  if (!uploaded_) uploaded_ = std::make_shared<VulkanPicture>(*renderer_);
+  if (Status written = uploaded_->write(frame.colour); !written) return written;
+  picture_ = uploaded_;
+  return {};
+}
+
+void VulkanScreen::collect(const ImDrawData& gui) {
+  static_assert(sizeof(ImDrawIdx) == sizeof(std::uint16_t));
+  vertices_.clear();
+  indices_.clear();
+  draws_.clear();
+  const ImVec2 scale = gui.FramebufferScale;
+  const ImVec2 origin = gui.DisplayPos;
+  for (int i = 0; i < gui.CmdListsCount; ++i) {
+    const ImDrawList& list = *gui.CmdLists[i];
+    const auto first_vertex = static_cast<std::uint32_t>(vertices_.size());
+    const auto first_index = static_cast<std::uint32_t>(indices_.size());
+    for (const ImDrawVert& v : list.VtxBuffer) {
+      vertices_.push_back({(v.pos.x - origin.x) * scale.x, (v.pos.y - origin.y) * scale.y, v.uv.x, v.uv.y, v.col});
+    }
+    indices_.insert(indices_.end(), list.IdxBuffer.begin(), list.IdxBuffer.end());
+    for (const ImDrawCmd& command : list.CmdBuffer) {
+      if (command.UserCallback != nullptr) continue;
+      const auto pixel = [](float value) { return static_cast<int>(std::floor(value)); };
+      const int left = pixel((command.ClipRect.x - origin.x) * scale.x);
+      const int top = pixel((command.ClipRect.y - origin.y) * scale.y);
+      const int right = -pixel(-(command.ClipRect.z - origin.x) * scale.x);
+      const int bottom = -pixel(-(command.ClipRect.w - origin.y) * scale.y);
+      draws_.push_back({{left, top, right - left, bottom - top},
+                        first_index + command.IdxOffset,
+                        command.ElemCount,
+                        first_vertex + command.VtxOffset});
+    }
+  }
+}
+
+Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
+  collect(gui);
+  const SDL_Point size = output_size();
+  return shown_in_->present(size.x, size.y, picture_.get(), {place.x, place.y, place.w, place.h},
+                            {vertices_, indices_, draws_});
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Screen>> open_vulkan_screen(int width, int height, const std::string& device) {
+  auto screen = std::make_unique<VulkanScreen>();
+  if (Status opened = screen->open(width, height, device); !opened) return tl::unexpected<Error>(opened.error());
+  return screen;
+}
+
+}  // namespace quoin::viewer

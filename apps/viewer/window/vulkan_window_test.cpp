@@ -1,0 +1,157 @@
+// Windows of Vulkan on a display, small and short-lived; tests/viewer/window.sh looks at a large one. The validation
+// layer watches where it is installed.
+
+#include <SDL.h>
+#include <SDL_vulkan.h>
+#include <array>
+#include <cstdlib>
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <quoin/render_vk/vulkan_window.h>
+
+#include "screen.h"
+#include "viewer/viewer_fixture.h"
+
+namespace quoin::viewer {
+namespace {
+
+/// Skipped without a display or a device that reaches it.
+class VulkanWindowTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ::unsetenv("SDL_VIDEODRIVER");
+    auto video = SdlVideo::start();
+    if (!video) GTEST_SKIP() << video.error().message;
+    video_ = std::move(*video);
+    window_.reset(SDL_CreateWindow("test", 0, 0, 160, 90, SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE));
+    if (!window_) GTEST_SKIP() << sdl_says();
+    auto made = VulkanRenderer::create(options(true));
+    if (!made) made = VulkanRenderer::create(options(false));
+    if (!made) GTEST_SKIP() << made.error().message;
+    renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+    scene_ = small_scene();
+    ASSERT_TRUE(renderer_->update(scene_.scene));
+  }
+  void TearDown() override {
+    renderer_.reset();
+    window_.reset();
+    for (const std::string& message : messages_) ADD_FAILURE() << message;
+  }
+
+  [[nodiscard]] VulkanOptions options(bool is_validated) {
+    VulkanOptions options;
+    if (is_validated) options.on_validation_message = [this](const std::string& text) { messages_.push_back(text); };
+    unsigned count = 0;
+    SDL_Vulkan_GetInstanceExtensions(window_.get(), &count, nullptr);
+    std::vector<const char*> names(count);
+    SDL_Vulkan_GetInstanceExtensions(window_.get(), &count, names.data());
+    options.surface.extensions.assign(names.begin(), names.end());
+    options.surface.make = [this](void* instance) {
+      VkSurfaceKHR surface{};
+      SDL_Vulkan_CreateSurface(window_.get(), static_cast<VkInstance>(instance), &surface);
+      std::uint64_t number = 0;
+      std::memcpy(&number, &surface, sizeof surface);
+      return number;
+    };
+    return options;
+  }
+
+  [[nodiscard]] VulkanPicture drawn(int width, int height) {
+    VulkanPicture picture(*renderer_);
+    RenderOptions wanted;
+    wanted.width = width;
+    wanted.height = height;
+    const Camera camera = frame_scene(scene_.scene, View::Iso, 16.0 / 9.0);
+    const Status status = renderer_->draw(picture, camera, wanted, true);
+    EXPECT_TRUE(status) << to_string(status.error());
+    return picture;
+  }
+
+  std::unique_ptr<SdlVideo> video_;
+  SdlPointer<SDL_Window> window_;
+  std::unique_ptr<VulkanRenderer> renderer_;
+  LoadedScene scene_;
+  std::vector<std::string> messages_;
+};
+
+constexpr std::array<std::uint8_t, 4> kFont = {255, 255, 0, 255};
+constexpr std::array kCorners = {OverlayVertex{0, 0, 0, 0, 0xFF0000FFU}, OverlayVertex{50, 0, 1, 0, 0xFF00FF00U},
+                                 OverlayVertex{0, 50, 0, 1, 0x80FF0000U}};
+constexpr std::array<std::uint16_t, 3> kIndices = {0, 1, 2};
+
+TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
+  auto window = VulkanWindow::create(*renderer_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 0, 3, 0}, OverlayDraw{{-50, -50, 10, 10}, 0, 3, 0},
+                            OverlayDraw{{100, 50, 5000, 5000}, 0, 3, 0}};
+  const Overlay overlay{kCorners, kIndices, draws};
+  EXPECT_TRUE(window->present(160, 90, nullptr, {}, overlay)) << "an overlay without a font is not drawn";
+  ASSERT_TRUE(window->set_font(2, 2, kFont));
+  const VulkanPicture whole = drawn(160, 90);
+  const VulkanPicture coarse = drawn(20, 12);
+  const VulkanPicture never_drawn(*renderer_);
+  for (const VulkanPicture* picture : {&whole, &coarse, &never_drawn, static_cast<const VulkanPicture*>(nullptr)}) {
+    for (const PixelRect place : {PixelRect{0, 0, 160, 90}, {-20, 30, 70, 500}, {10, 10, 0, 0}, {500, 500, 10, 10}}) {
+      const Status shown = window->present(160, 90, picture, place, overlay);
+      ASSERT_TRUE(shown) << to_string(shown.error());
+    }
+  }
+}
+
+TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
+  auto window = VulkanWindow::create(*renderer_, false);
+  ASSERT_TRUE(window) << to_string(window.error());
+  const VulkanPicture picture = drawn(64, 64);
+  for (const auto& [width, height] : {std::pair{64, 64}, {300, 20}, {0, 0}, {640, 480}, {64, 0}, {64, 64}}) {
+    if (width > 0 && height > 0) SDL_SetWindowSize(window_.get(), width, height);
+    for (int frame = 0; frame < 3; ++frame) {
+      SDL_PumpEvents();
+      const Status shown = window->present(width, height, &picture, {0, 0, width, height}, {});
+      ASSERT_TRUE(shown) << width << " x " << height << ": " << to_string(shown.error());
+    }
+  }
+}
+
+TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
+  const VulkanPicture picture = drawn(32, 32);
+  for (int i = 0; i < 50; ++i) {
+    auto window = VulkanWindow::create(*renderer_);
+    ASSERT_TRUE(window) << to_string(window.error());
+    ASSERT_TRUE(window->present(160, 90, &picture, {0, 0, 32, 32}, {}));
+  }
+}
+
+TEST_F(VulkanWindowTest, PicturesOfTheProcessorAreShownToo) {
+  VulkanPicture picture(*renderer_);
+  EXPECT_EQ(picture.write({}).error().code, ErrorCode::InvalidArgument);
+  const Image image{2, 1, {10, 20, 30, 250, 240, 230}};
+  ASSERT_TRUE(picture.write(image));
+  const auto read = picture.read();
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->rgb, image.rgb);
+  auto window = VulkanWindow::create(*renderer_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  EXPECT_TRUE(window->present(160, 90, &picture, {0, 0, 160, 90}, {}));
+}
+
+TEST_F(VulkanWindowTest, WhatCannotBeIsTold) {
+  VulkanOptions wrong = options(false);
+  wrong.surface.extensions = {"VK_QUOIN_no_such_thing"};
+  auto made = VulkanRenderer::create(wrong);
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
+  wrong = options(false);
+  wrong.surface.make = [](void*) { return std::uint64_t{0}; };
+  made = VulkanRenderer::create(wrong);
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
+  auto plain = VulkanRenderer::create();
+  ASSERT_TRUE(plain) << to_string(plain.error());
+  const auto window = VulkanWindow::create(*plain);
+  ASSERT_FALSE(window);
+  EXPECT_EQ(window.error().code, ErrorCode::InvalidArgument);
+}
+
+}  // namespace
+}  // namespace quoin::viewer
