@@ -64,6 +64,7 @@ struct DeviceBackend::Impl {
   [[nodiscard]] int samples_now() const;
   [[nodiscard]] ViewFrame frame(double seconds) const;
   void fail_with(const Error& error);
+  void give_up_device();
 
   const Scene* scene;
   DeviceBackendOptions options;
@@ -217,14 +218,19 @@ ViewFrame DeviceBackend::Impl::frame(double seconds) const {
 
 void DeviceBackend::Impl::fail_with(const Error& what) {
   error = what;
+  give_up_device();
+}
+
+void DeviceBackend::Impl::give_up_device() {
   is_device_gone = true;
+  if (request && !uses_device()) cpu.show(*request);
 }
 
 void DeviceBackend::forget_device() {
   impl_->meshes.reset();
   impl_->picture.reset();
   impl_->renderer.reset();
-  impl_->is_device_gone = true;
+  impl_->give_up_device();
 }
 
 std::string DeviceBackend::name() const {

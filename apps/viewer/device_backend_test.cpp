@@ -1,0 +1,241 @@
+#include "device_backend.h"
+
+#include <chrono>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "loader.h"
+#include "viewer_fixture.h"
+
+namespace quoin::viewer {
+namespace {
+
+/// Skipped where there is no device; fails on every message of the validation layer.
+class DeviceBackendTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    VulkanOptions options;
+    options.on_validation_message = [this](const std::string& text) { messages_.push_back(text); };
+    auto made = VulkanRenderer::create(options);
+    if (!made) made = VulkanRenderer::create();
+    if (!made) GTEST_SKIP() << made.error().message;
+    renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
+  }
+  void TearDown() override {
+    renderer_.reset();
+    for (const std::string& message : messages_) ADD_FAILURE() << message;
+  }
+
+  [[nodiscard]] std::unique_ptr<DeviceBackend> backend_of(const Document& document, bool rays_on_device = true) {
+    DeviceBackendOptions options;
+    options.cpu.threads = {2};
+    options.rays_on_device = rays_on_device;
+    const auto open = [this]() -> Result<std::shared_ptr<VulkanRenderer>> { return renderer_; };
+    return std::make_unique<DeviceBackend>(document.scene(), options, open, std::function<void()>());
+  }
+
+  static ViewRequest request_for(const Document& document, DrawMode mode) {
+    ViewRequest request;
+    request.width = 160;
+    request.height = 100;
+    request.camera = frame_scene(document.scene(), View::Iso, 1.6);
+    request.samples = 4;
+    request.mode = mode;
+    return request;
+  }
+
+  /// The frames until the picture has settled, as a window would ask for them; empty when it did not within a minute.
+  static std::vector<Image> settle(DeviceBackend& backend) {
+    std::vector<Image> pictures;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < end) {
+      const auto frame = backend.take();
+      if (const auto fault = backend.fault()) ADD_FAILURE() << to_string(*fault);
+      if (!frame) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        continue;
+      }
+      auto image = frame->on_device ? frame->on_device->read() : Result<Image>(frame->colour);
+      EXPECT_TRUE(image) << to_string(image.error());
+      pictures.push_back(std::move(*image));
+      if (frame->is_settled) return pictures;
+    }
+    return {};
+  }
+
+  std::shared_ptr<VulkanRenderer> renderer_;
+  std::vector<std::string> messages_;
+};
+
+Image by_processor(const Document& document, const ViewRequest& request) {
+  RenderOptions options;
+  options.width = request.width;
+  options.height = request.height;
+  options.samples = request.samples;
+  options.light = request.light;
+  return CpuRenderer(document.scene()).render(request.camera, options).value().colour;
+}
+
+/// The share of pixels that differ by more than `most` in a channel.
+double differing(const Image& a, const Image& b, int most) {
+  EXPECT_EQ(a.rgb.size(), b.rgb.size());
+  if (a.rgb.size() != b.rgb.size() || a.rgb.empty()) return 1.0;
+  int count = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); i += 3) {
+    bool differs = false;
+    for (std::size_t c = i; c < i + 3; ++c) differs |= std::abs(a.rgb[c] - b.rgb[c]) > most;
+    count += differs ? 1 : 0;
+  }
+  return 3.0 * count / static_cast<double>(a.rgb.size());
+}
+
+void edit(Document& document, DeviceBackend& backend, IVec3 voxel) {
+  const ScenePause pause(backend);
+  SceneHit hit{};
+  hit.instance = document.scene().instances().handles().front();
+  hit.voxel = voxel;
+  hit.face = Direction::PosY;
+  Brush brush;
+  brush.action = BrushAction::Remove;
+  brush.radius = 4;
+  ASSERT_TRUE(document.begin_stroke(brush, hit));
+  document.end_stroke();
+}
+
+TEST_F(DeviceBackendTest, RaysSettleOnTheProcessorsPictureAndFollowEdits) {
+  Document document = small_document();
+  const auto backend = backend_of(document);
+  const ViewRequest request = request_for(document, DrawMode::Rays);
+  backend->show(request);
+  EXPECT_TRUE(backend->wants_frames());
+  auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+  EXPECT_FALSE(backend->wants_frames());
+  EXPECT_FALSE(backend->take());
+  edit(document, *backend, {30, 12, 20});
+  EXPECT_TRUE(backend->wants_frames());
+  pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+}
+
+TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
+  Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Blocks);
+  request.samples = 1;
+  request.light.occlusion = OcclusionMode::Vertex;
+  request.light.shadows = false;
+  backend->show(request);
+  auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  const Image before = pictures.back();
+  // Glass and silhouettes differ a little; see VulkanMeshRenderer.
+  EXPECT_LT(differing(before, by_processor(document, request), 6), 0.05);
+  edit(document, *backend, {30, 12, 20});
+  pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_GT(differing(before, pictures.back(), 6), 0.01) << "the edit is seen";
+  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 6), 0.05);
+  {
+    const ScenePause pause(*backend);
+    ASSERT_TRUE(document.undo());
+  }
+  pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_EQ(pictures.back().rgb, before.rgb);
+  EXPECT_FALSE(backend->facts().empty());
+}
+
+TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
+  Document document = small_document();
+  const auto backend = backend_of(document);
+  std::vector<Image> all;
+  for (const DrawMode mode : {DrawMode::Rays, DrawMode::Blocks, DrawMode::Smooth}) {
+    for (const MeshShading shading : {MeshShading::Lit, MeshShading::Occlusion, MeshShading::Normals}) {
+      for (const Wireframe wireframe : {Wireframe::Off, Wireframe::Over, Wireframe::Only}) {
+        if (mode == DrawMode::Rays && (shading != MeshShading::Lit || wireframe != Wireframe::Off)) continue;
+        ViewRequest request = request_for(document, mode);
+        request.shading = shading;
+        request.wireframe = wireframe;
+        backend->show(request);
+        const auto pictures = settle(*backend);
+        ASSERT_FALSE(pictures.empty());
+        for (const Image& other : all) EXPECT_GT(differing(other, pictures.back(), 6), 0.001);
+        all.push_back(pictures.back());
+      }
+    }
+  }
+  EXPECT_EQ(all.size(), 19U);
+}
+
+TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFasterAndLevelsOfDetail) {
+  const Document document = small_document();
+  const auto backend = backend_of(document, false);
+  ViewRequest request = request_for(document, DrawMode::Rays);
+  backend->show(request);
+  auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+  EXPECT_EQ(backend->name(), "processor");
+  const auto on_device = backend_of(document, true);
+  request.detail_by_pixels = true;
+  request.detail_colours = true;
+  on_device->show(request);
+  ASSERT_FALSE(settle(*on_device).empty());
+  EXPECT_EQ(on_device->name(), "processor");
+}
+
+TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
+  const Document document = small_document();
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  DeviceBackend backend(
+      document.scene(), options,
+      []() -> Result<std::shared_ptr<VulkanRenderer>> { return fail(ErrorCode::Unsupported, "vulkan: nothing here"); },
+      {});
+  backend.show(request_for(document, DrawMode::Blocks));
+  EXPECT_FALSE(backend.take());
+  ASSERT_TRUE(backend.fault());
+  EXPECT_EQ(backend.fault()->message, "vulkan: nothing here");
+  EXPECT_FALSE(backend.can_draw(DrawMode::Blocks));
+  EXPECT_FALSE(backend.wants_frames()) << "what cannot be drawn keeps nobody busy";
+  EXPECT_TRUE(backend.can_draw(DrawMode::Rays));
+  backend.show(request_for(document, DrawMode::Rays));
+  EXPECT_FALSE(settle(backend).empty());
+}
+
+TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
+  const Document document = small_document();
+  const auto backend = backend_of(document);
+  const ViewRequest request = request_for(document, DrawMode::Rays);
+  backend->show(request);
+  ASSERT_FALSE(settle(*backend).empty());
+  backend->forget_device();
+  const auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty()) << "without another request too";
+  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+}
+
+TEST_F(DeviceBackendTest, ManyRequestsEndWithTheLast) {
+  const Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Rays);
+  for (int i = 0; i < 12; ++i) {
+    request.camera.position.x += 0.5;
+    request.mode = static_cast<DrawMode>(i % 3);
+    backend->show(request);
+    (void)backend->take();
+  }
+  request.mode = DrawMode::Rays;
+  backend->show(request);
+  const auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001);
+}
+
+}  // namespace
+}  // namespace quoin::viewer
