@@ -83,6 +83,7 @@ class LiveMeshes {
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
     double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
     std::size_t copied_bytes = 0;       ///< of chunks that wait for workers
+    std::int64_t out_of_memory = 0;     ///< times a worker's memory ran out; the chunk stays pending, to be tried again
   };
   [[nodiscard]] Facts facts() const;
 
