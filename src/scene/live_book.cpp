@@ -208,7 +208,7 @@ void LiveBook::finish(const Scene& scene, DVec3 eye) {
   for (;;) {
     const LiveMeshes::Facts before = facts();
     update(scene, eye);
-    if (totals_.unfinished == 0) return;
+    if (totals_.unfinished == 0) return queue_.wait(0);  // for what was removed while it was meshed
     queue_.wait(has_waiting() ? most_ahead_ / 2 : 0);
     const LiveMeshes::Facts after = facts();
     // Nothing but failures: it will not do to try for ever.
