@@ -187,7 +187,9 @@ TEST(LiveBook, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
     book.finish(one.scene, {});
     const std::vector<SurfaceUpdate> taken = book.take();
     ASSERT_EQ(taken.size(), replaced ? 1U : 0U);
-    if (replaced) EXPECT_EQ(faces_of(taken[0]), 10U);
+    if (replaced) {
+      EXPECT_EQ(faces_of(taken[0]), 10U);
+    }
   }
 }
 

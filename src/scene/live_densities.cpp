@@ -215,14 +215,17 @@ std::shared_ptr<LiveDensity> DensityBook::density(const Grid& grid, IVec3 chunk,
   return made;
 }
 
-void DensityBook::keep(IVec3 chunk, const LiveDensities& made) {
+std::uint32_t DensityBook::keep(IVec3 chunk, const LiveDensities& made) {
+  std::uint32_t kept = 0;
   for (int i = 0; i < 27; ++i) {
     const std::shared_ptr<LiveDensity>& each = made[static_cast<std::size_t>(i)];
     if (each == nullptr || !each->is_made()) continue;
     const auto found = slots_.find(neighbour_of(chunk, i));
     if (found == slots_.end() || found->second.under_way.lock() != each) continue;
     found->second = Slot{each, {}, false, false};
+    kept |= std::uint32_t{1} << i;
   }
+  return kept;
 }
 
 }  // namespace quoin

@@ -80,8 +80,8 @@ class DensityBook {
   void follow(const Grid& grid, const ChunkCopies& copies, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
   /// Requires: `grid` is as `follow` saw it.
   [[nodiscard]] LiveDensities around(const Grid& grid, IVec3 chunk, ChunkCopies& copies);
-  /// Keeps what workers made, as far as it holds still.
-  void keep(IVec3 chunk, const LiveDensities& made);
+  /// Keeps what workers made, as far as it holds still. Answers a bit for each that is new.
+  std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
 
  private:
   struct Slot {

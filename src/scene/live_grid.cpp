@@ -227,8 +227,33 @@ void LiveGrid::withdrawn(const LiveJob& job) {
   state.is_working = false;
 }
 
+// Where new densities read as those that a surface is of, the surface counts as one of the new: later ones will be
+// compared with these.
+void LiveGrid::keep_densities(const LiveJob& job) {
+  const std::uint32_t kept = densities_.keep(job.chunk, job.densities);
+  const int reach = reach_of(options_.occlusion);
+  for (int i = 0; i < 27; ++i) {
+    if ((kept >> i & 1U) == 0) continue;
+    const LiveDensity& density = *job.densities[static_cast<std::size_t>(i)];
+    for (int n = 0; n < 27; ++n) {
+      const auto found = chunks_.find(neighbour_of(neighbour_of(job.chunk, i), n));
+      if (found == chunks_.end() || found->second.last_stamps == nullptr) continue;
+      std::uint64_t& stamp = (*found->second.last_stamps)[static_cast<std::size_t>(26 - n)];
+      if (density.reads_as(stamp, reach, neighbour_of(IVec3{0}, n))) stamp = density.stamp();
+    }
+  }
+}
+
+void LiveGrid::keep_stamps(const LiveJob& job, LiveChunk& state) {
+  if (state.last_stamps == nullptr) state.last_stamps = std::make_unique<DensityStamps>();
+  for (std::size_t i = 0; i < 27; ++i) {
+    (*state.last_stamps)[i] = job.densities[i] == nullptr ? 0 : job.densities[i]->stamp();
+  }
+  state.type_generation = job.type_generation;
+}
+
 void LiveGrid::collect(LiveJob& job) {
-  densities_.keep(job.chunk, job.densities);
+  if (options_.style == SurfaceStyle::Smooth) keep_densities(job);
   const auto found = chunks_.find(job.chunk);
   if (found == chunks_.end() || found->second.is_gone) return;
   LiveChunk& state = found->second;
@@ -247,13 +272,7 @@ void LiveGrid::collect(LiveJob& job) {
     return;
   }
   state.collected = job.serial;
-  if (options_.style == SurfaceStyle::Smooth) {
-    if (state.last_stamps == nullptr) state.last_stamps = std::make_unique<DensityStamps>();
-    for (std::size_t i = 0; i < 27; ++i) {
-      (*state.last_stamps)[i] = job.densities[i] == nullptr ? 0 : job.densities[i]->stamp();
-    }
-    state.type_generation = job.type_generation;
-  }
+  if (options_.style == SurfaceStyle::Smooth) keep_stamps(job, state);
   if (job.outcome == LiveJob::Outcome::AsBefore) return;
   state.surface = std::move(job.surface);
   state.is_ready = false;

@@ -100,6 +100,8 @@ class LiveGrid {
   void mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now);
   void wait_again(IVec3 chunk, LiveChunk& state);
   void remove(IVec3 chunk);
+  void keep_densities(const LiveJob& job);
+  void keep_stamps(const LiveJob& job, LiveChunk& state);
   void make_ready(IVec3 chunk, LiveChunk& state);
 
   GridHandle handle_;

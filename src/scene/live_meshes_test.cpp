@@ -36,7 +36,8 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     SceneEditor editor(seed);
     LiveMeshes meshes(wanted);
     ShownSurfaces shown;
-    for (int i = 0; i < 40; ++i) {
+    const int edits = GetParam() == SurfaceStyle::Blocky ? 60 : 16;
+    for (int i = 0; i < edits; ++i) {
       editor.edit();
       if (editor.below(2) == 0) meshes.update(editor.scene, editor.eye());
       if (editor.below(4) == 0) shown.apply(meshes.take());
@@ -65,7 +66,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
   std::int64_t meshed = 0;
   {
     LiveMeshes meshes(wanted);
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < (GetParam() == SurfaceStyle::Blocky ? 400 : 100); ++i) {
       editor.edit();
       meshes.update(editor.scene, editor.eye());
       shown.apply(meshes.take());

@@ -95,12 +95,12 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
   ChunkSet given;
   followed.meshed(given);
   std::mt19937 random(5);
-  for (int i = 0; i < 24; ++i) {
+  for (int i = 0; i < 12; ++i) {
     SCOPED_TRACE(i);
     const DensityGrid before = field_from_grid(grid);
     const auto place = [&] { return std::array{2, 9, 13, 16, 30, 46, 49, 52, 59, 63}[random() % 10]; };
     const IVec3 at{place(), 10 + static_cast<int>(random() % 20), place()};
-    ASSERT_TRUE(grid.set(at, i % 3 == 0 && grid.get(at) != kAir ? 5 : grid.get(at) == kAir ? 1 : kAir) || i % 3 == 0);
+    ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : i % 3 == 0 ? 5 : kAir));
     const DensityGrid after = field_from_grid(grid);
     ChunkSet asked;
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk));
@@ -109,11 +109,10 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 0, 1}));
     const ChunkSet reached = chunks_that_read_changes(before, after, asked);
     const std::int64_t meshed = followed.meshed(given);
-    // What lies beside the grid and owns no quad is not meshed; stamps that were passed over cost a chunk at times.
-    EXPECT_LE(meshed, static_cast<std::int64_t>(reached.size()) + 1);
-    for (const auto& each : given) {
-      EXPECT_TRUE(reached.contains(each) || meshed > static_cast<std::int64_t>(reached.size()));
-    }
+    // Not all that were asked can own a quad.
+    EXPECT_LE(meshed, static_cast<std::int64_t>(reached.size()));
+    EXPECT_GT(meshed, 0);
+    for (const auto& each : given) EXPECT_TRUE(reached.contains(each));
     expect_smooth(followed.shown, followed.one.scene, FollowedGrid::options_of(SurfaceStyle::Smooth));
   }
 }
