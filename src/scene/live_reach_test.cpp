@@ -62,11 +62,26 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
   }
 }
 
+// Those of which a density field says that a sample changed within reach.
+ChunkSet chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
+  DensityGrid edited = before.clone();
+  edited.take_dirty(reach);
+  for (const IVec3 chunk : before.chunks()) {
+    if (after.find_chunk(chunk) == nullptr) edited.put_chunk(chunk, DensityChunk(DensityNeighbourhood{}.outside));
+  }
+  for (const IVec3 chunk : after.chunks()) edited.put_chunk(chunk, *after.find_chunk(chunk));
+  ChunkSet all;
+  for (const IVec3 chunk : edited.take_dirty(reach)) all.insert(key(chunk));
+  return all;
+}
+
 // The chunks that can own quads and read a density that differs, or a type of a solid sample that does.
 ChunkSet chunks_that_read_changes(const DensityGrid& before, const DensityGrid& after, const ChunkSet& asked) {
   const int reach = reach_of({});
   ChunkSet changed;
+  const ChunkSet near = chunks_near_changes(before, after, reach);
   for (const auto& each : asked) {
+    if (!near.contains(each)) continue;
     const IVec3 chunk{each[0], each[1], each[2]};
     const DensityNeighbourhood a = before.neighbourhood(chunk);
     const DensityNeighbourhood b = after.neighbourhood(chunk);
