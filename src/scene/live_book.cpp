@@ -53,9 +53,14 @@ void LiveBook::update(const Scene& scene, DVec3 eye) {
   try {
     update_or_throw(scene, eye);
   } catch (...) {
-    for (auto& [handle, grid] : grids_) grid.forget();
+    forget();
     throw;
   }
+}
+
+// Memory ran out in the middle: whatever was lost is found by beginning anew.
+void LiveBook::forget() {
+  for (auto& [handle, grid] : grids_) grid.forget();
 }
 
 void LiveBook::update_or_throw(const Scene& scene, DVec3 eye) {
@@ -194,9 +199,14 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
 }
 
 std::vector<SurfaceUpdate> LiveBook::take() {
-  collect();
   std::vector<SurfaceUpdate> taken;
-  taken.reserve(totals_.ready.size());
+  try {
+    collect();
+    taken.reserve(totals_.ready.size());
+  } catch (...) {
+    forget();
+    throw;
+  }
   for (const auto& [handle, chunk] : totals_.ready) {
     if (LiveGrid* live = find(handle)) live->take(chunk, taken);
   }

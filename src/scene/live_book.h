@@ -34,6 +34,7 @@ class LiveBook {
   void update_or_throw(const Scene& scene, DVec3 eye);
   [[nodiscard]] std::vector<bool> follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
+  void forget();
   void collect();
   void hand_over(const Scene& scene, DVec3 eye);
   [[nodiscard]] bool has_waiting() const;

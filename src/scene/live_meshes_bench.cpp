@@ -3,6 +3,7 @@
 
 #include <quoin/scene/live_meshes.h>
 
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <string>

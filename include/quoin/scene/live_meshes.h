@@ -57,6 +57,7 @@ struct LiveMeshOptions {
 /// Threads: all calls come from one thread.
 class LiveMeshes {
  public:
+  /// Errors: std::system_error where the workers cannot be started.
   explicit LiveMeshes(const LiveMeshOptions& options);
   /// Waits for the chunks that are being meshed; others are given up.
   ~LiveMeshes();
@@ -75,6 +76,7 @@ class LiveMeshes {
 
   /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
   /// Of chunks of which nothing was, or is, to be seen, none is given.
+  /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take();
 
   /// Chunks whose newest surface was not taken yet.
