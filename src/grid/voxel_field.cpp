@@ -28,6 +28,7 @@ constexpr int kPitch = 80;                         // kSmoothed, rounded up to w
 constexpr float kLeastSolid = 0.35F;
 constexpr float kLeastAir = 0.1F;
 constexpr float kBand = 8.0F;
+static_assert(kMargin == kVoxelFieldReach);
 
 using ByteRow = std::array<std::uint8_t, kPitch>;
 
@@ -206,7 +207,20 @@ bool is_one_kind_throughout(const Neighbourhood& chunks) {
                                           [&](const Chunk* chunk) { return kind(chunk) == first; });
 }
 
-DensityChunk make_chunk(const Neighbourhood& chunks, Half far) {
+// The chunks that hold a voxel, and those around them: the band reaches into these.
+std::vector<IVec3> chunks_near(const Grid& grid) {
+  std::vector<IVec3> all;
+  for (const IVec3 at : grid.chunks()) {
+    for (int i = 0; i < 27; ++i) all.push_back(at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
+  }
+  sort_and_unite(all);
+  return all;
+}
+
+}  // namespace
+
+DensityChunk density_of_voxels(const Neighbourhood& chunks) {
+  const Half far = largest_within(kBand);
   const Half deep = stored_within(-kBand, far);
   const Chunk* voxels = chunks.at(0, 0, 0);
   DensityChunk made(far);
@@ -232,21 +246,8 @@ DensityChunk make_chunk(const Neighbourhood& chunks, Half far) {
   return made;
 }
 
-// The chunks that hold a voxel, and those around them: the band reaches into these.
-std::vector<IVec3> chunks_near(const Grid& grid) {
-  std::vector<IVec3> all;
-  for (const IVec3 at : grid.chunks()) {
-    for (int i = 0; i < 27; ++i) all.push_back(at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
-  }
-  sort_and_unite(all);
-  return all;
-}
-
-}  // namespace
-
 DensityGrid field_from_grid(const Grid& grid, Threads threads) {
   DensityGrid field(kBand);
-  const Half far = largest_within(kBand);
   const std::vector<IVec3> places = chunks_near(grid);
   // In batches, so that little waits to be put in place.
   constexpr std::size_t kBatch = 64;
@@ -254,7 +255,7 @@ DensityGrid field_from_grid(const Grid& grid, Threads threads) {
   for (std::size_t first = 0; first < places.size(); first += kBatch) {
     const std::size_t count = std::min(kBatch, places.size() - first);
     parallel_for(count, threads,
-                 [&](std::size_t i) { made[i] = make_chunk(grid.neighbourhood(places[first + i]), far); });
+                 [&](std::size_t i) { made[i] = density_of_voxels(grid.neighbourhood(places[first + i])); });
     for (std::size_t i = 0; i < count; ++i) field.put_chunk(places[first + i], std::move(*made[i]));
   }
   return field;

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <quoin/core/parallel.h>
+#include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
+#include <quoin/grid/neighbourhood.h>
 
 namespace quoin {
 
@@ -18,5 +20,13 @@ namespace quoin {
 /// Order:     the same densities at any thread count.
 /// Cost:      about 5 ms a chunk that the surface comes near, on each thread; little for the others.
 [[nodiscard]] DensityGrid field_from_grid(const Grid& grid, Threads threads = {});
+
+/// How far, in voxels, the density of a sample looks: an edit that is farther than this from a chunk leaves its
+/// densities as they were.
+inline constexpr int kVoxelFieldReach = 10;
+
+/// One chunk of that field, of the centre's voxels and those around them: what `field_from_grid` puts there, all far
+/// air included. Several threads may make chunks at once.
+[[nodiscard]] DensityChunk density_of_voxels(const Neighbourhood& chunks);
 
 }  // namespace quoin

@@ -45,7 +45,7 @@ struct LiveMeshOptions {
   SmoothOcclusionOptions occlusion;  ///< of smooth surfaces
   bool hidden = false;               ///< grids of instances that are not visible are meshed too
   Threads threads;                   ///< workers; 0: one less than the machine has, at least one
-  /// Called from a worker when there is something to take; may be empty.
+  /// Called from a worker when there is something to take; may be empty. It must not throw or call the meshes.
   std::function<void()> on_ready;
 };
 
@@ -57,25 +57,32 @@ struct LiveMeshOptions {
 /// Threads: all calls come from one thread.
 class LiveMeshes {
  public:
+  /// Errors: std::system_error where the workers cannot be started.
   explicit LiveMeshes(const LiveMeshOptions& options);
   /// Waits for the chunks that are being meshed; others are given up.
   ~LiveMeshes();
   LiveMeshes(const LiveMeshes&) = delete;
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
-  /// Takes over whatever was changed: voxels, grids, types whose visibility changed, instances that first show a grid
-  /// or last showed it. Chunks nearest to `eye` (world) come first. Call it after edits and once a frame while
-  /// `pending` is not 0: no more chunks are copied ahead than keep the workers busy.
+  /// Takes over whatever was changed: voxels, grids, types whose visibility changed (smooth: whose colour did),
+  /// instances that first show a grid or last showed it. Chunks nearest to `eye` (world) come first. Call it after
+  /// edits and once a frame while `pending` is not 0: no more chunks are copied ahead than keep the workers busy.
   ///
-  /// Cost: O(chunks of grids whose version changed), and copies of at most 27 chunks for each that is to be meshed.
+  /// Cost:   O(instances + types + chunks of grids whose version changed), and for each chunk that is to be meshed the
+  ///         copies of at most 27 chunks (smooth: of those around each of its 27 densities that must be made anew),
+  ///         each once.
+  /// Errors: bad_alloc; the next call begins anew with all chunks.
   void update(const Scene& scene, DVec3 eye);
 
   /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
+  /// Of chunks of which nothing was, or is, to be seen, none is given.
+  /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take();
 
   /// Chunks whose newest surface was not taken yet.
   [[nodiscard]] std::size_t pending() const;
   /// Calls `update` until nothing is left to mesh. For tests and screenshots.
+  /// Errors: bad_alloc, also when workers' memory runs out for every chunk that is left.
   void finish(const Scene& scene, DVec3 eye);
 
   struct Facts {
@@ -83,6 +90,7 @@ class LiveMeshes {
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
     double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
     std::size_t copied_bytes = 0;       ///< of chunks that wait for workers
+    std::int64_t out_of_memory = 0;     ///< times a worker's memory ran out; the chunk stays pending, to be tried again
   };
   [[nodiscard]] Facts facts() const;
 

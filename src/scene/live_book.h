@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <quoin/scene/live_meshes.h>
+#include <quoin/scene/scene.h>
+
+#include "scene/copied_chunk.h"
+#include "scene/live_distance.h"
+#include "scene/live_grid.h"
+#include "scene/live_queue.h"
+
+namespace quoin {
+
+/// LiveMeshes, with the workers' work to be chosen.
+class LiveBook {
+ public:
+  /// Calls of `work` come from several threads at once.
+  LiveBook(const LiveMeshOptions& options, LiveQueue::Work work);
+
+  void update(const Scene& scene, DVec3 eye);
+  [[nodiscard]] std::vector<SurfaceUpdate> take();
+  [[nodiscard]] std::size_t pending() const { return totals_.pending; }
+  void finish(const Scene& scene, DVec3 eye);
+  [[nodiscard]] LiveMeshes::Facts facts() const;
+
+ private:
+  struct Candidate;
+
+  void update_or_throw(const Scene& scene, DVec3 eye);
+  [[nodiscard]] std::vector<bool> follow_types(const VoxelRegistry& types);
+  [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
+  void forget();
+  void collect();
+  void hand_over(const Scene& scene, DVec3 eye);
+  [[nodiscard]] bool has_waiting() const;
+  [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene, DVec3 eye) const;
+  [[nodiscard]] std::vector<Candidate> candidates(const std::map<GridHandle, ChunkDistances>& distances);
+  void withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
+  [[nodiscard]] LiveGrid* find(GridHandle grid);
+
+  const LiveMeshOptions options_;
+  const unsigned workers_;
+  const std::size_t most_ahead_;  // jobs that wait for workers
+  LiveTotals totals_;
+  CopiedBytes copied_;
+  LiveTypes types_;
+  // Of each registered type what surfaces depend on: its visibility, or the linear colour that it gives.
+  std::vector<std::uint32_t> type_looks_;
+  std::map<GridHandle, LiveGrid> grids_;
+  LiveQueue queue_;  // last: its threads end first
+};
+
+}  // namespace quoin

@@ -1,0 +1,278 @@
+#include "scene/live_book.h"
+
+#include <condition_variable>
+#include <mutex>
+#include <new>
+
+#include <gtest/gtest.h>
+
+#include "scene/live_test_support.h"
+
+namespace quoin {
+namespace {
+
+// Workers that stop at a gate, and what they did.
+class GatedWork {
+ public:
+  explicit GatedWork(const LiveMeshOptions& options) : options_(options) {}
+
+  LiveQueue::Work work() {
+    return [this](LiveJob& job, LiveWorkspace& workspace) {
+      {
+        std::unique_lock lock(mutex_);
+        started_.push_back({job.chunk, job.distance});
+        progressed_.notify_all();
+        progressed_.wait(lock, [&] { return is_open_ || allowed_ != 0; });
+        if (!is_open_) --allowed_;
+      }
+      make_live_surface(options_, job, workspace);
+    };
+  }
+  void let_through(int jobs) {
+    const std::lock_guard lock(mutex_);
+    allowed_ += jobs;
+    progressed_.notify_all();
+  }
+  void open() {
+    const std::lock_guard lock(mutex_);
+    is_open_ = true;
+    progressed_.notify_all();
+  }
+  void wait_for_started(std::size_t jobs) {
+    std::unique_lock lock(mutex_);
+    progressed_.wait(lock, [&] { return started_.size() >= jobs; });
+  }
+  struct Started {
+    IVec3 chunk{0};
+    double distance = 0.0;
+  };
+  std::vector<Started> started() {
+    const std::lock_guard lock(mutex_);
+    return started_;
+  }
+
+ private:
+  LiveMeshOptions options_;
+  std::mutex mutex_;
+  std::condition_variable progressed_;
+  std::vector<Started> started_;
+  int allowed_ = 0;
+  bool is_open_ = false;
+};
+
+LiveMeshOptions blocky(unsigned threads) {
+  LiveMeshOptions options;
+  options.merge = false;
+  options.threads = {threads};
+  return options;
+}
+
+// A voxel in each of a row of chunks.
+void fill_row(Grid& grid, int chunks) {
+  for (int i = 0; i < chunks; ++i) grid.set({64 * i + 30, 30, 30}, 1);
+}
+
+std::size_t faces_of(const SurfaceUpdate& update) {
+  return update.surface == nullptr ? 0 : update.surface->quads.size();
+}
+
+TEST(LiveBook, TheNearestChunksComeFirst) {
+  OneGrid one;
+  fill_row(one.grid(), 200);
+  Instance& instance = one.scene.instances()[one.placed];
+  instance.voxel_size = 0.5;
+  instance.mirrored = true;
+  GatedWork gated(blocky(1));
+  gated.open();
+  LiveBook book(blocky(1), gated.work());
+  // Mirrored, chunk i lies from -32 i to -32 i - 32.
+  book.finish(one.scene, {-32 * 120.0, 0.0, 15.0});
+  const std::vector<GatedWork::Started> started = gated.started();
+  ASSERT_EQ(started.size(), 200U);
+  EXPECT_TRUE(started[0].chunk.x == 119 || started[0].chunk.x == 120);
+  for (std::size_t i = 1; i < started.size(); ++i) EXPECT_GE(started[i].distance, started[i - 1].distance) << i;
+  EXPECT_EQ(started.back().chunk.x, 0);
+}
+
+TEST(LiveBook, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
+  OneGrid one;
+  fill_row(one.grid(), 200);
+  GatedWork gated(blocky(1));
+  LiveBook book(blocky(1), gated.work());
+  book.update(one.scene, {0.0, 30.0, 30.0});
+  gated.wait_for_started(1);
+  book.update(one.scene, {64 * 150.0 + 30.0, 30.0, 30.0});
+  gated.let_through(1);
+  gated.wait_for_started(2);
+  EXPECT_EQ(gated.started()[1].chunk.x, 150);
+  EXPECT_EQ(book.pending(), 200U);
+  gated.open();
+  book.finish(one.scene, {});
+  EXPECT_EQ(book.take().size(), 200U);
+  EXPECT_EQ(book.facts().chunks_meshed, 200);
+}
+
+TEST(LiveBook, NoMoreIsCopiedAheadThanKeepsWorkersBusy) {
+  OneGrid one;
+  for (int i = 0; i < 400; ++i) {
+    for (int x = 0; x < 64; ++x) one.grid().set({64 * i + x, x, x / 2}, static_cast<VoxelType>(1 + x % 3));
+  }
+  const std::size_t chunk_bytes = one.grid().find_chunk({0, 0, 0})->bytes();
+  GatedWork gated(blocky(1));
+  LiveBook book(blocky(1), gated.work());
+  for (int i = 0; i < 10; ++i) book.update(one.scene, {64.0 * 40 * i, 0.0, 0.0});
+  // 64 that wait and one that runs, with two neighbours each at most.
+  EXPECT_LE(book.facts().copied_bytes, 3 * 65 * chunk_bytes);
+  EXPECT_GE(book.facts().copied_bytes, 64 * chunk_bytes);
+  gated.open();
+  book.finish(one.scene, {});
+  EXPECT_EQ(book.take().size(), 400U);
+  EXPECT_EQ(book.facts().copied_bytes, 0U);
+}
+
+TEST(LiveBook, OfSeveralEditsBeforeItsTurnTheLastCounts) {
+  OneGrid one;
+  fill_row(one.grid(), 2);
+  GatedWork gated(blocky(1));
+  LiveBook book(blocky(1), gated.work());
+  book.update(one.scene, {});
+  gated.wait_for_started(1);  // chunk 0; chunk 1 waits
+  for (int i = 1; i <= 5; ++i) {
+    one.grid().set({64 + 4 * i, 4, 4}, 1);
+    book.update(one.scene, {});
+  }
+  gated.open();
+  book.finish(one.scene, {});
+  EXPECT_EQ(book.facts().chunks_meshed, 2);
+  for (const SurfaceUpdate& update : book.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
+}
+
+TEST(LiveBook, AnEditDuringMeshingGivesBothInOrder) {
+  OneGrid one;
+  fill_row(one.grid(), 1);
+  GatedWork gated(blocky(1));
+  LiveBook book(blocky(1), gated.work());
+  book.update(one.scene, {});
+  gated.wait_for_started(1);
+  one.grid().set({3, 3, 3}, 1);
+  book.update(one.scene, {});
+  gated.let_through(1);
+  gated.wait_for_started(2);
+  std::vector<SurfaceUpdate> first = book.take();
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(faces_of(first[0]), 6U);
+  EXPECT_EQ(book.pending(), 1U);
+  gated.open();
+  book.finish(one.scene, {});
+  std::vector<SurfaceUpdate> second = book.take();
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(faces_of(second[0]), 12U);
+  EXPECT_EQ(book.pending(), 0U);
+}
+
+TEST(LiveBook, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
+  for (const bool replaced : {false, true}) {
+    SCOPED_TRACE(replaced);
+    OneGrid one;
+    fill_row(one.grid(), 1);
+    GatedWork gated(blocky(1));
+    LiveBook book(blocky(1), gated.work());
+    book.update(one.scene, {});
+    gated.wait_for_started(1);
+    one.grid() = Grid();
+    if (replaced) one.grid().fill_box({30, 30, 30}, {31, 30, 30}, 1);
+    book.update(one.scene, {});
+    EXPECT_EQ(book.pending(), replaced ? 1U : 0U);
+    gated.open();
+    book.finish(one.scene, {});
+    const std::vector<SurfaceUpdate> taken = book.take();
+    ASSERT_EQ(taken.size(), replaced ? 1U : 0U);
+    if (replaced) {
+      EXPECT_EQ(faces_of(taken[0]), 10U);
+    }
+  }
+}
+
+// Each edit adds a voxel that touches no other: the faces count the edits.
+TEST(LiveBook, NothingOlderIsGivenAfterSomethingNewer) {
+  LiveMeshOptions options = blocky(4);
+  OneGrid one;
+  LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+    // Jobs of one chunk overtake each other.
+    if (job.serial % 3 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    make_live_surface(options, job, workspace);
+  });
+  std::map<int, std::size_t> faces;
+  std::mt19937 random(3);
+  std::size_t edits = 0;
+  const auto take = [&] {
+    for (const SurfaceUpdate& update : book.take()) {
+      EXPECT_GT(faces_of(update), faces[update.chunk.x]);
+      faces[update.chunk.x] = faces_of(update);
+    }
+  };
+  for (int i = 0; i < 1000; ++i) {
+    const IVec3 at{64 * static_cast<int>(random() % 2) + 2 * (i % 30) + 1, 2 * (i / 30 % 30) + 1, 2 * (i / 900) + 1};
+    edits += one.grid().set(at, 1) ? 1 : 0;
+    book.update(one.scene, {});
+    if (random() % 4 == 0) take();
+    if (random() % 16 == 0) std::this_thread::sleep_for(std::chrono::microseconds(500));
+  }
+  book.finish(one.scene, {});
+  take();
+  EXPECT_EQ(faces[0] + faces[1], 6 * edits);
+}
+
+TEST(LiveBook, MemoryThatRunsOutIsTriedAgain) {
+  for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
+    LiveMeshOptions options = blocky(2);
+    options.style = style;
+    OneGrid one;
+    one.grid().fill_box({-5, -5, -5}, {5, 5, 5}, 1);
+    std::atomic<int> calls{0};
+    LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+      if (++calls % 2 == 1) throw std::bad_alloc();
+      make_live_surface(options, job, workspace);
+    });
+    ShownSurfaces shown;
+    int updates = 0;
+    do {
+      book.update(one.scene, {});
+      shown.apply(book.take());
+      ++updates;
+    } while (book.pending() != 0 && updates < 100'000'000);
+    expect_surfaces(shown, one.scene, options);
+    EXPECT_EQ(book.facts().out_of_memory, calls / 2);
+    EXPECT_GT(book.facts().out_of_memory, 0);
+  }
+}
+
+TEST(LiveBook, FinishSaysSoWhereMemoryNeverSuffices) {
+  OneGrid one;
+  fill_row(one.grid(), 3);
+  LiveBook book(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
+  EXPECT_THROW(book.finish(one.scene, {}), std::bad_alloc);
+  EXPECT_EQ(book.pending(), 3U);
+  EXPECT_TRUE(book.take().empty());
+}
+
+TEST(LiveBook, EndsWithoutMeshingWhatWaits) {
+  OneGrid one;
+  fill_row(one.grid(), 60);
+  std::atomic<int> started{0};
+  std::atomic<int> ended{0};
+  {
+    LiveBook book(blocky(2), [&](LiveJob&, LiveWorkspace&) {
+      ++started;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      ++ended;
+    });
+    book.update(one.scene, {});
+    while (started == 0) std::this_thread::yield();
+  }
+  EXPECT_EQ(started, ended);
+  EXPECT_LT(started, 60);
+}
+
+}  // namespace
+}  // namespace quoin

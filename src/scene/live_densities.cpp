@@ -1,0 +1,231 @@
+#include "scene/live_densities.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <quoin/grid/voxel_field.h>
+
+#include "grid/chunk_order.h"
+#include "grid/long_box.h"
+
+namespace quoin {
+namespace {
+
+// So many chunks of one update are compared voxel by voxel; an edit of more reaches most of what is beside them anyway.
+constexpr std::size_t kMostCompared = 32;
+
+std::uint64_t next_stamp() {
+  static std::atomic<std::uint64_t> count{0};
+  return count.fetch_add(1, std::memory_order_relaxed) + 1;
+}
+
+ChunkDifference everything() {
+  ChunkDifference all;
+  all.solid.add_all();
+  all.types.add_all();
+  return all;
+}
+
+// Which samples differ; null is far air.
+ChangeReach density_difference(const DensityChunk* before, const DensityChunk* after) {
+  static const DensityChunk kFarAir(DensityNeighbourhood{}.outside);
+  const DensityChunk& a = before == nullptr ? kFarAir : *before;
+  const DensityChunk& b = after == nullptr ? kFarAir : *after;
+  ChangeReach found;
+  std::array<Half, kChunkEdge> old_row;
+  std::array<Half, kChunkEdge> new_row;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      a.read_row(y, z, old_row);
+      b.read_row(y, z, new_row);
+      if (old_row == new_row) continue;
+      std::uint64_t changed = 0;
+      for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{old_row[x] != new_row[x]} << x;
+      found.add(y, z, changed);
+    }
+  }
+  return found;
+}
+
+const Chunk* materials_of(const DensityChunk* chunk) {
+  return chunk == nullptr ? nullptr : &chunk->materials();
+}
+
+}  // namespace
+
+LiveDensity::LiveDensity(CopiedNeighbourhood voxels, std::uint64_t version, std::shared_ptr<const LiveDensity> base,
+                         bool only_types)
+    : stamp_(next_stamp()),
+      version_(version),
+      voxels_(std::move(voxels)),
+      base_(std::move(base)),
+      only_types_(only_types) {}
+
+void LiveDensity::try_to_make() {
+  if (is_made()) return;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (lock.owns_lock() && !is_made()) make_locked();
+}
+
+void LiveDensity::make() {
+  if (is_made()) return;
+  const std::lock_guard lock(mutex_);
+  if (!is_made()) make_locked();
+}
+
+void LiveDensity::make_locked() {
+  const Neighbourhood voxels = voxels_.view();
+  std::unique_ptr<DensityChunk> made;
+  if (only_types_ && base_ != nullptr && base_->densities() != nullptr && voxels.centre() != nullptr) {
+    made = std::make_unique<DensityChunk>(*base_->densities());
+    made->materials() = *voxels.centre();
+  } else {
+    made = std::make_unique<DensityChunk>(density_of_voxels(voxels));
+    if (made->uniform() == DensityNeighbourhood{}.outside) made.reset();
+  }
+  if (base_ != nullptr) {
+    changed_densities_ = density_difference(base_->densities(), made.get());
+    changed_types_ = difference(materials_of(base_->densities()), materials_of(made.get())).types;
+    base_stamp_ = base_->stamp();
+    has_base_ = true;
+  }
+  densities_ = std::move(made);
+  is_made_.store(true, std::memory_order_release);
+  voxels_ = {};
+  base_.reset();
+}
+
+bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
+  if (stamp == stamp_) return true;
+  if (!has_base_ || base_stamp_ != stamp) return false;
+  // Vertices take the materials of their cells' corners, which end one sample past the chunk.
+  return !changed_densities_.is_within(reach, offset.x, offset.y, offset.z) &&
+         !changed_types_.is_within(1, offset.x, offset.y, offset.z);
+}
+
+// The chunks that came, went or were edited, sorted; `seen_` is brought up to date.
+std::vector<IVec3> DensityBook::changed_chunks(const Grid& grid) {
+  ++scans_;
+  std::vector<IVec3> changed;
+  for (const IVec3 chunk : grid.chunks()) {
+    Seen& seen = seen_[chunk];
+    const std::uint64_t version = grid.version(chunk);
+    seen.scan = scans_;
+    if (seen.version == version) continue;
+    seen.last_version = std::exchange(seen.version, version);
+    changed.push_back(chunk);
+  }
+  for (auto& [chunk, seen] : seen_) {
+    if (seen.scan == scans_) continue;
+    seen.last_version = std::exchange(seen.version, 0);
+    changed.push_back(chunk);
+  }
+  std::sort(changed.begin(), changed.end(), by_zyx);
+  return changed;
+}
+
+void DensityBook::follow(const Grid& grid, const ChunkCopies& copies, std::vector<IVec3>& changed,
+                         std::vector<IVec3>& reached) {
+  const bool is_first = slots_.empty();
+  changed = changed_chunks(grid);
+  // All are compared before any densities are given up: they tell what was there.
+  std::vector<Change> changes;
+  changes.reserve(changed.size());
+  for (const IVec3 chunk : changed) {
+    const bool compares = !is_first && changes.size() < kMostCompared;
+    changes.push_back({chunk, compares ? change_of(chunk, seen_[chunk].last_version, grid, copies) : everything()});
+  }
+  for (const Change& change : changes) reach_from(change, reached);
+  sort_and_unite(reached);
+  drop_what_is_gone(changed);
+}
+
+void DensityBook::reach_from(const Change& change, std::vector<IVec3>& reached) {
+  for (int i = 0; i < 27; ++i) {
+    const IVec3 at = neighbour_of(change.chunk, i);
+    const IVec3 offset = at - change.chunk;
+    const auto is_within = [&](const ChangeReach& reach, int samples) {
+      return reach.is_within(samples, offset.x, offset.y, offset.z);
+    };
+    if (is_within(change.difference.solid, kVoxelFieldReach)) {
+      invalidate(at, true);
+    } else if (i == 13 && change.difference.types.samples != 0) {
+      invalidate(at, false);
+    }
+    if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, 1)) {
+      reached.push_back(at);
+    }
+  }
+}
+
+void DensityBook::drop_what_is_gone(const std::vector<IVec3>& changed) {
+  std::erase_if(seen_, [](const auto& each) { return each.second.version == 0; });
+  for (const IVec3 chunk : changed) {
+    if (seen_.contains(chunk)) continue;
+    for (int i = 0; i < 27; ++i) {
+      if (!has_voxels_near(neighbour_of(chunk, i))) slots_.erase(neighbour_of(chunk, i));
+    }
+  }
+}
+
+// Where a chunk differs from what it was at `last_version`, as far as that is still known.
+ChunkDifference DensityBook::change_of(IVec3 chunk, std::uint64_t last_version, const Grid& grid,
+                                       const ChunkCopies& copies) const {
+  const Chunk* now = grid.find_chunk(chunk);
+  if (last_version == 0) return difference(nullptr, now);
+  if (const auto copy = copies.find(chunk, last_version)) return difference(&copy->chunk(), now);
+  const auto found = slots_.find(chunk);
+  if (found == slots_.end()) return everything();
+  const std::shared_ptr<LiveDensity> under_way = found->second.under_way.lock();
+  for (const std::shared_ptr<LiveDensity>& each : {found->second.kept, under_way}) {
+    const bool tells = each != nullptr && each->version() == last_version && each->is_made();
+    if (tells) return difference(materials_of(each->densities()), now);
+  }
+  return everything();
+}
+
+void DensityBook::invalidate(IVec3 chunk, bool solid) {
+  Slot& slot = slots_[chunk];
+  slot.under_way.reset();
+  (solid ? slot.is_solid_stale : slot.is_type_stale) = true;
+}
+
+bool DensityBook::has_voxels_near(IVec3 chunk) const {
+  for (int i = 0; i < 27; ++i) {
+    if (seen_.contains(neighbour_of(chunk, i))) return true;
+  }
+  return false;
+}
+
+LiveDensities DensityBook::around(const Grid& grid, IVec3 chunk, ChunkCopies& copies) {
+  LiveDensities all;
+  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(grid, neighbour_of(chunk, i), copies);
+  return all;
+}
+
+std::shared_ptr<LiveDensity> DensityBook::density(const Grid& grid, IVec3 chunk, ChunkCopies& copies) {
+  // As in a DensityGrid, the outermost chunks stay air.
+  if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
+  Slot& slot = slots_[chunk];
+  if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
+  if (std::shared_ptr<LiveDensity> under_way = slot.under_way.lock()) return under_way;
+  const bool only_types = slot.kept != nullptr && !slot.is_solid_stale;
+  auto made = std::make_shared<LiveDensity>(copies.around(grid, chunk), grid.version(chunk), slot.kept, only_types);
+  slot.under_way = made;
+  return made;
+}
+
+std::uint32_t DensityBook::keep(IVec3 chunk, const LiveDensities& made) {
+  std::uint32_t kept = 0;
+  for (int i = 0; i < 27; ++i) {
+    const std::shared_ptr<LiveDensity>& each = made[static_cast<std::size_t>(i)];
+    if (each == nullptr || !each->is_made()) continue;
+    const auto found = slots_.find(neighbour_of(chunk, i));
+    if (found == slots_.end() || found->second.under_way.lock() != each) continue;
+    found->second = Slot{each, {}, false, false};
+    kept |= std::uint32_t{1} << i;
+  }
+  return kept;
+}
+
+}  // namespace quoin

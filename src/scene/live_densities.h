@@ -1,0 +1,118 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/grid/grid.h>
+
+#include "grid/change_reach.h"
+#include "grid/chunk_difference.h"
+#include "grid/coordinate_hash.h"
+#include "scene/copied_chunk.h"
+
+namespace quoin {
+
+/// The densities of one chunk of voxels in one state, made by the first who needs them.
+///
+/// Threads: any; the voxels are let go once the densities are made.
+class LiveDensity {
+ public:
+  /// `version` is that of the chunk's own voxels. `base` are the densities of an earlier state, or null; with
+  /// `only_types`, the two differ in types alone.
+  LiveDensity(CopiedNeighbourhood voxels, std::uint64_t version, std::shared_ptr<const LiveDensity> base,
+              bool only_types);
+
+  /// Tells this state of this chunk from every other; 0 stands for far air, of which there is no object.
+  [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
+  [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] bool is_made() const { return is_made_.load(std::memory_order_acquire); }
+  /// Makes them unless another thread is about it. When that throws, nothing has happened.
+  void try_to_make();
+  /// Returns once they are made, by this thread or another.
+  void make();
+
+  /// Null where all is far air. Requires: is_made().
+  [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
+  /// Whether these are, for the chunk at an offset from this one that looks `reach` samples beyond its own, those of
+  /// `stamp`; false when that is not known. Requires: is_made().
+  [[nodiscard]] bool reads_as(std::uint64_t stamp, int reach, IVec3 offset) const;
+
+ private:
+  void make_locked();
+
+  const std::uint64_t stamp_;
+  const std::uint64_t version_;
+  std::mutex mutex_;
+  CopiedNeighbourhood voxels_;               // until made, as `base_`
+  std::shared_ptr<const LiveDensity> base_;  // made
+  const bool only_types_;
+  std::unique_ptr<const DensityChunk> densities_;
+  std::uint64_t base_stamp_ = 0;
+  bool has_base_ = false;
+  ChangeReach changed_densities_;  // from the base
+  ChangeReach changed_types_;
+  std::atomic<bool> is_made_{false};
+};
+
+/// The densities around a chunk; null is far air.
+using LiveDensities = std::array<std::shared_ptr<LiveDensity>, 27>;
+using DensityStamps = std::array<std::uint64_t, 27>;
+
+/// Follows the voxels of one grid: which densities hold still, and which chunks an edit reaches.
+///
+/// Threads: one.
+class DensityBook {
+ public:
+  /// `reach` is what meshing reads beyond a chunk's own samples.
+  explicit DensityBook(int reach) : reach_(reach) {}
+
+  void clear() { *this = DensityBook(reach_); }
+  /// Takes over what was edited since the last time: of all chunks, if any, in which the surface may have changed
+  /// (`reached`, sorted), and of those that came or went and all that changed (`changed`, sorted). The first time that
+  /// is everything.
+  void follow(const Grid& grid, const ChunkCopies& copies, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
+  /// Requires: `grid` is as `follow` saw it.
+  [[nodiscard]] LiveDensities around(const Grid& grid, IVec3 chunk, ChunkCopies& copies);
+  /// Keeps what workers made, as far as it holds still. Answers a bit for each that is new.
+  std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
+
+ private:
+  struct Slot {
+    std::shared_ptr<LiveDensity> kept;     // made
+    std::weak_ptr<LiveDensity> under_way;  // of the present state; held by jobs
+    bool is_solid_stale = true;            // `kept` is of other voxels
+    bool is_type_stale = true;
+  };
+
+  struct Change {
+    IVec3 chunk{0};
+    ChunkDifference difference;
+  };
+  [[nodiscard]] std::vector<IVec3> changed_chunks(const Grid& grid);
+  [[nodiscard]] ChunkDifference change_of(IVec3 chunk, std::uint64_t last_version, const Grid& grid,
+                                          const ChunkCopies& copies) const;
+  void reach_from(const Change& change, std::vector<IVec3>& reached);
+  void drop_what_is_gone(const std::vector<IVec3>& changed);
+  void invalidate(IVec3 chunk, bool solid);
+  [[nodiscard]] bool has_voxels_near(IVec3 chunk) const;
+  [[nodiscard]] std::shared_ptr<LiveDensity> density(const Grid& grid, IVec3 chunk, ChunkCopies& copies);
+
+  int reach_;
+  std::uint64_t scans_ = 0;
+  struct Seen {
+    std::uint64_t version = 0;
+    std::uint64_t last_version = 0;
+    std::uint64_t scan = 0;
+  };
+  std::unordered_map<IVec3, Seen, CoordinateHash> seen_;  // the chunks of the grid
+  std::unordered_map<IVec3, Slot, CoordinateHash> slots_;
+};
+
+}  // namespace quoin

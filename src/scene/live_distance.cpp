@@ -1,0 +1,49 @@
+#include "scene/live_distance.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <quoin/grid/chunk.h>
+
+#include "scene/instance_axes.h"
+
+namespace quoin {
+namespace {
+
+double distance_to_chunks(DVec3 point, const IBox& chunks) {
+  const DVec3 first = DVec3(chunks.min) * double{kChunkEdge};
+  const DVec3 last = DVec3(chunks.max) * double{kChunkEdge};
+  const double distance = glm::length(point - glm::clamp(point, first, last));
+  return distance >= 0.0 ? distance : 0.0;
+}
+
+}  // namespace
+
+void ChunkDistances::add(const Instance& instance, const SceneGrid& grid) {
+  Place place;
+  place.voxel_size = instance.voxel_size;
+  place.eye_in_grid =
+      glm::transpose(world_axes(instance)) * (eye_ - instance.position) / instance.voxel_size + grid.pivot;
+  place.least = distance_to_chunks(place.eye_in_grid, chunks_) * place.voxel_size;
+  places_.push_back(place);
+}
+
+void ChunkDistances::sort() {
+  std::sort(places_.begin(), places_.end(), [](const Place& a, const Place& b) { return a.least < b.least; });
+}
+
+double ChunkDistances::to(IVec3 chunk) const {
+  if (places_.empty()) return 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Place& place : places_) {
+    if (place.least >= least) break;
+    const double distance = distance_to_chunks(place.eye_in_grid, {chunk, chunk + 1}) * place.voxel_size;
+    least = std::min(least, distance);
+  }
+  return least;
+}
+
+}  // namespace quoin

@@ -1,0 +1,299 @@
+#include "scene/live_grid.h"
+
+#include <algorithm>
+#include <array>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+namespace {
+
+bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
+  if (chunk == nullptr) return false;
+  if (const auto uniform = chunk->uniform()) return *uniform != kAir;
+  return chunk->mixed()->layer_counts[axis][0] != 0;
+}
+
+// Quads belong to the chunk in which their lattice edge starts: it, or the next one along the edge, has a solid sample.
+bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
+  return grid.find_chunk(chunk) != nullptr || has_solid_first_layer(grid.find_chunk(chunk + IVec3{1, 0, 0}), 0) ||
+         has_solid_first_layer(grid.find_chunk(chunk + IVec3{0, 1, 0}), 1) ||
+         has_solid_first_layer(grid.find_chunk(chunk + IVec3{0, 0, 1}), 2);
+}
+
+}  // namespace
+
+// Keeps the totals right while a chunk's state changes.
+class LiveGrid::Change {
+ public:
+  Change(LiveTotals& totals, const LiveChunk& state) : totals_(totals), state_(state) {
+    totals_.unfinished -= state.is_unfinished() ? 1 : 0;
+    totals_.pending -= state.is_pending() ? 1 : 0;
+  }
+  Change(const Change&) = delete;
+  Change& operator=(const Change&) = delete;
+  ~Change() {
+    totals_.unfinished += state_.is_unfinished() ? 1 : 0;
+    totals_.pending += state_.is_pending() ? 1 : 0;
+  }
+
+ private:
+  LiveTotals& totals_;
+  const LiveChunk& state_;
+};
+
+LiveGrid::LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals, const CopiedBytes& copied)
+    : handle_(handle), options_(options), totals_(totals), copies_(copied), densities_(reach_of(options.occlusion)) {}
+
+void LiveGrid::follow(const Grid& grid, LiveClock::time_point now) {
+  if (identity_ == grid.identity() && version_ == grid.version()) return;
+  if (identity_ != grid.identity()) begin_anew();
+  identity_ = 0;  // stays so when memory runs out
+  if (options_.style == SurfaceStyle::Blocky) {
+    follow_blocky(grid, now);
+  } else {
+    follow_smooth(grid, now);
+  }
+  identity_ = grid.identity();
+  version_ = grid.version();
+}
+
+// What was made so far, or is being made, is of another grid.
+void LiveGrid::begin_anew() {
+  copies_.clear();
+  densities_.clear();
+  for (auto& [chunk, state] : chunks_) {
+    if (state.is_gone) continue;
+    waiting_.insert(chunk);
+    const Change change(totals_, state);
+    state.version = 0;
+    state.oldest = totals_.serial + 1;
+    state.last_stamps.reset();
+    state.surface.reset();
+    state.is_ready = false;
+    // It stays pending until it is seen whether the new grid has it.
+    state.is_waiting = true;
+  }
+}
+
+void LiveGrid::leave() {
+  std::vector<IVec3> all;
+  for (const auto& [chunk, state] : chunks_) {
+    if (!state.is_gone) all.push_back(chunk);
+  }
+  for (const IVec3 chunk : all) remove(chunk);
+  identity_ = 0;
+  copies_.clear();
+  densities_.clear();
+}
+
+void LiveGrid::follow_blocky(const Grid& grid, LiveClock::time_point now) {
+  ++scan_;
+  for (const IVec3 chunk : grid.chunks()) {
+    LiveChunk& state = chunks_[chunk];
+    const std::uint64_t version = grid.neighbourhood_version(chunk);
+    if (state.version != version || state.is_gone) mark(chunk, state, now);
+    state.version = version;
+    state.scan = scan_;
+  }
+  std::vector<IVec3> gone;
+  for (const auto& [chunk, state] : chunks_) {
+    if (state.scan != scan_ && !state.is_gone) gone.push_back(chunk);
+  }
+  for (const IVec3 chunk : gone) remove(chunk);
+}
+
+void LiveGrid::follow_smooth(const Grid& grid, LiveClock::time_point now) {
+  std::vector<IVec3> changed;
+  std::vector<IVec3> reached;
+  densities_.follow(grid, copies_, changed, reached);
+  std::vector<IVec3> asked;
+  for (const IVec3 chunk : changed) {
+    for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
+  }
+  for (const auto& [chunk, state] : chunks_) {
+    if (state.oldest > state.serial && !state.is_gone) asked.push_back(chunk);
+  }
+  sort_and_unite(asked);
+  for (const IVec3 chunk : asked) see_whether_meshed(grid, chunk, now);
+  for (const IVec3 chunk : reached) mark_if_there(chunk, now);
+}
+
+void LiveGrid::see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time_point now) {
+  const auto found = chunks_.find(chunk);
+  const bool is_there = found != chunks_.end() && !found->second.is_gone;
+  const bool is_meshed = can_own_smooth_quads(grid, chunk);
+  if (is_meshed && !is_there) mark(chunk, chunks_[chunk], now);
+  if (!is_meshed && is_there) remove(chunk);
+}
+
+void LiveGrid::mark_types(const Grid& grid, const std::vector<bool>& changed, LiveClock::time_point now) {
+  for (const IVec3 chunk : grid.chunks()) {
+    const std::vector<VoxelType> types = grid.find_chunk(chunk)->types();
+    const auto has_changed = [&](VoxelType type) { return type < changed.size() && changed[type]; };
+    if (std::none_of(types.begin(), types.end(), has_changed)) continue;
+    for (int i = 0; i < 27; ++i) mark_if_there(neighbour_of(chunk, i), now);
+  }
+}
+
+void LiveGrid::mark_if_there(IVec3 chunk, LiveClock::time_point now) {
+  const auto found = chunks_.find(chunk);
+  if (found != chunks_.end() && !found->second.is_gone) mark(chunk, found->second, now);
+}
+
+void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
+  waiting_.insert(chunk);
+  box_ = unite(box_, {chunk, chunk + 1});
+  const Change change(totals_, state);
+  // Jobs of a chunk that was here before may still be running.
+  if (state.oldest == 0) state.oldest = totals_.serial + 1;
+  // That it was gone need not be told any more.
+  if (state.is_gone) state.is_ready = false;
+  state.is_gone = false;
+  state.is_waiting = true;
+  state.seen = now;
+}
+
+void LiveGrid::wait_again(IVec3 chunk, LiveChunk& state) {
+  mark(chunk, state, state.seen);
+}
+
+void LiveGrid::remove(IVec3 chunk) {
+  LiveChunk& state = chunks_.at(chunk);
+  waiting_.erase(chunk);
+  {
+    const Change change(totals_, state);
+    state.version = 0;
+    state.oldest = totals_.serial + 1;
+    state.is_waiting = state.is_working = false;
+    state.is_ready = false;
+    state.is_gone = true;
+    state.surface.reset();
+    state.last_stamps.reset();
+    if (state.is_shown) make_ready(chunk, state);
+  }
+  if (!state.is_listed) chunks_.erase(chunk);
+}
+
+void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
+  state.is_ready = true;
+  if (state.is_listed) return;
+  totals_.ready.emplace_back(handle_, chunk);
+  state.is_listed = true;
+}
+
+std::unique_ptr<LiveJob> LiveGrid::make_job(const Grid& grid, IVec3 chunk, const LiveTypes& types) {
+  const LiveChunk& state = chunks_.at(chunk);
+  auto job = std::make_unique<LiveJob>();
+  job->grid = handle_;
+  job->chunk = chunk;
+  job->serial = ++totals_.serial;
+  job->seen = state.seen;
+  if (options_.style == SurfaceStyle::Blocky) {
+    job->voxels = copies_.around(grid, chunk);
+    job->types = types.registry;
+    return job;
+  }
+  job->densities = densities_.around(grid, chunk, copies_);
+  job->materials = types.materials;
+  job->type_generation = types.generation;
+  job->last_collected = state.collected;
+  if (state.last_stamps != nullptr && state.type_generation == types.generation) job->last_stamps = *state.last_stamps;
+  return job;
+}
+
+void LiveGrid::hand_over(IVec3 chunk, std::uint64_t serial) {
+  LiveChunk& state = chunks_.at(chunk);
+  waiting_.erase(chunk);
+  const Change change(totals_, state);
+  state.is_waiting = false;
+  state.is_working = true;
+  state.serial = serial;
+}
+
+bool LiveGrid::is_current(const LiveJob& job) const {
+  const auto found = chunks_.find(job.chunk);
+  if (found == chunks_.end()) return false;
+  const LiveChunk& state = found->second;
+  return !state.is_gone && !state.is_waiting && state.serial == job.serial && job.serial >= state.oldest;
+}
+
+void LiveGrid::withdrawn(const LiveJob& job) {
+  const auto found = chunks_.find(job.chunk);
+  if (found == chunks_.end() || found->second.serial != job.serial || found->second.is_gone) return;
+  LiveChunk& state = found->second;
+  wait_again(job.chunk, state);
+  const Change change(totals_, state);
+  state.is_working = false;
+}
+
+// Where new densities read as those that a surface is of, the surface counts as one of the new: later ones will be
+// compared with these.
+void LiveGrid::keep_densities(const LiveJob& job) {
+  const std::uint32_t kept = densities_.keep(job.chunk, job.densities);
+  const int reach = reach_of(options_.occlusion);
+  for (int i = 0; i < 27; ++i) {
+    if ((kept >> i & 1U) == 0) continue;
+    const LiveDensity& density = *job.densities[static_cast<std::size_t>(i)];
+    for (int n = 0; n < 27; ++n) {
+      const auto found = chunks_.find(neighbour_of(neighbour_of(job.chunk, i), n));
+      if (found == chunks_.end() || found->second.last_stamps == nullptr) continue;
+      std::uint64_t& stamp = (*found->second.last_stamps)[static_cast<std::size_t>(26 - n)];
+      if (density.reads_as(stamp, reach, neighbour_of(IVec3{0}, n))) stamp = density.stamp();
+    }
+  }
+}
+
+void LiveGrid::keep_stamps(const LiveJob& job, LiveChunk& state) {
+  if (state.last_stamps == nullptr) state.last_stamps = std::make_unique<DensityStamps>();
+  for (std::size_t i = 0; i < 27; ++i) {
+    (*state.last_stamps)[i] = job.densities[i] == nullptr ? 0 : job.densities[i]->stamp();
+  }
+  state.type_generation = job.type_generation;
+}
+
+void LiveGrid::collect(LiveJob& job) {
+  if (options_.style == SurfaceStyle::Smooth) keep_densities(job);
+  const auto found = chunks_.find(job.chunk);
+  if (found == chunks_.end() || found->second.is_gone) return;
+  LiveChunk& state = found->second;
+  const Change change(totals_, state);
+  const bool is_newest = job.serial == state.serial;
+  if (is_newest) state.is_working = false;
+  if (job.serial < state.oldest || job.serial <= state.collected) return;
+  // What another job gave meanwhile may differ from what this one was compared with.
+  const bool is_void = job.outcome == LiveJob::Outcome::OutOfMemory ||
+                       (job.outcome == LiveJob::Outcome::AsBefore && job.last_collected != state.collected);
+  if (is_void) {
+    if (is_newest) {
+      waiting_.insert(job.chunk);
+      state.is_waiting = true;
+    }
+    return;
+  }
+  state.collected = job.serial;
+  if (options_.style == SurfaceStyle::Smooth) keep_stamps(job, state);
+  if (job.outcome == LiveJob::Outcome::AsBefore) return;
+  state.surface = std::move(job.surface);
+  state.is_ready = false;
+  if (state.surface != nullptr || state.is_shown) make_ready(job.chunk, state);
+}
+
+void LiveGrid::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
+  const auto found = chunks_.find(chunk);
+  if (found == chunks_.end()) return;
+  LiveChunk& state = found->second;
+  {
+    const Change change(totals_, state);
+    state.is_listed = false;
+    if (state.is_ready) {
+      state.is_ready = false;
+      state.is_shown = state.surface != nullptr;
+      out.push_back({handle_, chunk, std::move(state.surface)});
+      state.surface.reset();
+    }
+  }
+  if (state.is_gone) chunks_.erase(found);
+}
+
+}  // namespace quoin

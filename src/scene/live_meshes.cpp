@@ -1,0 +1,44 @@
+#include <quoin/scene/live_meshes.h>
+
+#include "scene/live_book.h"
+
+namespace quoin {
+
+std::int64_t ChunkSurface::triangles() const {
+  return 2 * static_cast<std::int64_t>(quads.size()) + static_cast<std::int64_t>(smooth.indices.size() / 3);
+}
+
+std::size_t ChunkSurface::bytes() const {
+  return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
+         smooth.normals.capacity() * sizeof(Vec3) + smooth.openness.capacity() * sizeof(float) +
+         smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
+         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType);
+}
+
+struct LiveMeshes::Impl {
+  explicit Impl(const LiveMeshOptions& options)
+      : book(options,
+             [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
+  LiveBook book;
+};
+
+LiveMeshes::LiveMeshes(const LiveMeshOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+LiveMeshes::~LiveMeshes() = default;
+
+void LiveMeshes::update(const Scene& scene, DVec3 eye) {
+  impl_->book.update(scene, eye);
+}
+std::vector<SurfaceUpdate> LiveMeshes::take() {
+  return impl_->book.take();
+}
+std::size_t LiveMeshes::pending() const {
+  return impl_->book.pending();
+}
+void LiveMeshes::finish(const Scene& scene, DVec3 eye) {
+  impl_->book.finish(scene, eye);
+}
+LiveMeshes::Facts LiveMeshes::facts() const {
+  return impl_->book.facts();
+}
+
+}  // namespace quoin

@@ -1,0 +1,148 @@
+#include "scene/live_queue.h"
+
+#include <algorithm>
+#include <new>
+#include <utility>
+
+namespace quoin {
+namespace {
+
+double seconds(LiveClock::duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+// What only workers need; copies of chunks are let go as soon as they are done with.
+void drop_inputs(LiveJob& job) {
+  job.voxels = {};
+  job.types.reset();
+  job.materials.reset();
+}
+
+}  // namespace
+
+LiveQueue::LiveQueue(unsigned workers, Work work, std::function<void()> on_ready)
+    : work_(std::move(work)), on_ready_(std::move(on_ready)) {
+  try {
+    for (unsigned i = 0; i < workers; ++i) workers_.emplace_back([this] { run(); });
+  } catch (...) {
+    {
+      const std::lock_guard lock(mutex_);
+      is_stopping_ = true;
+    }
+    wake_.notify_all();
+    throw;
+  }
+}
+
+LiveQueue::~LiveQueue() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+  }
+  wake_.notify_all();
+  workers_.clear();
+}
+
+void LiveQueue::push(std::unique_ptr<LiveJob> job) {
+  {
+    const std::lock_guard lock(mutex_);
+    const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;
+    // Workers must not run out of memory where they say that they did.
+    if (done_.capacity() < wanted) done_.reserve(2 * wanted);
+    queue_.push_back(std::move(job));
+  }
+  wake_.notify_one();
+}
+
+std::vector<std::unique_ptr<LiveJob>> LiveQueue::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
+  std::vector<std::unique_ptr<LiveJob>> taken;
+  const std::lock_guard lock(mutex_);
+  taken.reserve(queue_.size());
+  std::erase_if(queue_, [&](std::unique_ptr<LiveJob>& job) {
+    if (!is_unwanted(*job)) return false;
+    taken.push_back(std::move(job));
+    return true;
+  });
+  return taken;
+}
+
+std::vector<double> LiveQueue::measure(const std::function<double(const LiveJob&)>& distance) {
+  std::vector<double> distances;
+  const std::lock_guard lock(mutex_);
+  distances.reserve(queue_.size());
+  for (const std::unique_ptr<LiveJob>& job : queue_) distances.push_back(job->distance = distance(*job));
+  std::sort(distances.begin(), distances.end());
+  return distances;
+}
+
+std::vector<std::unique_ptr<LiveJob>> LiveQueue::collect() {
+  std::vector<std::unique_ptr<LiveJob>> taken;
+  const std::lock_guard lock(mutex_);
+  taken.reserve(done_.size());
+  for (std::unique_ptr<LiveJob>& job : done_) taken.push_back(std::move(job));
+  done_.clear();
+  return taken;
+}
+
+void LiveQueue::wait(std::size_t waiting) {
+  std::unique_lock lock(mutex_);
+  progressed_.wait(lock, [&] { return queue_.size() <= waiting && (waiting != 0 || running_ == 0); });
+}
+
+LiveMeshes::Facts LiveQueue::facts() const {
+  const std::lock_guard lock(mutex_);
+  return facts_;
+}
+
+std::unique_ptr<LiveJob> LiveQueue::take_nearest() {
+  const auto nearest = std::min_element(queue_.begin(), queue_.end(), [](const auto& a, const auto& b) {
+    return a->distance != b->distance ? a->distance < b->distance : a->serial < b->serial;
+  });
+  std::unique_ptr<LiveJob> job = std::move(*nearest);
+  queue_.erase(nearest);
+  return job;
+}
+
+void LiveQueue::run() {
+  LiveWorkspace workspace;
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [&] { return is_stopping_ || !queue_.empty(); });
+    if (is_stopping_) return;
+    std::unique_ptr<LiveJob> job = take_nearest();
+    ++running_;
+    lock.unlock();
+    const LiveClock::time_point start = LiveClock::now();
+    try {
+      work_(*job, workspace);
+    } catch (const std::bad_alloc&) {
+      job->outcome = LiveJob::Outcome::OutOfMemory;
+      job->surface.reset();
+      workspace = {};
+    }
+    drop_inputs(*job);
+    const bool is_meshed = job->outcome == LiveJob::Outcome::Meshed;
+    finish(std::move(job), start);
+    if (is_meshed && on_ready_) on_ready_();
+    lock.lock();
+  }
+}
+
+void LiveQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start) {
+  {
+    const std::lock_guard lock(mutex_);
+    const LiveClock::time_point now = LiveClock::now();
+    if (job->outcome == LiveJob::Outcome::Meshed) {
+      ++facts_.chunks_meshed;
+      facts_.last_mesh_seconds = seconds(now - start);
+      facts_.last_latency_seconds = seconds(now - job->seen);
+    } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
+      ++facts_.out_of_memory;
+    }
+    done_.push_back(std::move(job));
+    --running_;
+  }
+  progressed_.notify_all();
+}
+
+}  // namespace quoin

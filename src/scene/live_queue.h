@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/smooth.h>
+#include <quoin/scene/live_meshes.h>
+
+#include "mesh/smooth_material.h"
+#include "scene/copied_chunk.h"
+#include "scene/live_densities.h"
+
+namespace quoin {
+
+using LiveClock = std::chrono::steady_clock;
+
+/// A chunk that is to be meshed, with all that takes, and later its surface.
+struct LiveJob {
+  GridHandle grid;
+  IVec3 chunk{0};
+  std::uint64_t serial = 0;
+  double distance = 0.0;       ///< from the eye; the least comes first
+  LiveClock::time_point seen;  ///< when the edit was
+
+  CopiedNeighbourhood voxels;                         ///< blocky
+  std::shared_ptr<const VoxelRegistry> types;         ///< blocky
+  LiveDensities densities;                            ///< smooth
+  std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth
+  /// Smooth: the stamps of the densities of which the last surface is; meshing what they say again is spared.
+  std::optional<DensityStamps> last_stamps;
+  std::uint64_t last_collected = 0;   ///< the job whose surface that was
+  std::uint64_t type_generation = 0;  ///< of `materials`
+
+  enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
+  Outcome outcome = Outcome::Meshed;
+  std::shared_ptr<const ChunkSurface> surface;  ///< null where there is nothing to see
+};
+
+/// What a worker keeps from chunk to chunk.
+struct LiveWorkspace {
+  std::optional<BlockyMesher> blocky;
+  std::optional<SmoothMesher> smooth;
+  QuadBuffer quads;
+  SmoothChunkMesh mesh;
+};
+
+/// Workers, the jobs that wait for them, nearest first, and those that are done.
+///
+/// Threads: all calls come from one thread.
+class LiveQueue {
+ public:
+  /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory.
+  using Work = std::function<void(LiveJob&, LiveWorkspace&)>;
+
+  /// `on_ready`, if any, is called by a worker after each surface.
+  LiveQueue(unsigned workers, Work work, std::function<void()> on_ready);
+  /// Waits for jobs that were started; gives up the rest.
+  ~LiveQueue();
+  LiveQueue(const LiveQueue&) = delete;
+  LiveQueue& operator=(const LiveQueue&) = delete;
+
+  void push(std::unique_ptr<LiveJob> job);
+  /// Takes back what no worker has started of the jobs for which `is_unwanted`.
+  [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
+  /// Gives the jobs that wait new distances; answers these, the least first.
+  [[nodiscard]] std::vector<double> measure(const std::function<double(const LiveJob&)>& distance);
+  /// The jobs that were done since the last call, in the order in which they were.
+  [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
+  /// Returns once at most `waiting` jobs wait for workers; with 0, once none is left at all.
+  void wait(std::size_t waiting);
+  /// All but `copied_bytes`.
+  [[nodiscard]] LiveMeshes::Facts facts() const;
+
+ private:
+  void run();
+  void finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start);
+  [[nodiscard]] std::unique_ptr<LiveJob> take_nearest();
+
+  const Work work_;
+  const std::function<void()> on_ready_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::condition_variable progressed_;
+  bool is_stopping_ = false;
+  std::size_t running_ = 0;
+  std::vector<std::unique_ptr<LiveJob>> queue_;
+  std::vector<std::unique_ptr<LiveJob>> done_;  // with room for all that wait and run
+  LiveMeshes::Facts facts_;
+  std::vector<std::jthread> workers_;  // last: they end first
+};
+
+/// Makes the surface of a job's chunk.
+void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace);
+
+}  // namespace quoin

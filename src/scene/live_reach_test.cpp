@@ -1,0 +1,177 @@
+// Which chunks are meshed again after an edit.
+
+#include <quoin/scene/live_meshes.h>
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "scene/copied_chunk.h"
+#include "scene/live_test_support.h"
+
+namespace quoin {
+namespace {
+
+using ChunkSet = std::set<std::array<int, 3>>;
+
+std::array<int, 3> key(IVec3 chunk) {
+  return {chunk.x, chunk.y, chunk.z};
+}
+
+class FollowedGrid {
+ public:
+  explicit FollowedGrid(SurfaceStyle style) : meshes(options_of(style)) {}
+
+  static LiveMeshOptions options_of(SurfaceStyle style) {
+    LiveMeshOptions options;
+    options.style = style;
+    options.threads = {2};
+    return options;
+  }
+  // How many chunks were meshed since the last call, and which were given.
+  std::int64_t meshed(ChunkSet& given) {
+    const std::int64_t before = meshes.facts().chunks_meshed;
+    meshes.finish(one.scene, {});
+    given.clear();
+    const std::vector<SurfaceUpdate> updates = meshes.take();
+    for (const SurfaceUpdate& update : updates) given.insert(key(update.chunk));
+    shown.apply(updates);
+    return meshes.facts().chunks_meshed - before;
+  }
+
+  OneGrid one;
+  LiveMeshes meshes;
+  ShownSurfaces shown;
+};
+
+TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
+  FollowedGrid followed(SurfaceStyle::Blocky);
+  Grid& grid = followed.one.grid();
+  for (int i = 0; i < 27; ++i) grid.set(neighbour_of({0, 0, 0}, i) * 64 + 30, 1);
+  ChunkSet given;
+  EXPECT_EQ(followed.meshed(given), 27);
+  std::mt19937 random(5);
+  for (int i = 0; i < 60; ++i) {
+    const auto place = [&] { return std::array{0, 1, 31, 62, 63}[random() % 5]; };
+    const IVec3 at{place(), place(), place()};
+    ChunkSet reached;
+    for (int n = 0; n < 27; ++n) reached.insert(key(chunk_of(neighbour_of(at, n))));
+    ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : kAir));
+    EXPECT_EQ(followed.meshed(given), static_cast<std::int64_t>(reached.size()));
+    EXPECT_EQ(given, reached);
+  }
+}
+
+// Those of which a density field says that a sample changed within reach.
+ChunkSet chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
+  DensityGrid edited = before.clone();
+  edited.take_dirty(reach);
+  for (const IVec3 chunk : before.chunks()) {
+    if (after.find_chunk(chunk) == nullptr) edited.put_chunk(chunk, DensityChunk(DensityNeighbourhood{}.outside));
+  }
+  for (const IVec3 chunk : after.chunks()) edited.put_chunk(chunk, *after.find_chunk(chunk));
+  ChunkSet all;
+  for (const IVec3 chunk : edited.take_dirty(reach)) all.insert(key(chunk));
+  return all;
+}
+
+// The chunks that can own quads and read a density that differs, or a type of a solid sample that does.
+ChunkSet chunks_that_read_changes(const DensityGrid& before, const DensityGrid& after, const ChunkSet& asked) {
+  const int reach = reach_of({});
+  ChunkSet changed;
+  const ChunkSet near = chunks_near_changes(before, after, reach);
+  for (const auto& each : asked) {
+    if (!near.contains(each)) continue;
+    const IVec3 chunk{each[0], each[1], each[2]};
+    const DensityNeighbourhood a = before.neighbourhood(chunk);
+    const DensityNeighbourhood b = after.neighbourhood(chunk);
+    bool differs = false;
+    for (int z = -reach; z < kChunkEdge + reach && !differs; ++z) {
+      for (int y = -reach; y < kChunkEdge + reach && !differs; ++y) {
+        for (int x = -reach; x < kChunkEdge + reach && !differs; ++x) {
+          differs = a.get({x, y, z}) != b.get({x, y, z});
+          const IVec3 p{x, y, z};
+          const bool has_material = glm::clamp(p, IVec3(-1), IVec3(64)) == p;
+          const IVec3 sample = chunk * 64 + p;
+          differs = differs || (has_material && before.material(sample) != after.material(sample));
+        }
+      }
+    }
+    if (differs) changed.insert(each);
+  }
+  return changed;
+}
+
+TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
+  FollowedGrid followed(SurfaceStyle::Smooth);
+  Grid& grid = followed.one.grid();
+  grid.fill_box({-40, 0, -40}, {90, 20, 90}, 1);
+  grid.fill_sphere({60, 30, 60}, 24.0, 3);
+  ChunkSet given;
+  followed.meshed(given);
+  std::mt19937 random(5);
+  for (int i = 0; i < 12; ++i) {
+    SCOPED_TRACE(i);
+    const DensityGrid before = field_from_grid(grid);
+    const auto place = [&] { return std::array{2, 9, 13, 16, 30, 46, 49, 52, 59, 63}[random() % 10]; };
+    const IVec3 at{place(), 10 + static_cast<int>(random() % 20), place()};
+    ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : i % 3 == 0 ? 5 : kAir));
+    const DensityGrid after = field_from_grid(grid);
+    ChunkSet asked;
+    for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk));
+    for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{1, 0, 0}));
+    for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 1, 0}));
+    for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 0, 1}));
+    const ChunkSet reached = chunks_that_read_changes(before, after, asked);
+    const std::int64_t meshed = followed.meshed(given);
+    // Not all that were asked can own a quad.
+    EXPECT_LE(meshed, static_cast<std::int64_t>(reached.size()));
+    EXPECT_GT(meshed, 0);
+    for (const auto& each : given) EXPECT_TRUE(reached.contains(each));
+    expect_smooth(followed.shown, followed.one.scene, FollowedGrid::options_of(SurfaceStyle::Smooth));
+  }
+}
+
+TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
+  FollowedGrid followed(SurfaceStyle::Smooth);
+  Grid& grid = followed.one.grid();
+  grid.fill_box({-40, -40, -40}, {100, 100, 100}, 1);
+  ChunkSet given;
+  EXPECT_GT(followed.meshed(given), 0);
+  // Painted, far from every face: the chunk's densities are the same, and no vertex takes its type.
+  grid.set({30, 30, 30}, 3);
+  EXPECT_LE(followed.meshed(given), 1);
+  // A type below the face changes colours of that chunk alone.
+  grid.set({30, 100, 30}, 3);
+  EXPECT_EQ(followed.meshed(given), 1);
+  EXPECT_EQ(given, (ChunkSet{{0, 1, 0}}));
+  expect_smooth(followed.shown, followed.one.scene, FollowedGrid::options_of(SurfaceStyle::Smooth));
+}
+
+TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
+  for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
+    FollowedGrid followed(style);
+    followed.one.grid().fill_box({10, 10, 10}, {20, 20, 20}, 1);
+    followed.one.grid().fill_box({330, 10, 10}, {340, 20, 20}, 2);
+    ChunkSet given;
+    EXPECT_EQ(followed.meshed(given), 2);
+    VoxelRegistry& types = followed.one.scene.types;
+    VoxelProperties properties = types[2];
+    properties.name = "glowing";
+    properties.emission = 3.0F;
+    types.replace(2, properties);
+    EXPECT_EQ(followed.meshed(given), 0);
+    properties.visibility = Visibility::Opaque;
+    properties.colour.r = 77;
+    types.replace(2, properties);
+    EXPECT_EQ(followed.meshed(given), 1);
+    EXPECT_EQ(given, (ChunkSet{{5, 0, 0}}));
+    expect_surfaces(followed.shown, followed.one.scene, FollowedGrid::options_of(style));
+    // Of a type that nothing has.
+    EXPECT_TRUE(types.add(properties).has_value());
+    EXPECT_EQ(followed.meshed(given), 0);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

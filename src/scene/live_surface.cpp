@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <cassert>
+
+#include "scene/live_queue.h"
+
+namespace quoin {
+namespace {
+
+template <class T>
+void copy_exactly(const Buffer<T>& from, Buffer<T>& to) {
+  to.resize(from.size());
+  std::copy(from.begin(), from.end(), to.begin());
+}
+
+void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  if (!workspace.blocky) workspace.blocky.emplace();
+  QuadOptions wanted;
+  wanted.merge = options.merge;
+  const VoxelRegistry& types = *job.types;
+  workspace.blocky->mesh(job.voxels.view(), types, wanted, workspace.quads);
+  if (workspace.quads.empty()) return;
+  auto surface = std::make_shared<ChunkSurface>();
+  surface->style = SurfaceStyle::Blocky;
+  surface->quads.reserve(workspace.quads.size());
+  for (const bool transparent : {false, true}) {
+    for (const Quad quad : workspace.quads) {
+      if (types.is_transparent(quad.type()) == transparent) surface->quads.push_back(quad);
+    }
+    if (!transparent) surface->opaque_quads = surface->quads.size();
+  }
+  job.surface = std::move(surface);
+}
+
+// The densities around the chunk at an offset of 0 or -1 on each axis, as far as those around this one tell.
+DensityNeighbourhood moved(const DensityNeighbourhood& chunks, IVec3 offset) {
+  DensityNeighbourhood result;
+  result.outside = chunks.outside;
+  std::size_t i = 0;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx, ++i) {
+        const IVec3 at = IVec3{dx, dy, dz} + offset;
+        if (std::min({at.x, at.y, at.z}) >= -1) result.chunks[i] = chunks.at(at.x, at.y, at.z);
+      }
+    }
+  }
+  return result;
+}
+
+// A vertex of a cell before the chunk's own looks as it does in that cell's chunk.
+void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials, ChunkSurface& surface) {
+  std::array<DensityNeighbourhood, 8> around;
+  for (int i = 0; i < 8; ++i) around[static_cast<std::size_t>(i)] = moved(chunks, -IVec3{i & 1, i >> 1 & 1, i >> 2});
+  surface.albedo.reserve(surface.smooth.cells.size());
+  surface.types.reserve(surface.smooth.cells.size());
+  for (const SmoothCell cell : surface.smooth.cells) {
+    const std::size_t previous = cell.bits >> SmoothCell::kPreviousShift & 7U;
+    const SurfaceMaterial material = materials.of_cell(around[previous], cell.cell(), 0);
+    surface.albedo.push_back(material.albedo);
+    surface.types.push_back(material.type);
+  }
+}
+
+bool reads_as_before(const LiveJob& job, int reach) {
+  if (!job.last_stamps.has_value()) return false;
+  for (int i = 0; i < 27; ++i) {
+    const auto& density = job.densities[static_cast<std::size_t>(i)];
+    const std::uint64_t last = (*job.last_stamps)[static_cast<std::size_t>(i)];
+    // From that chunk, this one lies the other way.
+    const IVec3 offset = -neighbour_of(IVec3{0}, i);
+    if (density == nullptr ? last != 0 : !density->reads_as(last, reach, offset)) return false;
+  }
+  return true;
+}
+
+// What no other worker is about comes first; what others are about is there, or nearly so, by then.
+DensityNeighbourhood make_densities(const LiveDensities& densities) {
+  DensityNeighbourhood chunks;
+  for (const auto& density : densities) {
+    if (density != nullptr) density->try_to_make();
+  }
+  for (std::size_t i = 0; i < 27; ++i) {
+    if (densities[i] == nullptr) continue;
+    densities[i]->make();
+    chunks.chunks[i] = densities[i]->densities();
+  }
+  return chunks;
+}
+
+void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  const DensityNeighbourhood chunks = make_densities(job.densities);
+  if (reads_as_before(job, reach_of(options.occlusion))) {
+    job.outcome = LiveJob::Outcome::AsBefore;
+    return;
+  }
+  if (!workspace.smooth) workspace.smooth.emplace();
+  SmoothOptions wanted;
+  wanted.occlusion = options.occlusion;
+  wanted.split_sheets = true;
+  workspace.smooth->mesh(chunks, wanted, workspace.mesh);
+  if (workspace.mesh.indices.empty()) return;
+  auto surface = std::make_shared<ChunkSurface>();
+  surface->style = SurfaceStyle::Smooth;
+  copy_exactly(workspace.mesh.positions, surface->smooth.positions);
+  copy_exactly(workspace.mesh.normals, surface->smooth.normals);
+  copy_exactly(workspace.mesh.openness, surface->smooth.openness);
+  copy_exactly(workspace.mesh.cells, surface->smooth.cells);
+  copy_exactly(workspace.mesh.indices, surface->smooth.indices);
+  add_materials(chunks, *job.materials, *surface);
+  job.surface = std::move(surface);
+}
+
+}  // namespace
+
+void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  job.outcome = LiveJob::Outcome::Meshed;
+  if (options.style == SurfaceStyle::Blocky) {
+    make_blocky(options, job, workspace);
+  } else {
+    make_smooth(options, job, workspace);
+  }
+}
+
+}  // namespace quoin

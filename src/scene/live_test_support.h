@@ -1,0 +1,328 @@
+#pragma once
+
+// Scenes that are edited at random, and what their surfaces should be.
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <random>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/grid/voxel_field.h>
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/smooth_mesh.h>
+#include <quoin/scene/live_meshes.h>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+
+inline bool operator<(const SurfaceUpdate& a, const SurfaceUpdate& b) {
+  return a.grid == b.grid ? by_zyx(a.chunk, b.chunk) : a.grid < b.grid;
+}
+
+/// Grass, glass and stone.
+inline VoxelRegistry live_types() {
+  VoxelRegistry types;
+  VoxelProperties properties;
+  properties.colour = {200, 30, 90, 255};
+  EXPECT_TRUE(types.add(properties).has_value());
+  properties.colour = {0, 130, 190, 120};
+  properties.visibility = Visibility::Transparent;
+  EXPECT_TRUE(types.add(properties).has_value());
+  properties.colour = {77, 77, 70, 255};
+  properties.visibility = Visibility::Opaque;
+  EXPECT_TRUE(types.add(properties).has_value());
+  return types;
+}
+
+/// What a client keeps of the updates.
+class ShownSurfaces {
+ public:
+  void apply(const std::vector<SurfaceUpdate>& updates) {
+    std::set<std::pair<GridHandle, std::array<int, 3>>> given;
+    for (const SurfaceUpdate& update : updates) {
+      EXPECT_TRUE(given.insert({update.grid, {update.chunk.x, update.chunk.y, update.chunk.z}}).second)
+          << "given twice";
+      const auto found = shown_.find(update);
+      if (found != shown_.end()) shown_.erase(found);
+      if (update.surface == nullptr) {
+        EXPECT_TRUE(found != shown_.end()) << "nothing was there to take away";
+        continue;
+      }
+      EXPECT_FALSE(update.surface->is_empty());
+      shown_.insert(update);
+    }
+  }
+  [[nodiscard]] const std::set<SurfaceUpdate>& all() const { return shown_; }
+  [[nodiscard]] const ChunkSurface* find(GridHandle grid, IVec3 chunk) const {
+    const auto found = shown_.find({grid, chunk, nullptr});
+    return found == shown_.end() ? nullptr : found->surface.get();
+  }
+
+ private:
+  std::set<SurfaceUpdate> shown_;
+};
+
+inline std::set<GridHandle> drawn_grids(const Scene& scene, bool hidden_too) {
+  std::set<GridHandle> drawn;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (instance.visible || hidden_too) drawn.insert(instance.grid);
+  });
+  return drawn;
+}
+
+inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
+  BlockyMesher mesher;
+  std::size_t surfaces = 0;
+  for (const GridHandle handle : drawn_grids(scene, options.hidden)) {
+    const Grid& grid = scene.grids()[handle].grid;
+    for (const IVec3 chunk : grid.chunks()) {
+      QuadBuffer quads;
+      QuadOptions wanted;
+      wanted.merge = options.merge;
+      mesher.mesh(grid.neighbourhood(chunk), scene.types, wanted, quads);
+      const auto end_of_opaque = std::stable_partition(
+          quads.begin(), quads.end(), [&](Quad quad) { return !scene.types.is_transparent(quad.type()); });
+      const ChunkSurface* surface = shown.find(handle, chunk);
+      ASSERT_EQ(surface == nullptr, quads.empty());
+      if (surface == nullptr) continue;
+      ++surfaces;
+      ASSERT_EQ(surface->style, SurfaceStyle::Blocky);
+      ASSERT_EQ(surface->quads, quads);
+      ASSERT_EQ(surface->opaque_quads, static_cast<std::size_t>(end_of_opaque - quads.begin()));
+      ASSERT_EQ(surface->triangles(), 2 * static_cast<std::int64_t>(quads.size()));
+    }
+  }
+  EXPECT_EQ(shown.all().size(), surfaces);
+}
+
+/// A corner of a triangle with all that it carries, in numbers that compare.
+using SmoothCorner = std::array<float, 12>;
+using SmoothTriangles = std::vector<std::array<SmoothCorner, 3>>;
+
+inline SmoothCorner corner_of(Vec3 p, Vec3 n, float openness, const LinearRgba16& colour, VoxelType type) {
+  return {p.x,
+          p.y,
+          p.z,
+          n.x,
+          n.y,
+          n.z,
+          openness,
+          float(colour[0]),
+          float(colour[1]),
+          float(colour[2]),
+          float(colour[3]),
+          float(type)};
+}
+
+inline void sort_triangles(SmoothTriangles& triangles) {
+  for (auto& t : triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  std::sort(triangles.begin(), triangles.end());
+}
+
+inline SmoothTriangles triangles_of(const ChunkSurface& surface, IVec3 chunk) {
+  SmoothTriangles all;
+  const SmoothChunkMesh& mesh = surface.smooth;
+  const auto corner = [&](std::size_t i) {
+    const std::uint32_t v = mesh.indices[i];
+    const Vec3 position(DVec3(mesh.positions[v]) + DVec3(chunk) * 64.0);
+    return corner_of(position, mesh.normals[v], mesh.openness.empty() ? 1.0F : mesh.openness[v], surface.albedo[v],
+                     surface.types[v]);
+  };
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) all.push_back({corner(i), corner(i + 1), corner(i + 2)});
+  return all;
+}
+
+inline SmoothTriangles triangles_of(const SmoothMesh& mesh) {
+  SmoothTriangles all;
+  const auto corner = [&](std::size_t i) {
+    const std::uint32_t v = mesh.indices[i];
+    return corner_of(mesh.positions[v], mesh.normals[v], mesh.openness.empty() ? 1.0F : mesh.openness[v],
+                     mesh.albedo[v], mesh.types[v]);
+  };
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) all.push_back({corner(i), corner(i + 1), corner(i + 2)});
+  return all;
+}
+
+inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
+  const std::set<GridHandle> drawn = drawn_grids(scene, options.hidden);
+  for (const SurfaceUpdate& each : shown.all()) EXPECT_TRUE(drawn.contains(each.grid));
+  for (const GridHandle handle : drawn) {
+    SmoothMeshOptions wanted;
+    wanted.occlusion = options.occlusion;
+    const auto whole = build_smooth_mesh(field_from_grid(scene.grids()[handle].grid), scene.types, wanted);
+    ASSERT_TRUE(whole.has_value());
+    SmoothTriangles expected = triangles_of(*whole);
+    SmoothTriangles found;
+    for (const SurfaceUpdate& each : shown.all()) {
+      if (each.grid != handle) continue;
+      ASSERT_EQ(each.surface->style, SurfaceStyle::Smooth);
+      const SmoothTriangles part = triangles_of(*each.surface, each.chunk);
+      found.insert(found.end(), part.begin(), part.end());
+    }
+    sort_triangles(expected);
+    sort_triangles(found);
+    ASSERT_EQ(found.size(), expected.size());
+    ASSERT_TRUE(found == expected);
+  }
+}
+
+inline void expect_surfaces(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
+  if (options.style == SurfaceStyle::Blocky) {
+    expect_blocky(shown, scene, options);
+  } else {
+    expect_smooth(shown, scene, options);
+  }
+}
+
+/// A scene of one grid, seen once.
+struct OneGrid {
+  OneGrid() {
+    scene.types = live_types();
+    instance.grid = handle = scene.add_grid({});
+    placed = scene.add_instance(instance);
+  }
+  Grid& grid() { return scene.grids()[handle].grid; }
+
+  Scene scene;
+  GridHandle handle;
+  Instance instance;
+  InstanceHandle placed;
+};
+
+/// Edits a scene in all ways that surfaces depend on.
+class SceneEditor {
+ public:
+  explicit SceneEditor(unsigned seed) : random_(seed) {
+    scene.types = live_types();
+    add_grid();
+  }
+
+  int below(int end) { return static_cast<int>(random_() % static_cast<unsigned>(end)); }
+
+  void edit() {
+    if (scene.grids().empty()) add_grid();
+    switch (const int which = below(40)) {
+      case 0:
+        return add_grid();
+      case 1:
+        return change_instances();
+      case 2:
+        return replace_grid();
+      case 3:
+        scene.remove_grid(any(scene.grids().handles()));
+        return;
+      case 4:
+        return change_types();
+      case 5:
+        scene.grids()[any(scene.grids().handles())].grid.clear();
+        return;
+      default:
+        return edit_voxels(scene.grids()[any(scene.grids().handles())].grid, which);
+    }
+  }
+
+  DVec3 eye() { return {below(200) - 100, below(200) - 100, below(200) - 100}; }
+
+  Scene scene;
+
+ private:
+  template <class T>
+  T any(const std::vector<T>& all) {
+    return all[static_cast<std::size_t>(below(static_cast<int>(all.size())))];
+  }
+
+  // More often than not beside a border between chunks.
+  int place() { return below(3) != 0 ? 64 * (below(3) - 1) + below(5) - 2 : below(140) - 70; }
+
+  Grid small_grid() {
+    Grid grid;
+    for (int i = 0; i < 3; ++i) edit_voxels(grid, 20);
+    return grid;
+  }
+
+  void add_grid() {
+    SceneGrid grid;
+    grid.grid = small_grid();
+    Instance instance;
+    instance.grid = scene.add_grid(std::move(grid));
+    instance.position = eye();
+    scene.add_instance(instance);
+  }
+
+  void change_instances() {
+    const std::vector<InstanceHandle> all = scene.instances().handles();
+    if (all.empty() || below(3) == 0) {
+      Instance instance;
+      instance.grid = any(scene.grids().handles());
+      instance.mirrored = below(2) == 0;
+      scene.add_instance(instance);
+    } else if (below(4) == 0) {
+      scene.remove_instance(any(all));
+    } else {
+      Instance& instance = scene.instances()[any(all)];
+      instance.visible = !instance.visible;
+    }
+  }
+
+  void replace_grid() {
+    Grid& grid = scene.grids()[any(scene.grids().handles())].grid;
+    switch (below(3)) {
+      case 0:
+        grid = grid.clone();
+        return;
+      case 1:
+        grid = small_grid();
+        return;
+      default:
+        std::swap(grid, scene.grids()[any(scene.grids().handles())].grid);
+        return;
+    }
+  }
+
+  void change_types() {
+    const auto type = static_cast<VoxelType>(1 + below(static_cast<int>(scene.types.size()) - 1));
+    VoxelProperties properties = scene.types[type];
+    if (below(2) == 0) {
+      properties.visibility =
+          properties.visibility == Visibility::Opaque ? Visibility::Transparent : Visibility::Opaque;
+    }
+    if (below(2) == 0) properties.colour.g = static_cast<std::uint8_t>(below(256));
+    if (below(4) == 0) {
+      EXPECT_TRUE(scene.types.add(properties).has_value());
+    } else {
+      scene.types.replace(type, properties);
+    }
+  }
+
+  void edit_voxels(Grid& grid, int which) {
+    const auto type = static_cast<VoxelType>(below(6));
+    const IVec3 at{place(), place(), place()};
+    if (which < 12) {
+      grid.set(at, type);
+    } else if (which < 18) {
+      // Done and undone: the versions have risen all the same.
+      const VoxelType before = grid.get(at);
+      grid.set(at, type);
+      grid.set(at, before);
+    } else if (which < 32) {
+      grid.fill_box(at, at + IVec3{below(40), below(9), below(40)}, type);
+    } else if (which < 36) {
+      grid.fill_sphere(at, below(12), type);
+    } else {
+      const IBox box{at - 10, at + 10};
+      grid.edit(box,
+                [&](IVec3, VoxelType current) { return current == kAir ? kAir : static_cast<VoxelType>(1 + type); });
+    }
+  }
+
+  std::mt19937 random_;
+};
+
+}  // namespace quoin
