@@ -23,6 +23,7 @@ namespace quoin::vulkan {
   X(vkGetDeviceProcAddr)                       \
   X(vkGetPhysicalDeviceFeatures)               \
   X(vkGetPhysicalDeviceFeatures2)              \
+  X(vkGetPhysicalDeviceFormatProperties)       \
   X(vkGetPhysicalDeviceMemoryProperties)       \
   X(vkGetPhysicalDeviceProperties)             \
   X(vkGetPhysicalDeviceQueueFamilyProperties)  \

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <iterator>
-#include <optional>
 #include <utility>
 
 namespace quoin::vulkan {
@@ -22,14 +21,6 @@ std::vector<VkMemoryPropertyFlags> wishes(Buffer::Where where) {
     default:
       return {kShared | VK_MEMORY_PROPERTY_HOST_CACHED_BIT, kShared};
   }
-}
-
-std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties& memory, std::uint32_t allowed,
-                                         VkMemoryPropertyFlags wanted) {
-  for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
-    if ((allowed >> i & 1U) != 0 && (memory.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
-  }
-  return std::nullopt;
 }
 
 // From the best kind of memory that has room.
@@ -53,6 +44,14 @@ VkResult allocate(const Device& device, VkBuffer buffer, Buffer::Where where, Vk
 }
 
 }  // namespace
+
+std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties& memory, std::uint32_t allowed,
+                                         VkMemoryPropertyFlags wanted) {
+  for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
+    if ((allowed >> i & 1U) != 0 && (memory.memoryTypes[i].propertyFlags & wanted) == wanted) return i;
+  }
+  return std::nullopt;
+}
 
 Result<Buffer> Buffer::create(const Device& device, VkDeviceSize size, Where where, const std::string& doing) {
   const Api& api = device.api();

@@ -4,12 +4,17 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "render_vk/device.h"
 
 namespace quoin::vulkan {
+
+/// A kind of memory that is among the `allowed` ones and has all that is wanted.
+[[nodiscard]] std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties& memory,
+                                                       std::uint32_t allowed, VkMemoryPropertyFlags wanted);
 
 /// One buffer with memory of its own.
 class Buffer {
@@ -73,6 +78,8 @@ class DeviceMemory {
   /// Forgets what was written since the last `flush`.
   void discard();
 
+  /// The buffer that a place lies in, at its offset.
+  [[nodiscard]] VkBuffer buffer_of(const Place& place) const { return blocks_[place.block]->buffer.handle(); }
   [[nodiscard]] std::size_t block_count() const;
   /// By `write`, so far.
   [[nodiscard]] std::uint64_t written() const { return written_; }

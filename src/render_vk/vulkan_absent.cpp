@@ -1,5 +1,7 @@
 // In place of everything else in this folder where the library is built without Vulkan.
 
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 namespace quoin {
@@ -37,6 +39,57 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 }
 Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, const Progress&) {
   return refusal();
+}
+
+// A renderer to make these for cannot be had.
+struct VulkanPicture::Impl {};
+
+VulkanPicture::VulkanPicture(VulkanRenderer&) {}
+VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
+VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
+VulkanPicture::~VulkanPicture() = default;
+
+int VulkanPicture::width() const {
+  return 0;
+}
+int VulkanPicture::height() const {
+  return 0;
+}
+int VulkanPicture::samples() const {
+  return 0;
+}
+std::int64_t VulkanPicture::rays() const {
+  return 0;
+}
+std::size_t VulkanPicture::bytes() const {
+  return 0;
+}
+Result<Image> VulkanPicture::read() const {
+  return refusal();
+}
+
+struct VulkanMeshRenderer::Impl {};
+
+VulkanMeshRenderer::VulkanMeshRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VulkanMeshRenderer::VulkanMeshRenderer(VulkanMeshRenderer&&) noexcept = default;
+VulkanMeshRenderer& VulkanMeshRenderer::operator=(VulkanMeshRenderer&&) noexcept = default;
+VulkanMeshRenderer::~VulkanMeshRenderer() = default;
+
+Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer&) {
+  return refusal();
+}
+Status VulkanMeshRenderer::update(const Scene&, bool) {
+  return refusal();
+}
+Status VulkanMeshRenderer::put(std::span<const SurfaceUpdate>) {
+  return refusal();
+}
+void VulkanMeshRenderer::clear() {}
+Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPictureOptions&) {
+  return refusal();
+}
+VulkanMeshRenderer::Facts VulkanMeshRenderer::facts() const {
+  return {};
 }
 
 }  // namespace quoin

@@ -6,6 +6,7 @@
 #include "instances.glsl"
 #include "glass.glsl"
 #include "count.glsl"
+#include "sky.glsl"
 
 layout(constant_id = 0) const bool kHasGlass = true;
 
@@ -24,13 +25,7 @@ float sign_of(uint face) {
 
 vec3 sky_colour(float up) {
   Frame f = frame();
-  float y = clamp(up, -1.0, 1.0);
-  if (y >= 0.0) {
-    float low = (1.0 - y) * (1.0 - y);
-    return f.sky_zenith.xyz + (f.sky_horizon.xyz - f.sky_zenith.xyz) * (low * (1.0 - 0.5 * y));
-  }
-  float s = clamp((f.ground_begins - y) / (f.ground_begins - f.ground_is_full), 0.0, 1.0);
-  return f.sky_horizon.xyz + (f.sky_ground.xyz - f.sky_horizon.xyz) * (s * s * (3.0 - 2.0 * s));
+  return sky_colour(Sky(f.sky_zenith.xyz, f.sky_horizon.xyz, f.sky_ground.xyz, f.ground_begins, f.ground_is_full), up);
 }
 
 float sky_up(vec2 point) {
