@@ -238,6 +238,21 @@ TEST(Loader, ReadsOnItsOwnThread) {
   EXPECT_EQ(opened->backend->name(), "processor");
 }
 
+TEST(Loader, MayBeCancelledAtAnyTime) {
+  const ScratchFolder folder("cancelled");
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
+  for (int attempt = 0; attempt < 50; ++attempt) {
+    Loader loader(folder.file("hill.vox"), {}, by_processor(), nullptr);
+    loader.cancel();
+    while (!loader.is_done()) std::this_thread::yield();
+    const auto result = loader.take();
+    if (!result) {
+      EXPECT_EQ(result.error().code, ErrorCode::Cancelled);
+    }
+  }
+}
+
 TEST(Loader, ErrorsArriveToo) {
   Bell bell;
   Loader loader("/nowhere/a.vox", {}, by_processor(), [&bell] { bell.ring(); });

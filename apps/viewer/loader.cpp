@@ -33,7 +33,12 @@ Loader::~Loader() {
 }
 
 void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
-  auto document = Document::open(path_, options);
+  LoadOptions watched = options;
+  watched.progress = [this](double share) {
+    fraction_ = share;
+    return !is_abandoned_;
+  };
+  auto document = Document::open(path_, watched);
   if (!document) {
     result_ = tl::unexpected<Error>(document.error());
     return;
@@ -47,6 +52,11 @@ void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
   opened.document = std::move(*document);
   opened.backend = make_backend(*opened.document);
   result_ = std::move(opened);
+}
+
+std::optional<double> Loader::fraction() const {
+  const double share = fraction_;
+  return share < 0.0 || is_read_ ? std::nullopt : std::optional(share);
 }
 
 double Loader::seconds() const {

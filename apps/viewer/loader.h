@@ -28,13 +28,18 @@ class Loader {
   Loader(std::filesystem::path path, LoadOptions options, MakeBackend make_backend, std::function<void()> on_done);
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
-  /// Waits for the reader, which cannot be interrupted; to stop looking at it sooner, keep the loader aside.
+  /// Cancels, and waits for the end of the model that is being read; to stop looking at it sooner, keep the loader
+  /// aside.
   ~Loader();
+
+  void cancel() { is_abandoned_ = true; }
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] bool is_done() const { return is_done_; }
   /// For people: what is being done now.
   [[nodiscard]] std::string stage() const { return is_read_ ? "building" : "reading"; }
+  /// How much of the file has been read, 0 to 1; nothing while it is not known, and while there is building to do.
+  [[nodiscard]] std::optional<double> fraction() const;
   /// Seconds since the beginning.
   [[nodiscard]] double seconds() const;
   /// Requires: is_done(), and it has not been taken yet.
@@ -45,6 +50,7 @@ class Loader {
 
   std::filesystem::path path_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::atomic<double> fraction_{-1.0};
   std::atomic<bool> is_read_{false};
   std::atomic<bool> is_done_{false};
   std::atomic<bool> is_abandoned_{false};

@@ -106,8 +106,15 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   loaded.sun = file->sun;
   loaded.camera = file->camera;
   std::map<std::string, Body, std::less<>> bodies;
+  LoadOptions of_source = options;
   for (const SceneFile::Source& source : file->sources) {
-    auto part = load_source(path.parent_path() / source.file, options);
+    const double before = static_cast<double>(bodies.size());
+    if (options.progress) {
+      of_source.progress = [&](double share) {
+        return options.progress((before + share) / static_cast<double>(file->sources.size()));
+      };
+    }
+    auto part = load_source(path.parent_path() / source.file, of_source);
     if (!part) return with_path(part.error());
     for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
     auto body = take_over(part->scene, loaded.scene);

@@ -18,7 +18,7 @@ constexpr std::size_t kFreeGridBytes = std::size_t{256} << 20;
 constexpr std::size_t kGridBytesPerFileByte = 64;
 
 Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::ModelBuilder& builder,
-                                          std::size_t file_bytes, Scene& scene) {
+                                          std::size_t file_bytes, const Progress& progress, Scene& scene) {
   const std::size_t most_bytes = kFreeGridBytes + kGridBytesPerFileByte * file_bytes;
   std::size_t grid_bytes = 0;
   std::vector<GridHandle> handles;
@@ -31,6 +31,8 @@ Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::Mo
                   model.offset);
     }
     handles.push_back(scene.add_grid(std::move(grid)));
+    const double share = static_cast<double>(handles.size()) / static_cast<double>(document.models.size());
+    if (progress && !progress(share)) return fail(ErrorCode::Cancelled, "cancelled");
   }
   return handles;
 }
@@ -93,7 +95,8 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
     return tl::unexpected(status.error());
   }
   vox::ModelBuilder builder(type_of);
-  const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes.size(), loaded.scene);
+  const Result<std::vector<GridHandle>> grids =
+      add_grids(*document, builder, bytes.size(), options.progress, loaded.scene);
   if (!grids) return tl::unexpected(grids.error());
   add_instances(*placements, *grids, options, loaded.scene);
   warn("materials of no colour skipped", document->stray_materials, loaded.warnings);

@@ -68,7 +68,10 @@ void App::go_on_leaving() {
 }
 
 void App::load(const std::filesystem::path& path) {
-  if (state_.loader) abandoned_.push_back(std::move(state_.loader));
+  if (state_.loader) {
+    state_.loader->cancel();
+    abandoned_.push_back(std::move(state_.loader));
+  }
   DeviceBackendOptions backend;
   backend.cpu = {options_.load.hidden, options_.threads, CpuBackendOptions{}.first_frame_seconds};
   backend.rays_on_device = screen_->renderer() != nullptr;

@@ -81,8 +81,13 @@ void App::draw_loading() {
   const float width = 280.0F * static_cast<float>(gui_->scale());
   begin_box("loading");
   ImGui::Text("%s %s", state_.loader->stage().c_str(), state_.loader->path().filename().string().c_str());
-  waiting_bar(state_.loader->seconds(), width);
+  if (const auto fraction = state_.loader->fraction()) {
+    ImGui::ProgressBar(static_cast<float>(*fraction), {width, 0.0F});
+  } else {
+    waiting_bar(state_.loader->seconds(), width);
+  }
   if (ImGui::Button("Cancel")) {
+    state_.loader->cancel();
     abandoned_.push_back(std::move(state_.loader));
   } else {
     ImGui::SameLine();

@@ -158,7 +158,7 @@ void draw_picture_part(ViewState& state) {
   if (!heading("Picture")) return;
   Settings& settings = state.settings;
   int mode = static_cast<int>(settings.mode);
-  if (ImGui::Combo("drawn as", &mode, "marched rays\0blocky meshes\0smooth meshes\0")) {
+  if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0")) {
     const auto wanted = static_cast<DrawMode>(mode);
     const bool can = !state.open.backend || state.open.backend->can_draw(wanted);
     can ? void(settings.mode = wanted) : state.tell("there is no device to draw meshes");
@@ -193,7 +193,13 @@ void draw_light_part(ViewState& state) {
   ImGui::Checkbox("lit", &light.lit);
   ImGui::BeginDisabled(!light.lit);
   ImGui::SameLine();
+  const bool has_shadows = state.settings.mode == DrawMode::Rays;
+  ImGui::BeginDisabled(!has_shadows);
   ImGui::Checkbox("shadows", &light.shadows);
+  ImGui::EndDisabled();
+  if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
+    ImGui::SetTooltip("meshes carry no shadows; marched rays do (F5)");
+  }
   bool has_occlusion = light.occlusion != OcclusionMode::Off;
   if (ImGui::Checkbox("occlusion", &has_occlusion)) {
     light.occlusion = has_occlusion ? OcclusionMode::Rays : OcclusionMode::Off;

@@ -27,6 +27,7 @@ struct LoadedScene {
 struct LoadOptions {
   bool hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
   int frame = 0;        ///< which animation frame to take
+  Progress progress;    ///< told after every model; what then answers false is Cancelled
 };
 
 /// MagicaVoxel's format, versions 150 and 200.
@@ -42,8 +43,9 @@ struct LoadOptions {
 /// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
-///          InvalidArgument for a frame that is not there; LimitExceeded when a scene graph or scattered voxels would
-///          take far more memory than the file has bytes. Memory stays within a multiple of the input's size.
+///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered
+///          voxels would take far more memory than the file has bytes. Memory stays within a multiple of the input's
+///          size.
 [[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {});
 
 /// The scene as a .vox file of version 150; the same scene gives the same bytes.
