@@ -27,7 +27,7 @@ struct LoadedScene {
 struct LoadOptions {
   bool hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
   int frame = 0;        ///< which animation frame to take
-  Progress progress;    ///< told after every model; what then answers false is Cancelled
+  Progress progress{};  ///< told after every model; what then answers false is Cancelled
 };
 
 /// MagicaVoxel's format, versions 150 and 200.

@@ -1,0 +1,121 @@
+// live/*: pictures as a window shows them, which stay on the best device that there is, beside the processor's on all
+// its threads: the 256x128x256 terrain and a world of 4096x256x4096, at 1920x1080 and 3840x2160, with shadows and six
+// occlusion rays; and by kinds of rays. `device` is skipped where there is none.
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include <benchmark/benchmark.h>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/terrain/terrain.h>
+
+#include "bench/picture_workload.h"
+
+namespace quoin {
+namespace {
+
+using workloads::fail_unless;
+
+struct World {
+  Scene scene;
+  Camera camera;
+};
+
+const World& small_world() {
+  static const World world{workloads::picture_scene(), workloads::over_the_terrain()};
+  return world;
+}
+
+const World& large_world() {
+  static const World world = [] {
+    World made;
+    const auto types = add_terrain_types(made.scene.types);
+    fail_unless(types.has_value(), "types", 0);
+    TerrainOptions options;
+    options.size = {128, 8, 128};
+    options.water = false;
+    auto grid = generate_terrain(options, *types);
+    fail_unless(grid.has_value(), "a world", 0);
+    SceneGrid placed;
+    placed.grid = std::move(*grid);
+    made.scene.add_instance({"world", made.scene.add_grid(std::move(placed))});
+    made.camera = *look_at({2048, 300, 2048}, {2600, 60, 2700}, 1.2);
+    return made;
+  }();
+  return world;
+}
+
+enum class Kind { Primary, Shadow, Full };
+
+RenderOptions options_for(int height, Kind kind) {
+  RenderOptions options;
+  options.height = height;
+  options.width = height * 16 / 9;
+  options.light.occlusion_rays = 6;
+  if (kind == Kind::Primary) options.light.lit = false;
+  if (kind == Kind::Shadow) options.light.occlusion = OcclusionMode::Off;
+  return options;
+}
+
+void count(benchmark::State& state, std::int64_t rays) {
+  state.counters["rays"] = static_cast<double>(rays);
+  state.counters["rays_per_second"] =
+      benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["frames_per_second"] = benchmark::Counter(1.0, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void on_device(benchmark::State& state, const World& world, const RenderOptions& options) {
+  auto renderer = VulkanRenderer::create();
+  if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
+  fail_unless(renderer->update(world.scene).has_value(), "the update's success", 0);
+  VulkanPicture picture(*renderer);
+  for (auto _ : state) {
+    fail_unless(renderer->draw(picture, world.camera, options, true).has_value(), "the picture's success", 0);
+  }
+  state.SetLabel(renderer->device().name);
+  count(state, picture.rays());
+}
+
+void on_processor(benchmark::State& state, const World& world, const RenderOptions& options) {
+  const CpuRenderer renderer(world.scene);
+  std::int64_t rays = 0;
+  for (auto _ : state) {
+    const auto picture = renderer.render(world.camera, options);
+    fail_unless(picture.has_value(), "the picture's success", 0);
+    rays = picture->rays;
+  }
+  state.SetLabel(std::to_string(resolve(Threads{})) + " threads");
+  count(state, rays);
+}
+
+const World& world_of(bool is_large) {
+  return is_large ? large_world() : small_world();
+}
+
+void add(bool is_large, int height, Kind kind, const std::string& name) {
+  const auto finish = [](benchmark::internal::Benchmark* one) {
+    one->Unit(benchmark::kMillisecond)->Iterations(2)->UseRealTime();
+  };
+  finish(benchmark::RegisterBenchmark((name + "/device").c_str(), [=](benchmark::State& state) {
+    on_device(state, world_of(is_large), options_for(height, kind));
+  }));
+  finish(benchmark::RegisterBenchmark((name + "/processor").c_str(), [=](benchmark::State& state) {
+    on_processor(state, world_of(is_large), options_for(height, kind));
+  }));
+}
+
+const bool kIsAdded = [] {
+  add(false, 1080, Kind::Primary, "live/terrain/1080/primary");
+  add(false, 1080, Kind::Shadow, "live/terrain/1080/shadow");
+  add(false, 1080, Kind::Full, "live/terrain/1080");
+  add(false, 2160, Kind::Full, "live/terrain/2160");
+  add(true, 1080, Kind::Full, "live/world4096/1080");
+  add(true, 2160, Kind::Full, "live/world4096/2160");
+  return true;
+}();
+
+}  // namespace
+}  // namespace quoin
