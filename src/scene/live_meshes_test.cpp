@@ -37,7 +37,7 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     SceneEditor editor(seed);
     LiveMeshes meshes(wanted);
     ShownSurfaces shown;
-    const int edits = GetParam() == SurfaceStyle::Blocky ? 60 : 14;
+    const int edits = GetParam() == SurfaceStyle::Blocky ? 60 : kIsSlow ? 4 : 14;
     for (int i = 0; i < edits; ++i) {
       editor.edit();
       if (editor.below(2) == 0) meshes.update(editor.scene, editor.eye());
