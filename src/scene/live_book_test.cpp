@@ -228,7 +228,7 @@ TEST(LiveBook, MemoryThatRunsOutIsTriedAgain) {
     LiveMeshOptions options = blocky(2);
     options.style = style;
     OneGrid one;
-    one.grid().fill_box({-5, -5, -5}, {5, 5, 5}, 1);
+    one.grid().fill_box({25, 25, 25}, {35, 35, 35}, 1);
     std::atomic<int> calls{0};
     LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
       if (++calls % 2 == 1) throw std::bad_alloc();

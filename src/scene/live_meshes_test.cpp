@@ -27,7 +27,8 @@ std::vector<SurfaceUpdate> all_of(LiveMeshes& meshes, const Scene& scene) {
 }
 
 TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  const unsigned seeds = kIsSlow && GetParam() == SurfaceStyle::Smooth ? 2 : 40;
+  for (unsigned seed = 0; seed < seeds; ++seed) {
     SCOPED_TRACE(seed);
     LiveMeshOptions wanted = options(1 + seed % 3);
     wanted.merge = seed % 2 == 0;
@@ -36,7 +37,7 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     SceneEditor editor(seed);
     LiveMeshes meshes(wanted);
     ShownSurfaces shown;
-    const int edits = GetParam() == SurfaceStyle::Blocky ? 60 : 16;
+    const int edits = GetParam() == SurfaceStyle::Blocky ? 60 : kIsSlow ? 4 : 14;
     for (int i = 0; i < edits; ++i) {
       editor.edit();
       if (editor.below(2) == 0) meshes.update(editor.scene, editor.eye());
@@ -48,12 +49,13 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     EXPECT_EQ(meshes.pending(), 0U);
     EXPECT_EQ(meshes.facts().copied_bytes, 0U);
     expect_surfaces(shown, editor.scene, wanted);
+    if (HasFailure()) return;
+    if (GetParam() == SurfaceStyle::Smooth && seed % 4 != 0) continue;
     ShownSurfaces fresh;
     LiveMeshes other(wanted);
     fresh.apply(all_of(other, editor.scene));
     expect_surfaces(fresh, editor.scene, wanted);
     EXPECT_EQ(fresh.all().size(), shown.all().size());
-    if (HasFailure()) return;
   }
 }
 
@@ -66,7 +68,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
   std::int64_t meshed = 0;
   {
     LiveMeshes meshes(wanted);
-    for (int i = 0; i < (GetParam() == SurfaceStyle::Blocky ? 400 : 100); ++i) {
+    for (int i = 0; i < (GetParam() == SurfaceStyle::Blocky ? 400 : kIsSlow ? 20 : 100); ++i) {
       editor.edit();
       meshes.update(editor.scene, editor.eye());
       shown.apply(meshes.take());
@@ -81,7 +83,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
 }
 
 TEST_P(LiveMeshesOf, CanEndInTheMiddle) {
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < (kIsSlow ? 2 : 20); ++i) {
     OneGrid one;
     one.grid().fill_box({0, 0, 0}, {300, 20, 100}, 1);
     LiveMeshes meshes(options());
