@@ -7,11 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/grid/density_grid.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 
+#include "grid/chunk_order.h"
 #include "mesh/smooth_material.h"
 #include "render_vk/vulkan_for_tests.h"
 
@@ -53,6 +55,21 @@ inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityNeighbourhood& 
     surface->types.push_back(material.type);
   }
   return surface;
+}
+
+/// A chunk's mesh has triangles for samples of its own, so one before the first chunk may have some.
+inline std::vector<SurfaceUpdate> smooth_surfaces(GridHandle handle, const DensityGrid& field,
+                                                  const VoxelRegistry& types) {
+  std::vector<IVec3> chunks;
+  for (const IVec3 chunk : field.chunks()) {
+    for (int i = 0; i < 8; ++i) chunks.push_back(chunk - IVec3(i & 1, i >> 1 & 1, i >> 2));
+  }
+  sort_and_unite(chunks);
+  std::vector<SurfaceUpdate> updates;
+  for (const IVec3 chunk : chunks) {
+    updates.push_back({handle, chunk, smooth_surface(field.neighbourhood(chunk), types)});
+  }
+  return updates;
 }
 
 inline MeshPictureOptions mesh_options(const RenderOptions& options) {

@@ -21,6 +21,9 @@ constexpr double kEdge = kChunkEdge;
 // Of a ball around a chunk; smooth surfaces reach a little past it.
 constexpr double kChunkRadius = (kEdge / 2 + 2.0) * 1.7320508075688774;
 constexpr double kNearest = 1.0 / 1024.0;  // voxels
+// Of the steps in which a device places corners; half of one closes what rounding opens: of 34 million pixels of a room
+// of merged faces some 2,500 were holes without, 9 with 0.4, none with 0.5.
+constexpr double kWidening = 0.5;
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
@@ -142,7 +145,7 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, DVec3 s
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());
-  out.room = to_vec4({depth_per_w * pixel / instance.voxel_size / subpixels, 0.0, 0.0});
+  out.room = to_vec4({depth_per_w * kWidening * pixel / instance.voxel_size / subpixels, 0.0, 0.0});
   return out;
 }
 
