@@ -41,16 +41,16 @@ inline std::vector<SurfaceUpdate> blocky_surfaces(const Scene& scene, bool merge
   return updates;
 }
 
-inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityNeighbourhood& chunks, const VoxelRegistry& types) {
+inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Smooth;
   SmoothOptions options;
   options.split_sheets = true;
-  SmoothMesher().mesh(chunks, options, surface->smooth);
+  SmoothMesher().mesh(field.neighbourhood(chunk), options, surface->smooth);
   const SurfaceMaterials materials(types);
   for (const SmoothCell cell : surface->smooth.cells) {
-    const IVec3 at = cell.cell() + cell.chunk_offset() * kChunkEdge;
-    const SurfaceMaterial material = materials.of_cell(chunks, at, 0);
+    const DensityNeighbourhood around = field.neighbourhood(chunk + cell.chunk_offset());
+    const SurfaceMaterial material = materials.of_cell(around, cell.cell(), 0);
     surface->albedo.push_back(material.albedo);
     surface->types.push_back(material.type);
   }
@@ -67,7 +67,7 @@ inline std::vector<SurfaceUpdate> smooth_surfaces(GridHandle handle, const Densi
   sort_and_unite(chunks);
   std::vector<SurfaceUpdate> updates;
   for (const IVec3 chunk : chunks) {
-    updates.push_back({handle, chunk, smooth_surface(field.neighbourhood(chunk), types)});
+    updates.push_back({handle, chunk, smooth_surface(field, types, chunk)});
   }
   return updates;
 }

@@ -65,7 +65,7 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   ASSERT_TRUE(meshes_->put(std::vector{update, update}));
   expect_current("removed");
   EXPECT_EQ(meshes_->facts().chunks, 1U);
-  EXPECT_EQ(meshes_->facts().drawn_triangles, 4) << "of two faces that look this way";
+  EXPECT_EQ(meshes_->facts().drawn_triangles, 8) << "of four directions: the camera is between top and bottom";
   meshes_->clear();
   EXPECT_EQ(meshes_->facts().chunks, 0U);
   EXPECT_EQ(meshes_->facts().bytes, 0U);
@@ -155,7 +155,7 @@ TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
   expect_refused(blocky, "surface: more opaque quads than quads");
   DensityGrid field;
   field.add_sphere({32, 32, 32}, 10, 1);
-  const auto smooth = [&] { return vulkan_test::smooth_surface(field.neighbourhood({0, 0, 0}), scene.types); };
+  const auto smooth = [&] { return vulkan_test::smooth_surface(field, scene.types, {0, 0, 0}); };
   const auto short_albedo = smooth();
   short_albedo->albedo.pop_back();
   expect_refused(short_albedo, "surface: its vertices' arrays are not of one size");

@@ -1,0 +1,75 @@
+// A real model, in all the ways in which meshes are drawn. QUOIN_WRITE_VULKAN writes the pictures, for people.
+
+#include <filesystem>
+
+#include <quoin/grid/voxel_field.h>
+#include <quoin/io/formats.h>
+
+#include "render_vk/mesh_for_tests.h"
+
+namespace quoin {
+namespace {
+
+namespace fs = std::filesystem;
+using vulkan_test::blocky_surfaces;
+using vulkan_test::mesh_options;
+using vulkan_test::smooth_surfaces;
+
+class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
+ protected:
+  Image shown(const Camera& camera, const MeshPictureOptions& options, const std::string& name) {
+    Image image = drawn(camera, options);
+    if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+      EXPECT_TRUE(write_png(image, QUOIN_BINARY_DIR "/mesh_model_" + name + ".png"));
+    }
+    return image;
+  }
+};
+
+TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
+  const char* chosen = std::getenv("QUOIN_VULKAN_MODEL");
+  const fs::path model =
+      chosen != nullptr ? fs::path(chosen)
+                        : fs::path(QUOIN_SOURCE_DIR) / "../shared/data/vox/mikelovesrobots+mmmm/vox__scene_church1.vox";
+  if (!fs::exists(model)) GTEST_SKIP() << model << " is not there";
+  const auto loaded = load_scene(model);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const Scene& scene = loaded->scene;
+  const RenderOptions options = vulkan_test::without_shadows(render_test::sized(640, 400));
+  const Camera camera = frame_scene(scene, View::Iso, 640.0 / 400.0);
+  compare(scene, camera, options, "model");
+
+  MeshPictureOptions ways = mesh_options(options);
+  ways.samples = 4;
+  shown(camera, ways, "blocky");
+  const auto show_all = [&](const std::string& name) {
+    std::vector<Image> images;
+    ways.wireframe = Wireframe::Over;
+    images.push_back(shown(camera, ways, name + "_edges_over"));
+    ways.wireframe = Wireframe::Only;
+    images.push_back(shown(camera, ways, name + "_edges_only"));
+    ways.wireframe = Wireframe::Off;
+    ways.shading = MeshShading::Occlusion;
+    images.push_back(shown(camera, ways, name + "_occlusion"));
+    ways.shading = MeshShading::Normals;
+    images.push_back(shown(camera, ways, name + "_normals"));
+    ways.shading = MeshShading::Lit;
+    images.push_back(shown(camera, ways, name + "_lit"));
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) EXPECT_NE(images[i].rgb, images[j].rgb);
+    }
+  };
+  show_all("blocky");
+  meshes_->clear();
+  std::vector<SurfaceUpdate> surfaces;
+  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
+    for (SurfaceUpdate& update : smooth_surfaces(handle, field_from_grid(grid.grid), scene.types)) {
+      surfaces.push_back(std::move(update));
+    }
+  });
+  put(scene, surfaces);
+  show_all("smooth");
+}
+
+}  // namespace
+}  // namespace quoin
