@@ -194,6 +194,12 @@ VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& 
     stages[i].module = shaders_[2 * static_cast<std::size_t>(way.what) + i];
     stages[i].pName = "main";
   }
+  const std::array<VkBool32, 2> values = {way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE};
+  const std::array<VkSpecializationMapEntry, 2> entries = {
+      VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
+      VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}};
+  const VkSpecializationInfo constants{entries.size(), entries.data(), sizeof values, values.data()};
+  if (way.what == MeshWay::What::Blocky) stages[0].pSpecializationInfo = &constants;
   const auto vertices =
       info_of<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
   auto assembly =
