@@ -136,13 +136,10 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
 }
 
 std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe) const {
-  std::vector<Step> steps{{Step::Over::Sky}};
-  if (wireframe == Wireframe::Only) {
-    steps.push_back({Step::Over::All, kDrawEdgesOnly});
-    return steps;
-  }
+  if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
   const bool shows_values = data.has(kMeshShowOcclusion | kMeshShowNormals);
-  steps.push_back({shows_values ? Step::Over::All : Step::Over::Opaque});
+  // What is solid first, so that less of the sky is to be drawn.
+  std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMostOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});

@@ -71,11 +71,12 @@ VkPipelineRasterizationStateCreateInfo rasterization_of(const MeshWay& way) {
 VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
   auto state =
       info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
-  const bool is_tested = way.what != MeshWay::What::Sky && way.mode != kDrawEdgesOnly;
-  state.depthTestEnable = is_tested ? VK_TRUE : VK_FALSE;
-  state.depthWriteEnable = is_tested && way.mode == kDrawSurfaces ? VK_TRUE : VK_FALSE;
-  // Of equally near surfaces the first one drawn stays; edges lie on theirs.
-  state.depthCompareOp = way.mode == kDrawEdgesOver ? VK_COMPARE_OP_GREATER_OR_EQUAL : VK_COMPARE_OP_GREATER;
+  const bool is_sky = way.what == MeshWay::What::Sky;
+  state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
+  state.depthWriteEnable = way.mode == kDrawSurfaces && !is_sky ? VK_TRUE : VK_FALSE;
+  // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
+  state.depthCompareOp = VK_COMPARE_OP_GREATER;
+  if (is_sky || way.mode == kDrawEdgesOver) state.depthCompareOp = VK_COMPARE_OP_GREATER_OR_EQUAL;
   return state;
 }
 
@@ -151,7 +152,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
   const bool is_resolved = samples > 1;
   constexpr VkImageLayout kColourLayout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
   constexpr VkImageLayout kDepthLayout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-  // The sky covers all of it first.
+  // The sky covers what nothing else does.
   const std::array attachments = {
       attachment(kMeshColour, samples, VK_ATTACHMENT_LOAD_OP_DONT_CARE, !is_resolved, kColourLayout),
       attachment(kMeshDepth, samples, VK_ATTACHMENT_LOAD_OP_CLEAR, false, kDepthLayout),
