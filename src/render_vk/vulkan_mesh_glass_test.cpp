@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "render_vk/mesh_for_tests.h"
+#include "tests/golden_views.h"
 
 namespace quoin {
 namespace {
@@ -98,6 +99,42 @@ TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
   grid.fill_box({0, 0, 10}, {9, 19, 10}, types.wall);
   place(scene, std::move(grid));
   compare(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
+}
+
+// Waters of any depth are not the processor's, which counts their voxels; all else is.
+TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
+  Scene scene = golden::terrain_scene();
+  const golden::GoldenView& view = golden::kViews[0];
+  const Camera camera = golden::camera_for(view);
+  const RenderOptions options = without_shadows(golden::options_for(view));
+  put(scene, blocky_surfaces(scene));
+  const Image image = drawn(camera, mesh_options(options));
+  const Picture cpu = render_test::taken(scene, camera, options);
+  // Of another colour, water tells where it is.
+  for (std::size_t type = 1; type < scene.types.size(); ++type) {
+    VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
+    if (properties.visibility != Visibility::Transparent) continue;
+    properties.colour = {255, 0, 255, properties.colour.a};
+    scene.types.replace(static_cast<VoxelType>(type), properties);
+  }
+  const Picture marked = render_test::taken(scene, camera, options);
+  int waters = 0;
+  Picture mesh;
+  mesh.colour = image;
+  mesh.depth = cpu.depth;
+  for (std::size_t i = 0; i < cpu.colour.rgb.size(); i += 3) {
+    const auto at = [&](const Picture& picture) {
+      return std::vector(&picture.colour.rgb[i], &picture.colour.rgb[i] + 3);
+    };
+    if (at(cpu) == at(marked)) continue;
+    ++waters;
+    std::copy_n(&cpu.colour.rgb[i], 3, &mesh.colour.rgb[i]);
+  }
+  EXPECT_GT(waters, 1000);
+  expect_like(mesh.colour, cpu, "beside_water");
+  if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+    EXPECT_TRUE(write_png(image, QUOIN_BINARY_DIR "/mesh_water.vulkan.png"));
+  }
 }
 
 TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {

@@ -1,6 +1,8 @@
 // Surfaces come and go; what is wrong is refused.
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include <glm/vec2.hpp>
 
@@ -139,6 +141,37 @@ TEST_F(VulkanMeshUpdate, CamerasInsideOfThingsSeeWhatIsBehindThem) {
   // A thousandth of a voxel before a face is not too near.
   const Image near = drawn(towards({20, 30.01, 20}, {20.001, 20, 20}), options);
   EXPECT_EQ(byte_at(near, 16, 16), byte_at(near, 2, 29));
+}
+
+TEST_F(VulkanMeshUpdate, TenThousandChunksComeAreReplacedAndGo) {
+  Scene scene;
+  add_type(scene, {200, 40, 40});
+  const GridHandle grid = scene.add_grid({});
+  scene.add_instance({"", grid});
+  const unsigned seed = 8;
+  std::mt19937 random(seed);
+  std::size_t bytes = 0;
+  std::vector<SurfaceUpdate> updates;
+  for (int round = 0; round < 3; ++round) {
+    updates.clear();
+    bytes = 0;
+    for (int i = 0; i < 10'000; ++i) {
+      const auto surface = std::make_shared<ChunkSurface>();
+      surface->quads.resize(1 + random() % 300, Quad{std::uint64_t{1} << Quad::kTypeShift});
+      surface->opaque_quads = surface->quads.size();
+      bytes += (surface->quads.size() * sizeof(Quad) + 31) / 32 * 32;
+      updates.push_back({grid, {i % 100, i / 100, 0}, surface});
+    }
+    std::shuffle(updates.begin(), updates.end(), random);
+    put(scene, updates);
+    EXPECT_EQ(meshes_->facts().chunks, 10'000U);
+    EXPECT_EQ(meshes_->facts().bytes, bytes) << "seed " << seed;
+  }
+  for (SurfaceUpdate& update : updates) update.surface = nullptr;
+  put(scene, updates);
+  EXPECT_EQ(meshes_->facts().chunks, 0U);
+  EXPECT_EQ(meshes_->facts().bytes, 0U);
+  EXPECT_EQ(meshes_->facts().triangles, 0);
 }
 
 TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
