@@ -102,6 +102,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
     const DVec3 middle = space.view_axes * (offset + kEdge / 2) + space.base_in_view;
     if (!view.frustum.meets(middle, radius)) continue;
     const double depth = glm::dot(middle, view.rays.forward());
+    if (!std::isfinite(depth)) continue;
     view.include(depth, radius * 1.01, space.instance->voxel_size);
     const bool is_perspective = view.rays.is_perspective();
     data.draws.push_back({&mesh, number, Vec3(offset), is_perspective ? glm::length(middle) : depth,

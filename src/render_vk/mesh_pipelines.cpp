@@ -46,6 +46,20 @@ VkAttachmentDescription attachment(VkFormat format, std::uint32_t samples, VkAtt
   return made;
 }
 
+// After what was done with the images before, and before they are copied.
+std::array<VkSubpassDependency, 2> around_pass() {
+  constexpr VkPipelineStageFlags kDepthStages =
+      VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
+  constexpr VkPipelineStageFlags kColourStage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  constexpr VkAccessFlags kWrites = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
+  return {VkSubpassDependency{VK_SUBPASS_EXTERNAL, 0, kColourStage | kDepthStages | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              kColourStage | kDepthStages, kWrites | VK_ACCESS_TRANSFER_READ_BIT, kWrites, 0},
+          VkSubpassDependency{0, VK_SUBPASS_EXTERNAL, kColourStage, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
+}
+
 bool is_glass(const MeshWay& way) {
   return way.mode >= kDrawGlass;
 }
@@ -96,6 +110,30 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   state.alphaBlendOp = VK_BLEND_OP_ADD;
   return state;
 }
+
+// The two shaders with what of a way they are made for.
+struct Stages {
+  std::array<VkBool32, 2> values;
+  std::array<VkSpecializationMapEntry, 2> entries;
+  VkSpecializationInfo constants;
+  std::array<VkPipelineShaderStageCreateInfo, 2> all{};
+
+  Stages(const MeshWay& way, const VkShaderModule* shaders)
+      : values{way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE},
+        entries{VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
+                VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}},
+        constants{2, entries.data(), sizeof values, values.data()} {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+      all[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
+      all[i].module = shaders[i];
+      all[i].pName = "main";
+    }
+    if (way.what == MeshWay::What::Blocky) all[0].pSpecializationInfo = &constants;
+  }
+  Stages(const Stages&) = delete;
+  Stages& operator=(const Stages&) = delete;
+};
 
 }  // namespace
 
@@ -166,17 +204,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
   subpass.pColorAttachments = &colour;
   subpass.pDepthStencilAttachment = &depth;
   subpass.pResolveAttachments = is_resolved ? &resolved : nullptr;
-  constexpr VkPipelineStageFlags kDepthStages =
-      VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
-  constexpr VkPipelineStageFlags kColourStage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
-  constexpr VkAccessFlags kWrites = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
-                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT |
-                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
-  const std::array<VkSubpassDependency, 2> dependencies = {
-      VkSubpassDependency{VK_SUBPASS_EXTERNAL, 0, kColourStage | kDepthStages | VK_PIPELINE_STAGE_TRANSFER_BIT,
-                          kColourStage | kDepthStages, kWrites | VK_ACCESS_TRANSFER_READ_BIT, kWrites, 0},
-      VkSubpassDependency{0, VK_SUBPASS_EXTERNAL, kColourStage, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                          VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
+  const auto dependencies = around_pass();
   auto info = info_of<VkRenderPassCreateInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO);
   info.attachmentCount = is_resolved ? 3 : 2;
   info.pAttachments = attachments.data();
@@ -188,19 +216,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 }
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
-  std::array<VkPipelineShaderStageCreateInfo, 2> stages{};
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    stages[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    stages[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
-    stages[i].module = shaders_[2 * static_cast<std::size_t>(way.what) + i];
-    stages[i].pName = "main";
-  }
-  const std::array<VkBool32, 2> values = {way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE};
-  const std::array<VkSpecializationMapEntry, 2> entries = {
-      VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
-      VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}};
-  const VkSpecializationInfo constants{entries.size(), entries.data(), sizeof values, values.data()};
-  if (way.what == MeshWay::What::Blocky) stages[0].pSpecializationInfo = &constants;
+  const Stages stages(way, &shaders_[2 * static_cast<std::size_t>(way.what)]);
   const auto vertices =
       info_of<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
   auto assembly =
@@ -223,8 +239,8 @@ VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& 
   dynamic.dynamicStateCount = dynamics.size();
   dynamic.pDynamicStates = dynamics.data();
   auto info = info_of<VkGraphicsPipelineCreateInfo>(VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO);
-  info.stageCount = stages.size();
-  info.pStages = stages.data();
+  info.stageCount = stages.all.size();
+  info.pStages = stages.all.data();
   info.pVertexInputState = &vertices;
   info.pInputAssemblyState = &assembly;
   info.pViewportState = &viewport;

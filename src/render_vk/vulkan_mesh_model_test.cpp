@@ -24,6 +24,22 @@ class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
     }
     return image;
   }
+  /// Each way shows something else.
+  void show_all(const Camera& camera, MeshPictureOptions options, const std::string& name) {
+    std::vector<Image> images = {shown(camera, options, name + "_lit")};
+    options.wireframe = Wireframe::Over;
+    images.push_back(shown(camera, options, name + "_edges_over"));
+    options.wireframe = Wireframe::Only;
+    images.push_back(shown(camera, options, name + "_edges_only"));
+    options.wireframe = Wireframe::Off;
+    options.shading = MeshShading::Occlusion;
+    images.push_back(shown(camera, options, name + "_occlusion"));
+    options.shading = MeshShading::Normals;
+    images.push_back(shown(camera, options, name + "_normals"));
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) EXPECT_NE(images[i].rgb, images[j].rgb) << name << ' ' << i << ' ' << j;
+    }
+  }
 };
 
 TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
@@ -41,25 +57,7 @@ TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
 
   MeshPictureOptions ways = mesh_options(options);
   ways.samples = 4;
-  shown(camera, ways, "blocky");
-  const auto show_all = [&](const std::string& name) {
-    std::vector<Image> images;
-    ways.wireframe = Wireframe::Over;
-    images.push_back(shown(camera, ways, name + "_edges_over"));
-    ways.wireframe = Wireframe::Only;
-    images.push_back(shown(camera, ways, name + "_edges_only"));
-    ways.wireframe = Wireframe::Off;
-    ways.shading = MeshShading::Occlusion;
-    images.push_back(shown(camera, ways, name + "_occlusion"));
-    ways.shading = MeshShading::Normals;
-    images.push_back(shown(camera, ways, name + "_normals"));
-    ways.shading = MeshShading::Lit;
-    images.push_back(shown(camera, ways, name + "_lit"));
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) EXPECT_NE(images[i].rgb, images[j].rgb);
-    }
-  };
-  show_all("blocky");
+  show_all(camera, ways, "blocky");
   meshes_->clear();
   std::vector<SurfaceUpdate> surfaces;
   scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
@@ -68,7 +66,7 @@ TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
     }
   });
   put(scene, surfaces);
-  show_all("smooth");
+  show_all(camera, ways, "smooth");
 }
 
 }  // namespace
