@@ -21,8 +21,8 @@ constexpr double kEdge = kChunkEdge;
 // Of a ball around a chunk; smooth surfaces reach a little past it.
 constexpr double kChunkRadius = (kEdge / 2 + 2.0) * 1.7320508075688774;
 constexpr double kNearest = 1.0 / 1024.0;  // voxels
-// Of the steps in which a device places corners; half of one closes what rounding opens: of 34 million pixels of a room
-// of merged faces some 2,500 were holes without, 9 with 0.4, none with 0.5.
+// Of the steps in which a device places corners; half of one closes what rounding opens. In 2.3 million pixels of a
+// room of merged faces 168 were holes without, 12 with 0.25; in 34.6 million none with 0.5.
 constexpr double kWidening = 0.5;
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
