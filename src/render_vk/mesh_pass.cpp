@@ -110,8 +110,8 @@ Status MeshPass::grow(VkDeviceSize bytes) {
 
 // Puts what the shaders read of a picture where it will be copied from, and has the images ready.
 Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
-  constexpr VkDeviceSize instances = sizeof(ShaderMeshFrame);
-  const VkDeviceSize draws = instances + aligned(bytes_of(data.instances));
+  constexpr VkDeviceSize kInstances = sizeof(ShaderMeshFrame);
+  const VkDeviceSize draws = kInstances + aligned(bytes_of(data.instances));
   const VkDeviceSize order = draws + aligned(bytes_of(data.glass));
   frame_bytes_ = order + aligned(bytes_of(data.order));
   if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
@@ -122,7 +122,7 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
   data.push.frame = data.sky.frame = frame_address_;
   std::byte* to = staging_.mapped();
   std::memcpy(to, &data.frame, sizeof data.frame);
-  if (!data.instances.empty()) std::memcpy(to + instances, data.instances.data(), bytes_of(data.instances));
+  if (!data.instances.empty()) std::memcpy(to + kInstances, data.instances.data(), bytes_of(data.instances));
   if (!data.glass.empty()) std::memcpy(to + draws, data.glass.data(), bytes_of(data.glass));
   if (!data.order.empty()) std::memcpy(to + order, data.order.data(), bytes_of(data.order));
   if (target_.is_of(size, samples)) return {};
