@@ -208,13 +208,16 @@ void App::ask_for_picture() {
   request.mode = state_.settings.mode;
   request.shading = state_.settings.shading;
   request.wireframe = state_.settings.wireframe;
+  // What was drawn before is another picture, however good.
+  if (!asked_ || !is_same(*asked_, request)) state_.facts.is_settled = false;
+  asked_ = request;
   state_.open.backend->show(request);
 }
 
 void App::take_picture() {
   if (!state_.open.backend) return;
   if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
-  if (const auto fault = state_.open.backend->fault(); fault && !state_.message) take_fault(*fault);
+  take_fault();
   const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
                           state_.facts.height == state_.picture_place.h;
   if (!is_current) return;
@@ -236,9 +239,13 @@ void App::take_frame(ViewFrame frame) {
   state_.picture = std::move(frame);
 }
 
-void App::take_fault(const Error& fault) {
-  state_.tell(fault);
-  if (!options_.screenshot.empty()) end_with(fault);
+// A fault lasts until something else is asked for, and is told once.
+void App::take_fault() {
+  const auto fault = state_.open.backend->fault();
+  const std::string text = fault ? to_string(*fault) : "";
+  if (text == std::exchange(told_fault_, text) || !fault) return;
+  state_.tell(*fault);
+  if (!options_.screenshot.empty()) end_with(*fault);
   if (!state_.open.backend->can_draw(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
 }
 

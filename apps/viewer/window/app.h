@@ -44,13 +44,14 @@ class App {
   void ask_for_picture();
   void take_picture();
   void take_frame(ViewFrame frame);
-  void take_fault(const Error& fault);
+  void take_fault();
   void stand_in(const Error& why);
   [[nodiscard]] Result<std::shared_ptr<VulkanRenderer>> open_device();
   void end_with(const Error& error);
   void pace();
   void draw_gui();
   void draw_bars();
+  void draw_bare();
   void draw_loading();
   void draw_saving();
   void draw_leaving();
@@ -86,10 +87,11 @@ class App {
   Input input_;
   FileChooser chooser_;
   std::optional<Leaving> leaving_;
-  bool is_leaving_asked_ = false;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
   bool is_screenshot_wanted_ = false;
+  std::optional<ViewRequest> asked_;
+  std::string told_fault_;  // of the backend, as long as it lasts; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

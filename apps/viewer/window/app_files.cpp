@@ -54,7 +54,6 @@ void App::leave(Leaving leaving) {
 
 void App::go_on_leaving() {
   const Leaving leaving = *std::exchange(leaving_, std::nullopt);
-  is_leaving_asked_ = false;
   if (leaving.is_quit) {
     is_running_ = false;
   } else if (!leaving.open.empty()) {
@@ -103,6 +102,8 @@ void App::adopt(OpenDocument opened) {
   state_.facts = {};
   state_.picture = {};
   state_.message.reset();
+  told_fault_.clear();
+  asked_.reset();
   screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
@@ -139,7 +140,6 @@ void App::take_saved() {
   const std::unique_ptr<Saver> saver = std::move(state_.saver);
   if (!saver->status()) {
     leaving_.reset();
-    is_leaving_asked_ = false;
     state_.tell(saver->status().error());
     return;
   }

@@ -85,7 +85,8 @@ void draw_new_colour(ViewState& state) {
   ImGui::ColorPicker3("##colour", colour.data(), ImGuiColorEditFlags_NoSidePreview);
   if (ImGui::Button("Add") && state.can_edit()) {
     const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround(value * 255.0F)); };
-    ScenePause pause(*state.open.backend);
+    const ScenePause pause(*state.open.backend);
+    state.facts.is_settled = false;
     const auto type = state.open.document->type_of_colour({byte(colour[0]), byte(colour[1]), byte(colour[2]), 255});
     type ? void(state.brush.type = *type) : state.tell(type.error());
     ImGui::CloseCurrentPopup();

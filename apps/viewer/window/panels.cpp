@@ -13,8 +13,6 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr double kMessageSeconds = 6.0;
-
 void menu_item(Command command, MenuChoice& choice, bool is_enabled = true, bool is_checked = false) {
   const CommandInfo& info = info_of(command);
   if (ImGui::MenuItem(info.name, info.keys, is_checked, is_enabled)) choice.commands.push_back(command);
@@ -176,11 +174,6 @@ void draw_help(ViewState& state, float scale) {
 
 void draw_message(ViewState& state, float bottom) {
   const Message& message = *state.message;
-  const double age = std::chrono::duration<double>(std::chrono::steady_clock::now() - message.since).count();
-  if (age > (message.is_error ? 3.0 : 1.0) * kMessageSeconds) {
-    state.message.reset();
-    return;
-  }
   const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
   const SDL_Rect& place = state.picture_place;
   const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;
