@@ -63,6 +63,7 @@ class App {
   void run_command(Command command);
   bool run_draw_command(Command command);
   void draw_as(DrawMode mode);
+  void show_detail(bool is_shown);
   void run_file_command(Command command);
   void show_from(View view);
   void pick_type();
@@ -79,6 +80,12 @@ class App {
   void save_screenshot();
   void write_screenshot(const std::filesystem::path& path);
 
+  /// What a look at the levels of detail changed.
+  struct BeforeDetail {
+    DrawMode mode;
+    bool by_pixels;
+  };
+
   ViewerOptions options_;
   std::unique_ptr<Screen> screen_;
   std::unique_ptr<Gui> gui_;
@@ -86,6 +93,7 @@ class App {
   ViewState state_;
   Input input_;
   FileChooser chooser_;
+  std::optional<BeforeDetail> before_detail_;
   std::optional<Leaving> leaving_;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;

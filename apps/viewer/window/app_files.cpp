@@ -109,6 +109,7 @@ void App::adopt(OpenDocument opened) {
   state_.settings.note_recent(state_.open.document->path());
   if (loaded.sun) state_.settings.light.sun = *loaded.sun;
   state_.brush.type = 1;
+  state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (loaded.camera) {
@@ -141,6 +142,8 @@ void App::take_saved() {
   if (!saver->status()) {
     leaving_.reset();
     state_.tell(saver->status().error());
+    // With the name still there, to be mended.
+    if (saver->status().error().code != ErrorCode::Cancelled) chooser_.show(FileChooser::Purpose::Save, saver->path());
     return;
   }
   state_.open.document->note_written(saver->path(), saver->state());
@@ -164,7 +167,8 @@ void App::write_screenshot(const std::filesystem::path& path) {
     if (!options_.screenshot.empty()) end_with(written.error());
     return;
   }
-  state_.tell("saved " + path.string());
+  std::error_code ignored;
+  state_.tell("saved " + std::filesystem::absolute(path, ignored).string());
 }
 
 }  // namespace quoin::viewer

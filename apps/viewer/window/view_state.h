@@ -51,6 +51,7 @@ struct ViewState {
   CameraControl camera;
   Tool tool = Tool::Look;
   Brush brush;
+  VoxelType palette_shows = kAir;                            ///< the type that the palette has scrolled to
   OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
 
   SDL_Rect picture_place{0, 0, 0, 0};  ///< in pixels of the output
