@@ -71,6 +71,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
       gui_(std::make_unique<Gui>(*screen_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(*screen_))) {
   state_.camera.mode = settings.camera_mode;
   state_.settings = std::move(settings);
+  if (!gui_->status()) stand_in(Error(gui_->status().error()));
   if (!options_.file.empty()) load(options_.file);
 }
 
@@ -277,6 +278,7 @@ void App::stand_in(const Error& why) {
   gui_.reset();
   screen_ = std::move(*other);
   gui_ = std::make_unique<Gui>(*screen_, scale);
+  if (!gui_->status()) end_with(gui_->status().error());
   state_.settings.mode = DrawMode::Rays;
   state_.tell(why);
 }
