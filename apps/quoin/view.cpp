@@ -23,6 +23,7 @@ struct ViewArguments {
   std::filesystem::path screenshot;
   bool is_bare = false;
   std::string backend = "auto";
+  std::string drawn;
   std::string device;
 };
 
@@ -52,6 +53,9 @@ int run_view(const ViewArguments& arguments) {
   options.is_bare = arguments.is_bare;
   options.screenshot = arguments.screenshot;
   options.device = arguments.device;
+  if (arguments.drawn == "rays") options.mode = viewer::DrawMode::Rays;
+  if (arguments.drawn == "blocks") options.mode = viewer::DrawMode::Blocks;
+  if (arguments.drawn == "smooth") options.mode = viewer::DrawMode::Smooth;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
   Status status = check_input(arguments.input);
@@ -108,10 +112,12 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_flag("--hidden", arguments->load.hidden, "Include hidden layers and nodes");
   command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole());
-  command->add_option("--size", "Of the window (default: as it was last)")->type_name("WxH");
+  command->add_option("--size", "Of the window, 320x240 to 16384 a side (default: as it was last)")->type_name("WxH");
   command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
       ->check(file_name());
+  command->add_option("--draw", arguments->drawn, "What it is drawn as at first (default: as it was last)")
+      ->check(CLI::IsMember({"rays", "blocks", "smooth"}));
   command
       ->add_option("--backend", arguments->backend,
                    "What marches rays: a graphics card if there is one, the processor, or any device")

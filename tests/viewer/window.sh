@@ -207,6 +207,30 @@ grep -q '"panel": false' config/quoin/viewer.json || fail "the panel's state is 
 grep -q '"width": 500' config/quoin/viewer.json || fail "the window's size is not remembered"
 grep -q 'world.vox' config/quoin/viewer.json || fail "the file is not among the recent ones"
 
+echo "who asks to save and thinks better of it can go on"
+echo '{"width": 640, "height": 400, "samples": 1, "panel": false}' >config/quoin/viewer.json
+echo '{"quoin_scene": 1, "files": [{"id": "a", "path": "world.vox"}], "instances": [{"file": "a"}]}' >sc.json
+start sc.json
+xdotool mousemove 320 220
+sleep 0.5
+xdotool key --delay 80 3
+xdotool click 1
+until_true 20 title_is "* sc.json - Quoin" || fail "no edit in a scene file"
+xdotool key --delay 80 ctrl+q
+sleep 1
+# Scene files are not written: Save asks for a name.
+xdotool mousemove 214 224
+sleep 0.5
+xdotool click 1
+sleep 1
+xdotool key --delay 80 Escape
+sleep 1
+xdotool key --delay 80 Escape
+sleep 1
+xdotool key --delay 80 ctrl+z
+until_true 20 title_is "sc.json - Quoin" || fail "the window takes no keys after Save as was cancelled"
+stop
+
 echo "another file, and the picture of the settled window is the renderer's"
 "$quoin" view castle.vox --bare --size 320x240 --screenshot window.png --backend "$backend" >viewer.log 2>&1
 "$quoin" render castle.vox --size 320x240 --samples 16 -o render.png --backend "$backend" >/dev/null

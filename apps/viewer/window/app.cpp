@@ -71,6 +71,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
       gui_(std::make_unique<Gui>(*screen_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(*screen_))) {
   state_.camera.mode = settings.camera_mode;
   state_.settings = std::move(settings);
+  if (!gui_->status()) stand_in(Error(gui_->status().error()));
   if (options_.mode) state_.settings.mode = *options_.mode;
   if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
     state_.tell(renderer->device().name + " is the processor in truth, and slow; --backend auto is faster");
@@ -282,6 +283,7 @@ void App::stand_in(const Error& why) {
   gui_.reset();
   screen_ = std::move(*other);
   gui_ = std::make_unique<Gui>(*screen_, scale);
+  if (!gui_->status()) end_with(gui_->status().error());
   state_.settings.mode = DrawMode::Rays;
   state_.tell(why);
 }
