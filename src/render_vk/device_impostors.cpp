@@ -10,6 +10,9 @@
 namespace quoin::vulkan {
 namespace {
 
+constexpr std::uint32_t kFacesAGroup = 512;  // as far.comp has it
+constexpr std::uint32_t kAllViews = (1U << kImpostorViews) - 1U;
+
 Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
 }
@@ -43,6 +46,25 @@ float reach_of(const ImpostorFaces::Level& level) {
   return level.half + 1e-5F + 2e-6F * level.size;
 }
 
+// Bits of the directions whose faces any ray of the area may go against. What is linear is least or greatest in a
+// corner.
+std::uint32_t seen_sides(const raster::Job& job, const PixelArea& area) {
+  const auto width = static_cast<float>(area.right - area.left);
+  const auto height = static_cast<float>(area.bottom - area.top);
+  std::uint32_t seen = 0;
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    const std::size_t axis = side / 2;
+    const float sign = side % 2 == 0 ? 1.0F : -1.0F;
+    for (const float x : {0.0F, width}) {
+      for (const float y : {0.0F, height}) {
+        const float along = job.direction.at[axis] + job.direction.x[axis] * x + job.direction.y[axis] * y;
+        seen |= std::uint32_t{along * sign < 1e-6F} << side;
+      }
+    }
+  }
+  return seen;
+}
+
 // Rays from the upper left corner of the area on.
 void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) {
   raster::Job job;
@@ -57,11 +79,14 @@ void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) 
   far.down = to_vec4(job.down, job.down_at);
   far.ahead = to_vec4(job.ahead, job.ahead_at);
   far.at = {job.column_at, job.row_at, 0.0F, 0.0F};
+  for (ShaderFarLevel* level : {&far.level, &far.unseen}) {
+    level->views = (level->views & kAllViews) | seen_sides(job, drawn.area) << kImpostorViews;
+  }
   far.area = {drawn.area.left, drawn.area.top, drawn.area.right, drawn.area.bottom};
 }
 
 std::uint32_t groups_of(std::uint32_t faces) {
-  return (faces + 63) / 64;
+  return (faces + kFacesAGroup - 1) / kFacesAGroup;
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ struct FarTiles {
   struct Range {
     std::uint32_t first = 0;  ///< in `parts`
     std::uint32_t count = 0;
-    std::uint32_t groups = 0;  ///< of 64 faces
+    std::uint32_t groups = 0;  ///< that draw them
   };
   std::vector<ShaderFarPart> parts;
   std::vector<Range> ranges;  ///< of each tile, row by row

@@ -1,7 +1,9 @@
 // Levels of detail, drawn by the device and by the processor.
 
-#include <array>
 #include <random>
+#include <set>
+#include <string>
+#include <vector>
 
 #include <glm/gtc/quaternion.hpp>
 
@@ -26,6 +28,16 @@ class VulkanDetail : public vulkan_test::VulkanTest {
     auto expected = CpuRenderer(scene_).render(camera, options);
     ASSERT_TRUE(expected) << to_string(expected.error());
     expect_equal(taken_as_is(camera, options), *expected, name);
+  }
+  // Of the grids that the processor traces.
+  [[nodiscard]] std::set<int> halvings_of(const Camera& camera, const RenderOptions& options) const {
+    std::vector<SelectedInstance> selected;
+    DetailSelector().select(scene_, camera, options.width, options.height, *options.detail, selected);
+    const SceneTracer whole(scene_);
+    const SceneTracer detailed = whole.with_detail(selected);
+    std::set<int> halvings;
+    for (const PlacedGrid& placed : detailed.placed()) halvings.insert(placed.halvings);
+    return halvings;
   }
   [[nodiscard]] std::uint64_t impostor_bytes() const { return renderer_->impl().detail.impostor_bytes(); }
   [[nodiscard]] std::uint64_t halved_bytes() const { return renderer_->impl().detail.halved_bytes(); }
@@ -87,10 +99,12 @@ RenderOptions always_mid(double cell_pixels) {
 TEST_F(VulkanDetail, HalvedGridsAreTheProcessors) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 4, 260.0);
   const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
-  // The coarsest are halved four times.
+  std::set<int> halvings;
   for (const double pixels : {0.4, 1.0, 2.0, 6.0}) {
     compare(camera, always_mid(pixels), "mid_" + std::to_string(static_cast<int>(10 * pixels)));
+    halvings.merge(halvings_of(camera, always_mid(pixels)));
   }
+  EXPECT_EQ(halvings, (std::set<int>{1, 2, 3, 4}));
   const RenderOptions plain = sized(128, 96);
   const Picture near = taken_as_is(camera, plain);
   expect_equal(near, render_test::taken(scene_, camera, plain), "near_after_mid");
@@ -293,12 +307,15 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
   with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
   with("samples", [](RenderOptions& o) { o.samples = 5; });
   with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+  const Picture far = taken_as_is(camera, far_options(148));
+  EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
 }
 
 TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
-  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 9, 300.0);
+  add_crowd(scene_, {add_blobs(scene_, 31, 12), add_blobs(scene_, 32, 12)}, 6, 320.0);
   Camera camera = towards({-150, 160, -150}, {900, -60, 900}, 0.7);
-  RenderOptions options = in_detail(400, 256, 128);
+  // More than a tile, Near, Mid and Far.
+  RenderOptions options = in_detail(320, 200, 128);
   compare(camera, options, "crowd");
   options.detail_colours = true;
   compare(camera, options, "crowd_colours");
@@ -370,11 +387,11 @@ TEST_F(VulkanImpostors, WhatIsNotReadyInTimeIsTraced) {
 }
 
 TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
-  add_crowd(scene_, {add_blobs(scene_, 31)}, 4, 300.0);
+  add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   ASSERT_TRUE(renderer_->update(scene_));
-  const Camera camera = towards({-900, 1200, -1500}, {400, 0, 400}, 0.7);
+  const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
   // More than a tile.
-  RenderOptions options = in_detail(400, 300, 128);
+  RenderOptions options = in_detail(300, 100, 128);
   VulkanPicture picture(*renderer_);
   for (int sample = 0; sample < 3; ++sample) ASSERT_TRUE(renderer_->draw(picture, camera, options, sample == 0));
   options.samples = 3;

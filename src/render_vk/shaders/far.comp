@@ -1,11 +1,13 @@
 #version 460
-// Draws the impostors of a tile, a face an invocation: first the depth of the nearest at each pixel, then which face
+// Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which face
 // that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
 #include "data.glsl"
 #include "far.glsl"
 
 layout(constant_id = 0) const bool kFindsFaces = false;
 
+const uint kViews = 26;
+const uint kFacesAGroup = 512;
 const float kMargin = 0.01;  // pixels: for rounding
 
 // Pixels from the area's corner, inclusive.
@@ -48,10 +50,9 @@ void put(ivec2 pixel, float depth, uint number) {
   }
 }
 
-void draw(Far far, FarFace face, float half_size, float reach) {
-  int axis = int(face.what.z >> 1);
-  float sign = (face.what.z & 1) == 0 ? 1.0 : -1.0;
-  vec3 q = face.centre.xyz;
+void draw(Far far, vec3 q, uint side, uint number, float half_size, float reach) {
+  int axis = int(side >> 1);
+  float sign = (side & 1) == 0 ? 1.0 : -1.0;
   vec3 half_box = vec3(half_size);
   half_box[axis] = 0.0;
   Rectangle rectangle = rectangle_of(far, q, half_box);
@@ -68,7 +69,7 @@ void draw(Far far, FarFace face, float half_size, float reach) {
       vec3 off = abs(point + along * direction - q);
       off[axis] = 0.0;
       bool is_met = max(max(off.x, off.y), off.z) <= reach && towards * sign < 0.0 && 0.0 < depth;
-      if (is_met) put(ivec2(x, y) + to_tile, depth, far.faces.z + face.what.x);
+      if (is_met) put(ivec2(x, y) + to_tile, depth, number);
     }
   }
 }
@@ -96,9 +97,15 @@ void main() {
   Far far = Fars(frame().fars).at[part.x >> 1];
   bool is_unseen = (part.x & 1) != 0;
   uvec4 level = is_unseen ? far.unseen : far.level;
-  uint index = (group - part.y) * 64 + gl_LocalInvocationIndex;
-  if (index >= level.z) return;
-  FarFace face = FarFaces(level.xy).at[index];
-  if ((face.what.y & level.w) == 0) return;
-  draw(far, face, is_unseen ? far.size.y : far.size.x, is_unseen ? far.size.w : far.size.z);
+  uint sides = level.w >> kViews;
+  uint views = level.w & ((1u << kViews) - 1);
+  float half_size = is_unseen ? far.size.y : far.size.x;
+  float reach = is_unseen ? far.size.w : far.size.z;
+  uint first = (group - part.y) * kFacesAGroup;
+  uint end = min(first + kFacesAGroup, level.z);
+  for (uint i = first + gl_LocalInvocationIndex; i < end; i += 64) {
+    uvec4 what = FarFaces(level.xy).at[i].what;
+    if ((sides >> what.z & 1) == 0 || (what.y & views) == 0) continue;
+    draw(far, FarFaces(level.xy).at[i].centre.xyz, what.z, far.faces.z + what.x, half_size, reach);
+  }
 }

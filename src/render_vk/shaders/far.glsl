@@ -22,7 +22,7 @@ struct Far {
   vec4 size;    // xy: from a face's middle to its edges, at the level and of those that no view saw; zw: a bit further
   ivec4 area;   // pixels: left, top, right, bottom, the last two exclusive
   ivec4 origin; // of the tree's coordinates, in the grid; w: the instance
-  uvec4 level;  // address of its faces, how many, views that count
+  uvec4 level;  // address of its faces, how many; bits of views that count, and above them of directions that do
   uvec4 unseen; // of those that no view saw: the same, all of them count
   uvec4 faces;  // address of what is the same at all levels; number of the first among those of the picture
 };
