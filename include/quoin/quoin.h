@@ -48,6 +48,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render_vk/vulkan_window.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/live_meshes.h>

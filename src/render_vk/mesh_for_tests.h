@@ -7,11 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/grid/density_grid.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 
+#include "grid/chunk_order.h"
 #include "mesh/smooth_material.h"
 #include "render_vk/vulkan_for_tests.h"
 
@@ -39,20 +41,35 @@ inline std::vector<SurfaceUpdate> blocky_surfaces(const Scene& scene, bool merge
   return updates;
 }
 
-inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityNeighbourhood& chunks, const VoxelRegistry& types) {
+inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Smooth;
   SmoothOptions options;
   options.split_sheets = true;
-  SmoothMesher().mesh(chunks, options, surface->smooth);
+  SmoothMesher().mesh(field.neighbourhood(chunk), options, surface->smooth);
   const SurfaceMaterials materials(types);
   for (const SmoothCell cell : surface->smooth.cells) {
-    const IVec3 at = cell.cell() + cell.chunk_offset() * kChunkEdge;
-    const SurfaceMaterial material = materials.of_cell(chunks, at, 0);
+    const DensityNeighbourhood around = field.neighbourhood(chunk + cell.chunk_offset());
+    const SurfaceMaterial material = materials.of_cell(around, cell.cell(), 0);
     surface->albedo.push_back(material.albedo);
     surface->types.push_back(material.type);
   }
   return surface;
+}
+
+/// A chunk's mesh has triangles for samples of its own, so one before the first chunk may have some.
+inline std::vector<SurfaceUpdate> smooth_surfaces(GridHandle handle, const DensityGrid& field,
+                                                  const VoxelRegistry& types) {
+  std::vector<IVec3> chunks;
+  for (const IVec3 chunk : field.chunks()) {
+    for (int i = 0; i < 8; ++i) chunks.push_back(chunk - IVec3(i & 1, i >> 1 & 1, i >> 2));
+  }
+  sort_and_unite(chunks);
+  std::vector<SurfaceUpdate> updates;
+  for (const IVec3 chunk : chunks) {
+    updates.push_back({handle, chunk, smooth_surface(field, types, chunk)});
+  }
+  return updates;
 }
 
 inline MeshPictureOptions mesh_options(const RenderOptions& options) {

@@ -21,6 +21,9 @@ constexpr double kEdge = kChunkEdge;
 // Of a ball around a chunk; smooth surfaces reach a little past it.
 constexpr double kChunkRadius = (kEdge / 2 + 2.0) * 1.7320508075688774;
 constexpr double kNearest = 1.0 / 1024.0;  // voxels
+// Of the steps in which a device places corners; half of one closes what rounding opens. In 2.3 million pixels of a
+// room of merged faces 168 were holes without, 12 with 0.25; in 34.6 million none with 0.5.
+constexpr double kWidening = 0.5;
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
@@ -99,6 +102,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
     const DVec3 middle = space.view_axes * (offset + kEdge / 2) + space.base_in_view;
     if (!view.frustum.meets(middle, radius)) continue;
     const double depth = glm::dot(middle, view.rays.forward());
+    if (!std::isfinite(depth)) continue;
     view.include(depth, radius * 1.01, space.instance->voxel_size);
     const bool is_perspective = view.rays.is_perspective();
     data.draws.push_back({&mesh, number, Vec3(offset), is_perspective ? glm::length(middle) : depth,
@@ -124,10 +128,19 @@ Vec4 clip_point(const View& view, DVec3 in_view) {
   return to_vec4({p.x, p.y, (view.furthest - p.z) / (view.furthest - view.nearest)}, 1.0);
 }
 
-ShaderMeshInstance shader_instance(const Space& space, const View& view, DVec3 sun, int subpixels) {
+// The light of a face, which is linear in how open it is: without openness, and what that adds.
+std::array<float, 2> light_of(float diffuse, const LightOptions& options) {
+  if (!options.lit) return {1.0F, 0.0F};
+  if (options.occlusion == OcclusionMode::Off) return {kAmbientWithoutOcclusion + diffuse, 0.0F};
+  if (options.occlusion_affects == OcclusionAffects::Ambient) return {diffuse, kAmbient};
+  const float all = kAmbient + diffuse;
+  return {all * kLeastOfAll, all * (1.0F - kLeastOfAll)};
+}
+
+ShaderMeshInstance shader_instance(const Space& space, const View& view, const LightOptions& light, int subpixels) {
   ShaderMeshInstance out;
   const MeshInstance& instance = *space.instance;
-  const DVec3 sun_in_grid = glm::transpose(instance.world_axes) * sun;
+  const DVec3 sun_in_grid = glm::transpose(instance.world_axes) * to_sun(light);
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     out.clip[i] = clip_vector(view, space.view_axes[axis]);
@@ -135,14 +148,13 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, DVec3 s
   }
   out.clip[3] = clip_point(view, space.base_in_view);
   for (const Direction face : kDirections) {
-    const auto i = static_cast<std::size_t>(face);
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
-    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0));
+    out.light[static_cast<std::size_t>(face)] = light_of(static_cast<float>(std::max(cosine, 0.0)), light);
   }
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());
-  out.room = to_vec4({depth_per_w * pixel / instance.voxel_size / subpixels, 0.0, 0.0});
+  out.room = static_cast<float>(depth_per_w * kWidening * pixel / instance.voxel_size / subpixels);
   return out;
 }
 
@@ -198,20 +210,19 @@ std::uint32_t flags_of(const MeshPictureOptions& options) {
   return flags;
 }
 
-void set_frame(const View& view, const MeshPictureOptions& options, ShaderMeshFrame& frame) {
-  frame.right = to_vec4(view.rays.right());
-  frame.down = to_vec4(view.rays.down());
-  frame.corner = to_vec4(view.rays.corner());
-  frame.forward = to_vec4(view.rays.forward());
+void set_frame(const View& view, const MeshPictureOptions& options, MeshFrameData& data) {
+  data.push.numbers = flags_of(options) << kMeshFlagsShift;
+  data.sky.clip = {to_vec4(view.rays.right()), to_vec4(view.rays.down()), to_vec4(view.rays.corner()),
+                   to_vec4(view.rays.forward())};
+  data.sky.room = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
+  ShaderMeshFrame& frame = data.frame;
   frame.sky_zenith = {sky::kZenith, 0.0F};
   frame.sky_horizon = {sky::kHorizon, 0.0F};
   frame.sky_ground = {sky::kGround, 0.0F};
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
-  frame.sky_scale = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
   frame.sun = to_vec4(to_sun(options.light));
   frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
-  frame.flags = flags_of(options);
   frame.exposure = options.light.lit ? exposure_of(options.light) : 1.0F;
 }
 
@@ -266,13 +277,12 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
     data.instances.emplace_back();
   }
   view.finish();
-  const DVec3 sun = to_sun(options.light);
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    data.instances[i] = shader_instance(spaces[i], view, sun, subpixels);
+    data.instances[i] = shader_instance(spaces[i], view, options.light, subpixels);
   }
   std::stable_sort(data.draws.begin(), data.draws.end(),
                    [](const MeshDraw& a, const MeshDraw& b) { return a.distance < b.distance; });
-  set_frame(view, options, data.frame);
+  set_frame(view, options, data);
   // Where values are shown instead of colours, what is transparent is drawn like anything else.
   if (options.shading == MeshShading::Lit) order_glass(spaces, view, data);
   return data;

@@ -43,6 +43,8 @@ using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 /// What drawing one picture takes, but for where things lie in memory.
 struct MeshFrameData {
   ShaderMeshFrame frame;
+  ShaderMeshPush push;  ///< what all draws have in common
+  ShaderMeshPush sky;
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
   /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMostOrdered`: then
@@ -51,6 +53,7 @@ struct MeshFrameData {
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::size_t glass_quads = 0;
 
+  [[nodiscard]] bool has(std::uint32_t flag) const { return (push.numbers >> kMeshFlagsShift & flag) != 0; }
   /// Of the surfaces that are drawn.
   [[nodiscard]] std::int64_t triangles() const;
 };

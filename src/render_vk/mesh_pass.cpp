@@ -110,19 +110,19 @@ Status MeshPass::grow(VkDeviceSize bytes) {
 
 // Puts what the shaders read of a picture where it will be copied from, and has the images ready.
 Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
-  const VkDeviceSize instances = aligned(sizeof(ShaderMeshFrame));
-  const VkDeviceSize draws = instances + aligned(bytes_of(data.instances));
+  constexpr VkDeviceSize kInstances = sizeof(ShaderMeshFrame);
+  const VkDeviceSize draws = kInstances + aligned(bytes_of(data.instances));
   const VkDeviceSize order = draws + aligned(bytes_of(data.glass));
   frame_bytes_ = order + aligned(bytes_of(data.order));
   if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
   // Room was left for the address to be a multiple, whatever the buffer's is.
   frame_address_ = aligned(frame_.address());
-  data.frame.instances = frame_address_ + instances;
   data.frame.draws = frame_address_ + draws;
-  order_address_ = frame_address_ + order;
+  data.frame.order = frame_address_ + order;
+  data.push.frame = data.sky.frame = frame_address_;
   std::byte* to = staging_.mapped();
   std::memcpy(to, &data.frame, sizeof data.frame);
-  if (!data.instances.empty()) std::memcpy(to + instances, data.instances.data(), bytes_of(data.instances));
+  if (!data.instances.empty()) std::memcpy(to + kInstances, data.instances.data(), bytes_of(data.instances));
   if (!data.glass.empty()) std::memcpy(to + draws, data.glass.data(), bytes_of(data.glass));
   if (!data.order.empty()) std::memcpy(to + order, data.order.data(), bytes_of(data.order));
   if (target_.is_of(size, samples)) return {};
@@ -136,13 +136,10 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
 }
 
 std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe) const {
-  std::vector<Step> steps{{Step::Over::Sky}};
-  if (wireframe == Wireframe::Only) {
-    steps.push_back({Step::Over::All, kDrawEdgesOnly});
-    return steps;
-  }
-  const bool shows_values = (data.frame.flags & (kMeshShowOcclusion | kMeshShowNormals)) != 0;
-  steps.push_back({shows_values ? Step::Over::All : Step::Over::Opaque});
+  if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
+  const bool shows_values = data.has(kMeshShowOcclusion | kMeshShowNormals);
+  // What is solid first, so that less of the sky is to be drawn.
+  std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMostOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
@@ -154,7 +151,8 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
 Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples) {
   for (Step& step : steps) {
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline({what, step.mode, mirrored, samples});
+      const auto found =
+          pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, samples});
       if (!found) return tl::unexpected(found.error());
       out = *found;
       return {};
@@ -221,16 +219,14 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
   const Api& api = device_->api();
   api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
   VkPipeline bound = step.blocky;
-  ShaderMeshPush values;
-  values.frame = frame_address_;
-  values.what = step.mode;
   if (step.over == Step::Over::Sky) {
-    push(commands, values);
+    push(commands, data.sky);
     return api.vkCmdDraw(commands, 3, 1, 0, 0);
   }
+  ShaderMeshPush values = data.push;
+  values.numbers |= step.mode;
   bind_corners(commands);
   if (step.over == Step::Over::GlassInOrder) {
-    values.order = order_address_;
     push(commands, values);
     return draw_quads(commands, 0, static_cast<std::uint32_t>(data.order.size()));
   }
@@ -247,6 +243,10 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     values.data = draw.mesh->place.address;
     values.offset = {draw.offset.x, draw.offset.y, draw.offset.z};
     values.instance = draw.instance;
+    const ShaderMeshInstance& instance = data.instances[draw.instance];
+    values.clip = instance.clip;
+    values.eye = instance.eye;
+    values.room = instance.room;
     push(commands, values);
     draw_mesh(commands, draw, step);
   }

@@ -24,7 +24,7 @@ class MeshPass {
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 
-  /// Writes the pixels of `data` into `colours`. `data.frame.surfaces` says where those are.
+  /// Writes the pixels of `data` into `colours`. `data.push` says where surfaces are.
   [[nodiscard]] Status draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
                             const Buffer& colours);
 
@@ -57,7 +57,6 @@ class MeshPass {
   Buffer frame_;
   VkDeviceSize frame_bytes_ = 0;
   std::uint64_t frame_address_ = 0;
-  std::uint64_t order_address_ = 0;
   std::uint32_t sample_counts_ = 1;
   std::uint32_t largest_edge_ = 0;
   int subpixels_ = 16;

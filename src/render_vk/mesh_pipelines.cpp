@@ -46,6 +46,20 @@ VkAttachmentDescription attachment(VkFormat format, std::uint32_t samples, VkAtt
   return made;
 }
 
+// After what was done with the images before, and before they are copied.
+std::array<VkSubpassDependency, 2> around_pass() {
+  constexpr VkPipelineStageFlags kDepthStages =
+      VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
+  constexpr VkPipelineStageFlags kColourStage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  constexpr VkAccessFlags kWrites = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
+  return {VkSubpassDependency{VK_SUBPASS_EXTERNAL, 0, kColourStage | kDepthStages | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              kColourStage | kDepthStages, kWrites | VK_ACCESS_TRANSFER_READ_BIT, kWrites, 0},
+          VkSubpassDependency{0, VK_SUBPASS_EXTERNAL, kColourStage, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
+}
+
 bool is_glass(const MeshWay& way) {
   return way.mode >= kDrawGlass;
 }
@@ -71,11 +85,12 @@ VkPipelineRasterizationStateCreateInfo rasterization_of(const MeshWay& way) {
 VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
   auto state =
       info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
-  const bool is_tested = way.what != MeshWay::What::Sky && way.mode != kDrawEdgesOnly;
-  state.depthTestEnable = is_tested ? VK_TRUE : VK_FALSE;
-  state.depthWriteEnable = is_tested && way.mode == kDrawSurfaces ? VK_TRUE : VK_FALSE;
-  // Of equally near surfaces the first one drawn stays; edges lie on theirs.
-  state.depthCompareOp = way.mode == kDrawEdgesOver ? VK_COMPARE_OP_GREATER_OR_EQUAL : VK_COMPARE_OP_GREATER;
+  const bool is_sky = way.what == MeshWay::What::Sky;
+  state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
+  state.depthWriteEnable = way.mode == kDrawSurfaces && !is_sky ? VK_TRUE : VK_FALSE;
+  // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
+  state.depthCompareOp = VK_COMPARE_OP_GREATER;
+  if (is_sky || way.mode == kDrawEdgesOver) state.depthCompareOp = VK_COMPARE_OP_GREATER_OR_EQUAL;
   return state;
 }
 
@@ -95,6 +110,30 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   state.alphaBlendOp = VK_BLEND_OP_ADD;
   return state;
 }
+
+// The two shaders with what of a way they are made for.
+struct Stages {
+  std::array<VkBool32, 2> values;
+  std::array<VkSpecializationMapEntry, 2> entries;
+  VkSpecializationInfo constants;
+  std::array<VkPipelineShaderStageCreateInfo, 2> all{};
+
+  Stages(const MeshWay& way, const VkShaderModule* shaders)
+      : values{way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE},
+        entries{VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
+                VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}},
+        constants{2, entries.data(), sizeof values, values.data()} {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+      all[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
+      all[i].module = shaders[i];
+      all[i].pName = "main";
+    }
+    if (way.what == MeshWay::What::Blocky) all[0].pSpecializationInfo = &constants;
+  }
+  Stages(const Stages&) = delete;
+  Stages& operator=(const Stages&) = delete;
+};
 
 }  // namespace
 
@@ -151,7 +190,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
   const bool is_resolved = samples > 1;
   constexpr VkImageLayout kColourLayout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
   constexpr VkImageLayout kDepthLayout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-  // The sky covers all of it first.
+  // The sky covers what nothing else does.
   const std::array attachments = {
       attachment(kMeshColour, samples, VK_ATTACHMENT_LOAD_OP_DONT_CARE, !is_resolved, kColourLayout),
       attachment(kMeshDepth, samples, VK_ATTACHMENT_LOAD_OP_CLEAR, false, kDepthLayout),
@@ -165,17 +204,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
   subpass.pColorAttachments = &colour;
   subpass.pDepthStencilAttachment = &depth;
   subpass.pResolveAttachments = is_resolved ? &resolved : nullptr;
-  constexpr VkPipelineStageFlags kDepthStages =
-      VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
-  constexpr VkPipelineStageFlags kColourStage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
-  constexpr VkAccessFlags kWrites = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
-                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT |
-                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
-  const std::array<VkSubpassDependency, 2> dependencies = {
-      VkSubpassDependency{VK_SUBPASS_EXTERNAL, 0, kColourStage | kDepthStages | VK_PIPELINE_STAGE_TRANSFER_BIT,
-                          kColourStage | kDepthStages, kWrites | VK_ACCESS_TRANSFER_READ_BIT, kWrites, 0},
-      VkSubpassDependency{0, VK_SUBPASS_EXTERNAL, kColourStage, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                          VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
+  const auto dependencies = around_pass();
   auto info = info_of<VkRenderPassCreateInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO);
   info.attachmentCount = is_resolved ? 3 : 2;
   info.pAttachments = attachments.data();
@@ -187,13 +216,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 }
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
-  std::array<VkPipelineShaderStageCreateInfo, 2> stages{};
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    stages[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-    stages[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
-    stages[i].module = shaders_[2 * static_cast<std::size_t>(way.what) + i];
-    stages[i].pName = "main";
-  }
+  const Stages stages(way, &shaders_[2 * static_cast<std::size_t>(way.what)]);
   const auto vertices =
       info_of<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
   auto assembly =
@@ -216,8 +239,8 @@ VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& 
   dynamic.dynamicStateCount = dynamics.size();
   dynamic.pDynamicStates = dynamics.data();
   auto info = info_of<VkGraphicsPipelineCreateInfo>(VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO);
-  info.stageCount = stages.size();
-  info.pStages = stages.data();
+  info.stageCount = stages.all.size();
+  info.pStages = stages.all.data();
   info.pVertexInputState = &vertices;
   info.pInputAssemblyState = &assembly;
   info.pViewportState = &viewport;

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <tuple>
 
 #include "render_vk/device.h"
 
@@ -20,12 +20,10 @@ struct MeshWay {
   /// As ShaderMeshPush: surfaces, edges over them, edges alone, or a channel of glass.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
+  bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
   std::uint32_t samples = 1;
 
-  bool operator<(const MeshWay& other) const {
-    return std::tie(what, mode, mirrored, samples) < std::tie(other.what, other.mode, other.mirrored, other.samples);
-  }
-  bool operator==(const MeshWay&) const = default;
+  auto operator<=>(const MeshWay&) const = default;
 };
 
 /// Pipelines and render passes by what they are for, each made when it is first needed.

@@ -3,6 +3,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/render_vk/vulkan_window.h>
 
 namespace quoin {
 namespace {
@@ -40,6 +41,9 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, const Progress&) {
   return refusal();
 }
+Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, bool, const Progress&) {
+  return refusal();
+}
 
 // A renderer to make these for cannot be had.
 struct VulkanPicture::Impl {};
@@ -67,6 +71,9 @@ std::size_t VulkanPicture::bytes() const {
 Result<Image> VulkanPicture::read() const {
   return refusal();
 }
+Status VulkanPicture::write(const Image&) {
+  return refusal();
+}
 
 struct VulkanMeshRenderer::Impl {};
 
@@ -90,6 +97,23 @@ Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPicture
 }
 VulkanMeshRenderer::Facts VulkanMeshRenderer::facts() const {
   return {};
+}
+
+struct VulkanWindow::Impl {};
+
+VulkanWindow::VulkanWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VulkanWindow::VulkanWindow(VulkanWindow&&) noexcept = default;
+VulkanWindow& VulkanWindow::operator=(VulkanWindow&&) noexcept = default;
+VulkanWindow::~VulkanWindow() = default;
+
+Result<VulkanWindow> VulkanWindow::create(VulkanRenderer&, bool) {
+  return refusal();
+}
+Status VulkanWindow::set_font(int, int, std::span<const std::uint8_t>) {
+  return refusal();
+}
+Status VulkanWindow::present(int, int, const VulkanPicture*, const PixelRect&, const Overlay&) {
+  return refusal();
 }
 
 }  // namespace quoin

@@ -133,6 +133,36 @@ TEST_F(VulkanMeshLight, TypesThatAreNotRegisteredAreMagenta) {
   compare(scene, towards({5, 9, 20}, {5, 2, 2}), without_shadows(sized(64, 64)), "unregistered");
 }
 
+TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
+  Scene scene;
+  const VoxelType lamp = add_type(scene, {200, 120, 60}, Visibility::Opaque, 0.125F);
+  DensityGrid field;
+  field.add_box({0, 0, 0}, {60, 10, 60}, lamp);
+  const GridHandle grid = scene.add_grid({});
+  scene.add_instance({"", grid});
+  put(scene, vulkan_test::smooth_surfaces(grid, field, scene.types));
+  // Onto the middle of a flat face, which is all open.
+  const Camera camera = from_above(30, 50, 30, 8);
+  MeshPictureOptions options = mesh_options(without_shadows(sized(8, 8)));
+  const Vec3 colour = render_test::linear({200, 120, 60});
+  const auto up = static_cast<float>(glm::normalize(options.light.sun).y);
+  const auto expect = [&](Vec3 light, const char* what) {
+    const render_test::Pixel pixel = render_test::encoded(light);
+    EXPECT_LE(glm::length(byte_at(drawn(camera, options), 4, 4) - Vec3(pixel[0], pixel[1], pixel[2])), 2.0F) << what;
+  };
+  expect(colour * (0.15F + up) + colour * 0.125F, "lit");
+  options.light.occlusion_affects = OcclusionAffects::All;
+  expect(colour * (0.15F + up) + colour * 0.125F, "all of it is open");
+  options.light.exposure = 0.5;
+  expect(0.5F * (colour * (0.15F + up) + colour * 0.125F), "exposed");
+  options.light.occlusion = OcclusionMode::Off;
+  expect(0.5F * (colour * (0.10F + up) + colour * 0.125F), "without occlusion");
+  options.light.sun = {0, -1, 0};
+  expect(0.5F * (colour * 0.10F + colour * 0.125F), "the sun below");
+  options.light.lit = false;
+  expect(colour, "unlit");
+}
+
 TEST_F(VulkanMeshLight, MergedQuadsLookLikeSingleFaces) {
   const Scene scene = huts({0, 0, 0});
   const Camera camera = towards({10, 40, 70}, {0, 4, 0});

@@ -152,8 +152,9 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   if (impl_->surface_table.empty()) impl_->instances.clear();
   auto data = vulkan::make_mesh_frame(impl_->store, impl_->instances, camera, options, impl_->pass->subpixels());
   if (!data) return tl::unexpected(data.error());
-  data->frame.surfaces = impl_->surfaces.address;
-  data->frame.last_surface = static_cast<std::uint32_t>(impl_->surface_table.size() / 3) - 1;
+  data->push.surfaces = impl_->surfaces.address;
+  const std::size_t types = std::max<std::size_t>(impl_->surface_table.size() / 3, 1);
+  data->push.numbers |= static_cast<std::uint32_t>(types - 1) << vulkan::kMeshLastSurfaceShift;
   if (Status sized = target.resize(options.width, options.height); !sized) return sized;
   target.samples = 0;
   target.rays = 0;

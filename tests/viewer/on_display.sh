@@ -6,4 +6,4 @@ for program in xvfb-run xauth; do
   command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
 done
 unset WAYLAND_DISPLAY SDL_VIDEODRIVER
-exec xvfb-run -a -s '-screen 0 1024x640x24' "$@"
+exec xvfb-run -a -s '-screen 0 1024x640x24 -noreset' "$@"

@@ -144,6 +144,32 @@ xdotool key --delay 80 ctrl+y
 picture_becomes redone.png edited.png || fail "redo does not bring back the edit"
 
 xdotool key --delay 80 ctrl+z
+until_true 20 title_is "world.vox - Quoin" || fail "undo does not bring back the saved state again"
+
+# Where there is no device a message says so, and rays go on.
+if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/null 2>&1; then
+  echo "meshes follow edits"
+  xdotool key --delay 80 F6
+  sleep 0.5
+  picture blocks.png
+  ! cmp -s home.png blocks.png || fail "F6 draws no meshes"
+  xdotool mousemove 180 220
+  drag 1 6 2
+  until_true 20 title_is "* world.vox - Quoin" || fail "no edit among meshes"
+  picture blocks_edited.png
+  ! cmp -s blocks.png blocks_edited.png || fail "the meshes do not follow the edit"
+  xdotool key --delay 80 ctrl+z
+  picture_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
+  for key in F8 F9 F7; do
+    xdotool key --delay 80 "$key"
+    sleep 0.5
+    picture next.png
+    ! cmp -s blocks.png next.png || fail "$key changes nothing"
+    mv next.png blocks.png
+  done
+  xdotool key --delay 80 F8 F8 F9 F9 F5
+  picture_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
+fi
 
 echo "choose a colour in the panel, paint"
 xdotool key --delay 80 4

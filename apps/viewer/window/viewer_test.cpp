@@ -12,6 +12,7 @@
 #include <quoin/render/cpu_renderer.h>
 
 #include "viewer/viewer_fixture.h"
+#include "viewer/window/process_facts.h"
 
 namespace quoin::viewer {
 namespace {
@@ -38,22 +39,6 @@ class ViewerTest : public ::testing::Test {
 
   ScratchFolder folder_{"window"};
 };
-
-std::size_t open_files() {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}));
-}
-
-std::size_t threads() {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
-}
-
-double resident_megabytes() {
-  std::ifstream in("/proc/self/statm");
-  long long total = 0;
-  long long resident = 0;
-  in >> total >> resident;
-  return static_cast<double>(resident) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
-}
 
 TEST_F(ViewerTest, TheScreenshotIsTheRenderersPicture) {
   const ViewerOptions given = options(333, 250);

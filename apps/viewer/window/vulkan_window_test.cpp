@@ -11,7 +11,9 @@
 #include <quoin/render_vk/vulkan_window.h>
 
 #include "screen.h"
+#include "viewer.h"
 #include "viewer/viewer_fixture.h"
+#include "viewer/window/process_facts.h"
 
 namespace quoin::viewer {
 namespace {
@@ -120,6 +122,37 @@ TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
     ASSERT_TRUE(window) << to_string(window.error());
     ASSERT_TRUE(window->present(160, 90, &picture, {0, 0, 32, 32}, {}));
   }
+}
+
+TEST_F(VulkanWindowTest, FiftyStartsOfTheViewerLeaveNothingBehind) {
+  // The viewer starts and ends SDL itself.
+  renderer_.reset();
+  window_.reset();
+  video_.reset();
+  const ScratchFolder folder("vulkan_starts");
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
+  ViewerOptions given;
+  given.file = folder.file("hill.vox");
+  given.width = 64;
+  given.height = 48;
+  given.is_bare = true;
+  given.backend = ViewerBackend::Vulkan;
+  const auto start = [&] {
+    constexpr int kFrames = 3;
+    int asked = 0;
+    const Status status = run_viewer(given, [&asked] { return ++asked > kFrames; });
+    ASSERT_TRUE(status) << to_string(status.error());
+  };
+  for (int i = 0; i < 5; ++i) start();
+  const std::size_t files = open_files();
+  const std::size_t threads_before = threads();
+  const double memory = resident_megabytes();
+  for (int i = 0; i < 45; ++i) start();
+  EXPECT_EQ(open_files(), files);
+  EXPECT_LE(threads(), threads_before);
+  RecordProperty("megabytes", std::to_string(resident_megabytes() - memory));
+  EXPECT_LT(resident_megabytes() - memory, 25.0);
 }
 
 TEST_F(VulkanWindowTest, PicturesOfTheProcessorAreShownToo) {

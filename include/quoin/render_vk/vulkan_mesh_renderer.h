@@ -16,13 +16,13 @@ namespace quoin {
 
 enum class MeshShading : std::uint8_t {
   Lit,        ///< colours in the reference model of light, without shadows
-  Occlusion,  ///< the ambient occlusion alone, in grey
-  Normals,    ///< in colours: 0.5 + 0.5 n, in the world
+  Occlusion,  ///< the openness alone, in grey: a pixel's byte is 255 times it
+  Normals,    ///< in colours: bytes are 255 (0.5 + 0.5 n), in the world
 };
 
 enum class Wireframe : std::uint8_t {
   Off,
-  Over,  ///< the edges of triangles over the surfaces
+  Over,  ///< the edges of triangles over the surfaces: dark, but on what is nearly black
   Only,  ///< the edges alone; hidden ones too
 };
 
@@ -40,7 +40,13 @@ struct MeshPictureOptions {
 /// there, and its corners are made when it is drawn.
 ///
 /// Equal: a blocky mesh lit without shadows is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at
-///        silhouettes and where glass is seen: glass counts as one voxel thick, drawn from back to front.
+///        silhouettes and where glass is seen: glass counts as one voxel thick, drawn from back to front. There is no
+///        inside: only faces that look towards the camera are drawn.
+/// Glass: quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn in
+///        the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque, whatever
+///        their types; and so is glass where values are shown instead of colours.
+/// Far:   what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
+///        1/1024 of a voxel is cut off.
 /// Must not outlive the renderer it was made for. Threads: that renderer's. Errors: as there.
 class VulkanMeshRenderer {
  public:
@@ -52,12 +58,15 @@ class VulkanMeshRenderer {
 
   /// Takes over instances and types. Cost: O(instances + types).
   [[nodiscard]] Status update(const Scene& scene, bool hidden = false);
-  /// Takes over surfaces; cost: the upload of these.
+  /// Takes over surfaces; of one chunk the last. Cost: the upload of these.
+  /// Errors also: InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
+  /// error some surfaces may have been taken over, and the others are what they were.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
   void clear();
 
-  /// Draws all there is. Errors also: InvalidArgument for sizes and samples that cannot be, and for cameras as
-  /// CpuRenderer::render; Unsupported for wireframes where the device has no lines.
+  /// Draws all there is. Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as
+  /// CpuRenderer::render and those whose axes lie in one plane, and for a picture of another renderer; Unsupported for
+  /// wireframes where the device has no lines. After an error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
 
   struct Facts {

@@ -17,11 +17,12 @@ const uint kGlass = 3;  // and the channel
 
 // An instance, from a point of its grid that is not far from the camera. A grid's axes are unit in the world.
 struct Instance {
-  vec4 clip[4];     // columns: clip space from there, in voxels
-  vec4 axes[3];     // columns: the grid's axes in the world
-  vec4 diffuse[2];  // by face
-  vec4 eye;         // the camera, in voxels from there; orthographic: the direction towards it
-  vec4 room;        // voxels per clip w by which faces are widened
+  vec4 clip[4];   // columns: clip space from there, in voxels
+  vec4 axes[3];   // columns: the grid's axes in the world
+  vec4 eye;       // the camera, in voxels from there, and 1; orthographic: the direction towards it, and 0
+  vec2 light[6];  // of a face that is not open at all, and what openness adds
+  float room;     // voxels per clip w by which faces are widened
+  float pad[3];
 };
 
 struct Draw {
@@ -40,75 +41,45 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Pai
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vectors {
   vec4 at[];
 };
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Instances {
-  Instance at[];
-};
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Draws {
   Draw at[];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
-  vec4 right;  // a pixel to the right and down, and the picture's upper left corner, at a distance of 1
-  vec4 down;
-  vec4 corner;
-  vec4 forward;
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
   vec4 sun;
   vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
-  uvec2 surfaces;   // three vectors each: colour and own share as glass, emitted, what passes
-  uvec2 instances;
   uvec2 draws;
-  uvec2 pad;
-  uint last_surface;
-  uint flags;
+  uvec2 order;  // which quad of which draw is next, of what is transparent
   float exposure;
   float ground_begins;
   float ground_is_full;
-  float sky_scale;
+  float pad;
+  Instance instances[];
 };
 
+// What is the same for many vertices is here rather than in memory, all that Vulkan has room for everywhere.
 layout(push_constant) uniform Push {
-  uvec2 frame;
-  uvec2 data;   // of the chunk
-  vec3 offset;  // of the chunk, from where its instance is counted, in voxels
+  vec4 clip[4];  // of the instance; the sky's: right, down, corner and forward, as CameraRays has them
+  vec4 eye;      // of the instance
+  vec3 offset;   // of the chunk, from where its instance is counted, in voxels
   uint instance;
-  uvec2 order;  // not 0: which quad of which draw is next
-  uint what;
-  uint pad;
+  uvec2 frame;
+  uvec2 data;      // of the chunk
+  uvec2 surfaces;  // three vectors each: colour and own share as glass, emitted, what passes
+  float room;      // of the instance; the sky's: turns the way from the picture's middle into the tangent of an angle
+  uint numbers;    // bits 0-3 what is drawn, 4-11 flags, from 12 the last surface
 } push;
 
+uint drawn() {
+  return push.numbers & 15;
+}
 bool has(uint flag) {
-  return (Frame(push.frame).flags & flag) != 0;
+  return (push.numbers >> 4 & flag) != 0;
 }
-
-struct Surface {
-  vec3 colour;
-  float own;
-  vec3 emitted;
-  vec3 passed;
-};
-
-Surface surface_of(uint type) {
-  Frame f = Frame(push.frame);
-  uint at = 3 * min(type, f.last_surface);
-  vec4 colour = Vectors(f.surfaces).at[at];
-  vec4 emitted = Vectors(f.surfaces).at[at + 1];
-  vec4 passed = Vectors(f.surfaces).at[at + 2];
-  return Surface(colour.xyz, colour.w, emitted.xyz, passed.xyz);
-}
-
-// The reference model of light without shadows, before exposure: light/lighting.h. `diffuse`: max(n.l, 0).
-vec3 lit_colour(vec3 colour, vec3 emitted, float diffuse, float openness) {
-  if (!has(kLit)) return colour;
-  vec4 share = Frame(push.frame).light;
-  float light = share.x * openness + diffuse;
-  if (!has(kHasOcclusion)) {
-    light = share.y + diffuse;
-  } else if (has(kAffectsAll)) {
-    light = (share.x + diffuse) * (share.z + (1.0 - share.z) * openness);
-  }
-  return colour * light + emitted;
+uint surface_at(uint type) {
+  return 3 * min(type, push.numbers >> 12);
 }
 
 // What a fragment is to show of a colour, or of a value that is to be seen as it is.
@@ -119,9 +90,9 @@ vec3 shown(vec3 colour) {
   } else {
     colour *= Frame(push.frame).exposure;
   }
-  if (push.what == kEdgesOnly) return vec3(0.02);
-  if (push.what != kEdgesOver) return colour;
+  if (drawn() == kEdgesOnly) return vec3(0.02);
+  if (drawn() != kEdgesOver) return colour;
   // Edges stand out from dark and from bright surfaces.
   float luminance = dot(min(colour, vec3(1.0)), vec3(0.2126, 0.7152, 0.0722));
-  return luminance > 0.12 ? vec3(0.004) : vec3(0.5);
+  return luminance > 0.03 ? vec3(0.002) : vec3(0.2);
 }

@@ -2,19 +2,14 @@
 #include "mesh.glsl"
 #include "sky.glsl"
 
+layout(location = 0) flat in vec4 zenith;
+layout(location = 1) flat in vec4 horizon;
+layout(location = 2) flat in vec4 ground;
 layout(location = 0) out vec4 pixel;
 
 void main() {
-  Frame f = Frame(push.frame);
-  vec4 right = f.right;
-  vec4 down = f.down;
-  vec4 corner = f.corner;
-  vec4 forward = f.forward;
-  vec3 across = corner.xyz + right.xyz * gl_FragCoord.x + down.xyz * gl_FragCoord.y;
-  vec3 direction = forward.xyz + across * f.sky_scale;
-  vec4 zenith = f.sky_zenith;
-  vec4 horizon = f.sky_horizon;
-  vec4 ground = f.sky_ground;
-  Sky sky = Sky(zenith.xyz, horizon.xyz, ground.xyz, f.ground_begins, f.ground_is_full);
+  vec3 across = push.clip[2].xyz + push.clip[0].xyz * gl_FragCoord.x + push.clip[1].xyz * gl_FragCoord.y;
+  vec3 direction = push.clip[3].xyz + across * push.room;
+  Sky sky = Sky(zenith.xyz, horizon.xyz, ground.xyz, zenith.w, ground.w);
   pixel = vec4(sky_colour(sky, direction.y / length(direction)), 1.0);
 }

@@ -17,17 +17,16 @@ vec3 unit_vector(uint word) {
 }
 
 void main() {
-  Frame f = Frame(push.frame);
   Words words = Words(push.data);
   uint first = 7 * uint(gl_VertexIndex);
   vec3 local = vec3(uintBitsToFloat(words.at[first]), uintBitsToFloat(words.at[first + 1]),
                     uintBitsToFloat(words.at[first + 2]));
-  Instance instance = Instances(f.instances).at[push.instance];
   precise vec3 point = (local + 0.5) + push.offset;
-  gl_Position = instance.clip[0] * point.x + instance.clip[1] * point.y + instance.clip[2] * point.z + instance.clip[3];
+  gl_Position = push.clip[0] * point.x + push.clip[1] * point.y + push.clip[2] * point.z + push.clip[3];
   vec3 n = unit_vector(words.at[first + 3]);
-  normal = instance.axes[0].xyz * n.x + instance.axes[1].xyz * n.y + instance.axes[2].xyz * n.z;
+  vec4 axes[3] = Frame(push.frame).instances[push.instance].axes;
+  normal = axes[0].xyz * n.x + axes[1].xyz * n.y + axes[2].xyz * n.z;
   albedo = vec4(unpackUnorm2x16(words.at[first + 4]), unpackUnorm2x16(words.at[first + 5]));
-  Surface surface = surface_of(words.at[first + 6]);
-  emitted = surface.emitted;
+  vec4 glow = Vectors(push.surfaces).at[surface_at(words.at[first + 6]) + 1];
+  emitted = glow.xyz;
 }
