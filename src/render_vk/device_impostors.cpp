@@ -33,6 +33,7 @@ std::vector<ShaderFarFace> faces_of(const ImpostorFaces::Level& level) {
 
 std::vector<ShaderVoxelFace> faces_of(const ImpostorFaces& impostor) {
   std::vector<ShaderVoxelFace> faces;
+  faces.reserve(impostor.faces.size());
   for (const ImpostorFaces::Face& face : impostor.faces) {
     faces.push_back({face.voxel, std::uint32_t{face.type} | std::uint32_t{face.occlusion} << 16 |
                                      static_cast<std::uint32_t>(face.direction) << 24 |
