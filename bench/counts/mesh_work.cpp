@@ -1,0 +1,64 @@
+#include <memory>
+#include <utility>
+
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/smooth.h>
+
+#include "bench/smooth_workload.h"
+#include "bench/workloads.h"
+#include "counted.h"
+
+namespace quoin::counts {
+namespace {
+
+Counted blocky(const std::string& name, workloads::Blocky which, bool occlusion, InstructionSet instructions) {
+  struct State {
+    Chunk chunk;
+    VoxelRegistry types;
+    BlockyMesher mesher;
+    QuadBuffer quads;
+  };
+  const auto state = std::make_shared<State>(
+      State{workloads::blocky_chunk(which), workloads::three_types(), BlockyMesher(instructions), {}});
+  QuadOptions options;
+  options.occlusion = occlusion;
+  options.region = workloads::kInterior;
+  return {name, [=] { state->mesher.mesh(lone(state->chunk), state->types, options, state->quads); }};
+}
+
+Counted smooth(const std::string& name, workloads::Smooth which, SmoothOcclusion form, InstructionSet instructions) {
+  struct State {
+    DensityChunk chunk;
+    SmoothMesher mesher;
+    SmoothChunkMesh mesh;
+  };
+  const auto state = std::make_shared<State>(
+      State{workloads::density_chunk(workloads::smooth_field(which)), SmoothMesher(instructions), {}});
+  SmoothOptions options;
+  options.border = SmoothBorder::Open;
+  options.occlusion.form = form;
+  return {name, [=] {
+            DensityNeighbourhood alone;
+            alone.chunks[13] = &state->chunk;
+            state->mesher.mesh(alone, options, state->mesh);
+          }};
+}
+
+}  // namespace
+
+std::vector<Counted> mesh_work() {
+  using workloads::Blocky;
+  using workloads::Smooth;
+  return {blocky("blocky/w1/ao", Blocky::W1, true, InstructionSet::Best),
+          blocky("blocky/w1/no_ao", Blocky::W1, false, InstructionSet::Best),
+          blocky("blocky/w2/ao", Blocky::W2, true, InstructionSet::Best),
+          blocky("blocky/w4/ao", Blocky::W4, true, InstructionSet::Best),
+          blocky("blocky/empty", Blocky::Empty, true, InstructionSet::Best),
+          blocky("plain/blocky/w1/ao", Blocky::W1, true, InstructionSet::Plain),
+          smooth("smooth/s4", Smooth::S4, SmoothOcclusion::None, InstructionSet::Best),
+          smooth("smooth/s1", Smooth::S1, SmoothOcclusion::None, InstructionSet::Best),
+          smooth("smooth/s1/openness", Smooth::S1, SmoothOcclusion::Openness, InstructionSet::Best),
+          smooth("plain/smooth/s1", Smooth::S1, SmoothOcclusion::None, InstructionSet::Plain)};
+}
+
+}  // namespace quoin::counts
