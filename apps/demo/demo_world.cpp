@@ -68,7 +68,7 @@ quoin::Result<quoin::Scene> make_scene() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
+  if (argc != 2 || argv[1][0] == '-') {
     std::fprintf(stderr, "usage: quoin_demo_world OUT.vox\n");
     return 2;
   }

@@ -39,7 +39,7 @@ void CameraControl::set(const Camera& camera, const DBox& bounds) {
   apply_angles();
   const double ahead = glm::dot(middle - camera_.position, camera_.forward);
   pivot_ = camera_.position + camera_.forward * std::max(ahead, 0.01 * size_);
-  speed_ = 0.35 * size_;
+  speed_ = 0.2 * size_;
   velocity_ = DVec3{0.0};
   zoom_left_ = 0.0;
 }

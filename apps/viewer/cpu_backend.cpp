@@ -205,6 +205,7 @@ void CpuBackend::show(const ViewRequest& request) {
     impl_->is_done = false;
     impl_->error.reset();
     ++impl_->request_number;
+    if (impl_->frame) impl_->frame->is_settled = false;
   }
   impl_->wake.notify_all();
 }

@@ -75,6 +75,23 @@ struct Watched {
   CpuBackend backend;
 };
 
+TEST(CpuBackend, NoPictureOfAnEarlierRequestIsSettled) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene, 10.0);
+  ViewRequest request = request_for(loaded.scene, View::Iso);
+  request.samples = 1;
+  watched.backend.show(request);
+  ASSERT_FALSE(watched.settle().empty()) << "now it is known how fast it is, and the next picture is the last one";
+  request.camera.position.x += 1.0;
+  watched.backend.show(request);
+  ASSERT_TRUE(watched.bell.wait());
+  ViewRequest other = request_for(loaded.scene, View::Top, 64, 48);
+  watched.backend.show(other);
+  const auto frame = watched.backend.take();
+  ASSERT_TRUE(frame);
+  EXPECT_FALSE(frame->colour.width == request.width && frame->is_settled);
+}
+
 TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);

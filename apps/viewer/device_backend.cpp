@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <new>
+#include <system_error>
 #include <utility>
 
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
@@ -55,6 +57,7 @@ struct DeviceBackend::Impl {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
   }
   Status prepare();
+  Result<bool> draw();
   Status prepare_meshes(SurfaceStyle style);
   Result<bool> draw_meshes();
   Result<bool> draw_rays();
@@ -153,9 +156,22 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   return true;
 }
 
+// Answers whether there is another picture.
+Result<bool> DeviceBackend::Impl::draw() {
+  try {
+    if (Status ready = prepare(); !ready) return tl::unexpected<Error>(ready.error());
+    return request->mode == DrawMode::Rays ? draw_rays() : draw_meshes();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::LimitExceeded, "out of memory");
+  } catch (const std::system_error& why) {
+    return fail(ErrorCode::LimitExceeded, std::string("cannot start another thread: ") + why.what());
+  }
+}
+
 int DeviceBackend::Impl::first_divisor() const {
   const double pixels = static_cast<double>(request->width) * request->height;
   int chosen = kDivisors.front();
+  if (seconds_per_sample <= 0.0) return chosen;
   for (const int finer : kDivisors) {
     if (pixels / (finer * finer) * seconds_per_sample <= options.frame_seconds) chosen = finer;
   }
@@ -172,12 +188,8 @@ int DeviceBackend::Impl::samples_now() const {
 
 Status DeviceBackend::Impl::draw_stage() {
   const bool is_first = std::exchange(is_request_new, false);
-  if (is_first) {
-    divisor = first_divisor();
-  } else if (divisor > 1) {
-    divisor /= 2;
-  }
-  const bool is_new = is_first || picture->width() != (request->width + divisor - 1) / divisor;
+  const bool is_new = is_first || divisor > 1;
+  divisor = is_first ? first_divisor() : std::max(divisor / 2, 1);
   RenderOptions wanted;
   wanted.width = (request->width + divisor - 1) / divisor;
   wanted.height = (request->height + divisor - 1) / divisor;
@@ -220,6 +232,7 @@ ViewFrame DeviceBackend::Impl::frame(double seconds) const {
 
 void DeviceBackend::Impl::fail_with(const Error& what) {
   error = what;
+  meshes.reset();
   give_up_device();
 }
 
@@ -261,12 +274,7 @@ std::optional<ViewFrame> DeviceBackend::take() {
   if (!me.uses_device()) return me.cpu.take();
   if (!me.can_draw_now()) return std::nullopt;
   const Clock::time_point start = Clock::now();
-  Result<bool> drawn = false;
-  if (Status ready = me.prepare(); !ready) {
-    drawn = tl::unexpected<Error>(ready.error());
-  } else {
-    drawn = me.request->mode == DrawMode::Rays ? me.draw_rays() : me.draw_meshes();
-  }
+  const Result<bool> drawn = me.draw();
   if (!drawn) {
     me.fail_with(drawn.error());
     return std::nullopt;

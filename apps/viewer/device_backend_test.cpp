@@ -223,6 +223,45 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   EXPECT_FALSE(settle(backend).empty());
 }
 
+TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {
+  const Document document = small_document();
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  options.rays_on_device = true;
+  DeviceBackend backend(document.scene(), options,
+                        []() -> Result<std::shared_ptr<VulkanRenderer>> { throw std::bad_alloc(); }, {});
+  const ViewRequest request = request_for(document, DrawMode::Rays);
+  backend.show(request);
+  EXPECT_FALSE(backend.take());
+  ASSERT_TRUE(backend.fault());
+  EXPECT_EQ(backend.fault()->code, ErrorCode::LimitExceeded);
+  backend.show(request_for(document, DrawMode::Blocks));
+  backend.show(request);
+  EXPECT_FALSE(settle(backend).empty()) << "the processor stands in";
+}
+
+TEST_F(DeviceBackendTest, TheFirstPictureIsSoonThereHoweverSlowTheDevice) {
+  const Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Rays);
+  request.samples = 1;
+  for (const auto& [width, height] : {std::pair{160, 100}, {1, 1}, {1, 40}, {7, 2}}) {
+    request.width = width;
+    request.height = height;
+    backend->show(request);
+    const auto first = backend->take();
+    ASSERT_TRUE(first);
+    if (width == 160) {
+      EXPECT_LT(first->on_device->width(), width) << "how long it takes is not known yet";
+    }
+    if (first->is_settled) continue;
+    const auto pictures = settle(*backend);
+    ASSERT_FALSE(pictures.empty());
+    EXPECT_EQ(pictures.back().width, width);
+    EXPECT_EQ(pictures.back().height, height);
+  }
+}
+
 TEST_F(DeviceBackendTest, ADeviceThatIsForgottenIsStoodInFor) {
   const Document document = small_document();
   const auto backend = backend_of(document);

@@ -158,6 +158,7 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   if (Status sized = target.resize(options.width, options.height); !sized) return sized;
   target.samples = 0;
   target.rays = 0;
+  target.sums = {};
   const std::uint32_t samples = impl_->pass->samples_for(options.samples);
   const VkExtent2D size{static_cast<std::uint32_t>(options.width), static_cast<std::uint32_t>(options.height)};
   if (Status done = impl_->pass->draw(*data, size, samples, options.wireframe, target.colours); !done) return done;

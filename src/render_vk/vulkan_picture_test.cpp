@@ -63,6 +63,19 @@ TEST_F(VulkanPictures, BeginAnewWhenAskedAndForAnotherSize) {
   EXPECT_EQ(bytes_of(picture), rendered(1).colour.rgb);
 }
 
+TEST_F(VulkanPictures, AddNothingToWhatIsNoSumOfSamples) {
+  const std::vector<std::uint8_t> alone = rendered(1).colour.rgb;
+  VulkanPicture picture(*renderer_);
+  Image grey{200, 130, std::vector<std::uint8_t>(std::size_t{3} * 200 * 130, 128)};
+  for (const bool was_drawn : {false, true}) {
+    if (was_drawn) add(picture, 2, true);
+    ASSERT_TRUE(picture.write(grey));
+    add(picture, 1, false);
+    EXPECT_EQ(picture.samples(), 1);
+    EXPECT_EQ(bytes_of(picture), alone);
+  }
+}
+
 TEST_F(VulkanPictures, SayWhatCannotBe) {
   VulkanPicture picture(*renderer_);
   EXPECT_EQ(picture.read().error().code, ErrorCode::InvalidArgument);

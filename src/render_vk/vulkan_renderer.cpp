@@ -86,7 +86,8 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (Status status = check(camera, options); !status) return status;
   VulkanPicture::Impl& target = picture.impl();
   if (Status status = target.resize(options.width, options.height); !status) return status;
-  if (is_new || target.samples == 0) {
+  // Samples of meshes, and of pictures that were written, have no sums to add to.
+  if (is_new || target.samples == 0 || target.sums.handle() == VK_NULL_HANDLE) {
     if (Status status = target.begin_sums(); !status) return status;
   }
   if (target.samples + options.samples > kMostSamples) {

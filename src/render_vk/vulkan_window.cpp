@@ -23,11 +23,13 @@ const char* const kDoing = "showing a picture";
 constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
 
 VkRect2D within(const PixelRect& rect, VkExtent2D window) {
-  const auto clamped = [](int value, std::uint32_t most) { return std::clamp(value, 0, static_cast<int>(most)); };
+  const auto clamped = [](std::int64_t value, std::uint32_t most) {
+    return static_cast<int>(std::clamp<std::int64_t>(value, 0, most));
+  };
   const int left = clamped(rect.x, window.width);
   const int top = clamped(rect.y, window.height);
-  const int right = clamped(rect.x + std::max(rect.width, 0), window.width);
-  const int bottom = clamped(rect.y + std::max(rect.height, 0), window.height);
+  const int right = clamped(std::int64_t{rect.x} + std::max(rect.width, 0), window.width);
+  const int bottom = clamped(std::int64_t{rect.y} + std::max(rect.height, 0), window.height);
   return {{left, top}, {static_cast<std::uint32_t>(right - left), static_cast<std::uint32_t>(bottom - top)}};
 }
 
@@ -50,6 +52,7 @@ struct VulkanWindow::Impl {
   VkResult record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place, const Overlay& overlay);
   void draw_picture(const VulkanPicture::Impl& picture, const PixelRect& place) const;
   void draw_overlay(const Overlay& overlay) const;
+  void let_pictures_be_read() const;
   VkResult show(std::uint32_t image);
   VkResult wait();
 
@@ -60,8 +63,7 @@ struct VulkanWindow::Impl {
   bool is_stale = true;
   VkCommandPool pool = VK_NULL_HANDLE;
   VkCommandBuffer commands = VK_NULL_HANDLE;
-  VkFence done = VK_NULL_HANDLE;  // of the last frame
-  bool is_in_flight = false;
+  VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
   Buffer vertices;
   Buffer indices;
@@ -96,8 +98,8 @@ VulkanWindow::Impl::~Impl() {
   if (pool != VK_NULL_HANDLE) api.vkDestroyCommandPool(device->handle(), pool, nullptr);
 }
 
+// Until the last frame is drawn.
 VkResult VulkanWindow::Impl::wait() {
-  if (!std::exchange(is_in_flight, false)) return VK_SUCCESS;
   const vulkan::Api& api = device->api();
   const VkResult result =
       api.vkWaitForFences(device->handle(), 1, &done, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
@@ -164,6 +166,15 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
   }
 }
 
+// What commands before these wrote, is seen by shaders that draw the window.
+void VulkanWindow::Impl::let_pictures_be_read() const {
+  auto barrier = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
+  device->api().vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                                     VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
 VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place,
                                     const Overlay& overlay) {
   const vulkan::Api& api = device->api();
@@ -172,6 +183,7 @@ VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* pi
   VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
   if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &begin);
   if (result != VK_SUCCESS) return result;
+  let_pictures_be_read();
   const VkExtent2D size = swapchain->extent();
   auto pass = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
   const VkClearValue ground{kGround};
@@ -186,7 +198,8 @@ VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* pi
   api.vkCmdSetViewport(commands, 0, 1, &viewport);
   const bool is_seen = picture != nullptr && picture->samples() > 0 && place.width > 0 && place.height > 0;
   if (is_seen) draw_picture(picture->impl(), place);
-  if (!overlay.draws.empty() && font_size.x > 0) draw_overlay(overlay);
+  const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
+  if (has_overlay) draw_overlay(overlay);
   api.vkCmdEndRenderPass(commands);
   return api.vkEndCommandBuffer(commands);
 }
@@ -203,14 +216,16 @@ VkResult VulkanWindow::Impl::show(std::uint32_t image) {
   if (const VkResult result = device->api().vkQueueSubmit(device->queue(), 1, &submit, done); result != VK_SUCCESS) {
     return result;
   }
-  is_in_flight = true;
   const VkSwapchainKHR chain = swapchain->handle();
   auto present = info_of<VkPresentInfoKHR>(VK_STRUCTURE_TYPE_PRESENT_INFO_KHR);
   present.waitSemaphoreCount = present.swapchainCount = 1;
   present.pWaitSemaphores = &drawn;
   present.pSwapchains = &chain;
   present.pImageIndices = &image;
-  return device->api().vkQueuePresentKHR(device->queue(), &present);
+  const VkResult shown = device->api().vkQueuePresentKHR(device->queue(), &present);
+  // Nobody else knows of these commands: what they read could be given back while they run.
+  const VkResult waited = wait();
+  return waited == VK_SUCCESS ? shown : waited;
 }
 
 VulkanWindow::VulkanWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -232,7 +247,6 @@ Result<VulkanWindow> VulkanWindow::create(VulkanRenderer& renderer, bool vsync) 
 }
 
 Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
-  if (Status ready = impl_->device->check(impl_->wait(), kDoing); !ready) return ready;
   const Status put = impl_->put(impl_->font, std::as_bytes(opacity));
   impl_->font_size = put ? glm::ivec2(width, height) : glm::ivec2(0);
   return put;
@@ -243,7 +257,6 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;
   const vulkan::Api& api = window.device->api();
-  if (Status ready = window.device->check(window.wait(), kDoing); !ready) return ready;
   if (Status written = window.write(overlay); !written) return written;
   constexpr int kTries = 3;  // the size may change under one's hands
   for (int attempt = 0; attempt < kTries; ++attempt) {

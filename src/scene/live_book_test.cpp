@@ -223,6 +223,47 @@ TEST(LiveBook, NothingOlderIsGivenAfterSomethingNewer) {
   EXPECT_EQ(faces[0] + faces[1], 6 * edits);
 }
 
+// Of chunks that look as before nothing is given, but those who wait for `pending` to be 0 learn of them.
+TEST(LiveBook, WhoActsOnlyWhenCalledComesToTheEnd) {
+  OneGrid one;
+  constexpr int kEdited = 40;
+  for (int row = 0; row < 2; ++row) {
+    for (int i = 0; i < kEdited; ++i)
+      one.grid().fill_box({64 * i + 28, 64 * row + 28, 28}, {64 * i + 36, 64 * row + 36, 36}, 1);
+  }
+  std::mutex mutex;
+  std::condition_variable called;
+  int calls = 0;
+  LiveMeshOptions options;
+  options.style = SurfaceStyle::Smooth;
+  options.threads = {1};
+  options.on_ready = [&] {
+    const std::lock_guard lock(mutex);
+    ++calls;
+    called.notify_all();
+  };
+  std::atomic<int> as_before{0};
+  LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+    make_live_surface(options, job, workspace);
+    as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
+  });
+  const DVec3 eye{0.0, -10'000.0, 0.0};  // the lower row, which is edited, comes first
+  const auto come_to_the_end = [&] {
+    for (int seen = -1;;) {
+      book.update(one.scene, eye);
+      (void)book.take();
+      if (book.pending() == 0) return true;
+      std::unique_lock lock(mutex);
+      if (!called.wait_for(lock, std::chrono::seconds(20), [&] { return calls != seen; })) return false;
+      seen = calls;
+    }
+  };
+  ASSERT_TRUE(come_to_the_end());
+  for (int i = 0; i < kEdited; ++i) one.grid().set({64 * i + 28, 28, 28}, kAir);
+  ASSERT_TRUE(come_to_the_end());
+  EXPECT_GT(as_before, 0) << "the test is of such chunks";
+}
+
 TEST(LiveBook, MemoryThatRunsOutIsTriedAgain) {
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     LiveMeshOptions options = blocky(2);

@@ -79,7 +79,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
     meshed = meshes.facts().chunks_meshed;
   }
   EXPECT_GT(meshed, 0);
-  EXPECT_EQ(calls, meshed);
+  EXPECT_GE(calls, meshed);
 }
 
 TEST_P(LiveMeshesOf, CanEndInTheMiddle) {

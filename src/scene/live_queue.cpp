@@ -121,9 +121,10 @@ void LiveQueue::run() {
       workspace = {};
     }
     drop_inputs(*job);
-    const bool is_meshed = job->outcome == LiveJob::Outcome::Meshed;
+    // Nobody is told of failures: whoever tried again at once would fail again.
+    const bool is_told = job->outcome != LiveJob::Outcome::OutOfMemory;
     finish(std::move(job), start);
-    if (is_meshed && on_ready_) on_ready_();
+    if (is_told && on_ready_) on_ready_();
     lock.lock();
   }
 }

@@ -61,7 +61,7 @@ class LiveQueue {
   /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory.
   using Work = std::function<void(LiveJob&, LiveWorkspace&)>;
 
-  /// `on_ready`, if any, is called by a worker after each surface.
+  /// `on_ready`, if any, is called by a worker after each job that did not run out of memory.
   LiveQueue(unsigned workers, Work work, std::function<void()> on_ready);
   /// Waits for jobs that were started; gives up the rest.
   ~LiveQueue();

@@ -71,6 +71,10 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
       gui_(std::make_unique<Gui>(*screen_, settings.ui_scale > 0.0 ? settings.ui_scale : scale_of_display(*screen_))) {
   state_.camera.mode = settings.camera_mode;
   state_.settings = std::move(settings);
+  if (options_.mode) state_.settings.mode = *options_.mode;
+  if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
+    state_.tell(renderer->device().name + " is the processor in truth, and slow; --backend auto is faster");
+  }
   if (!options_.file.empty()) load(options_.file);
 }
 
@@ -90,6 +94,7 @@ Status App::run(const std::function<bool()>& is_interrupted) {
     }
   }
   note_size();
+  show_detail(false);
   return status_;
 }
 
@@ -208,13 +213,16 @@ void App::ask_for_picture() {
   request.mode = state_.settings.mode;
   request.shading = state_.settings.shading;
   request.wireframe = state_.settings.wireframe;
+  // What was drawn before is another picture, however good.
+  if (!asked_ || !is_same(*asked_, request)) state_.facts.is_settled = false;
+  asked_ = request;
   state_.open.backend->show(request);
 }
 
 void App::take_picture() {
   if (!state_.open.backend) return;
   if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
-  if (const auto fault = state_.open.backend->fault(); fault && !state_.message) take_fault(*fault);
+  take_fault();
   const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
                           state_.facts.height == state_.picture_place.h;
   if (!is_current) return;
@@ -236,9 +244,13 @@ void App::take_frame(ViewFrame frame) {
   state_.picture = std::move(frame);
 }
 
-void App::take_fault(const Error& fault) {
-  state_.tell(fault);
-  if (!options_.screenshot.empty()) end_with(fault);
+// A fault lasts until something else is asked for, and is told once.
+void App::take_fault() {
+  const auto fault = state_.open.backend->fault();
+  const std::string text = fault ? to_string(*fault) : "";
+  if (text == std::exchange(told_fault_, text) || !fault) return;
+  state_.tell(*fault);
+  if (!options_.screenshot.empty()) end_with(*fault);
   if (!state_.open.backend->can_draw(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
 }
 
@@ -301,6 +313,22 @@ void App::draw_as(DrawMode mode) {
   state_.settings.mode = mode;
 }
 
+// A look at the levels of detail, after which all is as it was before.
+void App::show_detail(bool is_shown) {
+  Settings& settings = state_.settings;
+  if (is_shown) {
+    before_detail_ = BeforeDetail{settings.mode, settings.detail_by_pixels};
+    settings.detail_by_pixels = true;
+    draw_as(DrawMode::Rays);
+    state_.tell(kDetailLegend);
+  } else if (before_detail_) {
+    settings.detail_by_pixels = before_detail_->by_pixels;
+    draw_as(before_detail_->mode);
+    before_detail_.reset();
+  }
+  settings.detail_colours = is_shown;
+}
+
 bool App::run_draw_command(Command command) {
   Settings& settings = state_.settings;
   const auto next = [](auto value, int count) {
@@ -323,15 +351,15 @@ bool App::run_draw_command(Command command) {
       settings.shading = next(settings.shading, 3);
       break;
     case Command::DetailColours:
-      settings.detail_colours = !settings.detail_colours;
-      if (settings.detail_colours) settings.detail_by_pixels = true;
-      draw_as(DrawMode::Rays);
+      show_detail(!settings.detail_colours);
       return true;
     default:
       return false;
   }
-  // Only meshes have edges and shadings.
-  if (settings.mode == DrawMode::Rays) draw_as(DrawMode::Blocks);
+  if (settings.mode == DrawMode::Rays) {
+    state_.tell("drawn as blocks: only meshes have edges and shadings");
+    draw_as(DrawMode::Blocks);
+  }
   return true;
 }
 

@@ -44,13 +44,14 @@ class App {
   void ask_for_picture();
   void take_picture();
   void take_frame(ViewFrame frame);
-  void take_fault(const Error& fault);
+  void take_fault();
   void stand_in(const Error& why);
   [[nodiscard]] Result<std::shared_ptr<VulkanRenderer>> open_device();
   void end_with(const Error& error);
   void pace();
   void draw_gui();
   void draw_bars();
+  void draw_bare();
   void draw_loading();
   void draw_saving();
   void draw_leaving();
@@ -62,6 +63,7 @@ class App {
   void run_command(Command command);
   bool run_draw_command(Command command);
   void draw_as(DrawMode mode);
+  void show_detail(bool is_shown);
   void run_file_command(Command command);
   void show_from(View view);
   void pick_type();
@@ -78,6 +80,12 @@ class App {
   void save_screenshot();
   void write_screenshot(const std::filesystem::path& path);
 
+  /// What a look at the levels of detail changed.
+  struct BeforeDetail {
+    DrawMode mode;
+    bool by_pixels;
+  };
+
   ViewerOptions options_;
   std::unique_ptr<Screen> screen_;
   std::unique_ptr<Gui> gui_;
@@ -85,11 +93,13 @@ class App {
   ViewState state_;
   Input input_;
   FileChooser chooser_;
+  std::optional<BeforeDetail> before_detail_;
   std::optional<Leaving> leaving_;
-  bool is_leaving_asked_ = false;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
   bool is_screenshot_wanted_ = false;
+  std::optional<ViewRequest> asked_;
+  std::string told_fault_;  // of the backend, as long as it lasts; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

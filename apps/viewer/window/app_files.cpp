@@ -54,7 +54,6 @@ void App::leave(Leaving leaving) {
 
 void App::go_on_leaving() {
   const Leaving leaving = *std::exchange(leaving_, std::nullopt);
-  is_leaving_asked_ = false;
   if (leaving.is_quit) {
     is_running_ = false;
   } else if (!leaving.open.empty()) {
@@ -103,11 +102,14 @@ void App::adopt(OpenDocument opened) {
   state_.facts = {};
   state_.picture = {};
   state_.message.reset();
+  told_fault_.clear();
+  asked_.reset();
   screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
   if (loaded.sun) state_.settings.light.sun = *loaded.sun;
   state_.brush.type = 1;
+  state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (loaded.camera) {
@@ -139,8 +141,9 @@ void App::take_saved() {
   const std::unique_ptr<Saver> saver = std::move(state_.saver);
   if (!saver->status()) {
     leaving_.reset();
-    is_leaving_asked_ = false;
     state_.tell(saver->status().error());
+    // With the name still there, to be mended.
+    if (saver->status().error().code != ErrorCode::Cancelled) chooser_.show(FileChooser::Purpose::Save, saver->path());
     return;
   }
   state_.open.document->note_written(saver->path(), saver->state());
@@ -164,7 +167,8 @@ void App::write_screenshot(const std::filesystem::path& path) {
     if (!options_.screenshot.empty()) end_with(written.error());
     return;
   }
-  state_.tell("saved " + path.string());
+  std::error_code ignored;
+  state_.tell("saved " + std::filesystem::absolute(path, ignored).string());
 }
 
 }  // namespace quoin::viewer

@@ -46,8 +46,9 @@ void waiting_bar(double seconds, float width) {
 }  // namespace
 
 void App::draw_gui() {
+  if (state_.message && state_.message->is_old()) state_.message.reset();
   if (options_.is_bare) {
-    place_picture(0.0F, 0.0F, 0.0F);
+    draw_bare();
   } else {
     draw_bars();
   }
@@ -59,6 +60,13 @@ void App::draw_gui() {
   if (const auto path = chooser_.draw(static_cast<float>(gui_->scale()))) {
     chooser_.purpose() == FileChooser::Purpose::Open ? load(*path) : save(*path);
   }
+}
+
+// Nothing but what went wrong stands before the picture.
+void App::draw_bare() {
+  place_picture(0.0F, 0.0F, 0.0F);
+  if (state_.message && !state_.message->is_error) state_.message.reset();
+  if (state_.message) draw_message(state_, 0.0F);
 }
 
 void App::draw_bars() {
@@ -109,8 +117,8 @@ void App::draw_saving() {
 void App::draw_leaving() {
   if (!leaving_ || state_.saver || chooser_.is_shown()) return;
   constexpr const char* kTitle = "Unsaved changes";
-  if (!is_leaving_asked_) ImGui::OpenPopup(kTitle);
-  is_leaving_asked_ = true;
+  // Again, too, when the user thought better of saving.
+  if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
   const ImVec2 room = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Always, {0.5F, 0.5F});
   if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
@@ -126,10 +134,7 @@ void App::draw_leaving() {
   ImGui::EndPopup();
   if (answer == Answer::Save) run_file_command(Command::Save);
   if (answer == Answer::Discard) go_on_leaving();
-  if (answer == Answer::Stay) {
-    leaving_.reset();
-    is_leaving_asked_ = false;
-  }
+  if (answer == Answer::Stay) leaving_.reset();
 }
 
 }  // namespace quoin::viewer

@@ -46,6 +46,7 @@ void edit_paused(ViewState& state, Edit edit) {
   state.last_wait_seconds = pause.waited_seconds();
   state.longest_wait_seconds = std::max(state.longest_wait_seconds, pause.waited_seconds());
   pause.changed = edit(*state.open.document);
+  if (pause.changed) state.facts.is_settled = false;
 }
 
 }  // namespace

@@ -149,7 +149,7 @@ std::optional<std::filesystem::path> FileChooser::accept() {
 std::optional<std::filesystem::path> FileChooser::draw(float scale) {
   if (!is_shown_) return std::nullopt;
   const char* title = purpose_ == Purpose::Open ? "Open a file" : "Save as";
-  if (is_new_) ImGui::OpenPopup(title);
+  if (!ImGui::IsPopupOpen(title)) ImGui::OpenPopup(title);
   const ImVec2 room = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Always, {0.5F, 0.5F});
   ImGui::SetNextWindowSize({std::min(640.0F * scale, room.x - 20.0F), std::min(480.0F * scale, room.y - 20.0F)});

@@ -46,6 +46,8 @@ void set_style(float scale) {
   style.Colors[ImGuiCol_MenuBarBg] = {0.14F, 0.15F, 0.175F, 1.0F};
   style.Colors[ImGuiCol_FrameBg] = {0.19F, 0.205F, 0.24F, 1.0F};
   style.Colors[ImGuiCol_TitleBgActive] = {0.17F, 0.19F, 0.23F, 1.0F};
+  style.Colors[ImGuiCol_HeaderHovered] = {0.24F, 0.29F, 0.38F, 1.0F};
+  style.Colors[ImGuiCol_ModalWindowDimBg] = {0.0F, 0.0F, 0.0F, 0.45F};
   style.Colors[ImGuiCol_Header] = {0.19F, 0.21F, 0.25F, 1.0F};
   style.Colors[ImGuiCol_Button] = {0.23F, 0.26F, 0.31F, 1.0F};
   style.Colors[ImGuiCol_ButtonHovered] = {0.30F, 0.36F, 0.45F, 1.0F};

@@ -56,7 +56,7 @@ void draw_palette(ViewState& state) {
   const int across = std::max(1, static_cast<int>((ImGui::GetContentRegionAvail().x - 16.0F) / (edge + gap)));
   const std::size_t shown = std::min<std::size_t>(scene.types.size() - 1, 1'024);
   const int rows = static_cast<int>((shown + static_cast<std::size_t>(across) - 1) / static_cast<std::size_t>(across));
-  const float height = static_cast<float>(std::min(rows, 4)) * (edge + gap) + 2.0F;
+  const float height = static_cast<float>(std::min(rows, 6)) * (edge + gap) + 2.0F;
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {gap, gap});
   ImGui::BeginChild("palette", {0.0F, height});
   for (std::size_t i = 1; i <= shown; ++i) {
@@ -67,6 +67,9 @@ void draw_palette(ViewState& state) {
     if (ImGui::ColorButton("type", colour_of(scene.types[type]), flags, {edge, edge})) state.brush.type = type;
     if (ImGui::IsItemHovered()) describe_type(scene, type);
     if (type == state.brush.type) {
+      // Whoever chose it elsewhere wants to see it.
+      if (state.palette_shows != type) ImGui::SetScrollHereY();
+      state.palette_shows = type;
       ImGui::GetWindowDrawList()->AddRect(ImGui::GetItemRectMin(), ImGui::GetItemRectMax(), IM_COL32_WHITE, 3.0F, 0,
                                           2.0F);
     }
@@ -85,9 +88,15 @@ void draw_new_colour(ViewState& state) {
   ImGui::ColorPicker3("##colour", colour.data(), ImGuiColorEditFlags_NoSidePreview);
   if (ImGui::Button("Add") && state.can_edit()) {
     const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround(value * 255.0F)); };
-    ScenePause pause(*state.open.backend);
+    const ScenePause pause(*state.open.backend);
+    state.facts.is_settled = false;
     const auto type = state.open.document->type_of_colour({byte(colour[0]), byte(colour[1]), byte(colour[2]), 255});
-    type ? void(state.brush.type = *type) : state.tell(type.error());
+    if (type) {
+      state.brush.type = *type;
+      state.tell("the colour is type " + std::to_string(*type) + ", and chosen");
+    } else {
+      state.tell(type.error());
+    }
     ImGui::CloseCurrentPopup();
   }
   ImGui::EndPopup();
@@ -169,6 +178,7 @@ void draw_picture_part(ViewState& state) {
     ImGui::SameLine();
     ImGui::Checkbox("in colours", &settings.detail_colours);
     ImGui::EndDisabled();
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
   } else {
     int shading = static_cast<int>(settings.shading);
     if (ImGui::Combo("shading", &shading, "lit\0occlusion alone\0normals\0")) {
@@ -195,7 +205,8 @@ void draw_light_part(ViewState& state) {
   ImGui::SameLine();
   const bool has_shadows = state.settings.mode == DrawMode::Rays;
   ImGui::BeginDisabled(!has_shadows);
-  ImGui::Checkbox("shadows", &light.shadows);
+  bool shows_shadows = light.shadows && has_shadows;
+  if (ImGui::Checkbox("shadows", &shows_shadows)) light.shadows = shows_shadows;
   ImGui::EndDisabled();
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip("meshes carry no shadows; marched rays do (F5)");
@@ -214,7 +225,8 @@ void draw_light_part(ViewState& state) {
   auto elevation = static_cast<float>(sun.elevation);
   const bool is_turned =
       ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
-  const bool is_raised = ImGui::SliderFloat("height", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  const bool is_raised =
+      ImGui::SliderFloat("elevation", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
   if (is_turned || is_raised) {
     // Straight up there is no azimuth to come back to.
     light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), 0.5, 89.5)});
@@ -225,7 +237,7 @@ void draw_light_part(ViewState& state) {
     light.exposure = exposure;
   }
   ImGui::EndDisabled();
-  if (ImGui::Button("As at first")) light = LightOptions{};
+  if (ImGui::Button("Reset light")) light = LightOptions{};
 }
 
 void draw_statistics_part(const ViewState& state) {
@@ -239,8 +251,8 @@ void draw_statistics_part(const ViewState& state) {
   row("flight a second", "%.3g voxels", state.camera.speed());
   row("memory", "%.0f MB", resident_megabytes());
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
-  row("wait of edits", "%.2f ms", state.last_wait_seconds * 1e3);
-  row("longest wait", "%.2f ms", state.longest_wait_seconds * 1e3);
+  row("last edit waited", "%.2f ms", state.last_wait_seconds * 1e3);
+  row("longest so far", "%.2f ms", state.longest_wait_seconds * 1e3);
   if (state.open.backend) {
     for (const auto& [what, value] : state.open.backend->facts()) {
       ImGui::TextDisabled("%s", what.c_str());

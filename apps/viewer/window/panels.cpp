@@ -13,15 +13,19 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr double kMessageSeconds = 6.0;
-
 void menu_item(Command command, MenuChoice& choice, bool is_enabled = true, bool is_checked = false) {
   const CommandInfo& info = info_of(command);
   if (ImGui::MenuItem(info.name, info.keys, is_checked, is_enabled)) choice.commands.push_back(command);
 }
 
+/// Of the menu that is being drawn.
+void close_on_escape() {
+  if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) ImGui::CloseCurrentPopup();
+}
+
 void draw_file_menu(const ViewState& state, MenuChoice& choice) {
   if (!ImGui::BeginMenu("File")) return;
+  close_on_escape();
   menu_item(Command::Open, choice);
   if (ImGui::BeginMenu("Open again", !state.settings.recent.empty())) {
     for (const std::string& file : state.settings.recent) {
@@ -40,6 +44,7 @@ void draw_file_menu(const ViewState& state, MenuChoice& choice) {
 
 void draw_edit_menu(const ViewState& state, MenuChoice& choice) {
   if (!ImGui::BeginMenu("Edit")) return;
+  close_on_escape();
   const EditHistory& history = state.open.document->history();
   menu_item(Command::Undo, choice, state.can_edit() && history.can_undo());
   menu_item(Command::Redo, choice, state.can_edit() && history.can_redo());
@@ -57,6 +62,7 @@ void draw_edit_menu(const ViewState& state, MenuChoice& choice) {
 
 void draw_view_menu(const ViewState& state, MenuChoice& choice) {
   if (!ImGui::BeginMenu("View")) return;
+  close_on_escape();
   for (const Command command : {Command::ViewIso, Command::ViewFront, Command::ViewBack, Command::ViewLeft,
                                 Command::ViewRight, Command::ViewTop}) {
     menu_item(command, choice, state.open.backend != nullptr);
@@ -66,8 +72,9 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
     const int index = static_cast<int>(command) - static_cast<int>(Command::DrawRays);
     menu_item(command, choice, state.open.backend != nullptr, static_cast<int>(state.settings.mode) == index);
   }
-  menu_item(Command::NextWireframe, choice, true, state.settings.wireframe != Wireframe::Off);
-  menu_item(Command::NextShading, choice, true, state.settings.shading != MeshShading::Lit);
+  const bool has_meshes = state.settings.mode != DrawMode::Rays;
+  menu_item(Command::NextWireframe, choice, true, has_meshes && state.settings.wireframe != Wireframe::Off);
+  menu_item(Command::NextShading, choice, true, has_meshes && state.settings.shading != MeshShading::Lit);
   menu_item(Command::DetailColours, choice, true, state.settings.detail_colours);
   ImGui::Separator();
   menu_item(Command::CameraMode, choice);
@@ -77,6 +84,7 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
 }
 
 std::string hover_text(const ViewState& state) {
+  if (state.loader) return state.loader->stage() + " " + state.loader->path().filename().string();
   if (!state.hover) return state.open.backend ? "" : "no file";
   const SceneHit& hit = *state.hover;
   const Instance* instance = state.scene().instances().find(hit.instance);
@@ -119,6 +127,7 @@ float draw_menu(ViewState& state, MenuChoice& choice) {
   draw_edit_menu(state, choice);
   draw_view_menu(state, choice);
   if (ImGui::BeginMenu("Help")) {
+    close_on_escape();
     menu_item(Command::Help, choice, true, state.is_help_shown);
     ImGui::EndMenu();
   }
@@ -137,7 +146,12 @@ float draw_status(const ViewState& state) {
   ImGui::PushStyleColor(ImGuiCol_WindowBg, ImGui::GetStyleColorVec4(ImGuiCol_MenuBarBg));
   ImGui::Begin("status", nullptr, bar_flags());
   ImGui::TextUnformatted(hover_text(state).c_str());
-  const std::string right = picture_text(state) + (state.camera.mode == CameraMode::Fly ? "   fly" : "   orbit");
+  std::string right = picture_text(state) + "   orbit";
+  if (state.camera.mode == CameraMode::Fly) {
+    std::array<char, 64> speed{};
+    std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels a second", state.camera.speed());
+    right = picture_text(state) + speed.data();
+  }
   ImGui::SameLine(room.x - ImGui::CalcTextSize(right.c_str()).x - 12.0F);
   ImGui::TextDisabled("%s", right.c_str());
   ImGui::End();
@@ -165,6 +179,7 @@ float draw_panel(ViewState& state, float scale, float top, float bottom, MenuCho
 
 void draw_help(ViewState& state, float scale) {
   if (!state.is_help_shown) return;
+  if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) state.is_help_shown = false;
   const ImVec2 room = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Appearing, {0.5F, 0.5F});
   ImGui::SetNextWindowSizeConstraints({0.0F, 0.0F}, {room.x - 8.0F, room.y - 8.0F});
@@ -176,11 +191,6 @@ void draw_help(ViewState& state, float scale) {
 
 void draw_message(ViewState& state, float bottom) {
   const Message& message = *state.message;
-  const double age = std::chrono::duration<double>(std::chrono::steady_clock::now() - message.since).count();
-  if (age > (message.is_error ? 3.0 : 1.0) * kMessageSeconds) {
-    state.message.reset();
-    return;
-  }
   const float unit = static_cast<float>(1.0 / state.pixels_per_unit);
   const SDL_Rect& place = state.picture_place;
   const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;

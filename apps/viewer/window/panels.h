@@ -7,6 +7,9 @@
 
 namespace quoin::viewer {
 
+/// What the colours of levels of detail mean.
+inline constexpr const char* kDetailLegend = "green: in full; yellow to red: in coarser cells; blue: impostors";
+
 /// What the menus ask for beyond commands.
 struct MenuChoice {
   std::vector<Command> commands;

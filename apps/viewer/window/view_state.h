@@ -16,11 +16,16 @@ namespace quoin::viewer {
 /// What the left mouse button does.
 enum class Tool : std::uint8_t { Look, Place, Remove, Paint };
 
-/// One line that tells the user something.
+/// One line that tells the user something, for a while.
 struct Message {
   std::string text;
   bool is_error = false;
   std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();
+
+  [[nodiscard]] bool is_old() const {
+    constexpr std::chrono::seconds kShown{6};
+    return std::chrono::steady_clock::now() - since > (is_error ? 3 : 1) * kShown;
+  }
 };
 
 /// Facts about the picture that is shown.
@@ -46,6 +51,7 @@ struct ViewState {
   CameraControl camera;
   Tool tool = Tool::Look;
   Brush brush;
+  VoxelType palette_shows = kAir;                            ///< the type that the palette has scrolled to
   OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
 
   SDL_Rect picture_place{0, 0, 0, 0};  ///< in pixels of the output

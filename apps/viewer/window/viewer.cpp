@@ -16,6 +16,15 @@ bool has_graphics_card() {
          });
 }
 
+/// Whether the device that was asked for is there, where it is not needed yet.
+Status check_device(const std::string& device) {
+  if (device.empty()) return {};
+  VulkanOptions options;
+  options.device = device;
+  const auto made = VulkanRenderer::create(options);
+  return made ? Status{} : tl::unexpected<Error>(made.error());
+}
+
 Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int width, int height) {
   if (options.backend == ViewerBackend::Vulkan) return open_vulkan_screen(width, height, options.device);
   if (options.backend == ViewerBackend::Auto && has_graphics_card()) {
@@ -23,6 +32,7 @@ Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int wi
     // A card that does not reach this display is no reason not to start; a device of that name is the user's wish.
     if (screen || !options.device.empty()) return screen;
   }
+  if (Status there = check_device(options.device); !there) return tl::unexpected<Error>(there.error());
   return open_sdl_screen(width, height);
 }
 

@@ -2,11 +2,14 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/io/vox.h>
+
+#include "viewer/view_backend.h"
 
 namespace quoin::viewer {
 
@@ -22,8 +25,9 @@ struct ViewerOptions {
   LoadOptions load;
   Threads threads;
   ViewerBackend backend = ViewerBackend::Auto;
-  std::string device;  ///< of Vulkan, as VulkanOptions::device
-  int width = 0;       ///< of the window; 0: as it was last
+  std::string device;            ///< of Vulkan, as VulkanOptions::device
+  std::optional<DrawMode> mode;  ///< what the scene is drawn as at first; without, as it was last
+  int width = 0;                 ///< of the window; 0: as it was last
   int height = 0;
   bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
   std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer

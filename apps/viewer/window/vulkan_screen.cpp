@@ -127,6 +127,8 @@ Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
 }  // namespace
 
 Result<std::unique_ptr<Screen>> open_vulkan_screen(int width, int height, const std::string& device) {
+  // SDL says less clearly that there is no driver.
+  if (const auto devices = vulkan_devices(); !devices) return tl::unexpected<Error>(devices.error());
   auto screen = std::make_unique<VulkanScreen>();
   if (Status opened = screen->open(width, height, device); !opened) return tl::unexpected<Error>(opened.error());
   return screen;

@@ -101,6 +101,22 @@ TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
   }
 }
 
+TEST_F(VulkanWindowTest, PicturesMayGoOnceTheyAreShown) {
+  auto window = VulkanWindow::create(*renderer_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  for (int i = 0; i < 40; ++i) {
+    VulkanPicture picture(*renderer_);
+    const int edge = 1500 + 10 * (i % 7);
+    const auto bytes = std::size_t{3} * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
+    ASSERT_TRUE(picture.write({edge, edge, std::vector<std::uint8_t>(bytes, 90)}));
+    const Status shown = window->present(160, 90, &picture, {0, 0, 160, 90}, {});
+    ASSERT_TRUE(shown) << to_string(shown.error());
+    if (i % 2 == 0) {
+      ASSERT_TRUE(picture.write({2, 1, {10, 20, 30, 250, 240, 230}}));
+    }
+  }
+}
+
 TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
   auto window = VulkanWindow::create(*renderer_, false);
   ASSERT_TRUE(window) << to_string(window.error());

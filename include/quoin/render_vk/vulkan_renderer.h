@@ -87,8 +87,8 @@ class VulkanRenderer {
                                        const Progress& progress = {});
 
   /// Draws into a picture that stays on the device: adds `options.samples` samples a pixel to those that it has, or
-  /// begins it anew where `is_new` or the size is another. Sample after sample it becomes the picture that `render`
-  /// takes with as many; after an error, Cancelled too, it has none.
+  /// begins it anew where `is_new`, the size is another, or what it shows was not drawn by this. Sample after sample it
+  /// becomes the picture that `render` takes with as many; after an error, Cancelled too, it has none.
   ///
   /// Requires: unless it begins anew, camera, light and scene are those of its other samples.
   /// Errors:   those of `render`, and LimitExceeded for more than 4,096 samples; `options.depth` means nothing.

@@ -61,8 +61,9 @@ class VulkanWindow {
   /// Shows a picture, stretched over `place`, on a dark ground, and the overlay over all. `width` and `height`: of the
   /// window now, in pixels; where one is 0, as in minimised windows, nothing is done. `picture` may be null, or empty.
   ///
-  /// What belongs to the window's size is made anew where that has changed. Waits for the picture before, and for the
-  /// display.
+  /// What belongs to the window's size is made anew where that has changed. Waits for the display, and until the window
+  /// is drawn: `picture` may go afterwards.
+  /// Requires: draws name indices, and these name vertices, that are there.
   [[nodiscard]] Status present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
                                const Overlay& overlay);
 

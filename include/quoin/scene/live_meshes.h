@@ -45,7 +45,8 @@ struct LiveMeshOptions {
   SmoothOcclusionOptions occlusion;  ///< of smooth surfaces
   bool hidden = false;               ///< grids of instances that are not visible are meshed too
   Threads threads;                   ///< workers; 0: one less than the machine has, at least one
-  /// Called from a worker when there is something to take; may be empty. It must not throw or call the meshes.
+  /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
+  /// room for more chunks. May be empty. It must not throw or call the meshes.
   std::function<void()> on_ready;
 };
 
