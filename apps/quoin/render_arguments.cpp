@@ -113,8 +113,6 @@ std::string fault_of_backend(const CLI::App& command, const RenderArguments& arg
   const bool is_vulkan = arguments.backend == "vulkan";
   if (command.count("--device") > 0 && !is_vulkan) return "--device needs --backend vulkan";
   if (command.count("--device") > 0 && arguments.device.empty()) return "--device: must be a number or a name";
-  const bool has_detail = command.count("--detail") > 0 ? arguments.detail != "near" : arguments.render.detail_colours;
-  if (is_vulkan && has_detail) return "--backend vulkan draws everything near: no --detail but near, no --lod-colours";
   return "";
 }
 

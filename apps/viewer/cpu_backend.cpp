@@ -19,7 +19,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {8, 4, 2, 1};
-constexpr double kImpostorSeconds = 0.01;
 constexpr int kSampleFactor = 4;
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
 

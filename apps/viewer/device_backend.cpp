@@ -51,8 +51,7 @@ struct DeviceBackend::Impl {
 
   [[nodiscard]] bool uses_device() const {
     if (!request || request->mode != DrawMode::Rays) return request.has_value();
-    // Levels of detail are the processor's.
-    return options.rays_on_device && !is_device_gone && !request->detail_by_pixels;
+    return options.rays_on_device && !is_device_gone;
   }
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
@@ -197,6 +196,9 @@ Status DeviceBackend::Impl::draw_stage() {
   wanted.samples = is_new ? 1 : samples_now();
   wanted.light = request->light;
   wanted.detail_colours = request->detail_colours;
+  if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  // What is shown for a moment does not wait for impostors.
+  if (divisor > 1) wanted.impostor_seconds = kImpostorSeconds;
   const Clock::time_point start = Clock::now();
   if (Status drawn = renderer->draw(*picture, request->camera, wanted, is_new); !drawn) return drawn;
   seconds_per_sample = seconds_since(start) / (static_cast<double>(wanted.width) * wanted.height * wanted.samples);

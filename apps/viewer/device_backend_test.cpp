@@ -75,6 +75,8 @@ Image by_processor(const Document& document, const ViewRequest& request) {
   options.height = request.height;
   options.samples = request.samples;
   options.light = request.light;
+  options.detail_colours = request.detail_colours;
+  if (request.detail_by_pixels) options.detail.emplace();
   return CpuRenderer(document.scene()).render(request.camera, options).value().colour;
 }
 
@@ -174,21 +176,32 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   EXPECT_EQ(all.size(), 15U);
 }
 
-TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFasterAndLevelsOfDetail) {
+TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
   const Document document = small_document();
   const auto backend = backend_of(document, false);
-  ViewRequest request = request_for(document, DrawMode::Rays);
+  const ViewRequest request = request_for(document, DrawMode::Rays);
   backend->show(request);
-  auto pictures = settle(*backend);
+  const auto pictures = settle(*backend);
   ASSERT_FALSE(pictures.empty());
   EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
   EXPECT_EQ(backend->name(), "processor");
-  const auto on_device = backend_of(document, true);
+}
+
+TEST_F(DeviceBackendTest, TheDeviceDrawsLevelsOfDetail) {
+  const Document document = small_document();
+  const auto backend = backend_of(document, true);
+  ViewRequest request = request_for(document, DrawMode::Rays);
   request.detail_by_pixels = true;
   request.detail_colours = true;
-  on_device->show(request);
-  ASSERT_FALSE(settle(*on_device).empty());
-  EXPECT_EQ(on_device->name(), "processor");
+  // Far enough away for an impostor, and near enough for none.
+  for (const double times : {1.0, 6.0}) {
+    request.camera.position *= times;
+    backend->show(request);
+    const auto pictures = settle(*backend);
+    ASSERT_FALSE(pictures.empty());
+    EXPECT_LT(differing(pictures.back(), by_processor(document, request), 2), 0.001) << times;
+    EXPECT_EQ(backend->name(), renderer_->device().name);
+  }
 }
 
 TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {

@@ -17,6 +17,9 @@
 
 namespace quoin::viewer {
 
+/// For how long a picture that is shown for a moment has impostors built.
+inline constexpr double kImpostorSeconds = 0.01;
+
 /// What the scene is drawn as.
 enum class DrawMode : std::uint8_t {
   Rays,    ///< a ray-marched picture

@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "render/far_impostors.h"
 #include "render/impostor_pass.h"
+#include "render/picture_detail.h"
 #include "render/picture_request.h"
 #include "render/tile.h"
 
@@ -58,51 +56,14 @@ struct CpuRenderer::Impl {
   Impl(const Scene& of_scene, bool hidden_too, Threads threads)
       : scene(&of_scene), hidden(hidden_too), tracer(of_scene, hidden_too, threads), surfaces(of_scene.types) {}
 
-  [[nodiscard]] std::vector<SelectedInstance> select(const Camera& camera, const RenderOptions& options) const {
-    std::vector<SelectedInstance> selected;
-    if (!options.detail) return selected;
-    DetailPolicy policy = *options.detail;
-    policy.hidden = hidden;
-    DetailSelector().select(*scene, camera, options.width, options.height, policy, selected);
-    return selected;
-  }
-
-  // One picture at a time has impostors built: another would find some of them being built, and go on without. It waits
-  // where it has all the time there is, else takes what is there.
-  [[nodiscard]] FarImpostors take_far(std::span<const SelectedInstance> selected, const RenderOptions& options) {
-    const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
-    if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
-    std::unique_lock lock(building, std::defer_lock);
-    const bool may_wait = options.impostor_seconds == std::numeric_limits<double>::infinity();
-    if (may_wait) {
-      lock.lock();
-    } else {
-      static_cast<void>(lock.try_lock());
-    }
-    const double seconds = lock.owns_lock() ? options.impostor_seconds : 0.0;
-    return take_impostors(impostors, *scene, selected, seconds, options.threads);
-  }
-
   const Scene* scene;
   bool hidden;
   SceneTracer tracer;
   Surfaces surfaces;
-  ImpostorCache impostors{{FarImpostors::kMostBytes}};
-  std::mutex building;  // impostors
+  DetailChooser detail;
 };
 
 namespace {
-
-// Those with impostors stay whole where they are traced: shadows onto what an impostor shows are those of its voxels.
-void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected) {
-  auto next = far.begin();
-  for (SelectedInstance& choice : selected) {
-    if (next == far.end()) return;
-    if (choice.instance != next->instance) continue;
-    choice.halvings = 0;
-    ++next;
-  }
-}
 
 // What a picture is taken of.
 struct Subject {
@@ -132,19 +93,17 @@ const SceneTracer& CpuRenderer::tracer() const {
 void CpuRenderer::update(Threads threads) {
   impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);
-  impl_->impostors.look_at_types(impl_->scene->types);
+  impl_->detail.look_at_types(impl_->scene->types);
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
-  std::vector<SelectedInstance> selected = impl_->select(camera, options);
-  const FarImpostors far = impl_->take_far(selected, options);
-  keep_whole(far.instances, selected);
+  const PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->hidden, camera, options);
   Subject subject;
-  if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(selected, options.threads));
+  if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, options.threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position, options.instructions);
-  subject.leave_to_impostors(far.instances, camera, options);
+  subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);

@@ -10,6 +10,7 @@
 
 #include "render/camera_rays.h"
 #include "render/impostor_raster.h"
+#include "render/impostor_screen.h"
 
 namespace quoin {
 
@@ -41,44 +42,18 @@ class ImpostorPass {
             FarFaces& faces) const;
 
  private:
-  // Pixels, `right` and `bottom` exclusive.
-  struct Area {
-    int left = 0;
-    int top = 0;
-    int right = 0;
-    int bottom = 0;
-  };
-  struct Drawn {
-    std::int32_t placed = 0;
-    const ImpostorFaces* faces = nullptr;
-    const ImpostorFaces::Level* level = nullptr;
-    std::uint32_t views = 0;
-    Area area;
-    double nearest = 0.0;  // depth
-    raster::Aim aim;
-    glm::dmat3 axes{1.0};  // a point p of the view is axes * p / voxel_size + offset in the grid, about the
-    DVec3 offset{0.0};     // content's centre
-  };
-
-  struct Screen;
-  // Whether it is to be drawn, and where on the screen it may lie.
-  [[nodiscard]] bool find_area(const Screen& screen, Area& area) const;
-  void add(const PlacedGrid& placed, std::int32_t index, const Impostor& impostor);
   void fill_bins();
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
-  [[nodiscard]] static bool is_hidden(const Drawn& drawn, const raster::Job& job, const raster::Canvas& canvas);
+  [[nodiscard]] static bool is_hidden(const DrawnImpostor& drawn, const raster::Job& job, const raster::Canvas& canvas);
   // Along a ray to the plane of a face.
-  [[nodiscard]] static double distance_to(const Drawn& drawn, const ImpostorFaces::Face& face, const Ray& ray);
+  [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Face& face, const Ray& ray);
 
-  Camera camera_;
-  bool is_perspective_;
   int width_;
   int height_;
-  double focal_ = 0.0;  // perspective: pixels at distance 1; orthographic: pixels a world unit
   int across_;
   int down_;
   raster::Draw draw_;
-  std::vector<Drawn> drawn_;                      // in the order of `placed`
+  std::vector<DrawnImpostor> drawn_;              // in the order of `placed`
   std::vector<std::vector<std::uint32_t>> bins_;  // of tiles: indices of these, nearest first
 };
 

@@ -12,7 +12,6 @@ namespace quoin::vulkan {
 namespace {
 
 constexpr std::int64_t kWidest = std::int64_t{1} << 29;  // voxels; shaders count in 32 bits
-constexpr std::size_t kPage = 4096;
 constexpr std::size_t kMostInstances = std::size_t{1} << 24;
 
 template <class T>
@@ -42,16 +41,6 @@ PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHa
   return placed;
 }
 
-ShaderTree shader_tree(const TopTree& top, const OccupancyTree* tree, IVec3 origin) {
-  ShaderTree shader;
-  if (tree == nullptr || top.root.mask == 0) return shader;
-  const IBox bounds = tree->bounds();
-  shader.root = top.root;
-  shader.low = IVec4(bounds.min - origin, top.root_level);
-  shader.high = IVec4(bounds.max - origin, 0);
-  return shader;
-}
-
 }  // namespace
 
 Status DeviceScene::update(const Scene& scene, bool hidden, Threads threads) {
@@ -61,44 +50,40 @@ Status DeviceScene::update(const Scene& scene, bool hidden, Threads threads) {
   return done;
 }
 
-void DeviceScene::release(DeviceGrid& grid) {
-  for (auto& [at, chunk] : grid.chunks) memory_->release(chunk.place);
-  memory_->release(grid.opaque.place);
-  memory_->release(grid.transparent.place);
-}
-
 void DeviceScene::clear() {
   memory_->discard();
-  for (auto& [handle, grid] : grids_) release(grid);
+  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
   grids_.clear();
-  placed_.clear();
-  instances_ = {};
-  has_transparent_ = false;
+  placement_ = {};
   grid_table_.clear();
   surface_table_.clear();
   memory_->release(grids_place_);
   memory_->release(surfaces_place_);
 }
 
-// Grids are packed by what their types are; new types count as opaque before they are registered.
-void DeviceScene::forget_old_types(const VoxelRegistry& types) {
+bool takes_other_visibility(std::vector<Visibility>& known, const VoxelRegistry& types) {
   bool is_other = false;
-  visibility_.resize(std::max(visibility_.size(), types.size()), Visibility::Opaque);
-  for (std::size_t i = 1; i < visibility_.size(); ++i) {
+  known.resize(std::max(known.size(), types.size()), Visibility::Opaque);
+  for (std::size_t i = 1; i < known.size(); ++i) {
     const Visibility now = types.visibility(static_cast<VoxelType>(i));
-    is_other |= visibility_[i] != now;
-    visibility_[i] = now;
+    is_other |= known[i] != now;
+    known[i] = now;
   }
-  if (!is_other) return;
-  for (auto& [handle, grid] : grids_) release(grid);
+  return is_other;
+}
+
+// Grids are packed by what their types are.
+void DeviceScene::forget_old_types(const VoxelRegistry& types) {
+  if (!takes_other_visibility(visibility_, types)) return;
+  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
   grids_.clear();
 }
 
 // Lists the instances and keeps, of the known grids, those that are among them.
 void DeviceScene::place(const Scene& scene, bool hidden) {
-  placed_.clear();
+  placement_.placed.clear();
   std::vector<DBox> boxes;
-  std::map<GridHandle, DeviceGrid> kept;
+  std::map<GridHandle, KnownGrid> kept;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(instance, grid, hidden)) return;
@@ -108,12 +93,12 @@ void DeviceScene::place(const Scene& scene, bool hidden) {
     } else if (const auto [added, is_new] = kept.try_emplace(instance.grid); is_new) {
       added->second.identity = grid->grid.identity();
     }
-    placed_.push_back({placed_as(instance, *grid, handle)});
-    boxes.push_back(bounds_in_world(placed_.back().placed, grid->grid.bounds()));
+    placement_.placed.push_back({placed_as(instance, *grid, handle)});
+    boxes.push_back(bounds_in_world(placement_.placed.back().placed, grid->grid.bounds()));
   });
-  for (auto& [handle, grid] : grids_) release(grid);
+  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
   grids_ = std::move(kept);
-  instances_ = InstanceTree(std::move(boxes));
+  placement_.instances = InstanceTree(std::move(boxes));
 }
 
 void DeviceScene::update_trees(const Scene& scene, Threads threads) {
@@ -124,12 +109,12 @@ void DeviceScene::update_trees(const Scene& scene, Threads threads) {
 
 // What depends on the grids as they are by now.
 void DeviceScene::finish_placed(const Scene& scene) {
-  for (DevicePlaced& each : placed_) {
+  for (DevicePlaced& each : placement_.placed) {
     const GridHandle handle = scene.instances()[each.placed.instance].grid;
-    const DeviceGrid& known = grids_.find(handle)->second;
+    const KnownGrid& known = grids_.find(handle)->second;
     const IBox bounds = scene.grids()[handle].grid.bounds();
     each.grid = known.index;
-    each.origin = known.origin * kChunkEdge;
+    each.origin = known.voxels.origin();
     each.low = DVec3(bounds.min - each.origin);
     each.high = DVec3(bounds.max - each.origin);
   }
@@ -138,7 +123,7 @@ void DeviceScene::finish_placed(const Scene& scene) {
 Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
   forget_old_types(scene.types);
   place(scene, hidden);
-  if (placed_.size() > kMostInstances) {
+  if (placement_.placed.size() > kMostInstances) {
     return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
   }
   for (const auto& [handle, known] : grids_) {
@@ -147,99 +132,31 @@ Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads)
   }
   update_trees(scene, threads);
   std::int32_t index = 0;
-  has_transparent_ = false;
+  placement_.has_transparent = false;
   for (auto& [handle, known] : grids_) {
     known.index = index++;
-    if (Status done = update_grid(known, scene.grids()[handle].grid); !done) return done;
-    has_transparent_ |= known.transparent.top.root.mask != 0;
+    const Grid& grid = scene.grids()[handle].grid;
+    Status done = known.voxels.update(*memory_, grid, known.trees.opaque(), known.trees.transparent());
+    if (!done) return done;
+    placement_.has_transparent |= known.voxels.has_transparent();
   }
   finish_placed(scene);
   if (Status done = put_surfaces(scene.types); !done) return done;
   return put_grids();
 }
 
-Status DeviceScene::update_grid(DeviceGrid& known, const Grid& grid) {
-  if (!known.chunks.empty() && known.version == grid.version()) return {};
-  const std::vector<IVec3> present = grid.chunks();
-  std::vector<IVec3> changed;
-  for (const IVec3 at : present) {
-    const auto found = known.chunks.find(at);
-    if (found == known.chunks.end() || found->second.version != grid.version(at)) changed.push_back(at);
-  }
-  for (auto& [at, chunk] : known.chunks) {
-    if (grid.find_chunk(at) == nullptr) changed.push_back(at);
-  }
-  for (const IVec3 at : changed) {
-    if (Status done = put_chunk(known, grid, at); !done) return done;
-  }
-  known.origin = present.front();
-  for (const IVec3 at : present) known.origin = glm::min(known.origin, at);
-  if (Status done = put_top(known, known.opaque, &DeviceChunk::opaque); !done) return done;
-  if (Status done = put_top(known, known.transparent, &DeviceChunk::transparent); !done) return done;
-  known.version = grid.version();
-  return {};
-}
-
-Status DeviceScene::put_chunk(DeviceGrid& known, const Grid& grid, IVec3 chunk) {
-  const Chunk* voxels = grid.find_chunk(chunk);
-  if (voxels == nullptr) {
-    const auto old = known.chunks.find(chunk);
-    memory_->release(old->second.place);
-    known.chunks.erase(old);
-    return {};
-  }
-  DeviceChunk& entry = known.chunks[chunk];
-  memory_->release(entry.place);
-  ChunkRecord record = pack_chunk(known.trees.opaque(), known.trees.transparent(), *voxels, chunk);
-  const auto place = memory_->allocate(record.words.size() * 4, "uploading voxels");
-  if (!place) return tl::unexpected(place.error());
-  entry.place = *place;
-  record.move_to(place->address);
-  entry.version = grid.version(chunk);
-  entry.opaque = record.opaque;
-  entry.transparent = record.transparent;
-  return memory_->write(entry.place, bytes_of(record.words));
-}
-
-Status DeviceScene::put_top(DeviceGrid& known, DeviceTree& tree, Node DeviceChunk::*node) {
-  std::vector<ChunkNodeAt> chunks;
-  for (const auto& [at, chunk] : known.chunks) {
-    if ((chunk.*node).mask != 0) chunks.push_back({at - known.origin, chunk.*node});
-  }
-  TopTree top = build_top_tree(chunks, tree.place.address);
-  const std::size_t bytes = top.nodes.size() * sizeof(Node);
-  if (bytes > tree.place.size) {
-    memory_->release(tree.place);
-    // Half as much again, so that a growing world does not move each time.
-    const auto place = memory_->allocate(bytes + bytes / 2, "uploading voxels");
-    if (!place) return tl::unexpected(place.error());
-    tree.place = *place;
-    tree.top.nodes.clear();
-    top = build_top_tree(std::move(chunks), tree.place.address);
-  }
-  // Only the pages that changed.
-  constexpr std::size_t kNodes = kPage / sizeof(Node);
-  const std::span<const Node> now(top.nodes);
-  const std::span<const Node> before(tree.top.nodes);
-  for (std::size_t first = 0; first < now.size(); first += kNodes) {
-    const auto page = now.subspan(first, std::min(kNodes, now.size() - first));
-    const bool is_same = before.size() >= first + page.size() &&
-                         std::equal(page.begin(), page.end(), before.begin() + static_cast<std::ptrdiff_t>(first));
-    if (is_same) continue;
-    if (Status done = memory_->write(tree.place, std::as_bytes(page), first * sizeof(Node)); !done) return done;
-  }
-  tree.top = std::move(top);
-  return {};
-}
-
-Status DeviceScene::put_table(Place& place, std::span<const std::byte> bytes) {
+Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes) {
   if (bytes.size() > place.size || place.size == 0) {
-    memory_->release(place);
-    const auto larger = memory_->allocate(bytes.size(), "uploading the scene");
+    memory.release(place);
+    const auto larger = memory.allocate(bytes.size(), "uploading the scene");
     if (!larger) return tl::unexpected(larger.error());
     place = *larger;
   }
-  return memory_->write(place, bytes);
+  return memory.write(place, bytes);
+}
+
+bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ShaderGrid)) == 0);
 }
 
 Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
@@ -256,23 +173,18 @@ Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
   }
   if (table == surface_table_) return {};
   surface_table_ = std::move(table);
-  return put_table(surfaces_place_, bytes_of(surface_table_));
+  return put_table(*memory_, surfaces_place_, bytes_of(surface_table_));
 }
 
 Status DeviceScene::put_grids() {
   std::vector<ShaderGrid> table;
-  for (const auto& [handle, grid] : grids_) {
-    const IVec3 origin = grid.origin * kChunkEdge;
-    table.push_back({shader_tree(grid.opaque.top, &grid.trees.opaque(), origin),
-                     shader_tree(grid.transparent.top, grid.trees.transparent(), origin)});
+  for (const auto& [handle, grid] : grids_) table.push_back(grid.voxels.shader_grid());
+  if (!is_same(table, grid_table_)) {
+    grid_table_ = std::move(table);
+    if (Status done = put_table(*memory_, grids_place_, bytes_of(grid_table_)); !done) return done;
   }
-  const auto is_same = [&] {
-    return table.size() == grid_table_.size() &&
-           (table.empty() || std::memcmp(table.data(), grid_table_.data(), table.size() * sizeof(ShaderGrid)) == 0);
-  };
-  if (is_same()) return {};
-  grid_table_ = std::move(table);
-  return put_table(grids_place_, bytes_of(grid_table_));
+  placement_.grids = grids_place_.address;
+  return {};
 }
 
 }  // namespace quoin::vulkan

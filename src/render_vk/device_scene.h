@@ -1,15 +1,15 @@
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <map>
-#include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
+#include "render_vk/device_grid.h"
 #include "render_vk/memory.h"
-#include "render_vk/tree_packing.h"
 #include "scene/instance_tree.h"
 #include "scene/kept_trees.h"
 
@@ -22,7 +22,32 @@ struct DevicePlaced {
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
   DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates
   DVec3 high{0.0};
+  bool is_far = false;  ///< drawn from its impostor: the camera's rays pass it by
 };
+
+/// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.
+template <class Iterator>
+[[nodiscard]] Iterator find_placed(Iterator begin, Iterator end, InstanceHandle instance) {
+  return std::lower_bound(begin, end, instance, [](const DevicePlaced& each, InstanceHandle handle) {
+    return each.placed.instance < handle;
+  });
+}
+
+/// What rays meet: instances, and the table of the grids that they place.
+struct Placement {
+  std::vector<DevicePlaced> placed;  ///< in the order of their handles
+  InstanceTree instances;            ///< their boxes in the world
+  std::uint64_t grids = 0;           ///< the table's address
+  bool has_transparent = false;
+  std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
+};
+
+/// Whether any type is transparent or opaque that `known` says otherwise of, which then says it too; new types count as
+/// opaque before they are registered.
+[[nodiscard]] bool takes_other_visibility(std::vector<Visibility>& known, const VoxelRegistry& types);
+/// Puts a table in place, or in a larger one.
+[[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
+[[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
 /// A scene's voxels in device memory, and its instances.
 class DeviceScene {
@@ -32,58 +57,32 @@ class DeviceScene {
   /// As VulkanRenderer::update. After an error it holds nothing.
   [[nodiscard]] Status update(const Scene& scene, bool hidden, Threads threads);
 
-  [[nodiscard]] const std::vector<DevicePlaced>& placed() const { return placed_; }
-  [[nodiscard]] const InstanceTree& instances() const { return instances_; }
-  [[nodiscard]] bool has_transparent() const { return has_transparent_; }
-  [[nodiscard]] std::uint64_t grids_address() const { return grids_place_.address; }
+  [[nodiscard]] const Placement& placement() const { return placement_; }
+  [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
 
  private:
-  struct ByPlace {
-    bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
-  };
-  struct DeviceChunk {
-    std::uint64_t version = 0;
-    Place place;
-    Node opaque;
-    Node transparent;
-  };
-  struct DeviceTree {
-    Place place;
-    TopTree top;
-  };
-  struct DeviceGrid {
+  struct KnownGrid {
     std::uint64_t identity = 0;
-    std::uint64_t version = 0;
     KeptTrees trees;
-    std::map<IVec3, DeviceChunk, ByPlace> chunks;
-    IVec3 origin{0};  // in chunks
-    DeviceTree opaque;
-    DeviceTree transparent;
+    DeviceGrid voxels;
     std::int32_t index = 0;
   };
 
   void clear();
-  void release(DeviceGrid& grid);
   void forget_old_types(const VoxelRegistry& types);
   void place(const Scene& scene, bool hidden);
   void update_trees(const Scene& scene, Threads threads);
   void finish_placed(const Scene& scene);
   Status try_update(const Scene& scene, bool hidden, Threads threads);
-  Status update_grid(DeviceGrid& known, const Grid& grid);
-  Status put_chunk(DeviceGrid& known, const Grid& grid, IVec3 chunk);
-  Status put_top(DeviceGrid& known, DeviceTree& tree, Node DeviceChunk::*node);
-  Status put_table(Place& place, std::span<const std::byte> bytes);
   Status put_surfaces(const VoxelRegistry& types);
   Status put_grids();
 
   DeviceMemory* memory_;
-  std::map<GridHandle, DeviceGrid> grids_;
+  std::map<GridHandle, KnownGrid> grids_;
   std::vector<Visibility> visibility_;
-  std::vector<DevicePlaced> placed_;
-  InstanceTree instances_;
-  bool has_transparent_ = false;
+  Placement placement_;
   Place grids_place_;
   std::vector<ShaderGrid> grid_table_;
   Place surfaces_place_;

@@ -65,7 +65,8 @@ void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vec
 }
 
 // `view_origin`: from the camera.
-void add_instances(const InstanceTree& tree, const Camera& camera, DVec3 view_origin, FrameData& data) {
+void add_instances(const Placement& scene, const Camera& camera, DVec3 view_origin, FrameData& data) {
+  const InstanceTree& tree = scene.instances;
   // Two far positions first, as everywhere.
   const auto in_view = [&](const DBox& box) {
     return DBox{box.min - camera.position - view_origin, box.max - camera.position - view_origin};
@@ -75,7 +76,7 @@ void add_instances(const InstanceTree& tree, const Camera& camera, DVec3 view_or
     add_box(in_view(node.box), static_cast<std::uint32_t>(node.first), count, data.tree);
   }
   for (const std::size_t i : tree.order())
-    add_box(in_view(tree.boxes()[i]), static_cast<std::uint32_t>(i), 0, data.leaves);
+    add_box(in_view(tree.boxes()[i]), static_cast<std::uint32_t>(i), scene.placed[i].is_far ? 1 : 0, data.leaves);
 }
 
 // The camera's numbers as CameraRays has them.
@@ -146,31 +147,32 @@ void set_sun(const PlacedGrid& placed, DVec3 sun, ShaderPlaced& out) {
 }
 
 // Where rays start, and view space has its origin: as far ahead as there is nothing.
-void add_placed(const DeviceScene& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
+void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
                 FrameData& data) {
   const DVec3 sun = to_sun(options.light);
   std::vector<GridSpace> spaces;
   std::vector<double> depths;
-  double least = scene.placed().empty() ? 0.0 : std::numeric_limits<double>::infinity();
-  for (const DevicePlaced& grid : scene.placed()) {
+  double least = scene.placed.empty() ? 0.0 : std::numeric_limits<double>::infinity();
+  for (const DevicePlaced& grid : scene.placed) {
     const GridSpace& space = spaces.emplace_back(grid, camera);
     depths.push_back(depth_of(grid, space.view_axes, space.camera, rays.forward));
     least = std::min(least, depths.back());
   }
   const DVec3 view_origin = rays.forward * least;
   for (std::size_t i = 0; i < spaces.size(); ++i) {
-    const DevicePlaced& grid = scene.placed()[i];
+    const DevicePlaced& grid = scene.placed[i];
     ShaderPlaced& placed = data.placed.emplace_back();
     set_start(grid, spaces[i], rays, depths[i], options, placed);
     set_spaces(grid, spaces[i], view_origin, placed);
     set_sun(grid.placed, sun, placed);
+    placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.halvings), 0.0F};
   }
   const double spread = rays.spread(least);
   data.frame.view_depth = static_cast<float>(least);
   data.frame.start = to_vec4(rays.corner * spread);
   data.frame.start_x = to_vec4(rays.right * spread);
   data.frame.start_y = to_vec4(rays.down * spread);
-  add_instances(scene.instances(), camera, view_origin, data);
+  add_instances(scene, camera, view_origin, data);
 }
 
 void add_directions(int rays, FrameData& data) {
@@ -219,7 +221,6 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
   frame.sky_ground = {sky::kGround, 0.0F};
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
-  frame.detail_colour = {colour_of_detail(Detail::Near, 0), 0.0F};
   frame.occlusion_count = light.occlusion_rays;
   frame.occlusion_distance = capped(light.occlusion_distance);
   frame.shadow_distance = capped(light.shadow_distance);
@@ -228,7 +229,7 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
 
 }  // namespace
 
-FrameData make_frame(const DeviceScene& scene, const Camera& camera, const RenderOptions& options) {
+FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options) {
   FrameData data;
   const CameraRays picture(camera, options.width, options.height);
   const Rays rays{picture.is_perspective(), picture.right(), picture.down(), picture.corner(), picture.forward()};
@@ -246,8 +247,7 @@ FrameData make_frame(const DeviceScene& scene, const Camera& camera, const Rende
   frame.width = options.width;
   frame.height = options.height;
   frame.samples = static_cast<float>(options.samples);
-  frame.last_surface = scene.last_surface();
-  frame.placed_count = static_cast<std::uint32_t>(scene.placed().size());
+  frame.placed_count = static_cast<std::uint32_t>(scene.placed.size());
   set_light(options, frame);
   add_placed(scene, camera, options, rays, data);
   add_directions(options.light.occlusion_rays, data);

@@ -21,7 +21,7 @@ struct FrameData {
 };
 
 /// All that is in the world is made relative to the camera here, in double precision. Cost: O(instances).
-[[nodiscard]] FrameData make_frame(const DeviceScene& scene, const Camera& camera, const RenderOptions& options);
+[[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
 
 /// The least light of each byte but the first: SrgbEncoder as a table.
 [[nodiscard]] std::vector<float> srgb_thresholds();

@@ -62,9 +62,10 @@ Status PicturePass::upload(const std::vector<T>& values, std::uint64_t& address)
 }
 
 Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
-  FrameData data = make_frame(*scene_, camera, options);
+  FrameData data = make_frame(*placement_, camera, options);
   frame_ = data.frame;
-  frame_.grids = scene_->grids_address();
+  frame_.grids = placement_->grids;
+  frame_.last_surface = scene_->last_surface();
   frame_.surfaces = scene_->surfaces_address();
   Status done = upload(data.placed, frame_.placed);
   if (done) done = upload(data.tree, frame_.tree);
@@ -73,13 +74,29 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   if (done) done = upload(data.turns, frame_.turns);
   if (done) done = upload(thresholds(), frame_.thresholds);
   if (done) done = make_tile_buffers(options);
+  if (done) done = put_far(options);
   if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
   if (done) done = memory_->flush();
   return done;
 }
 
+Status PicturePass::put_far(const RenderOptions& options) {
+  const FarTiles tiles = far_tiles(placement_->far, tile_edge_, options.width, options.height);
+  far_ = tiles.ranges;
+  frame_.far_count = static_cast<std::uint32_t>(placement_->far.size());
+  if (tiles.parts.empty()) return {};
+  Status done = upload(placement_->far, frame_.fars);
+  if (done) done = upload(tiles.parts, frame_.far_parts);
+  const auto pixels = static_cast<std::size_t>(tile_edge_) * static_cast<std::size_t>(tile_edge_);
+  if (done) done = reserve(pixels * 8, frame_.far_depths);
+  if (!done) return done;
+  far_place_ = places_.back();
+  frame_.far_numbers = frame_.far_depths + pixels * 4;
+  return {};
+}
+
 Status PicturePass::make_tile_buffers(const RenderOptions& options) {
-  const bool has_glass = scene_->has_transparent();
+  const bool has_glass = placement_->has_transparent;
   tile_edge_ = tile_edge(options, has_glass, device_->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
                       static_cast<std::size_t>(std::min(tile_edge_, options.height));
@@ -115,6 +132,9 @@ ShaderPush PicturePass::push_for(const Tile& tile) const {
   push.corner_y = tile.y;
   push.size_x = tile.width;
   push.size_y = tile.height;
+  push.far_first = tile.far.first;
+  push.far_count = tile.far.count;
+  push.far_groups = tile.far.groups;
   push.pitch = static_cast<std::uint32_t>(target_ == nullptr ? tile.width : target_->width);
   if (target_ != nullptr)
     push.base = static_cast<std::uint32_t>(tile.y) * push.pitch + static_cast<std::uint32_t>(tile.x);
@@ -133,11 +153,26 @@ ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   return push;
 }
 
+// What each pixel's ray meets.
+void PicturePass::find_hits(VkCommandBuffer commands, const ShaderPush& push) const {
+  if (push.far_groups > 0) {
+    const VkDeviceSize half = (frame_.far_numbers - frame_.far_depths);
+    const VkBuffer buffer = memory_->buffer_of(far_place_);
+    constexpr std::uint32_t kInfinity = 0x7F800000;
+    device_->api().vkCmdFillBuffer(commands, buffer, far_place_.offset, half, kInfinity);
+    device_->api().vkCmdFillBuffer(commands, buffer, far_place_.offset + half, half, ~0U);
+    device_->separate(commands);
+    pipelines_->dispatch_far(commands, Pass::FarDepths, push);
+    pipelines_->dispatch_far(commands, Pass::FarFaces, push);
+  }
+  pipelines_->dispatch(commands, Pass::Primary, push);
+}
+
 Status PicturePass::take_sample(const Tile& tile, int sample) {
   const ShaderPush push = push_for_sample(tile, sample);
-  const bool has_glass = scene_->has_transparent();
+  const bool has_glass = placement_->has_transparent;
   Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
-    pipelines_->dispatch(commands, Pass::Primary, push);
+    find_hits(commands, push);
     if (has_glass) return;
     pipelines_->dispatch(commands, Pass::Light, push);
   });
@@ -200,7 +235,8 @@ std::vector<PicturePass::Tile> PicturePass::tiles_of(const RenderOptions& option
   std::vector<Tile> tiles;
   for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
     for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
-      tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y)});
+      const FarTiles::Range far = far_[tiles.size()];
+      tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y), far});
     }
   }
   return tiles;
@@ -238,7 +274,7 @@ Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& o
 
 // One sample of some tiles; without glass, which the processor counts rounds for, all in one batch.
 Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
-  if (scene_->has_transparent()) {
+  if (placement_->has_transparent) {
     for (const Tile& tile : tiles) {
       if (Status done = take_sample(tile, sample); !done) return done;
     }
@@ -247,7 +283,7 @@ Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
   return device_->run(kDoing, [&](VkCommandBuffer commands) {
     for (const Tile& tile : tiles) {
       const ShaderPush push = push_for_sample(tile, sample);
-      pipelines_->dispatch(commands, Pass::Primary, push);
+      find_hits(commands, push);
       pipelines_->dispatch(commands, Pass::Light, push);
     }
   });

@@ -1,10 +1,14 @@
 #include "render_vk/pipelines.h"
 
+#include <algorithm>
 #include <span>
 
 namespace quoin::vulkan {
 namespace {
 
+constexpr std::uint32_t kFar[] = {
+#include "far.comp.inc"
+};
 constexpr std::uint32_t kPrimary[] = {
 #include "primary.comp.inc"
 };
@@ -20,6 +24,9 @@ constexpr std::uint32_t kResolve[] = {
 
 std::span<const std::uint32_t> code_of(Pass pass) {
   switch (pass) {
+    case Pass::FarDepths:
+    case Pass::FarFaces:
+      return kFar;
     case Pass::Primary:
       return kPrimary;
     case Pass::Glass:
@@ -66,10 +73,12 @@ VkResult Pipelines::make(Pass pass) {
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
   info.stage.pName = "main";
-  const VkBool32 has_glass = pass == Pass::LightWithGlass ? VK_TRUE : VK_FALSE;
-  const VkSpecializationMapEntry entry{0, 0, sizeof has_glass};
-  const VkSpecializationInfo constants{1, &entry, sizeof has_glass, &has_glass};
-  if (pass == Pass::Light || pass == Pass::LightWithGlass) info.stage.pSpecializationInfo = &constants;
+  // Two passes of a shader differ in its one constant.
+  const VkBool32 is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces ? VK_TRUE : VK_FALSE;
+  const VkSpecializationMapEntry entry{0, 0, sizeof is_second};
+  const VkSpecializationInfo constants{1, &entry, sizeof is_second, &is_second};
+  const bool has_constant = is_second == VK_TRUE || pass == Pass::Light || pass == Pass::FarDepths;
+  if (has_constant) info.stage.pSpecializationInfo = &constants;
   VkResult result = api.vkCreateShaderModule(device_->handle(), &module, nullptr, &info.stage.module);
   if (result != VK_SUCCESS) return result;
   result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr,
@@ -81,10 +90,21 @@ VkResult Pipelines::make(Pass pass) {
 void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
   constexpr std::int32_t kGroup = 8;
   const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
+  dispatch(commands, pass, push, groups(push.size_x), groups(push.size_y));
+}
+
+void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
+  constexpr std::uint32_t kMostAcross = 32768;
+  const std::uint32_t across = std::min(push.far_groups, kMostAcross);
+  dispatch(commands, pass, push, across, (push.far_groups + across - 1) / across);
+}
+
+void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, std::uint32_t across,
+                         std::uint32_t down) const {
   const Api& api = device_->api();
   api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[static_cast<std::size_t>(pass)]);
   api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
-  api.vkCmdDispatch(commands, groups(push.size_x), groups(push.size_y), 1);
+  api.vkCmdDispatch(commands, across, down, 1);
   device_->separate(commands);
 }
 

@@ -45,10 +45,57 @@ struct ShaderPlaced {
   Vec4 start_y{0.0F};
   Vec4 to_sun{0.0F};
   std::array<Vec4, 2> diffuse{};
+  Vec4 detail_colour{0.0F};
   std::array<Vec4, 3> grid_axes_low{};
   Vec4 start_low{0.0F};
   Vec4 start_x_low{0.0F};
   Vec4 start_y_low{0.0F};
+};
+
+/// An entry of a level of an impostor's; see far.glsl.
+struct ShaderFarFace {
+  Vec4 centre{0.0F};
+  std::uint32_t face = 0;
+  std::uint32_t views = 0;
+  std::uint32_t direction = 0;
+  std::uint32_t pad = 0;
+};
+
+struct ShaderVoxelFace {
+  IVec3 voxel{0};
+  std::uint32_t what = 0;
+};
+
+struct ShaderFarLevel {
+  std::uint64_t faces = 0;
+  std::uint32_t count = 0;
+  std::uint32_t views = 0;
+};
+
+struct ShaderFar {
+  Vec4 point{0.0F};
+  Vec4 point_x{0.0F};
+  Vec4 point_y{0.0F};
+  Vec4 direction{0.0F};
+  Vec4 direction_x{0.0F};
+  Vec4 direction_y{0.0F};
+  Vec4 across{0.0F};
+  Vec4 down{0.0F};
+  Vec4 ahead{0.0F};
+  Vec4 at{0.0F};
+  Vec4 size{0.0F};
+  IVec4 area{0};
+  IVec4 origin{0};
+  ShaderFarLevel level;
+  ShaderFarLevel unseen;
+  std::uint64_t faces = 0;
+  std::uint32_t first_number = 0;
+  std::uint32_t pad = 0;
+};
+
+struct ShaderFarPart {
+  std::uint32_t draw = 0;  ///< twice the impostor, and one more for what no view saw
+  std::uint32_t first_group = 0;
 };
 
 // Bits of ShaderFrame::flags.
@@ -89,7 +136,6 @@ struct ShaderFrame {
   Vec4 sky_zenith{0.0F};
   Vec4 sky_horizon{0.0F};
   Vec4 sky_ground{0.0F};
-  Vec4 detail_colour{0.0F};
   Vec4 light{0.0F};
   std::uint64_t placed = 0;
   std::uint64_t grids = 0;
@@ -107,6 +153,10 @@ struct ShaderFrame {
   std::uint64_t colours = 0;
   std::uint64_t depths = 0;
   std::uint64_t counters = 0;
+  std::uint64_t fars = 0;
+  std::uint64_t far_parts = 0;
+  std::uint64_t far_depths = 0;
+  std::uint64_t far_numbers = 0;
   std::int32_t width = 0;
   std::int32_t height = 0;
   std::uint32_t flags = 0;
@@ -122,7 +172,7 @@ struct ShaderFrame {
   float view_depth = 0.0F;
   float sky_scale = 0.0F;
   float lift = 0.0F;
-  std::uint32_t pad = 0;
+  std::uint32_t far_count = 0;
 };
 
 struct ShaderPush {
@@ -140,11 +190,14 @@ struct ShaderPush {
   std::uint32_t round = 0;
   std::uint32_t base = 0;
   std::uint32_t pitch = 0;
-  std::uint32_t pad = 0;
+  std::uint32_t far_first = 0;
+  std::uint32_t far_count = 0;
+  std::uint32_t far_groups = 0;
 };
 
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
-static_assert(sizeof(ShaderPlaced) == 352 && sizeof(ShaderFrame) == 16 * 16 + 16 * 8 + 16 * 4);
-static_assert(sizeof(ShaderPush) == 64 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
+static_assert(sizeof(ShaderPlaced) == 368 && sizeof(ShaderFrame) == 15 * 16 + 20 * 8 + 16 * 4);
+static_assert(sizeof(ShaderPush) == 72 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

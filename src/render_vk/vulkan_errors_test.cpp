@@ -83,12 +83,23 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
   expect_same(wrong, sized(4, 4));
 }
 
-TEST_F(VulkanErrors, DetailIsRefused) {
-  RenderOptions options = sized(4, 4);
+// There is no scene to make levels of detail of, before the first update and after one that failed.
+TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
+  const Camera camera = towards({20, 20, 40}, {0, 0, 0});
+  RenderOptions options = sized(16, 12);
   options.detail.emplace();
-  const auto refused = renderer_->render(towards({0, 0, 0}, {1, 0, 0}), options);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+  const Picture sky = render_test::taken(Scene(), camera, options);
+  EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);
+  Scene scene;
+  const VoxelType stone = add_type(scene, {140, 140, 150});
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
+  const InstanceHandle instance = place(scene, std::move(grid));
+  EXPECT_GT(taken(scene, camera, options).pixels_hit, 0);
+  Grid& voxels = scene.grids()[scene.instances()[instance].grid].grid;
+  voxels.set({-1'000'000'000, 0, 0}, stone);
+  ASSERT_FALSE(renderer_->update(scene)) << "too wide";
+  EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);
 }
 
 TEST_F(VulkanErrors, AListenerCanStopIt) {

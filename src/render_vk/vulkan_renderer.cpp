@@ -1,6 +1,7 @@
 #include <quoin/render_vk/vulkan_renderer.h>
 
-#include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "render/picture_request.h"
 #include "render_vk/picture_pass.h"
@@ -9,11 +10,28 @@
 namespace quoin {
 namespace {
 
-Status check_request(const Camera& camera, const RenderOptions& options) {
-  if (Status status = check(camera, options); !status) return status;
-  if (!options.detail) return {};
-  return fail(ErrorCode::Unsupported, "vulkan: levels of detail are not drawn on graphics devices yet");
-}
+// What a picture is taken of: the instances as the scene has them, or in their detail.
+class Subject {
+ public:
+  [[nodiscard]] static Result<Subject> of(VulkanRenderer::Impl& impl, const Camera& camera,
+                                          const RenderOptions& options) {
+    Subject subject(impl.scene.placement());
+    if (!options.detail || impl.voxels == nullptr) return subject;
+    const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.hidden, camera, options);
+    auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
+    if (!placed) return tl::unexpected(placed.error());
+    subject.detailed_ = std::move(*placed);
+    return subject;
+  }
+
+  [[nodiscard]] const vulkan::Placement& placement() const { return detailed_ ? *detailed_ : *plain_; }
+
+ private:
+  explicit Subject(const vulkan::Placement& plain) : plain_(&plain) {}
+
+  const vulkan::Placement* plain_;
+  std::optional<vulkan::Placement> detailed_;
+};
 
 }  // namespace
 
@@ -46,6 +64,7 @@ Status VulkanRenderer::update(const Scene& scene, bool hidden, Threads threads) 
   const std::uint64_t before = impl_->memory.written();
   Status done = impl_->scene.update(scene, hidden, threads);
   impl_->uploaded = impl_->memory.written() - before;
+  impl_->look_at(done ? &scene : nullptr, hidden);
   return done;
 }
 
@@ -54,15 +73,17 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 }
 
 Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
-  if (const Status status = check_request(camera, options); !status) return tl::unexpected(status.error());
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene);
+  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  const auto subject = Subject::of(*impl_, camera, options);
+  if (!subject) return tl::unexpected(subject.error());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
   return pass.render(camera, options, progress);
 }
 
 Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
                             const Progress& progress) {
   constexpr int kMostSamples = 4096;
-  if (Status status = check_request(camera, options); !status) return status;
+  if (Status status = check(camera, options); !status) return status;
   VulkanPicture::Impl& target = picture.impl();
   if (Status status = target.resize(options.width, options.height); !status) return status;
   // Samples of meshes, and of pictures that were written, have no sums to add to.
@@ -72,7 +93,9 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (target.samples + options.samples > kMostSamples) {
     return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene);
+  const auto subject = Subject::of(*impl_, camera, options);
+  if (!subject) return tl::unexpected(subject.error());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
   return pass.draw(target, camera, options, progress);
 }
 

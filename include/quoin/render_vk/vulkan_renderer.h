@@ -52,8 +52,10 @@ struct VulkanOptions {
 ///
 /// Equal:   every option means the same, and so does every error; a channel of a pixel differs by 2 at most but at
 ///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
-///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little. The exception:
-///          `RenderOptions::detail` is Unsupported.
+///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little.
+/// Detail:  grids are halved and impostors built on the processor, when a picture first asks for them, from the scene
+/// of
+///          the last update: pictures with `RenderOptions::detail` require that it is still there, unedited.
 /// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
 /// Errors:  LimitExceeded when a memory is full; Unsupported when the device was lost, after which a new renderer is
@@ -70,8 +72,8 @@ class VulkanRenderer {
 
   [[nodiscard]] const VulkanDevice& device() const;
 
-  /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards. Instances that are not
-  /// visible are left out unless `hidden`.
+  /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards but for levels of detail
+  /// (see above). Instances that are not visible are left out unless `hidden`.
   ///
   /// What changed is told by the identities of grids and the versions of chunks; it may be another scene each time.
   /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
@@ -80,7 +82,7 @@ class VulkanRenderer {
   /// Bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
-  /// One picture, as CpuRenderer::render; `options.threads` and `instructions` mean nothing.
+  /// One picture, as CpuRenderer::render; `options.threads` are for what detail needs, `instructions` mean nothing.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {});
 

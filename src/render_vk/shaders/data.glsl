@@ -41,6 +41,7 @@ struct Placed {
   vec4 start_y;
   vec4 to_sun;
   vec4 diffuse[2];  // by face
+  vec4 detail_colour;
   // What is left of numbers above when they are rounded.
   vec4 grid_axes_low[3];
   vec4 start_low;
@@ -54,6 +55,7 @@ struct Point {
   vec4 inside;  // where in the voxel; w: t
   uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
 };
+// Of an impostor the kind is kSurface | kIsFar, with the corner levels and open rays of its face from bit 8 on.
 
 // A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
 // enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside.
@@ -72,6 +74,11 @@ struct State {
 const uint kSurface = 0;
 const uint kUnlit = 1;
 const uint kGlow = 2;
+const uint kIsFar = 4;
+
+uint kind_of(Point point) {
+  return point.what.z & 3;
+}
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Nodes {
   uvec4 at[];
@@ -109,6 +116,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Sums {
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words32 {
   uint at[];
 };
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer FarPixels {
+  uint at[];
+};
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Depths {
   float at[];
 };
@@ -136,12 +146,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
-  vec4 detail_colour;
   vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
   uvec2 placed;
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
-  uvec2 leaves;  // their boxes: low and high, w: the instance
+  uvec2 leaves;  // their boxes: low and high, w: the instance, and whether it is drawn from its impostor
   uvec2 surfaces;    // three vectors each: colour and log clarity, emitted, log transmittance
   uvec2 directions;  // of occlusion: nine a face; or the rings' angles
   uvec2 turns;
@@ -154,6 +163,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 colours;
   uvec2 depths;
   uvec2 counters;
+  uvec2 fars;         // impostors
+  uvec2 far_parts;    // which of them show in which tile
+  uvec2 far_depths;   // of the nearest at each pixel of a tile, as bits, and that one's number
+  uvec2 far_numbers;
   int width;
   int height;
   uint flags;
@@ -169,7 +182,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float view_depth;  // where view space has its origin
   float sky_scale;   // turns the way from an orthographic picture's middle into the tangent of an angle
   float lift;
-  uint pad;
+  uint far_count;  // 0: nothing is drawn from impostors
 };
 
 layout(push_constant) uniform Push {
@@ -183,7 +196,9 @@ layout(push_constant) uniform Push {
   uint round;       // of the sample
   uint base;        // of the tile's first pixel in sums and colours, and from one row there to the next
   uint pitch;
-  uint pad;
+  uint far_first;   // the tile's part of the list of impostors, and how many workgroups draw it
+  uint far_count;
+  uint far_groups;
 } push;
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -18,6 +18,7 @@ uint visit_stack[kVisitDepth];
 int visit_height;
 uint visit_next;
 uint visit_end;
+bool visited_is_far;  // the last one is drawn from its impostor
 
 vec3 visit_origin;
 vec3 visit_direction;
@@ -57,7 +58,10 @@ int next_instance(float max_t) {
       vec4 low = leaves.at[2 * visit_next];
       vec4 high = leaves.at[2 * visit_next + 1];
       ++visit_next;
-      if (may_meet(low.xyz, high.xyz, max_t)) return floatBitsToInt(low.w);
+      if (may_meet(low.xyz, high.xyz, max_t)) {
+        visited_is_far = floatBitsToInt(high.w) != 0;
+        return floatBitsToInt(low.w);
+      }
     }
     if (visit_height == 0) return -1;
     uint node = visit_stack[--visit_height];
@@ -200,14 +204,22 @@ GridRay rounded(Placed placed, ExactRay ray, float t) {
   return GridRay(placed.start_base.xyz + shift, start.high, ray.direction.high, t);
 }
 
+// How far along such a ray, from the instance's start, the plane of a voxel's face is.
+Pair distance_to_face(ExactRay ray, Pair from_voxel, uint face) {
+  int axis = int(face >> 1);
+  float plane = (face & 1) == 0 ? 1.0 : 0.0;
+  Pair from_plane = sum_of(Pair(vec3(plane), vec3(0.0)), component(Pair(-from_voxel.high, -from_voxel.low), axis));
+  return quotient_of(from_plane, component(ray.direction, axis));
+}
+
+// A ray's start, from the voxel's lower corner.
+Pair start_from(ExactRay ray, Placed placed, ivec3 voxel) {
+  return sum_of(ray.start, Pair(-vec3(voxel - placed.start_base.xyz), vec3(0.0)));
+}
+
 // Where such a ray meets the face through which it enters a voxel, from the voxel's lower corner.
 vec3 exact_place(Placed placed, Pair d, ivec3 voxel, uint face) {
   ExactRay ray = exact_ray_in(placed, d);
-  int axis = int(face >> 1);
-  vec3 corner = vec3(voxel - placed.start_base.xyz);
-  Pair start = sum_of(ray.start, Pair(-corner, vec3(0.0)));
-  float plane = (face & 1) == 0 ? 1.0 : 0.0;
-  Pair from_plane = sum_of(Pair(vec3(plane), vec3(0.0)), component(Pair(-start.high, -start.low), axis));
-  Pair t = quotient_of(from_plane, component(ray.direction, axis));
-  return sum_of(start, product_of(t, ray.direction)).high;
+  Pair start = start_from(ray, placed, voxel);
+  return sum_of(start, product_of(distance_to_face(ray, start, face), ray.direction)).high;
 }

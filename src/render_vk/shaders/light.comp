@@ -107,8 +107,8 @@ float vertex_occlusion(bool side_u, bool side_v, bool corner) {
   return side_u && side_v ? 3.0 : float(side_u) + float(side_v) + float(corner);
 }
 
-// The corner levels that a blocky mesh carries, interpolated over its two triangles: light/corner_light.h.
-float level_at(Tree opaque, ivec3 voxel, uint face, vec3 inside) {
+// The corner levels that a blocky mesh carries, counted around the face: light/corner_light.h.
+vec4 corner_levels(Tree opaque, ivec3 voxel, uint face) {
   int u = kFaceU[face];
   int v = kFaceV[face];
   ivec3 front = voxel;
@@ -124,18 +124,33 @@ float level_at(Tree opaque, ivec3 voxel, uint face, vec3 inside) {
   bool east = (occluders & 32) != 0;
   bool south = (occluders & 2) != 0;
   bool north = (occluders & 128) != 0;
-  float a = vertex_occlusion(west, south, (occluders & 1) != 0);
-  float b = vertex_occlusion(east, south, (occluders & 4) != 0);
-  float c = vertex_occlusion(east, north, (occluders & 256) != 0);
-  float d = vertex_occlusion(west, north, (occluders & 64) != 0);
-  float x = clamp(inside[u], 0.0, 1.0);
-  float y = clamp(inside[v], 0.0, 1.0);
+  return vec4(vertex_occlusion(west, south, (occluders & 1) != 0), vertex_occlusion(east, south, (occluders & 4) != 0),
+              vertex_occlusion(east, north, (occluders & 256) != 0),
+              vertex_occlusion(west, north, (occluders & 64) != 0));
+}
+
+// Interpolated over the mesh's two triangles.
+float level_at(vec4 levels, uint face, vec3 inside) {
+  float a = levels.x;
+  float b = levels.y;
+  float c = levels.z;
+  float d = levels.w;
+  float x = clamp(inside[kFaceU[face]], 0.0, 1.0);
+  float y = clamp(inside[kFaceV[face]], 0.0, 1.0);
   if (!(a + c > b + d)) {
     if (x >= y) return a + x * (b - a) + y * (c - b);
     return a + y * (d - a) + x * (c - d);
   }
   if (x + y <= 1.0) return a + x * (b - a) + y * (d - a);
   return c + (1.0 - x) * (d - c) + (1.0 - y) * (b - c);
+}
+
+// What a face of an impostor says of itself.
+float openness_of_far(Point point) {
+  uint light = point.what.z >> 8;
+  if (!has(kOcclusionVertex)) return float(light >> 8) / 9.0;
+  vec4 levels = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
+  return 1.0 - level_at(levels, point.what.y, point.inside.xyz) / 3.0;
 }
 
 // Where a ray meets a face: put onto it, and a little inside its edges.
@@ -159,7 +174,8 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
   origin[axis] += frame().lift / cells * sign_of(face);
   int first = has(kShadows) && cosine > 0.0 ? -1 : 0;
-  int count = has(kOcclusionRays) ? frame().occlusion_count : 0;
+  bool is_far = (point.what.z & kIsFar) != 0;
+  int count = has(kOcclusionRays) && !is_far ? frame().occlusion_count : 0;
   ivec2 pixel = push.corner + tile_pixel();
   uint hash = hash_of(uint(pixel.x), uint(pixel.y)) ^ push.seed;
   int open = 0;
@@ -179,23 +195,27 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
       sunlight *= sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
     }
   }
+  if (is_far) {
+    openness = openness_of_far(point);
+    return;
+  }
   if (has(kOcclusionRays)) openness = float(open) / float(frame().occlusion_count);
   if (has(kOcclusionVertex)) {
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    openness = 1.0 - level_at(opaque, point.voxel.xyz, face, point.inside.xyz) / 3.0;
+    openness = 1.0 - level_at(corner_levels(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
 }
 
 vec3 light_of(Point point, uint slot) {
   Surface surface = surface_of(point.what.x);
   if (has(kDetailColours)) {
-    surface.colour = frame().detail_colour.xyz;
+    surface.colour = placed_at(point.voxel.w).detail_colour.xyz;
     surface.emitted = vec3(0.0);
   }
-  if (!has(kLit)) return point.what.z == kGlow ? vec3(0.0) : surface.colour;
-  if (point.what.z == kUnlit) return surface.colour;
+  if (!has(kLit)) return kind_of(point) == kGlow ? vec3(0.0) : surface.colour;
+  if (kind_of(point) == kUnlit) return surface.colour;
   vec3 colour = surface.emitted;
-  if (point.what.z == kSurface) {
+  if (kind_of(point) == kSurface) {
     vec3 sunlight;
     float openness;
     trace_light(point, placed_at(point.voxel.w), slot, sunlight, openness);

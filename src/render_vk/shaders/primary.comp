@@ -5,7 +5,40 @@
 #include "pairs.glsl"
 #include "instances.glsl"
 #include "count.glsl"
+#include "far.glsl"
 
+// Puts what is drawn of impostors at the pixel into `point`; answers the start of the instance's ray, and how far
+// behind it the face lies.
+bool find_far(Pair direction, float scale, inout Point point, out float depth, out float nearest) {
+  uint number = FarPixels(frame().far_numbers).at[slot_of_pixel()];
+  if (number == kNoFace) return false;
+  Fars fars = Fars(frame().fars);
+  uint low = 0;
+  uint high = frame().far_count;
+  while (high - low > 1) {
+    uint middle = (low + high) / 2;
+    if (fars.at[middle].faces.z <= number) {
+      low = middle;
+    } else {
+      high = middle;
+    }
+  }
+  Far far = fars.at[low];
+  ivec4 face = VoxelFaces(far.faces.xy).at[number - far.faces.z];
+  uint what = uint(face.w);
+  uint side = what >> 24 & 7;
+  uint light = what >> 16 & 0xFF | (what >> 27) << 8;
+  int i = far.origin.w;
+  Placed placed = placed_at(i);
+  ivec3 voxel = face.xyz - far.origin.xyz;
+  ExactRay ray = exact_ray_in(placed, direction);
+  depth = placed.start.w;
+  nearest = distance_to_face(ray, start_from(ray, placed, voxel), side).high.x;
+  point.voxel = ivec4(voxel, i);
+  point.inside.w = depth * scale + nearest;
+  point.what = uvec4(what & 0xFFFF, side, kSurface | kIsFar | light << 8, floatBitsToUint(nearest));
+  return true;
+}
 
 Point first_hit(vec2 at) {
   Point point;
@@ -19,9 +52,15 @@ Point first_hit(vec2 at) {
   float scale = length_a_depth(at);
   float depth = 0.0;
   float nearest = kInfinity;
+  if (push.far_count > 0 && !find_far(direction, scale, point, depth, nearest)) {
+    depth = 0.0;
+    nearest = kInfinity;
+  }
   start_visit(ray);
-  for (int i = next_instance(kInfinity); i >= 0;
+  float reach = (depth - frame().view_depth) * scale + nearest;
+  for (int i = next_instance(reach); i >= 0;
        i = next_instance((depth - frame().view_depth) * scale + nearest)) {
+    if (visited_is_far) continue;
     Placed placed = placed_at(i);
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
     ExactRay exact = exact_ray_in(placed, direction);
@@ -47,7 +86,7 @@ Point first_hit(vec2 at) {
     point.what = uvec4(type_found(), face, is_inside ? kUnlit : kSurface, floatBitsToUint(found_t));
   }
   // Inside a voxel the place does not count.
-  if (point.voxel.w >= 0 && point.what.z == kSurface) {
+  if (point.voxel.w >= 0 && kind_of(point) == kSurface) {
     point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);
   }
   return point;

@@ -1,0 +1,59 @@
+#include "render/picture_detail.h"
+
+#include <algorithm>
+#include <limits>
+#include <span>
+
+namespace quoin {
+namespace {
+
+std::vector<SelectedInstance> select(const Scene& scene, bool hidden, const Camera& camera,
+                                     const RenderOptions& options) {
+  DetailPolicy policy = *options.detail;
+  policy.hidden = hidden;
+  std::vector<SelectedInstance> selected;
+  DetailSelector().select(scene, camera, options.width, options.height, policy, selected);
+  return selected;
+}
+
+// Those with impostors stay whole where they are traced: shadows onto what an impostor shows are those of its voxels.
+void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected) {
+  auto next = far.begin();
+  for (SelectedInstance& choice : selected) {
+    if (next == far.end()) return;
+    if (choice.instance != next->instance) continue;
+    choice.halvings = 0;
+    ++next;
+  }
+}
+
+}  // namespace
+
+PictureDetail DetailChooser::choose(const Scene& scene, bool hidden, const Camera& camera,
+                                    const RenderOptions& options) {
+  PictureDetail detail;
+  if (!options.detail) return detail;
+  detail.selected = select(scene, hidden, camera, options);
+  detail.far = take_far(scene, detail.selected, options);
+  keep_whole(detail.far.instances, detail.selected);
+  return detail;
+}
+
+// One picture at a time has impostors built: another would find some of them being built, and go on without. It waits
+// where it has all the time there is, else takes what is there.
+FarImpostors DetailChooser::take_far(const Scene& scene, const std::vector<SelectedInstance>& selected,
+                                     const RenderOptions& options) {
+  const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
+  if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
+  std::unique_lock lock(building_, std::defer_lock);
+  const bool may_wait = options.impostor_seconds == std::numeric_limits<double>::infinity();
+  if (may_wait) {
+    lock.lock();
+  } else {
+    static_cast<void>(lock.try_lock());
+  }
+  const double seconds = lock.owns_lock() ? options.impostor_seconds : 0.0;
+  return take_impostors(impostors_, scene, selected, seconds, options.threads);
+}
+
+}  // namespace quoin

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <mutex>
+#include <vector>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/render/impostor_cache.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/level_of_detail.h>
+#include <quoin/scene/scene.h>
+
+#include "render/far_impostors.h"
+
+namespace quoin {
+
+/// How the instances of one picture are drawn.
+struct PictureDetail {
+  std::vector<SelectedInstance> selected;  ///< traced so often halved; those with impostors not at all
+  FarImpostors far;
+};
+
+/// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
+class DetailChooser {
+ public:
+  /// Nothing without RenderOptions::detail. Requires: nobody edits the scene meanwhile; it is always the same one.
+  [[nodiscard]] PictureDetail choose(const Scene& scene, bool hidden, const Camera& camera,
+                                     const RenderOptions& options);
+
+  /// As ImpostorCache::look_at_types.
+  void look_at_types(const VoxelRegistry& types) { impostors_.look_at_types(types); }
+
+ private:
+  [[nodiscard]] FarImpostors take_far(const Scene& scene, const std::vector<SelectedInstance>& selected,
+                                      const RenderOptions& options);
+
+  ImpostorCache impostors_{{FarImpostors::kMostBytes}};
+  std::mutex building_;  // impostors
+};
+
+}  // namespace quoin

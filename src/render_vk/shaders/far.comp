@@ -1,0 +1,111 @@
+#version 460
+// Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which face
+// that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
+#include "data.glsl"
+#include "far.glsl"
+
+layout(constant_id = 0) const bool kFindsFaces = false;
+
+const uint kViews = 26;
+const uint kFacesAGroup = 512;
+const float kMargin = 0.01;  // pixels: for rounding
+
+// Pixels from the area's corner, inclusive.
+struct Rectangle {
+  vec2 low;
+  vec2 high;
+  bool is_shown;
+};
+
+// The pixels that a box around `q` may show in: never fewer than it does.
+Rectangle rectangle_of(Far far, vec3 q, vec3 half_size) {
+  vec2 at = far.at.xy - push.point;
+  float ahead = dot(far.ahead.xyz, q) + far.ahead.w;
+  vec2 middle = vec2(dot(far.across.xyz, q) + far.across.w, dot(far.down.xyz, q) + far.down.w) / ahead;
+  float deep = dot(half_size, abs(far.ahead.xyz));
+  vec2 wide = vec2(dot(half_size, abs(far.across.xyz - middle.x * far.ahead.xyz)),
+                   dot(half_size, abs(far.down.xyz - middle.y * far.ahead.xyz)));
+  // Of the part of the area that lies in the tile.
+  vec2 least = vec2(max(push.corner - far.area.xy, ivec2(0)));
+  vec2 most = vec2(min(push.corner + push.size, far.area.zw) - far.area.xy - 1);
+  float nearest = ahead - deep;
+  Rectangle found = Rectangle(least, most, true);
+  // Boxes that reach to the camera's plane may show anywhere.
+  if (0.01 * ahead < nearest) {
+    vec2 size = wide / nearest;
+    found.low = max(ceil(middle - size + (at - kMargin)), least);
+    found.high = min(floor(middle + size + (at + kMargin)), most);
+  }
+  found.is_shown = all(lessThanEqual(found.low, found.high)) && 0.0 < ahead + deep;
+  return found;
+}
+
+void put(ivec2 pixel, float depth, uint number) {
+  uint slot = uint(pixel.y) * uint(push.size.x) + uint(pixel.x);
+  uint bits = floatBitsToUint(depth);
+  if (!kFindsFaces) {
+    atomicMin(FarPixels(frame().far_depths).at[slot], bits);
+  } else if (FarPixels(frame().far_depths).at[slot] == bits) {
+    atomicMin(FarPixels(frame().far_numbers).at[slot], number);
+  }
+}
+
+void draw(Far far, vec3 q, uint side, uint number, float half_size, float reach) {
+  int axis = int(side >> 1);
+  float sign = (side & 1) == 0 ? 1.0 : -1.0;
+  vec3 half_box = vec3(half_size);
+  half_box[axis] = 0.0;
+  Rectangle rectangle = rectangle_of(far, q, half_box);
+  if (!rectangle.is_shown) return;
+  ivec2 to_tile = far.area.xy - push.corner;
+  for (float y = rectangle.low.y; y <= rectangle.high.y; y += 1.0) {
+    for (float x = rectangle.low.x; x <= rectangle.high.x; x += 1.0) {
+      vec2 at = vec2(x, y) + push.point;
+      precise vec3 point = far.point.xyz + far.point_x.xyz * at.x + far.point_y.xyz * at.y;
+      precise vec3 direction = far.direction.xyz + far.direction_x.xyz * at.x + far.direction_y.xyz * at.y;
+      float towards = direction[axis];
+      precise float along = (q[axis] - point[axis]) / towards;
+      precise float depth = far.point.w + along * far.direction.w;
+      vec3 off = abs(point + along * direction - q);
+      off[axis] = 0.0;
+      bool is_met = max(max(off.x, off.y), off.z) <= reach && towards * sign < 0.0 && 0.0 < depth;
+      if (is_met) put(ivec2(x, y) + to_tile, depth, number);
+    }
+  }
+}
+
+// Which part of the tile's list the workgroup belongs to: the last one that begins up to there.
+uvec2 part_of(uint group) {
+  FarParts parts = FarParts(frame().far_parts);
+  uint low = push.far_first;
+  uint high = low + push.far_count;
+  while (high - low > 1) {
+    uint middle = (low + high) / 2;
+    if (parts.at[middle].y <= group) {
+      low = middle;
+    } else {
+      high = middle;
+    }
+  }
+  return parts.at[low];
+}
+
+void main() {
+  uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  if (group >= push.far_groups) return;
+  uvec2 part = part_of(group);
+  Far far = Fars(frame().fars).at[part.x >> 1];
+  bool is_unseen = (part.x & 1) != 0;
+  uvec4 level = is_unseen ? far.unseen : far.level;
+  uint sides = level.w >> kViews;
+  uint views = level.w & ((1u << kViews) - 1);
+  float half_size = is_unseen ? far.size.y : far.size.x;
+  float reach = is_unseen ? far.size.w : far.size.z;
+  uint first = (group - part.y) * kFacesAGroup;
+  uint end = min(first + kFacesAGroup, level.z);
+  for (uint i = first + gl_LocalInvocationIndex; i < end; i += 64) {
+    uvec4 what = FarFaces(level.xy).at[i].what;
+    if ((sides >> what.z & 1) == 0 || (what.y & views) == 0) continue;
+    draw(far, FarFaces(level.xy).at[i].centre.xyz, what.z, far.faces.z + what.x, half_size, reach);
+  }
+}
