@@ -64,6 +64,7 @@ TEST_F(VulkanPictures, BeginAnewWhenAskedAndForAnotherSize) {
 }
 
 TEST_F(VulkanPictures, AddNothingToWhatIsNoSumOfSamples) {
+  options_.width = 200;
   const std::vector<std::uint8_t> alone = rendered(1).colour.rgb;
   VulkanPicture picture(*renderer_);
   Image grey{200, 130, std::vector<std::uint8_t>(std::size_t{3} * 200 * 130, 128)};

@@ -247,7 +247,7 @@ TEST(LiveBook, WhoActsOnlyWhenCalledComesToTheEnd) {
     make_live_surface(options, job, workspace);
     as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
   });
-  const DVec3 eye{0.0, -10'000.0, 0.0};  // the lower row, which is edited, comes first
+  const DVec3 eye{0.0, -1'000'000.0, 0.0};  // the lower row, which is edited, comes first
   const auto come_to_the_end = [&] {
     for (int seen = -1;;) {
       book.update(one.scene, eye);
