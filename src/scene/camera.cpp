@@ -67,7 +67,8 @@ Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
   if (!is_finite(position)) return fail(ErrorCode::InvalidArgument, "the camera's position is not finite");
   if (!is_finite(target)) return fail(ErrorCode::InvalidArgument, "the point to look at is not finite");
   if (!(vertical_fov > 0.0 && vertical_fov < std::numbers::pi)) {
-    return fail(ErrorCode::InvalidArgument, "the field of view is not more than 0 and less than pi radians (180 degrees)");
+    return fail(ErrorCode::InvalidArgument,
+                "the field of view is not more than 0 and less than pi radians (180 degrees)");
   }
   // Halved so that the difference of the greatest numbers is one; then scaled so that no square is lost.
   const DVec3 half = 0.5 * target - 0.5 * position;

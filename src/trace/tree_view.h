@@ -17,8 +17,8 @@ struct TreeView {
   IVec3 cell_strides;
   IVec3 brick_strides;
   IVec3 brick_sizes;
-  DVec3 origin;  ///< of the tables, in the grid
-  IBox box;      ///< tight, from `origin`
+  DVec3 origin;   ///< of the tables, in the grid
+  IBox box;       ///< tight, from `origin`
   bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
   // The same again, as single rays read it.
   alignas(32) double corner[4];

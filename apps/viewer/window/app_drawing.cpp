@@ -1,0 +1,61 @@
+#include "app.h"
+
+namespace quoin::viewer {
+
+void App::draw_as(DrawMode mode) {
+  if (state_.open.backend && !state_.open.backend->can_draw(mode))
+    return state_.tell("there is no device to draw meshes");
+  state_.settings.mode = mode;
+}
+
+// A look at the levels of detail, after which all is as it was before.
+void App::show_detail(bool is_shown) {
+  Settings& settings = state_.settings;
+  if (is_shown) {
+    before_detail_ = BeforeDetail{settings.mode, settings.detail_by_pixels};
+    settings.detail_by_pixels = true;
+    draw_as(DrawMode::Rays);
+    state_.tell(kDetailLegend);
+  } else if (before_detail_) {
+    settings.detail_by_pixels = before_detail_->by_pixels;
+    draw_as(before_detail_->mode);
+    before_detail_.reset();
+  }
+  settings.detail_colours = is_shown;
+}
+
+bool App::run_draw_command(Command command) {
+  Settings& settings = state_.settings;
+  const auto next = [](auto value, int count) {
+    return static_cast<decltype(value)>((static_cast<int>(value) + 1) % count);
+  };
+  switch (command) {
+    case Command::DrawRays:
+      draw_as(DrawMode::Rays);
+      return true;
+    case Command::DrawBlocks:
+      draw_as(DrawMode::Blocks);
+      return true;
+    case Command::DrawSmooth:
+      draw_as(DrawMode::Smooth);
+      return true;
+    case Command::NextWireframe:
+      settings.wireframe = next(settings.wireframe, 3);
+      break;
+    case Command::NextShading:
+      settings.shading = next(settings.shading, 3);
+      break;
+    case Command::DetailColours:
+      show_detail(!settings.detail_colours);
+      return true;
+    default:
+      return false;
+  }
+  if (settings.mode == DrawMode::Rays) {
+    state_.tell("drawn as blocks: only meshes have edges and shadings");
+    draw_as(DrawMode::Blocks);
+  }
+  return true;
+}
+
+}  // namespace quoin::viewer
