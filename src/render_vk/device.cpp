@@ -39,25 +39,26 @@ Status Device::open(const PhysicalDevice& physical) {
     info.enabledExtensionCount = 1;
     info.ppEnabledExtensionNames = &swapchain;
   }
-  VkResult result = api_.vkCreateDevice(physical.handle, &info, nullptr, &handle_);
+  const VkResult result = api_.vkCreateDevice(physical.handle, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
   api_.load_device(handle_);
   api_.vkGetDeviceQueue(handle_, physical.queue_family, 0, &queue_);
+  return check(make_commands(), "starting");
+}
+
+VkResult Device::make_commands() {
   auto pool = info_of<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-  pool.queueFamilyIndex = physical.queue_family;
-  result = api_.vkCreateCommandPool(handle_, &pool, nullptr, &pool_);
-  if (result == VK_SUCCESS) {
-    auto buffer = info_of<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-    buffer.commandPool = pool_;
-    buffer.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-    buffer.commandBufferCount = 1;
-    result = api_.vkAllocateCommandBuffers(handle_, &buffer, &commands_);
-  }
-  if (result == VK_SUCCESS) {
-    const auto fence = info_of<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
-    result = api_.vkCreateFence(handle_, &fence, nullptr, &fence_);
-  }
-  return check(result, "starting");
+  pool.queueFamilyIndex = physical_.queue_family;
+  VkResult result = api_.vkCreateCommandPool(handle_, &pool, nullptr, &pool_);
+  if (result != VK_SUCCESS) return result;
+  auto buffer = info_of<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  buffer.commandPool = pool_;
+  buffer.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+  buffer.commandBufferCount = 1;
+  result = api_.vkAllocateCommandBuffers(handle_, &buffer, &commands_);
+  if (result != VK_SUCCESS) return result;
+  const auto fence = info_of<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
+  return api_.vkCreateFence(handle_, &fence, nullptr, &fence_);
 }
 
 Device::~Device() {

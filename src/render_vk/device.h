@@ -47,6 +47,7 @@ class Device {
  private:
   Device() = default;
   Status open(const PhysicalDevice& physical);
+  VkResult make_commands();
 
   std::unique_ptr<VulkanInstance> instance_;
   Api api_;

@@ -117,6 +117,20 @@ void row(const char* name, const char* format, double value) {
   ImGui::Text(format, value);
 }
 
+void draw_sun(LightOptions& light) {
+  SunAngles sun = sun_angles(light.sun);
+  auto azimuth = static_cast<float>(sun.azimuth);
+  auto elevation = static_cast<float>(sun.elevation);
+  const bool is_turned =
+      ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  const bool is_raised =
+      ImGui::SliderFloat("elevation", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  if (is_turned || is_raised) {
+    // Straight up there is no azimuth to come back to.
+    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), 0.5, 89.5)});
+  }
+}
+
 }  // namespace
 
 void draw_tool_part(ViewState& state, MenuChoice& choice) {
@@ -220,17 +234,7 @@ void draw_light_part(ViewState& state) {
   if (ImGui::Checkbox("of all light", &is_all)) {
     light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
   }
-  SunAngles sun = sun_angles(light.sun);
-  auto azimuth = static_cast<float>(sun.azimuth);
-  auto elevation = static_cast<float>(sun.elevation);
-  const bool is_turned =
-      ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
-  const bool is_raised =
-      ImGui::SliderFloat("elevation", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
-  if (is_turned || is_raised) {
-    // Straight up there is no azimuth to come back to.
-    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), 0.5, 89.5)});
-  }
+  draw_sun(light);
   auto exposure = static_cast<float>(light.exposure);
   if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {

@@ -1,4 +1,4 @@
-// live/*: pictures as a window shows them, which stay on the best device that there is, beside the processor's on all
+// view/*: pictures as a window shows them, which stay on the best device that there is, beside the processor's on all
 // its threads: the 256x128x256 terrain and a world of 4096x256x4096, at 1920x1080 and 3840x2160, with shadows and six
 // occlusion rays; and by kinds of rays. `device` is skipped where there is none.
 
@@ -108,12 +108,12 @@ void add(bool is_large, int height, Kind kind, const std::string& name) {
 }
 
 const bool kIsAdded = [] {
-  add(false, 1080, Kind::Primary, "live/terrain/1080/primary");
-  add(false, 1080, Kind::Shadow, "live/terrain/1080/shadow");
-  add(false, 1080, Kind::Full, "live/terrain/1080");
-  add(false, 2160, Kind::Full, "live/terrain/2160");
-  add(true, 1080, Kind::Full, "live/world4096/1080");
-  add(true, 2160, Kind::Full, "live/world4096/2160");
+  add(false, 1080, Kind::Primary, "view/terrain/1080/primary");
+  add(false, 1080, Kind::Shadow, "view/terrain/1080/shadow");
+  add(false, 1080, Kind::Full, "view/terrain/1080");
+  add(false, 2160, Kind::Full, "view/terrain/2160");
+  add(true, 1080, Kind::Full, "view/world4096/1080");
+  add(true, 2160, Kind::Full, "view/world4096/2160");
   return true;
 }();
 
