@@ -45,12 +45,19 @@ GraphicsPipelineInfo::GraphicsPipelineInfo() {
       VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
 }
 
-VkResult make_graphics_pipeline(const Device& device, const GraphicsPipelineInfo& wanted, VkPipeline& pipeline) {
-  const Module vertex(device, wanted.vertex_shader);
-  const Module fragment(device, wanted.fragment_shader);
+VkResult make_graphics_pipeline(const Device& device, std::span<const std::uint32_t> vertex_shader,
+                                std::span<const std::uint32_t> fragment_shader, const GraphicsPipelineInfo& wanted,
+                                VkPipeline& pipeline) {
+  const Module vertex(device, vertex_shader);
+  const Module fragment(device, fragment_shader);
   if (vertex.result() != VK_SUCCESS) return vertex.result();
   if (fragment.result() != VK_SUCCESS) return fragment.result();
   const std::array stages = {vertex.stage(VK_SHADER_STAGE_VERTEX_BIT), fragment.stage(VK_SHADER_STAGE_FRAGMENT_BIT)};
+  return make_graphics_pipeline(device, stages, wanted, pipeline);
+}
+
+VkResult make_graphics_pipeline(const Device& device, std::span<const VkPipelineShaderStageCreateInfo, 2> stages,
+                                const GraphicsPipelineInfo& wanted, VkPipeline& pipeline) {
   const auto input =
       info_of<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
   auto assembly =

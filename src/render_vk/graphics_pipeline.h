@@ -9,8 +9,6 @@ namespace quoin::vulkan {
 
 /// How triangles are drawn whose corners shaders read from memory. Viewport and scissor are set when that is recorded.
 struct GraphicsPipelineInfo {
-  std::span<const std::uint32_t> vertex_shader;
-  std::span<const std::uint32_t> fragment_shader;
   VkRenderPass pass = VK_NULL_HANDLE;
   VkPipelineLayout layout = VK_NULL_HANDLE;
   VkPipelineRasterizationStateCreateInfo raster{};
@@ -22,7 +20,13 @@ struct GraphicsPipelineInfo {
   GraphicsPipelineInfo();
 };
 
-[[nodiscard]] VkResult make_graphics_pipeline(const Device& device, const GraphicsPipelineInfo& info,
-                                              VkPipeline& pipeline);
+/// `stages`: of vertices and of fragments.
+[[nodiscard]] VkResult make_graphics_pipeline(const Device& device,
+                                              std::span<const VkPipelineShaderStageCreateInfo, 2> stages,
+                                              const GraphicsPipelineInfo& info, VkPipeline& pipeline);
+/// Of shaders that nothing else is made of.
+[[nodiscard]] VkResult make_graphics_pipeline(const Device& device, std::span<const std::uint32_t> vertex_shader,
+                                              std::span<const std::uint32_t> fragment_shader,
+                                              const GraphicsPipelineInfo& info, VkPipeline& pipeline);
 
 }  // namespace quoin::vulkan

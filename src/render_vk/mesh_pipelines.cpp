@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "render_vk/graphics_pipeline.h"
 #include "render_vk/mesh_shader_data.h"
 
 namespace quoin::vulkan {
@@ -217,41 +218,14 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
   const Stages stages(way, &shaders_[2 * static_cast<std::size_t>(way.what)]);
-  const auto vertices =
-      info_of<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
-  auto assembly =
-      info_of<VkPipelineInputAssemblyStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO);
-  assembly.topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
-  auto viewport = info_of<VkPipelineViewportStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO);
-  viewport.viewportCount = 1;
-  viewport.scissorCount = 1;
-  const VkPipelineRasterizationStateCreateInfo rasterization = rasterization_of(way);
-  auto samples =
-      info_of<VkPipelineMultisampleStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO);
-  samples.rasterizationSamples = static_cast<VkSampleCountFlagBits>(way.samples);
-  const VkPipelineDepthStencilStateCreateInfo depth = depth_of(way);
-  const VkPipelineColorBlendAttachmentState attachment = blend_of(way);
-  auto blend = info_of<VkPipelineColorBlendStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO);
-  blend.attachmentCount = 1;
-  blend.pAttachments = &attachment;
-  const std::array dynamics = {VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR};
-  auto dynamic = info_of<VkPipelineDynamicStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO);
-  dynamic.dynamicStateCount = dynamics.size();
-  dynamic.pDynamicStates = dynamics.data();
-  auto info = info_of<VkGraphicsPipelineCreateInfo>(VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO);
-  info.stageCount = stages.all.size();
-  info.pStages = stages.all.data();
-  info.pVertexInputState = &vertices;
-  info.pInputAssemblyState = &assembly;
-  info.pViewportState = &viewport;
-  info.pRasterizationState = &rasterization;
-  info.pMultisampleState = &samples;
-  info.pDepthStencilState = &depth;
-  info.pColorBlendState = &blend;
-  info.pDynamicState = &dynamic;
+  GraphicsPipelineInfo info;
+  info.pass = pass;
   info.layout = layout_;
-  info.renderPass = pass;
-  return device_->api().vkCreateGraphicsPipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  info.raster = rasterization_of(way);
+  info.depth = depth_of(way);
+  info.blend = blend_of(way);
+  info.samples = static_cast<VkSampleCountFlagBits>(way.samples);
+  return make_graphics_pipeline(*device_, stages.all, info, pipeline);
 }
 
 }  // namespace quoin::vulkan

@@ -31,17 +31,17 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(Device& device)
   GraphicsPipelineInfo info;
   info.pass = made->pass_;
   info.layout = made->layout_;
-  info.vertex_shader = kPictureVertex;
-  info.fragment_shader = kPictureFragment;
-  if (result == VK_SUCCESS) result = make_graphics_pipeline(device, info, made->picture_);
-  info.vertex_shader = kOverlayVertex;
-  info.fragment_shader = kOverlayFragment;
+  if (result == VK_SUCCESS) {
+    result = make_graphics_pipeline(device, kPictureVertex, kPictureFragment, info, made->picture_);
+  }
   info.blend.blendEnable = VK_TRUE;
   info.blend.srcColorBlendFactor = VK_BLEND_FACTOR_SRC_ALPHA;
   info.blend.dstColorBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
   info.blend.srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE;
   info.blend.dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
-  if (result == VK_SUCCESS) result = make_graphics_pipeline(device, info, made->overlay_);
+  if (result == VK_SUCCESS) {
+    result = make_graphics_pipeline(device, kOverlayVertex, kOverlayFragment, info, made->overlay_);
+  }
   if (Status status = device.check(result, "compiling shaders"); !status) return tl::unexpected(status.error());
   return made;
 }
