@@ -76,7 +76,6 @@ struct DeviceBackend::Impl {
 
   std::optional<ViewRequest> request;
   bool is_request_new = false;
-  bool is_camera_new = true;
   bool is_paused = false;
   bool is_settled = false;
   bool is_device_gone = false;
@@ -126,15 +125,14 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) {
     return tl::unexpected<Error>(ready.error());
   }
-  bool is_new = std::exchange(is_request_new, false);
-  if (std::exchange(meshes->is_scene_new, false)) {
-    is_new = true;
-    if (Status taken = meshes->renderer.update(*scene, options.cpu.hidden); !taken)
+  const bool is_scene_changed = std::exchange(meshes->is_scene_new, false);
+  bool is_new = std::exchange(is_request_new, false) || is_scene_changed;
+  if (is_scene_changed) {
+    if (Status taken = meshes->renderer.update(*scene, options.cpu.hidden); !taken) {
       return tl::unexpected(taken.error());
-    meshes->live.update(*scene, request->camera.position);
-  } else if (meshes->live.pending() > 0) {
-    meshes->live.update(*scene, request->camera.position);
+    }
   }
+  if (is_scene_changed || meshes->live.pending() > 0) meshes->live.update(*scene, request->camera.position);
   const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
   if (!surfaces.empty()) {
     is_new = true;

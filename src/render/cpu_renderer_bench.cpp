@@ -1,12 +1,10 @@
 // render/terrain/1280x720: the 256x128x256 terrain with shadows and nine occlusion rays a hit, one thread.
 
-#include <cmath>
-
 #include <benchmark/benchmark.h>
 
 #include <quoin/render/cpu_renderer.h>
 
-#include "bench/picture_workload.h"
+#include "bench/picture_loop.h"
 
 namespace quoin {
 namespace {
@@ -20,16 +18,9 @@ void picture(benchmark::State& state, const LightOptions& light, Threads threads
   RenderOptions options;
   options.threads = threads;
   options.light = light;
-  std::int64_t rays = 0;
-  for (auto _ : state) {
-    const auto made = renderer.render(workloads::over_the_terrain(), options);
-    fail_unless(made.has_value() && std::abs(made->pixels_hit - workloads::kPixelsHit) < 50, "pixels hit",
-                made ? made->pixels_hit : -1);
-    rays = made->rays;
-  }
-  state.counters["rays"] = static_cast<double>(rays);
-  state.counters["rays_per_second"] =
-      benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
+  workloads::time_pictures(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
+    return renderer.render(camera, wanted);
+  });
 }
 
 void full(benchmark::State& state) {

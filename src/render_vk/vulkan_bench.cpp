@@ -1,13 +1,11 @@
 // render/terrain/1280x720/vulkan: the picture of cpu_renderer_bench.cpp on the best device that there is, and what an
 // edit of one voxel costs. Skipped where there is no device.
 
-#include <cmath>
-
 #include <benchmark/benchmark.h>
 
 #include <quoin/render_vk/vulkan_renderer.h>
 
-#include "bench/picture_workload.h"
+#include "bench/picture_loop.h"
 
 namespace quoin {
 namespace {
@@ -21,17 +19,10 @@ void picture(benchmark::State& state, const LightOptions& light) {
   fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
   RenderOptions options;
   options.light = light;
-  std::int64_t rays = 0;
-  for (auto _ : state) {
-    const auto made = renderer->render(workloads::over_the_terrain(), options);
-    fail_unless(made.has_value() && std::abs(made->pixels_hit - workloads::kPixelsHit) < 50, "pixels hit",
-                made ? made->pixels_hit : -1);
-    rays = made->rays;
-  }
+  workloads::time_pictures(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
+    return renderer->render(camera, wanted);
+  });
   state.SetLabel(renderer->device().name);
-  state.counters["rays"] = static_cast<double>(rays);
-  state.counters["rays_per_second"] =
-      benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void full(benchmark::State& state) {

@@ -106,20 +106,21 @@ void App::note_size() {
   SDL_GetWindowSize(screen_->window(), &state_.settings.width, &state_.settings.height);
 }
 
+// Whether the next frame cannot come too soon.
+bool App::is_moving() const {
+  const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
+  return is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
+}
+
 bool App::is_animating() const {
   if (screen_->is_minimised()) return false;
-  const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
-  return is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy() ||
-         state_.loader || state_.saver || state_.message || ImGui::GetIO().WantTextInput;
+  return is_moving() || state_.loader || state_.saver || state_.message || ImGui::GetIO().WantTextInput;
 }
 
 int App::patience_milliseconds() const {
   if (frames_left_ > 0 && !screen_->is_minimised()) return 0;
   if (!is_animating()) return kPatience;
-  const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
-  const bool is_moving =
-      is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
-  return is_moving ? 0 : kPatienceOfBars;
+  return is_moving() ? 0 : kPatienceOfBars;
 }
 
 void App::wait_and_process() {

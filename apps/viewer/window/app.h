@@ -37,6 +37,7 @@ class App {
   // Events and frames.
   void wait_and_process();
   [[nodiscard]] int patience_milliseconds() const;
+  [[nodiscard]] bool is_moving() const;
   [[nodiscard]] bool is_animating() const;
   void process(const SDL_Event& event);
   void frame();
