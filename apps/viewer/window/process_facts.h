@@ -2,10 +2,12 @@
 
 // What tests ask of their own process, to find what is left behind.
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <thread>
 
 #include <unistd.h>
 
@@ -17,6 +19,18 @@ inline std::size_t open_files() {
 
 inline std::size_t threads() {
   return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
+}
+
+/// Threads left when those that were joined are gone: the kernel lists a thread for a moment after its join returns.
+/// Waits at most five seconds for there to be no more than `expected`.
+inline std::size_t threads_after_joining(std::size_t expected) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  std::size_t count = threads();
+  while (count > expected && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    count = threads();
+  }
+  return count;
 }
 
 inline double resident_megabytes() {
