@@ -28,6 +28,14 @@ LevelTables make_level_tables() {
     tables.u_along_bits[around] = pack({l00, l10, l11, l01});
     tables.u_along_rows[around] = pack({l00, l01, l11, l10});
   }
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    const auto level = [&](unsigned corner) { return static_cast<std::uint8_t>(bits >> (2 * corner) & 3U); };
+    const bool flips = flips_diagonal({level(0), level(1), level(2), level(3)});
+    tables.flips[bits / 32] |= std::uint32_t{flips} << (bits + 6) % 32;
+  }
+  for (std::uint32_t at = 0; at < kBatchWords; ++at) {
+    tables.numbers[at] = (at / kRowStride * 64 + at % kRowStride % 64) * 0x0001'0001U;
+  }
   constexpr int kRowAxis[3] = {1, 2, 1};
   for (int axis = 0; axis < 3; ++axis) {
     for (std::uint64_t at = 0; at < kBatchWords; ++at) {
@@ -139,8 +147,7 @@ void gather_row_ends(const Job& job, Scratch& s) {
         if (chunk_offset(z) != dz) continue;
         for (int y = -1; y <= 64; ++y) {
           if (chunk_offset(y) != dy) continue;
-          s.z.before.words[word_index(z, y)] = before.at(63, y & 63, z & 63);
-          s.z.after.words[word_index(z, y)] = after.at(0, y & 63, z & 63) << 63;
+          s.z.ends.words[word_index(z, y)] = before.at(63, y & 63, z & 63) << 63 | after.at(0, y & 63, z & 63);
         }
       }
     }
@@ -197,8 +204,9 @@ void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& s) {
       const auto end = [&](int dx, int x) {
         return std::uint64_t{same_transparent_voxel(job, n.at(dx, 0, 0), {x, y, z}, {63 - x, y, z})} << x;
       };
-      const std::uint64_t after = row_ends ? s.z.after.words[at] : 0;
-      const std::uint64_t before = row_ends ? s.z.before.words[at] : 0;
+      const std::uint64_t ends = row_ends ? s.z.ends.words[at] : 0;
+      const std::uint64_t after = ends << 63;
+      const std::uint64_t before = ends >> 63;
       s.sides[0].words[at] = visible(opaque.words[at] >> 1 | after, (same_x & kAllCells >> 1) | end(1, 63));
       s.sides[1].words[at] = visible(opaque.words[at] << 1 | before, same_x << 1 | end(-1, 0));
       s.sides[2].words[at] = visible(
@@ -249,7 +257,13 @@ struct Kernel {
 
 Kernel pick_kernel(InstructionSet wanted) {
 #ifdef QUOIN_X86_KERNELS
-  if (resolve(wanted) != InstructionSet::Plain) return {blocky::mesh_avx2, blocky::find_faces_avx2};
+  const InstructionSet found = resolve(wanted);
+  if (found == InstructionSet::Avx512 && __builtin_cpu_supports("avx512vbmi") &&
+      __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
+      __builtin_cpu_supports("gfni")) {
+    return {blocky::mesh_avx512, blocky::find_faces_avx512};
+  }
+  if (found != InstructionSet::Plain) return {blocky::mesh_avx2, blocky::find_faces_avx2};
 #endif
   static_cast<void>(wanted);
   return {blocky::mesh_plain, blocky::find_faces_plain};

@@ -16,6 +16,7 @@
 
 #define QUOIN_KERNEL avx2
 #define QUOIN_KERNEL_AVX2 1
+#define QUOIN_KERNEL_AVX512 0
 #include "mesh/blocky_kernel.inl"
 
 namespace quoin::blocky {

@@ -5,6 +5,7 @@
 
 #define QUOIN_KERNEL plain
 #define QUOIN_KERNEL_AVX2 0
+#define QUOIN_KERNEL_AVX512 0
 #include "mesh/blocky_kernel.inl"
 
 namespace quoin::blocky {
