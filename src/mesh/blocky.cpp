@@ -291,7 +291,8 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
       const bool transparent = holds_transparent(*centre, types);
-      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent}, *scratch_, out);
+      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent, false}, *scratch_,
+                            out);
     }
   }
   out.resize(scratch_->quads);
@@ -311,7 +312,7 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
   blocky::Scratch& s = *scratch_;
-  scratch_->kernel.find_faces({&chunks, &types, region, false, false, holds_transparent(*centre, types)}, s);
+  scratch_->kernel.find_faces({&chunks, &types, region, false, false, holds_transparent(*centre, types), false}, s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;

@@ -5,6 +5,8 @@
 
 #ifdef QUOIN_X86_KERNELS
 
+#include <algorithm>
+
 #include <immintrin.h>
 
 #if defined(__clang__)

@@ -6,6 +6,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
+#include <algorithm>
 #include <array>
 
 #include <immintrin.h>
@@ -17,6 +18,9 @@
             apply_to = function)
 #else
 #pragma GCC push_options
+// GCC 12's own header reads what it leaves undefined on purpose (GCC bug 105593).
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #pragma GCC target( \
         "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi,avx512vbmi2,avx512vpopcntdq,gfni,avx2,bmi,bmi2,popcnt")
 #endif

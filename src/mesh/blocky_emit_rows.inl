@@ -27,28 +27,37 @@ struct CornerLanes {
   static constexpr __mmask8 kNextRow = kUAlongBits ? 0b1111'0000 : 0b0011'1100;
 };
 
+QUOIN_INLINE __m512i broadcast(const std::uint64_t* p) {
+  return _mm512_set1_epi64(static_cast<long long>(*p));
+}
+
+// The row before or the row after, as each lane needs it.
+template <bool kUAlongBits>
+QUOIN_INLINE __m512i rows_beside(const std::uint64_t* row) {
+  return _mm512_mask_broadcastq_epi64(broadcast(row - 1), CornerLanes<kUAlongBits>::kNextRow,
+                                      _mm_loadl_epi64(reinterpret_cast<const __m128i*>(row + 1)));
+}
+
+// The cell before or after, as each lane needs it: a rotation by 1 or by 63 brings it, and with it an end of the row,
+// which is replaced first.
+template <bool kUAlongBits>
+QUOIN_INLINE __m512i cells_beside(__m512i row, __m512i ends) {
+  constexpr __mmask8 kAfter = CornerLanes<kUAlongBits>::kAfter;
+  const __m512i rotation = _mm512_mask_set1_epi64(_mm512_set1_epi64(1), kAfter, 63);
+  const __m512i brought = _mm512_mask_set1_epi64(_mm512_set1_epi64(INT64_MIN), kAfter, 1);
+  return _mm512_rolv_epi64(_mm512_ternarylogic_epi64(brought, ends, row, 0xCA), rotation);
+}
+
 // The eight level bits of all 64 cells of a row, as a quad has them.
 template <bool kUAlongBits, bool kRowEnds>
 QUOIN_INLINE __m512i levels_of_row(const std::uint64_t* front, const std::uint64_t* ends) {
-  using Lanes = CornerLanes<kUAlongBits>;
-  const auto broadcast = [](const std::uint64_t* p) { return _mm512_set1_epi64(static_cast<long long>(*p)); };
-  const auto of_two_rows = [&](const std::uint64_t* p) {
-    return _mm512_mask_broadcastq_epi64(broadcast(p - 1), Lanes::kNextRow,
-                                        _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p + 1)));
-  };
-  // A rotation brings the cell before (by 1) or after (by 63) to each cell; what it brings in is replaced.
-  const __m512i rotation = _mm512_mask_set1_epi64(_mm512_set1_epi64(1), Lanes::kAfter, 63);
-  const __m512i brought = _mm512_mask_set1_epi64(_mm512_set1_epi64(INT64_MIN), Lanes::kAfter, 1);
-  const auto beside = [&](__m512i cells, __m512i outside) {
-    return _mm512_rolv_epi64(_mm512_ternarylogic_epi64(brought, outside, cells, 0xCA), rotation);
-  };
-  const __m512i side_rows = of_two_rows(front);
   const __m512i none = _mm512_setzero_si512();
-  const __m512i side = beside(broadcast(front), kRowEnds ? broadcast(ends) : none);
-  const __m512i corner = beside(side_rows, kRowEnds ? of_two_rows(ends) : none);
+  const __m512i side2 = rows_beside<kUAlongBits>(front);
+  const __m512i side1 = cells_beside<kUAlongBits>(broadcast(front), kRowEnds ? broadcast(ends) : none);
+  const __m512i corner = cells_beside<kUAlongBits>(side2, kRowEnds ? rows_beside<kUAlongBits>(ends) : none);
   constexpr __mmask8 kHighBits = 0b1010'1010;
-  __m512i planes = _mm512_mask_ternarylogic_epi64(side, kHighBits, side_rows, corner, 0xE8);
-  planes = _mm512_mask_ternarylogic_epi64(planes, static_cast<__mmask8>(~kHighBits), side_rows, corner, 0xD6);
+  __m512i planes = _mm512_mask_ternarylogic_epi64(side1, kHighBits, side2, corner, 0xE8);
+  planes = _mm512_mask_ternarylogic_epi64(planes, static_cast<__mmask8>(~kHighBits), side2, corner, 0xD6);
   // Byte i of each plane, the last plane first; then their bits, a cell a byte.
   alignas(64) static constexpr auto kTurned = [] {
     std::array<std::uint8_t, 64> bytes{};
@@ -59,10 +68,19 @@ QUOIN_INLINE __m512i levels_of_row(const std::uint64_t* front, const std::uint64
   return _mm512_gf2p8affine_epi64_epi8(_mm512_set1_epi64(0x8040'2010'0804'0201), turned, 0);
 }
 
-// Stores at least `count` bytes.
+// Stores at least `count` bytes: most rows have few.
 QUOIN_INLINE void append(std::uint8_t* to, __m512i bytes, std::int64_t count) {
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_castsi512_si256(bytes));
-  if (__builtin_expect(count > 32, 0)) _mm512_storeu_si512(to, bytes);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm512_castsi512_si128(bytes));
+  if (__builtin_expect(count > 16, 0)) _mm512_storeu_si512(to, bytes);
+}
+
+// The same number `count` times.
+QUOIN_INLINE void append(std::uint16_t* to, __m512i numbers, std::int64_t count) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_castsi512_si256(numbers));
+  if (__builtin_expect(count > 16, 0)) {
+    _mm512_storeu_si512(to, numbers);
+    _mm512_storeu_si512(to + 32, numbers);
+  }
 }
 
 // Writes the parts of all quads that end in the listed rows.
@@ -81,7 +99,8 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
   const std::uint64_t* opaque = pass.view->opaque.words + front;
   const std::uint64_t* row_ends = pass.view->ends.words + front;
   __m512i heights = _mm512_setzero_si512();  // of the run that ends in a column: its rows so far
-  std::size_t quads = 0;
+  std::uint8_t* out = parts.bytes[0];
+  std::uint16_t* places = parts.places;
   for (std::size_t i = 0; i < rows; ++i) {
     const std::size_t at = parts.rows[i];
     const std::uint64_t ends = b.ends[at];
@@ -89,18 +108,17 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
     const __m512i last = _mm512_maskz_compress_epi8(closes, columns);
     const __m512i first = _mm512_maskz_compress_epi8(_pdep_u64(_pext_u64(closes, ends), b.starts[at]), columns);
     const std::int64_t count = __builtin_popcountll(closes);
-    append(parts.last + quads, last, count);
-    append(parts.first + quads, first, count);
-    append(parts.rows_before + quads, _mm512_permutexvar_epi8(last, heights), count);
+    append(out + Parts::kFirst * kBatchQuads, first, count);
+    append(out + Parts::kLast * kBatchQuads, last, count);
+    append(out + Parts::kRowsBefore * kBatchQuads, _mm512_permutexvar_epi8(last, heights), count);
     heights = _mm512_maskz_add_epi8(ends ^ closes, heights, one);
     if constexpr (kOcclusion) {
       const __m512i levels = levels_of_row<kUAlongBits, kRowEnds>(opaque + at, row_ends + at);
-      append(parts.levels + quads, _mm512_permutexvar_epi8(last, levels), count);
+      append(out + Parts::kLevels * kBatchQuads, _mm512_permutexvar_epi8(last, levels), count);
     }
-    const __m512i number = _mm512_set1_epi32(static_cast<int>(s.levels.numbers[at]));
-    _mm512_storeu_si512(parts.places + quads, number);
-    if (__builtin_expect(count > 32, 0)) _mm512_storeu_si512(parts.places + quads + 32, number);
-    quads += static_cast<std::size_t>(count);
+    append(places, _mm512_set1_epi32(static_cast<int>(s.levels.numbers[at])), count);
+    out += count;
+    places += count;
   }
 }
 
@@ -120,16 +138,20 @@ QUOIN_INLINE __m512i types_of(const Scratch& s, __m512i positions) {
   return _mm512_permutexvar_epi32(index, _mm512_load_si512(s.narrow_palette));
 }
 
+QUOIN_INLINE __m512i sixteen_bytes(const std::uint8_t* p) {
+  return _mm512_cvtepu8_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+}
+
+QUOIN_INLINE __m512i or3(__m512i a, __m512i b, __m512i c) {
+  return _mm512_ternarylogic_epi32(a, b, c, 0xFE);
+}
+
 // Puts quads together from their parts.
 template <int kDirection, bool kOcclusion, int kBits>
 QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size_t quads, const Scratch& s,
                               std::uint64_t* out) {
   using L = Layout<kDirection>;
   const Parts& parts = s.parts;
-  const auto read = [](const std::uint8_t* p) {
-    return _mm512_cvtepu8_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
-  };
-  const auto either = [](__m512i a, __m512i b, __m512i c) { return _mm512_ternarylogic_epi32(a, b, c, 0xFE); };
   const __m512i plane = _mm512_set1_epi32(first_plane << (6 * L::kAxis));
   const __m512i upper =
       _mm512_set1_epi32(static_cast<int>(((std::uint64_t{kDirection} << Quad::kDirectionShift) | one_type) >> 32));
@@ -139,18 +161,18 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
   for (std::size_t i = 0; i < quads; i += 16) {
     const __m512i number =
         _mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(parts.places + i)));
-    const __m512i first = read(parts.first + i);
-    const __m512i rows_before = read(parts.rows_before + i);
+    const __m512i first = sixteen_bytes(parts.bytes[Parts::kFirst] + i);
+    const __m512i rows_before = sixteen_bytes(parts.bytes[Parts::kRowsBefore] + i);
     const __m512i row = _mm512_sub_epi32(_mm512_and_si512(number, _mm512_set1_epi32(63)), rows_before);
     const __m512i planes = _mm512_slli_epi32(_mm512_srli_epi32(number, 6), 6 * L::kAxis);
-    const __m512i width = _mm512_sub_epi32(read(parts.last + i), first);
-    __m512i low = either(_mm512_slli_epi32(row, 6 * L::kRowAxis), _mm512_slli_epi32(first, 6 * L::kBitAxis),
-                         _mm512_add_epi32(planes, plane));
+    const __m512i width = _mm512_sub_epi32(sixteen_bytes(parts.bytes[Parts::kLast] + i), first);
+    __m512i low = or3(_mm512_slli_epi32(row, 6 * L::kRowAxis), _mm512_slli_epi32(first, 6 * L::kBitAxis),
+                      _mm512_add_epi32(planes, plane));
     __m512i high = upper;
     if constexpr (kBits > 0) high = _mm512_or_si512(high, types_of<kBits>(s, low));
-    low = either(low, _mm512_slli_epi32(width, L::kWidthShift), _mm512_slli_epi32(rows_before, L::kHeightShift));
+    low = or3(low, _mm512_slli_epi32(width, L::kWidthShift), _mm512_slli_epi32(rows_before, L::kHeightShift));
     if constexpr (kOcclusion) {
-      const __m512i levels = read(parts.levels + i);
+      const __m512i levels = sixteen_bytes(parts.bytes[Parts::kLevels] + i);
       low = _mm512_or_si512(low, _mm512_slli_epi32(levels, Quad::kLevelsShift));
       const __m512i flip = _mm512_rorv_epi32(_mm512_permutexvar_epi32(_mm512_srli_epi32(levels, 5), flips), levels);
       high = _mm512_ternarylogic_epi32(high, flip, _mm512_set1_epi32(1 << (Quad::kFlipShift - 32)), 0xF8);

@@ -54,13 +54,12 @@ void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch
         job.has_transparent ? find_faces<true>(pass, first, count, b) : find_faces<false>(pass, first, count, b);
     if (groups == 0) continue;
     if (!job.merge) {
-      find_runs<false, kOcclusion, false>(pass, first, groups, b);
-    } else if (pass.row_ends) {
-      find_runs<true, kOcclusion, true>(pass, first, groups, b);
+      keep_apart(groups, b);
+    } else if (pass.one_type) {
+      merge<kOcclusion, false>(pass, first, groups, b);
     } else {
-      find_runs<true, kOcclusion, false>(pass, first, groups, b);
+      merge<kOcclusion, true>(pass, first, groups, b);
     }
-    find_growth(pass, first, groups, b);
     emit_batch<kDirection, kOcclusion>(pass, first, groups, types, s, quads);
   }
 }
@@ -77,6 +76,7 @@ Pass pass_for(Direction direction, const Job& job, const Scratch& s, bool row_en
   pass.rows = {rounded_down(job.region.min[row_axis]), rounded_up(job.region.max[row_axis])};
   pass.side = frame.sign;
   pass.row_ends = row_ends;
+  pass.one_type = job.one_type;
   return pass;
 }
 
@@ -103,6 +103,16 @@ void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& 
   }
 }
 
+template <int kDirection>
+void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
+  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
+  if (job.occlusion) {
+    run_pass<kDirection, true>(job, pass, types, s, out);
+  } else {
+    run_pass<kDirection, false>(job, pass, types, s, out);
+  }
+}
+
 // The type of all of a chunk's voxels besides air, when there is just one.
 bool has_one_type(const Chunk& chunk, VoxelType& type) {
   const Chunk::Mixed* voxels = chunk.mixed();
@@ -119,30 +129,19 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
   return found == 1;
 }
 
-template <int kDirection>
-void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
-  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
-  if (job.occlusion) {
-    run_pass<kDirection, true>(job, pass, types, s, out);
-  } else {
-    run_pass<kDirection, false>(job, pass, types, s, out);
+// Where the quads' types come from.
+TypeSource find_types(const Chunk& centre, Scratch& s) {
+  VoxelType type = kAir;
+  if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType};
+  const Chunk::Mixed& voxels = *centre.mixed();
+  for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+    s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+    if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);
   }
+  return {0, __builtin_ctz(static_cast<unsigned>(voxels.bits))};
 }
 
-void run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) {
-  TypeSource types{0, kOneType};
-  const Chunk& centre = *job.chunks->centre();
-  VoxelType type = kAir;
-  if (has_one_type(centre, type)) {
-    types.one = std::uint64_t{type} << Quad::kTypeShift;
-  } else {
-    const Chunk::Mixed& voxels = *centre.mixed();
-    types.log_bits = __builtin_ctz(static_cast<unsigned>(voxels.bits));
-    for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
-      s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
-      if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);
-    }
-  }
+void run_directions(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
   run_direction<0>(job, row_ends, types, s, out);
   run_direction<1>(job, row_ends, types, s, out);
   run_direction<2>(job, row_ends, types, s, out);
@@ -154,61 +153,82 @@ void run_directions(const Job& job, bool row_ends, Scratch& s, QuadBuffer& out) 
 // The region without its solid floor: layers in which every voxel, of the region and around it, is opaque, like the
 // layers below and above, show no face. A common case, the ground under a terrain's surface.
 IBox above_solid_floor(const Job& job, bool row_ends, const Scratch& s) {
-  const IBox& region = job.region;
-  const std::uint64_t first = region.min.x > 0 ? region.min.x - 1U : 0U;
-  const std::uint64_t last = region.max.x < 64 ? static_cast<unsigned>(region.max.x) : 63U;
-  const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last));
-  const auto is_solid = [&](int y) {
-    for (int z = region.min.z - 1; z <= region.max.z; ++z) {
-      const int at = word_index(z, y);
-      const std::uint64_t ends = row_ends ? s.z.ends.words[at] : 0;
-      const bool before = region.min.x > 0 || ends >> 63 != 0;
-      const bool after = region.max.x < 64 || (ends & 1) != 0;
-      if ((s.z.opaque.words[at] & cells) != cells || !before || !after) return false;
+  IBox rest = job.region;
+  const std::uint64_t before = rest.min.x == 0 ? std::uint64_t{1} << 63 : 0;  // as in a view's ends
+  const std::uint64_t after = rest.max.x == 64 ? 1 : 0;
+  if ((before | after) != 0 && !row_ends) return rest;
+  const std::uint64_t first = rest.min.x > 0 ? rest.min.x - 1U : 0U;
+  const std::uint64_t last = rest.max.x < 64 ? static_cast<unsigned>(rest.max.x) : 63U;
+  const Words cells = Words{} + ((~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last)));
+  const Words ends = Words{} + (before | after);
+  const int bottom = rest.min.y - 1;
+  for (int rows = rounded_down(bottom); rows < rest.max.y; rows += kLanes) {
+    Words open{};
+    for (int z = rest.min.z - 1; z <= rest.max.z; ++z) {
+      const int at = word_index(z, rows);
+      open |= cells & ~load(s.z.opaque.words + at);
+      if (row_ends) open |= ends & ~load(s.z.ends.words + at);
     }
-    return true;
-  };
-  int y = region.min.y - 1;
-  while (y < region.max.y && is_solid(y)) ++y;
-  IBox rest = region;
-  if (y - 1 > rest.min.y) rest.min.y = y - 1;
+    for (int i = 0; i < kLanes; ++i) {
+      const int y = rows + i;
+      if (y < bottom) continue;
+      if (y < rest.max.y && open[i] == 0) continue;
+      rest.min.y = std::max(rest.min.y, y - 1);
+      return rest;
+    }
+  }
+  rest.min.y = std::max(rest.min.y, rest.max.y - 1);
   return rest;
 }
 
-// Nothing merges across the chunk's last row or plane.
+// Nothing is the same across the chunk's border.
 void end_at_border(const SlabRange& range, Scratch& s) {
-  for (int z = range.z.begin; z < range.z.end; ++z) s.z.same_row.words[word_index(z, 63)] = 0;
-  for (int y = range.y.begin; y < range.y.end; ++y) s.same_z.words[word_index(63, y)] = 0;
+  for (int z = range.z.begin; z < range.z.end; ++z) {
+    s.z.same_row.words[word_index(z, -1)] = s.z.same_row.words[word_index(z, 63)] = 0;
+  }
+  for (int y = range.y.begin; y < range.y.end; ++y) {
+    s.same_z.words[word_index(-1, y)] = s.same_z.words[word_index(63, y)] = 0;
+  }
 }
 
 void find_all_faces(const Job& job, Scratch& s) {
   const SlabRange range = slabs_around(job.region);
   fill_layers(job, range, s);
+  end_at_border(range, s);
   find_faces_of_all_types(job, gather_border(job, s), s);
 }
 
-void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
-  const SlabRange read = slabs_around(whole.region);
-  fill_layers(whole, read, s);
-  end_at_border(read, s);
-  const bool row_ends = gather_border(whole, s);
-  Job job = whole;
-  job.region = above_solid_floor(whole, row_ends, s);
-  if (job.region.empty()) return;
+// The layers of the other views.
+void turn_views(const Job& job, bool row_ends, Scratch& s) {
   const SlabRange range = slabs_around(job.region);
-  fill_row_masks(job.region, s);
   swap_planes_and_rows(s.z.opaque, s.y.opaque, range.z, range.y);
-  swap_planes_and_rows(s.z.same_bit, s.y.same_bit, range.z, range.y);
-  swap_planes_and_rows(s.same_z, s.y.same_row, range.z, range.y);
   turn_bits(s.z.opaque, s.x.opaque, range.y);
   turn_border<-1>(s.z.opaque, s.x.opaque);
   turn_border<64>(s.z.opaque, s.x.opaque);
-  turn_bits(s.same_z, s.x.same_bit, range.y);
-  turn_bits(s.z.same_row, s.x.same_row, range.y);
   copy_border(row_ends, s);
   if (row_ends) copy_row_ends(s);
+  if (!job.one_type) {
+    swap_planes_and_rows(s.z.same_bit, s.y.same_bit, range.z, range.y);
+    swap_planes_and_rows(s.same_z, s.y.same_row, range.z, range.y);
+    turn_bits(s.same_z, s.x.same_bit, range.y);
+    turn_bits(s.z.same_row, s.x.same_row, range.y);
+  }
   if (job.has_transparent) fill_faces(job, range, row_ends, s);
-  run_directions(job, row_ends, s, out);
+}
+
+void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
+  Job job = whole;
+  const TypeSource types = find_types(*job.chunks->centre(), s);
+  job.one_type = types.log_bits == kOneType && !job.has_transparent;
+  const SlabRange range = slabs_around(job.region);
+  fill_layers(job, range, s);
+  if (!job.one_type) end_at_border(range, s);
+  const bool row_ends = gather_border(job, s);
+  job.region = above_solid_floor(job, row_ends, s);
+  if (job.region.empty()) return;
+  fill_row_masks(job.region, s);
+  turn_views(job, row_ends, s);
+  run_directions(job, row_ends, types, s, out);
 }
 
 #undef QUOIN_INLINE

@@ -176,8 +176,8 @@ void classify_planes(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
-// Where neighbours are of one type; and opacity, where air is the only index that is not opaque.
-template <int kBits>
+// Where neighbours are of one type, if there are several; and opacity, where air is the only index that is not opaque.
+template <int kBits, bool kTypes>
 void compare_planes(const SlabRange& range, int air, Scratch& s) {
   Words air_bits[kBits];
   for (int k = 0; k < kBits; ++k) air_bits[k] = Words{} - static_cast<std::uint64_t>(air >> k & 1);
@@ -192,11 +192,13 @@ void compare_planes(const SlabRange& range, int air, Scratch& s) {
         const std::uint64_t* p = s.planes[k].words + at;
         const Words here = load(p);
         opaque = or_difference(opaque, here, air_bits[k]);
+        if constexpr (!kTypes) continue;
         along_x = or_difference(along_x, here, here >> 1);
         along_y = or_difference(along_y, here, load(p + 1));
         along_z = or_difference(along_z, here, load(p + kRowStride));
       }
       if (air >= 0) store(s.z.opaque.words + at, opaque);
+      if constexpr (!kTypes) continue;
       store(s.z.same_bit.words + at, ~along_x);
       store(s.z.same_row.words + at, ~along_y);
       store(s.same_z.words + at, ~along_z);
@@ -220,7 +222,11 @@ void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& ra
   split_planes<kBits>(voxels, range, s);
   const int air = sole_air_index(s, 1 << kBits);
   if (air < 0) classify_planes<kBits>(job, range, s);
-  compare_planes<kBits>(range, air, s);
+  if (!job.one_type) {
+    compare_planes<kBits, true>(range, air, s);
+  } else if (air >= 0) {
+    compare_planes<kBits, false>(range, air, s);
+  }
 }
 
 // As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
@@ -293,9 +299,9 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
   }
   if (kTypesFromRows || voxels->bits > 4) find_rows(*voxels, range, s);
   if (!voxels->direct()) {
-    for (std::size_t i = 0; i < 256; ++i) {
-      s.index_class[i] =
-          i < voxels->palette.size() ? static_cast<std::uint8_t>(job.types->visibility(voxels->palette[i])) : 1;
+    __builtin_memset(s.index_class, 1, sizeof(s.index_class));
+    for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+      s.index_class[i] = static_cast<std::uint8_t>(job.types->visibility(voxels->palette[i]));
     }
   }
   switch (voxels->bits) {

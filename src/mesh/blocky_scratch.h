@@ -65,11 +65,9 @@ struct alignas(64) Batch {
 inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
 
 struct alignas(64) Parts {
-  std::uint16_t rows[kBatchPlanes * 64 + 8];  // words of a batch
-  std::uint8_t first[kBatchQuads];            // cell of its last row
-  std::uint8_t last[kBatchQuads];
-  std::uint8_t rows_before[kBatchQuads];
-  std::uint8_t levels[kBatchQuads];
+  enum : std::size_t { kFirst, kLast, kRowsBefore, kLevels };  // first and last cell of the row it ends in
+  std::uint16_t rows[kBatchPlanes * 64 + 8];                   // words of a batch
+  std::uint8_t bytes[4][kBatchQuads];
   std::uint16_t places[kBatchQuads];  // 64 * plane of the batch + row
 };
 
@@ -111,6 +109,7 @@ struct Job {
   bool merge;
   bool occlusion;
   bool has_transparent;  // some voxel of the centre chunk is
+  bool one_type;         // all its voxels but air are of one opaque type: the layers of same types are not made
 };
 
 // The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`

@@ -49,6 +49,9 @@ QUOIN_INLINE Words and_not(Words a, Words but_not, Words b) {
 QUOIN_INLINE Words choose(Words mask, Words where_set, Words where_not) {
   return ternary<0xCA>(mask, where_set, where_not);
 }
+QUOIN_INLINE Words and_same(Words so_far, Words a, Words b) {
+  return ternary<0x90>(so_far, a, b);
+}
 QUOIN_INLINE Words level_low(Words side1, Words side2, Words corner) {
   return ternary<0xD6>(side1, side2, corner);
 }
@@ -71,6 +74,9 @@ QUOIN_INLINE Words or_difference(Words so_far, Words a, Words b) {
 }
 QUOIN_INLINE Words and_not(Words a, Words but_not, Words b) {
   return a & ~but_not & b;
+}
+QUOIN_INLINE Words and_same(Words so_far, Words a, Words b) {
+  return so_far & ~(a ^ b);
 }
 // The two bits of a corner's level: how many of the three are set, but 3 where both sides are.
 QUOIN_INLINE Words level_low(Words side1, Words side2, Words corner) {
