@@ -15,6 +15,8 @@ inline constexpr bool kTypesFromRows = !QUOIN_KERNEL_AVX512;
 
 #include "mesh/blocky_layers.inl"
 
+#include "mesh/blocky_border.inl"
+
 #include "mesh/blocky_turn.inl"
 
 #include "mesh/blocky_runs.inl"

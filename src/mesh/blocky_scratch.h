@@ -126,11 +126,11 @@ void find_faces_avx512(const Job& job, Scratch& scratch);
 // Makes room for `more` quads behind the first `used`; answers where they go.
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 
-// Visible faces where some types are transparent: the z view's faces and `sides`, from the z view's other layers.
-void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& scratch);
+// Whether a voxel of the chunk is transparent.
+bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 
-// Rows of opacity around the chunk, from its 26 neighbours, into the z view. Answers whether any voxel before or after
-// a row of any view may be opaque; only then is `ends` written.
-bool gather_border(const Job& job, Scratch& scratch);
+// Takes away the faces of transparent voxels that voxels of their own type hide from beyond the chunk's border, from
+// `sides` and the z view's faces.
+void hide_faces_at_border(const Job& job, Scratch& scratch);
 
 }  // namespace quoin::blocky
