@@ -105,13 +105,14 @@ TEST(GreedyQuads, FloorSplitsAlongAWallsFoot) {
 }
 
 TEST(GreedyQuads, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
-  const VoxelRegistry types = workloads::three_types();
+  const VoxelRegistry types = workloads::glass_types();
   QuadOptions options;
   options.region = workloads::kInterior;
   QuadBuffer quads;
   BlockyMesher mesher;
   using workloads::Blocky;
-  for (const Blocky which : {Blocky::W1, Blocky::W2, Blocky::W3a, Blocky::W3b, Blocky::W3c, Blocky::W4}) {
+  for (const Blocky which : {Blocky::W1, Blocky::W2, Blocky::W3a, Blocky::W3b, Blocky::W3c, Blocky::W4, Blocky::Glass,
+                             Blocky::GlassColumns}) {
     const Chunk chunk = workloads::blocky_chunk(which);
     mesher.mesh(lone(chunk), types, options, quads);
     EXPECT_EQ(face_count(quads), workloads::expected_faces(which));
