@@ -123,14 +123,14 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
 }
 
 // The types of sixteen quads, shifted as in the upper half of a quad: from the bit planes of the palette index.
-template <int kBits>
+template <int kPlanes>
 QUOIN_INLINE __m512i types_of(const Scratch& s, __m512i positions) {
   // A layer in halves of words: 2 * word_index(z, y) + x / 32.
   const __m512i half = _mm512_add_epi32(
       _mm512_and_si512(_mm512_srli_epi32(positions, 5), _mm512_set1_epi32(0x1FFF)),
       _mm512_and_si512(_mm512_srli_epi32(positions, 12 - 1 - 3), _mm512_set1_epi32(63 * 2 * (kRowStride - 64))));
   __m512i index = _mm512_setzero_si512();
-  for (int k = 0; k < kBits; ++k) {
+  for (int k = 0; k < kPlanes; ++k) {
     const __m512i halves = _mm512_i32gather_epi32(half, s.planes[k].words + word_index(0, 0), 4);
     const __m512i bit = _mm512_rolv_epi32(_mm512_rorv_epi32(halves, positions), _mm512_set1_epi32(k));
     index = _mm512_ternarylogic_epi32(index, bit, _mm512_set1_epi32(1 << k), 0xF8);
@@ -147,7 +147,7 @@ QUOIN_INLINE __m512i or3(__m512i a, __m512i b, __m512i c) {
 }
 
 // Puts quads together from their parts.
-template <int kDirection, bool kOcclusion, int kBits>
+template <int kDirection, bool kOcclusion, int kPlanes>
 QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size_t quads, const Scratch& s,
                               std::uint64_t* out) {
   using L = Layout<kDirection>;
@@ -169,7 +169,7 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
     __m512i low = or3(_mm512_slli_epi32(row, 6 * L::kRowAxis), _mm512_slli_epi32(first, 6 * L::kBitAxis),
                       _mm512_add_epi32(planes, plane));
     __m512i high = upper;
-    if constexpr (kBits > 0) high = _mm512_or_si512(high, types_of<kBits>(s, low));
+    if constexpr (kPlanes > 0) high = _mm512_or_si512(high, types_of<kPlanes>(s, low));
     low = or3(low, _mm512_slli_epi32(width, L::kWidthShift), _mm512_slli_epi32(rows_before, L::kHeightShift));
     if constexpr (kOcclusion) {
       const __m512i levels = sixteen_bytes(parts.bytes[Parts::kLevels] + i);
@@ -207,12 +207,14 @@ void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource&
   }
   std::uint64_t* out = grow_quads(quads, s.quads, count + 16);
   s.quads += count;
-  switch (types.log_bits) {
-    case 0:
-      return put_together<kDirection, kOcclusion, 1>(first_plane, 0, count, s, out);
+  switch (types.planes) {
     case 1:
-      return put_together<kDirection, kOcclusion, 2>(first_plane, 0, count, s, out);
+      return put_together<kDirection, kOcclusion, 1>(first_plane, 0, count, s, out);
     case 2:
+      return put_together<kDirection, kOcclusion, 2>(first_plane, 0, count, s, out);
+    case 3:
+      return put_together<kDirection, kOcclusion, 3>(first_plane, 0, count, s, out);
+    case 4:
       return put_together<kDirection, kOcclusion, 4>(first_plane, 0, count, s, out);
     default:
       put_together<kDirection, kOcclusion, 0>(first_plane, types.one, count, s, out);

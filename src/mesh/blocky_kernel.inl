@@ -39,6 +39,7 @@ inline constexpr int kOneType = -1;
 struct TypeSource {
   std::uint64_t one;  // in a quad's place; 0 when there are several
   int log_bits;       // of the packed rows, or kOneType
+  int planes;         // of palette indices; 0 where there are none
 };
 
 #if QUOIN_KERNEL_AVX512
@@ -134,13 +135,13 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
 // Where the quads' types come from.
 TypeSource find_types(const Chunk& centre, Scratch& s) {
   VoxelType type = kAir;
-  if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType};
+  if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType, 0};
   const Chunk::Mixed& voxels = *centre.mixed();
   for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
     s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
     if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);
   }
-  return {0, __builtin_ctz(static_cast<unsigned>(voxels.bits))};
+  return {0, __builtin_ctz(static_cast<unsigned>(voxels.bits)), index_planes(voxels)};
 }
 
 void run_directions(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {

@@ -131,14 +131,20 @@ QUOIN_INLINE Four plane_of_rows(const std::uint64_t* rows, int k) {
               plane_of_row<kBits>(rows + 2 * kBits, k), plane_of_row<kBits>(rows + 3 * kBits, k)};
 }
 
-// The bit planes of rows of 1, 2 or 4 bits a voxel.
-template <int kBits>
+// How many of the planes of narrow palette indices may differ from 0.
+int index_planes(const Chunk::Mixed& voxels) {
+  if (voxels.bits > 4) return 0;
+  return voxels.bits == 4 && voxels.palette.size() <= 8 ? 3 : voxels.bits;
+}
+
+// The lowest planes of rows of 1, 2 or 4 bits a voxel.
+template <int kBits, int kPlanes>
 void split_planes(const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; z += 4) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
       const std::uint32_t entry = voxels.slabs[Chunk::slab_index(y, z)];
       const bool is_uniform = (entry & Chunk::kUniformSlab) != 0;
-      for (int k = 0; k < kBits; ++k) {
+      for (int k = 0; k < kPlanes; ++k) {
         for (int i = 0; i < 4; ++i) {
           const Four rows = is_uniform ? Four{} - (entry >> k & 1U) : plane_of_rows<kBits>(voxels.row(entry, 4 * i), k);
           *reinterpret_cast<UnalignedFour*>(s.planes[k].words + word_index(z + i, y)) = rows;
@@ -148,57 +154,65 @@ void split_planes(const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s
   }
 }
 
-// Opacity and "not air" from the bit planes.
-template <int kBits>
-void classify_planes(const Job& job, const SlabRange& range, Scratch& s) {
-  int others[1 << kBits];  // indices that are not opaque
-  int count = 0;
-  for (int i = 0; i < (1 << kBits); ++i) {
-    if (s.index_class[i] != 1) others[count++] = i;
-  }
-  for (int z = range.z.begin; z < range.z.end; ++z) {
-    for (int y = range.y.begin; y < range.y.end; y += kLanes) {
-      const int at = word_index(z, y);
-      Words opaque = ~Words{};
-      Words solid = ~Words{};
-      for (int i = 0; i < count; ++i) {
-        Words differs{};
-        for (int k = 0; k < kBits; ++k) {
-          const Words bit = Words{} - static_cast<std::uint64_t>(others[i] >> k & 1);
-          differs = or_difference(differs, load(s.planes[k].words + at), bit);
-        }
-        opaque &= differs;
-        if (s.index_class[others[i]] == 0) solid &= differs;
-      }
-      store(s.z.opaque.words + at, opaque);
-      if (job.has_transparent) store(s.solid.words + at, solid);
+// The palette indices that are in use and not opaque: air, and then those that are transparent.
+struct OpenIndices {
+  std::uint8_t indices[16];
+  int air_count;
+  int count;
+};
+
+OpenIndices open_indices(const Chunk::Mixed& voxels, const Scratch& s) {
+  OpenIndices open{};
+  for (const std::uint8_t wanted : {0, 2}) {
+    for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+      if (s.index_class[i] == wanted && voxels.counts[i] != 0)
+        open.indices[open.count++] = static_cast<std::uint8_t>(i);
     }
+    if (wanted == 0) open.air_count = open.count;
   }
+  return open;
 }
 
-// Where neighbours are of one type, if there are several; and opacity, where air is the only index that is not opaque.
-template <int kBits, bool kTypes>
-void compare_planes(const SlabRange& range, int air, Scratch& s) {
-  Words air_bits[kBits];
-  for (int k = 0; k < kBits; ++k) air_bits[k] = Words{} - static_cast<std::uint64_t>(air >> k & 1);
+// Which cells hold none of some indices.
+template <int kPlanes>
+QUOIN_INLINE Words hold_none(const Words (&planes)[kPlanes], const std::uint8_t* first, const std::uint8_t* last) {
+  Words none = ~Words{};
+  for (; first != last; ++first) {
+    Words differs{};
+    for (int k = 0; k < kPlanes; ++k) {
+      differs = or_difference(differs, planes[k], Words{} - static_cast<std::uint64_t>(*first >> k & 1));
+    }
+    none &= differs;
+  }
+  return none;
+}
+
+// Opacity, and where neighbours are of one type if there are several.
+template <int kPlanes, bool kTypes, bool kTransparent>
+void combine_planes(const SlabRange& range, const OpenIndices& open, Scratch& s) {
+  const std::uint8_t* first_transparent = open.indices + open.air_count;
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; y += kLanes) {
       const int at = word_index(z, y);
-      Words opaque{};
+      Words here[kPlanes];
+      for (int k = 0; k < kPlanes; ++k) here[k] = load(s.planes[k].words + at);
+      const Words solid = hold_none(here, open.indices, first_transparent);
+      if constexpr (kTransparent) {
+        store(s.solid.words + at, solid);
+        store(s.z.opaque.words + at, solid & hold_none(here, first_transparent, open.indices + open.count));
+      } else {
+        store(s.z.opaque.words + at, solid);
+      }
+      if constexpr (!kTypes) continue;
       Words along_x{};
       Words along_y{};
       Words along_z{};
-      for (int k = 0; k < kBits; ++k) {
+      for (int k = 0; k < kPlanes; ++k) {
         const std::uint64_t* p = s.planes[k].words + at;
-        const Words here = load(p);
-        opaque = or_difference(opaque, here, air_bits[k]);
-        if constexpr (!kTypes) continue;
-        along_x = or_difference(along_x, here, here >> 1);
-        along_y = or_difference(along_y, here, load(p + 1));
-        along_z = or_difference(along_z, here, load(p + kRowStride));
+        along_x = or_difference(along_x, here[k], here[k] >> 1);
+        along_y = or_difference(along_y, here[k], load(p + 1));
+        along_z = or_difference(along_z, here[k], load(p + kRowStride));
       }
-      if (air >= 0) store(s.z.opaque.words + at, opaque);
-      if constexpr (!kTypes) continue;
       store(s.z.same_bit.words + at, ~along_x);
       store(s.z.same_row.words + at, ~along_y);
       store(s.same_z.words + at, ~along_z);
@@ -206,26 +220,16 @@ void compare_planes(const SlabRange& range, int air, Scratch& s) {
   }
 }
 
-// The only palette index that is not opaque, if that is air; -1 otherwise.
-int sole_air_index(const Scratch& s, int indices) {
-  int air = -1;
-  for (int i = 0; i < indices; ++i) {
-    if (s.index_class[i] == 1) continue;
-    if (air >= 0 || s.index_class[i] == 2) return -1;
-    air = i;
-  }
-  return air;
-}
-
-template <int kBits>
+template <int kBits, int kPlanes>
 void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
-  split_planes<kBits>(voxels, range, s);
-  const int air = sole_air_index(s, 1 << kBits);
-  if (air < 0) classify_planes<kBits>(job, range, s);
-  if (!job.one_type) {
-    compare_planes<kBits, true>(range, air, s);
-  } else if (air >= 0) {
-    compare_planes<kBits, false>(range, air, s);
+  split_planes<kBits, kPlanes>(voxels, range, s);
+  const OpenIndices open = open_indices(voxels, s);
+  if (job.one_type) {
+    combine_planes<kPlanes, false, false>(range, open, s);
+  } else if (job.has_transparent) {
+    combine_planes<kPlanes, true, true>(range, open, s);
+  } else {
+    combine_planes<kPlanes, true, false>(range, open, s);
   }
 }
 
@@ -304,21 +308,24 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
       s.index_class[i] = static_cast<std::uint8_t>(job.types->visibility(voxels->palette[i]));
     }
   }
-  switch (voxels->bits) {
+  switch (index_planes(*voxels)) {
     case 1:
-      read_planes<1>(job, *voxels, range, s);
+      read_planes<1, 1>(job, *voxels, range, s);
       break;
     case 2:
-      read_planes<2>(job, *voxels, range, s);
+      read_planes<2, 2>(job, *voxels, range, s);
+      break;
+    case 3:
+      read_planes<4, 3>(job, *voxels, range, s);
       break;
     case 4:
-      read_planes<4>(job, *voxels, range, s);
-      break;
-    case 8:
-      classify_wide<8>(job, *voxels, range, s);
+      read_planes<4, 4>(job, *voxels, range, s);
       break;
     default:
-      classify_wide<16>(job, *voxels, range, s);
-      break;
+      if (voxels->bits == 8) {
+        classify_wide<8>(job, *voxels, range, s);
+      } else {
+        classify_wide<16>(job, *voxels, range, s);
+      }
   }
 }
