@@ -17,10 +17,14 @@ void decode_slice(Work& work, int z) {
     gather_row(work, y, z, halves + kPointX);
     float* const decoded = work.decoded_row(y, z) - kPointX;
     decode_row(halves, decoded, work.n + 2 * kPointX);
-    if (work.level == 0) continue;
-    // Exact: the unit is a power of two.
-    const float unit = depth_unit(work.level);
-    for (int i = 0; i < work.n + 2 * kPointX; ++i) decoded[i] *= unit;
+    if (work.level != 0) {
+      // Exact: the unit is a power of two.
+      const float unit = depth_unit(work.level);
+      for (int i = 0; i < work.n + 2 * kPointX; ++i) decoded[i] *= unit;
+    }
+    const int slices = work.decoded_mask + 1;
+    if ((z & work.decoded_mask) >= kRepeatedSlices) continue;
+    std::memcpy(decoded + std::ptrdiff_t{slices} * kDecodedSlice, decoded, sizeof(float) * kDecodedStride);
   }
 }
 
@@ -28,7 +32,7 @@ void begin_occlusion(Work& work) {
   // The slices from `apron` below a cell to as many above its upper points.
   const int slices = work.apron <= 6 ? 16 : 32;
   work.decoded_mask = slices - 1;
-  const std::size_t size = static_cast<std::size_t>(slices) * kDecodedSlice + 64;
+  const std::size_t size = static_cast<std::size_t>(slices + kRepeatedSlices) * kDecodedSlice + 64;
   if (work.decoded.size() < size) work.decoded.resize(size);
   work.next_decoded = work.cells.first - work.apron;
 }

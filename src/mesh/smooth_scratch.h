@@ -33,6 +33,7 @@ inline constexpr int kApronRows = 64 + 2 * kWidestApron + 2;
 inline constexpr int kPointSlice = 66 * kPlaceStride;
 inline constexpr int kDecodedStride = 96;
 inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
+inline constexpr int kRepeatedSlices = 5;
 
 // Words of signs: rows -1 to 64 of a slice.
 inline constexpr int kSignRows = 72;
@@ -102,7 +103,8 @@ struct Work {
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX].
+  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX]. The first
+  // kRepeatedSlices follow the last again, so that what one vertex reads lies at fixed distances.
   std::vector<float> decoded;
   int decoded_mask = 0;
   int next_decoded = 0;  // the first slice that is not there yet
