@@ -134,26 +134,26 @@ bool find_needed(Work& work) {
   return is_any;
 }
 
+RowPart row_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z) {
+  if (chunk == nullptr) return {nullptr, outside};
+  const Half* const samples = chunk->row(y.sample, z.sample);
+  return {samples, samples == nullptr ? chunk->get(0, y.sample, z.sample) : Half{0}};
+}
+
 // `kCount` points of a row of one chunk at level 0, from `first` on.
 template <int kCount>
-void copy_points(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int first, Half* to) {
-  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
-  if (from != nullptr) {
-    std::memcpy(to, from + first, kCount * sizeof(Half));
+void copy_points(const RowPart& part, int first, Half* to) {
+  if (part.samples != nullptr) {
+    std::memcpy(to, part.samples + first, kCount * sizeof(Half));
   } else {
-    std::fill_n(to, kCount, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
+    std::fill_n(to, kCount, part.value);
   }
 }
 
 // All points of a row of one chunk at a coarser level.
-void copy_thinned(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int level, Half* to) {
+void copy_thinned(const RowPart& part, int level, Half* to) {
   const int n = kChunkEdge >> level;
-  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
-  if (from == nullptr) {
-    std::fill_n(to, n, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
-    return;
-  }
-  for (int i = 0; i < n; ++i) to[i] = from[i << level];
+  for (int i = 0; i < n; ++i) to[i] = part.samples == nullptr ? part.value : part.samples[i << level];
 }
 
 // Nothing to mesh where the chunk and all that its cells touch are of one sign throughout.
@@ -197,24 +197,28 @@ bool prepare(const DensityNeighbourhood& chunks, Work& work) {
   return find_needed(work);
 }
 
-void gather_row(const Work& work, int y, int z, Half* row) {
+std::array<RowPart, 3> row_parts(const Work& work, int y, int z) {
   const ChunkCoordinate cy = chunk_coordinate(y, work.level);
   const ChunkCoordinate cz = chunk_coordinate(z, work.level);
   const DensityNeighbourhood& chunks = *work.chunks;
-  const DensityChunk* const three[3] = {chunks.at(-1, cy.chunk, cz.chunk), chunks.at(0, cy.chunk, cz.chunk),
-                                        chunks.at(1, cy.chunk, cz.chunk)};
+  const auto part = [&](int dx) { return row_part(chunks.at(dx, cy.chunk, cz.chunk), chunks.outside, cy, cz); };
+  return {part(-1), part(0), part(1)};
+}
+
+void gather_row(const Work& work, int y, int z, Half* row) {
+  const std::array<RowPart, 3> parts = row_parts(work, y, z);
   if (work.level == 0) {
-    copy_points<kPointX>(three[0], chunks.outside, cy, cz, kChunkEdge - kPointX, row - kPointX);
-    copy_points<kChunkEdge>(three[1], chunks.outside, cy, cz, 0, row);
-    copy_points<kPointX>(three[2], chunks.outside, cy, cz, 0, row + kChunkEdge);
+    copy_points<kPointX>(parts[0], kChunkEdge - kPointX, row - kPointX);
+    copy_points<kChunkEdge>(parts[1], 0, row);
+    copy_points<kPointX>(parts[2], 0, row + kChunkEdge);
     return;
   }
   std::array<Half, kChunkEdge> before{};
-  copy_thinned(three[0], chunks.outside, cy, cz, work.level, before.data());
+  copy_thinned(parts[0], work.level, before.data());
   const int side = std::min(work.n, kPointX);
   std::copy_n(before.data() + work.n - side, side, row - side);
-  copy_thinned(three[1], chunks.outside, cy, cz, work.level, row);
-  copy_thinned(three[2], chunks.outside, cy, cz, work.level, row + work.n);
+  copy_thinned(parts[1], work.level, row);
+  copy_thinned(parts[2], work.level, row + work.n);
 }
 
 }  // namespace quoin::smooth

@@ -135,6 +135,13 @@ inline constexpr int kVertexBits = 13;
 
 // Fills in the signs, the active cells and which points are needed; false when no cell is active.
 [[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
+// A row of one chunk's samples, or the one value that all of them have.
+struct RowPart {
+  const Half* samples;  // null: all are `value`
+  Half value;
+};
+// The row of points (y, z) in the chunk before, the chunk and the chunk after.
+[[nodiscard]] std::array<RowPart, 3> row_parts(const Work& work, int y, int z);
 // Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
 // where x = 0 is.
 void gather_row(const Work& work, int y, int z, Half* row);
