@@ -52,9 +52,9 @@ struct RowSet {
   std::uint64_t low = 0;
   std::uint64_t high = 0;
 
-  void add(int y) {
-    const int bit = y + 16;
-    (bit < 64 ? low : high) |= std::uint64_t{1} << (bit & 63);
+  // Row -1, and rows 0 to 63 by their bits.
+  static RowSet of(bool has_first, std::uint64_t rows) {
+    return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
   }
   [[nodiscard]] bool has(int y) const {
     const int bit = y + 16;
@@ -133,7 +133,7 @@ inline constexpr int kVertexBits = 13;
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }
 
-// Fills in the signs, the active cells and which points are needed; false when no cell is active.
+// Fills in the signs; false when all are the same.
 [[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
 // A row of one chunk's samples, or the one value that all of them have.
 struct RowPart {
