@@ -6,6 +6,7 @@
 #ifdef QUOIN_X86_KERNELS
 
 #include <algorithm>
+#include <type_traits>
 
 #include <immintrin.h>
 

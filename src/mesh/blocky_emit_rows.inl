@@ -135,7 +135,7 @@ QUOIN_INLINE __m512i types_of(const Scratch& s, __m512i positions) {
     const __m512i bit = _mm512_rolv_epi32(_mm512_rorv_epi32(halves, positions), _mm512_set1_epi32(k));
     index = _mm512_ternarylogic_epi32(index, bit, _mm512_set1_epi32(1 << k), 0xF8);
   }
-  return _mm512_permutexvar_epi32(index, _mm512_load_si512(s.narrow_palette));
+  return _mm512_permutexvar_epi32(index, _mm512_loadu_si512(s.narrow_palette));
 }
 
 QUOIN_INLINE __m512i sixteen_bytes(const std::uint8_t* p) {
@@ -200,11 +200,10 @@ void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource&
   constexpr bool kUAlongBits = Layout<kDirection>::kUAlongBits;
   std::size_t rows = 0;
   const std::size_t count = list_rows(groups, s.batch, s.parts.rows, rows);
-  if (kOcclusion && pass.row_ends) {
-    take_apart<kOcclusion, kUAlongBits, true>(pass, first_plane, rows, s);
-  } else {
-    take_apart<kOcclusion, kUAlongBits, false>(pass, first_plane, rows, s);
-  }
+  const auto take = [&](auto row_ends) {
+    take_apart<kOcclusion, kUAlongBits, kOcclusion && row_ends>(pass, first_plane, rows, s);
+  };
+  pass.row_ends ? take(std::true_type{}) : take(std::false_type{});
   std::uint64_t* out = grow_quads(quads, s.quads, count + 16);
   s.quads += count;
   switch (types.planes) {

@@ -1,6 +1,7 @@
 // The mesher's kernel for any processor.
 
 #include <algorithm>
+#include <type_traits>
 
 #include "grid/packed_row.h"
 #include "mesh/blocky_scratch.h"

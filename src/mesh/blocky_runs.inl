@@ -124,10 +124,9 @@ QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batc
 
 template <bool kOcclusion, bool kTypes>
 void merge(const Pass& pass, int first_plane, int groups, Batch& b) {
-  if (kOcclusion && pass.row_ends) {
-    find_runs<kOcclusion, kOcclusion, kTypes>(pass, first_plane, groups, b);
-  } else {
-    find_runs<kOcclusion, false, kTypes>(pass, first_plane, groups, b);
-  }
+  const auto find = [&](auto row_ends) {
+    find_runs<kOcclusion, kOcclusion && row_ends, kTypes>(pass, first_plane, groups, b);
+  };
+  pass.row_ends ? find(std::true_type{}) : find(std::false_type{});
   find_growth<kTypes>(pass, first_plane, groups, b);
 }

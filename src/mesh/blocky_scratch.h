@@ -65,8 +65,13 @@ struct alignas(64) Batch {
 inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
 
 struct alignas(64) Parts {
-  enum : std::size_t { kFirst, kLast, kRowsBefore, kLevels };  // first and last cell of the row it ends in
-  std::uint16_t rows[kBatchPlanes * 64 + 8];                   // words of a batch
+  // Of the row in which a quad ends, its first and last cell; its rows before; its eight level bits.
+  static constexpr std::size_t kFirst = 0;
+  static constexpr std::size_t kLast = 1;
+  static constexpr std::size_t kRowsBefore = 2;
+  static constexpr std::size_t kLevels = 3;
+
+  std::uint16_t rows[kBatchPlanes * 64 + 8];  // words of a batch
   std::uint8_t bytes[4][kBatchQuads];
   std::uint16_t places[kBatchQuads];  // 64 * plane of the batch + row
 };
@@ -92,13 +97,13 @@ struct Scratch {
   Batch batch;
   Parts parts;
   LevelTables levels;
-  std::uint64_t palette[256];                    // types in a quad's place, by palette index
-  alignas(64) std::uint32_t narrow_palette[16];  // the first, as in the upper half of a quad
-  std::uint64_t row_masks[3][64 + 8];            // by axis of the rows: the cells of the region
-  std::uint64_t patterns[256][16];               // a row of each uniform slab
-  const std::uint64_t* rows[4096];               // [z * 64 + y]: packed voxels
-  std::uint8_t index_class[256];                 // by palette index: 0 air, 1 opaque, 2 transparent
-  std::size_t quads;                             // written so far
+  std::uint64_t palette[256];          // types in a quad's place, by palette index
+  std::uint32_t narrow_palette[16];    // the first, as in the upper half of a quad
+  std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region
+  std::uint64_t patterns[256][16];     // a row of each uniform slab
+  const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
+  std::uint8_t index_class[256];       // by palette index: 0 air, 1 opaque, 2 transparent
+  std::size_t quads;                   // written so far
 };
 
 // What a kernel works on.
