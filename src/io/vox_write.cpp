@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <quoin/io/vox.h>
 
@@ -111,9 +112,16 @@ void Writer::gather_instances() {
   }
 }
 
+/// Gives back each piece's voxels once they are written: they and the file are what takes memory.
 void Writer::write_models() {
+  constexpr std::size_t kHeadBytes = 64;  // of a model, and more
+  std::size_t bytes = kHeadBytes;
   for (const GridParts& parts : grids_) {
-    for (const vox::Piece& piece : parts.pieces) {
+    for (const vox::Piece& piece : parts.pieces) bytes += kHeadBytes + piece.voxels.size();
+  }
+  out_.reserve(bytes);
+  for (GridParts& parts : grids_) {
+    for (vox::Piece& piece : parts.pieces) {
       const std::size_t size_chunk = out_.begin_chunk("SIZE");
       out_.i32(piece.size.x);
       out_.i32(piece.size.z);
@@ -121,7 +129,7 @@ void Writer::write_models() {
       out_.end_chunk(size_chunk);
       const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
       out_.u32(static_cast<std::uint32_t>(piece.voxels.size() / 4));
-      out_.raw(piece.voxels);
+      out_.raw(std::exchange(piece.voxels, {}));
       out_.end_chunk(voxel_chunk);
     }
   }

@@ -73,29 +73,73 @@ Result<TypeTable> make_type_table(const Scene& scene) {
   return table;
 }
 
+namespace {
+
+bool is_inside(IVec3 voxel, const Piece& piece) {
+  const IVec3 end = piece.min + piece.size;
+  return voxel.x >= piece.min.x && voxel.y >= piece.min.y && voxel.z >= piece.min.z && voxel.x < end.x &&
+         voxel.y < end.y && voxel.z < end.z;
+}
+
+/// The pieces of a grid by their places, and the last one that was asked for.
+class Pieces {
+ public:
+  explicit Pieces(const IBox& box) : box_(box) {}
+
+  Piece& of(IVec3 voxel) {
+    if (last_ != nullptr && is_inside(voxel, *last_)) return *last_;
+    const Cell cell = cell_of(voxel, box_.min);
+    last_ = &pieces_.try_emplace(cell, piece_at(cell, box_)).first->second;
+    return *last_;
+  }
+
+  /// Those of a grid, with room for its voxels and no more.
+  void make_for(const Grid& grid) {
+    std::map<Piece*, std::size_t> voxels;
+    for (const IVec3 at : grid.chunks()) {
+      const Chunk& chunk = *grid.find_chunk(at);
+      const IBox bounds = chunk.bounds();
+      const IVec3 low = at * kChunkEdge + bounds.min;
+      const IVec3 high = at * kChunkEdge + bounds.max - 1;
+      if (cell_of(low, box_.min) == cell_of(high, box_.min)) {
+        voxels[&of(low)] += static_cast<std::size_t>(chunk.non_air_count());
+      } else {
+        visit_voxels(chunk, at * kChunkEdge, [&](IVec3 voxel, VoxelType) { ++voxels[&of(voxel)]; });
+      }
+    }
+    for (const auto& [piece, count] : voxels) piece->voxels.reserve(4 * count);
+  }
+
+  std::vector<Piece> take() {
+    if (pieces_.empty()) pieces_.emplace(Cell{}, piece_at(Cell{}, box_));
+    std::vector<Piece> sorted;
+    sorted.reserve(pieces_.size());
+    for (auto& [cell, piece] : pieces_) sorted.push_back(std::move(piece));
+    return sorted;
+  }
+
+ private:
+  IBox box_;
+  std::map<Cell, Piece> pieces_;
+  Piece* last_ = nullptr;
+};
+
+}  // namespace
+
 std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std::uint8_t>& index_of_type) {
   IBox box = grid.declared_box();
   if (box.empty()) box = {box.min, box.min + 1};
-  std::map<Cell, Piece> pieces;
-  Cell last_cell{};
-  Piece* last = nullptr;
+  Pieces pieces(box);
+  pieces.make_for(grid.grid);
   visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
-    const Cell cell = cell_of(voxel, box.min);
-    if (last == nullptr || cell != last_cell) {
-      last_cell = cell;
-      last = &pieces.try_emplace(cell, piece_at(cell, box)).first->second;
-    }
-    const IVec3 local = voxel - last->min;
-    const int y = last->size.z - 1 - local.z;
-    last->voxels.insert(last->voxels.end(),
-                        {static_cast<std::byte>(local.x), static_cast<std::byte>(y), static_cast<std::byte>(local.y),
-                         static_cast<std::byte>(index_of_type[type])});
+    Piece& piece = pieces.of(voxel);
+    const IVec3 local = voxel - piece.min;
+    const int y = piece.size.z - 1 - local.z;
+    const std::array bytes = {static_cast<std::byte>(local.x), static_cast<std::byte>(y),
+                              static_cast<std::byte>(local.y), static_cast<std::byte>(index_of_type[type])};
+    piece.voxels.insert(piece.voxels.end(), bytes.begin(), bytes.end());
   });
-  if (pieces.empty()) pieces.emplace(Cell{}, piece_at(Cell{}, box));
-  std::vector<Piece> sorted;
-  sorted.reserve(pieces.size());
-  for (auto& [cell, piece] : pieces) sorted.push_back(std::move(piece));
-  return sorted;
+  return pieces.take();
 }
 
 DVec3 pivot_of(const Piece& piece) {
