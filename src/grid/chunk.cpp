@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cstring>
 #include <utility>
 
 #include "grid/packed_row.h"
@@ -35,6 +36,28 @@ void add_columns(std::array<std::uint16_t, kChunkEdge>& counts, std::uint64_t ma
       const auto all_or_none = static_cast<std::uint16_t>((eight & bit) == bit ? ~0U : 0U);
       counts[i + k] = static_cast<std::uint16_t>(counts[i + k] + (all_or_none & addend));
     }
+  }
+}
+
+bool is_one_type(std::span<const VoxelType> types) {
+  return std::memcmp(types.data(), types.data() + 1, types.size_bytes() - sizeof(VoxelType)) == 0;
+}
+
+// Calls `visit(type, voxels)` for the types of a row in the order in which they come; where there are many, for some of
+// them more than once.
+template <class Visit>
+void for_each_run(std::span<const VoxelType, kChunkEdge> row, Visit&& visit) {
+  constexpr int kFewTypes = 6;
+  if (is_one_type(row)) return visit(row[0], kAllVoxels);
+  std::uint64_t left = kAllVoxels;
+  for (int i = 0; i < kFewTypes && left != 0; ++i) {
+    const VoxelType type = row[static_cast<std::size_t>(std::countr_zero(left))];
+    const std::uint64_t same = packed_row::where_equal(row.data(), type);
+    visit(type, same);
+    left &= ~same;
+  }
+  for (; left != 0; left &= left - 1) {
+    visit(row[static_cast<std::size_t>(std::countr_zero(left))], left & (~left + 1));
   }
 }
 
@@ -223,19 +246,20 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
 
 Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   Chunk chunk(types[0]);
-  if (std::all_of(types.begin(), types.end(), [&](VoxelType t) { return t == types[0]; })) return chunk;
+  if (is_one_type(types)) return chunk;
   chunk.mixed_ = std::make_unique<Mixed>();
   Mixed& m = *chunk.mixed_;
   constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
   std::vector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
-  for (const VoxelType type : types) {
-    if (index_of[type] != kUnseen) {
-      ++m.counts[index_of[type]];
-      continue;
-    }
-    index_of[type] = static_cast<std::uint32_t>(m.palette.size());
-    m.palette.push_back(type);
-    m.counts.push_back(1);
+  for (std::size_t first = 0; first < types.size(); first += kChunkEdge) {
+    for_each_run(types.subspan(first).first<kChunkEdge>(), [&](VoxelType type, std::uint64_t voxels) {
+      if (index_of[type] == kUnseen) {
+        index_of[type] = static_cast<std::uint32_t>(m.palette.size());
+        m.palette.push_back(type);
+        m.counts.push_back(0);
+      }
+      m.counts[index_of[type]] += static_cast<std::uint32_t>(std::popcount(voxels));
+    });
   }
   m.bits = bits_for(m.palette.size());
   if (m.direct()) {
@@ -256,30 +280,26 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
                       const std::vector<std::uint32_t>& index_of) {
   Mixed& m = *mixed_;
   const auto row_of = [&](int y, int z) {
-    return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge), kChunkEdge);
+    return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge)).first<kChunkEdge>();
   };
   const VoxelType first = row_of(static_cast<int>(slab % 16) * 4, static_cast<int>(slab / 16) * 4)[0];
   bool is_uniform = true;
   for_each_row_of_slab(slab, [&](int, int y, int z) {
     const auto row = row_of(y, z);
-    std::uint64_t solid = 0;
-    for (std::size_t x = 0; x < kChunkEdge; ++x) {
-      is_uniform &= row[x] == first;
-      solid |= std::uint64_t{row[x] != kAir} << x;
-    }
-    if (solid != 0) count_change(y, z, 0, solid);
+    is_uniform = is_uniform && row[0] == first && is_one_type(row);
   });
   m.slabs[slab] = kUniformSlab | index_of[first];
-  if (is_uniform) return;
-  const std::uint32_t slot = slot_for_writing(slab);
+  const std::uint32_t slot = is_uniform ? 0 : slot_for_writing(slab);
   for_each_row_of_slab(slab, [&](int stored, int y, int z) {
-    const auto row = row_of(y, z);
-    std::uint64_t* packed = m.row(slot, stored);
-    std::fill_n(packed, m.bits, 0);
-    for (std::size_t x = 0; x < kChunkEdge; ++x) {
-      const std::size_t bit = x * static_cast<std::size_t>(m.bits);
-      packed[bit >> 6] |= std::uint64_t{index_of[row[x]]} << (bit & 63);
+    std::uint64_t solid = first == kAir ? 0 : kAllVoxels;
+    if (!is_uniform) {
+      solid = 0;
+      for_each_run(row_of(y, z), [&](VoxelType type, std::uint64_t voxels) {
+        packed_row::write_masked(m.row(slot, stored), m.bits, voxels, index_of[type]);
+        if (type != kAir) solid |= voxels;
+      });
     }
+    if (solid != 0) count_change(y, z, 0, solid);
   });
 }
 
