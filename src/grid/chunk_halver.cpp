@@ -114,21 +114,24 @@ void ChunkHalver::fill_mixed(int half, int y, int z, std::uint64_t mixed) {
   for (std::size_t i = 0; i < exposed.size(); ++i) {
     exposed[i] = masks_.exposed_faces(half, 2 * y + static_cast<int>(i & 1), 2 * z + static_cast<int>(i >> 1));
   }
+  for (Layer& layer : layers_) layer.won = 0;
   for (; mixed != 0; mixed &= mixed - 1) {
     const int x = std::countr_zero(mixed);
-    add(heaviest(exposed, x), half, std::uint64_t{1} << x);
+    layers_[heaviest(exposed, x)].won |= std::uint64_t{1} << x;
   }
+  for (const Layer& layer : layers_) add(layer.type, half, layer.won);
 }
 
-VoxelType ChunkHalver::heaviest(const Exposed& exposed, int x) const {
+std::size_t ChunkHalver::heaviest(const Exposed& exposed, int x) const {
   std::array<unsigned, 3> faces{};
   for (std::size_t digit = 0; digit < faces.size(); ++digit) {
     faces[digit] = cell_bits({exposed[0][digit], exposed[1][digit], exposed[2][digit], exposed[3][digit]}, x);
   }
-  VoxelType best = kAir;
+  std::size_t best = 0;
   int best_weight = 0;
   bool is_best_opaque = false;
-  for (const Layer& layer : layers_) {
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    const Layer& layer = layers_[i];
     if ((layer.cells >> x & 1U) == 0) continue;
     const unsigned voxels = cell_bits(layer.voxels, x);
     int weight = count_bits(voxels);
@@ -136,9 +139,9 @@ VoxelType ChunkHalver::heaviest(const Exposed& exposed, int x) const {
       weight += count_bits(voxels & faces[digit]) << (3 + digit);
     const bool is_better = layer.is_opaque != is_best_opaque
                                ? layer.is_opaque
-                               : weight > best_weight || (weight == best_weight && layer.type < best);
+                               : weight > best_weight || (weight == best_weight && layer.type < layers_[best].type);
     if (!is_better) continue;
-    best = layer.type;
+    best = i;
     best_weight = weight;
     is_best_opaque = layer.is_opaque;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -28,6 +29,7 @@ class ChunkHalver {
     bool is_opaque = false;
     std::array<std::uint64_t, 4> voxels{};
     std::uint64_t cells = 0;
+    std::uint64_t won = 0;  ///< of the cells that hold several types, those that become this one
   };
   /// Cells of one type in a row of 64.
   struct Run {
@@ -41,7 +43,8 @@ class ChunkHalver {
   void fill_half(int half, int y, int z, std::uint64_t solid);
   void find_layers(const Chunk& chunk, std::uint32_t slab, int half, int y, int z);
   void fill_mixed(int half, int y, int z, std::uint64_t mixed);
-  [[nodiscard]] VoxelType heaviest(const Exposed& exposed, int x) const;
+  /// Of the layers that occur in a cell.
+  [[nodiscard]] std::size_t heaviest(const Exposed& exposed, int x) const;
   void add(VoxelType type, int half, std::uint64_t cells);
 
   HalvingMasks masks_;
