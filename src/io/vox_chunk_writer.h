@@ -49,6 +49,10 @@ class ChunkWriter {
   /// As end_chunk, for a chunk that holds nothing but other chunks.
   void end_parent(std::size_t begin) { patch(begin - 4, bytes_.size() - begin); }
 
+  /// Makes room for bytes that are written through `bytes` later.
+  void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
+  [[nodiscard]] std::span<std::byte> bytes() { return bytes_; }
+
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
 
