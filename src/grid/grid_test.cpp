@@ -277,114 +277,6 @@ TEST(Grid, ChunksThatComeAndGoDoNotFillTheDirtyListForEver) {
   EXPECT_EQ(grid.take_dirty().size(), 3U);
 }
 
-// Voxels are set to random types, then back. What is left must take about what a grid takes that never had the edits.
-class EditsUndone : public testing::TestWithParam<unsigned> {};
-
-TEST_P(EditsUndone, LeaveTheMemoryOfANewGrid) {
-  constexpr int kEdits = 150'000;
-  std::mt19937 random(GetParam());
-  Grid grid;
-  grid.edit({IVec3{-64}, IVec3{64}}, [](IVec3 v, VoxelType) {
-    return static_cast<VoxelType>(v.y < (v.x * v.x + v.z) / 64 ? 1 + (v.x & 1) : 0);
-  });
-  Grid fresh = grid.clone();
-  fresh.compact();
-  std::vector<std::pair<IVec3, VoxelType>> undo;
-  for (int round = 0; round < 4; ++round) {
-    undo.clear();
-    for (int i = 0; i < kEdits; ++i) {
-      const auto place = [&] { return static_cast<int>(random() % 128) - 64; };
-      const IVec3 at{place(), place(), place()};
-      undo.emplace_back(at, grid.get(at));
-      grid.set(at, static_cast<VoxelType>(random() % GetParam()));
-    }
-    for (auto it = undo.rbegin(); it != undo.rend(); ++it) grid.set(it->first, it->second);
-    EXPECT_LE(grid.bytes(), fresh.bytes() + fresh.bytes() / 4) << "round " << round;
-  }
-  ASSERT_EQ(grid.chunks(), fresh.chunks());
-  for (const IVec3 at : fresh.chunks()) {
-    std::array<VoxelType, kChunkEdge> row{};
-    std::array<VoxelType, kChunkEdge> fresh_row{};
-    for (int i = 0; i < kChunkEdge * kChunkEdge; ++i) {
-      grid.find_chunk(at)->read_row(i % 64, i / 64, row);
-      fresh.find_chunk(at)->read_row(i % 64, i / 64, fresh_row);
-      ASSERT_EQ(row, fresh_row);
-    }
-    EXPECT_EQ(grid.find_chunk(at)->bounds(), fresh.find_chunk(at)->bounds());
-    EXPECT_EQ(grid.find_chunk(at)->types(), fresh.find_chunk(at)->types());
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Types, EditsUndone, testing::Values(2U, 5U, 40U, 300U, 60'000U));
-
-TEST(Grid, ManyChunksThatWereDroppedLeaveNoTable) {
-  Grid grid;
-  for (int i = 0; i < 20'000; ++i) grid.set({i % 100 * 64, i / 100 * 64, 0}, 1);
-  for (int i = 0; i < 20'000; ++i) grid.set({i % 100 * 64, i / 100 * 64, 0}, kAir);
-  grid.take_dirty();
-  for (int i = 0; i < 3; ++i) grid.set({i * 64, 0, 0}, 1);
-  EXPECT_LT(grid.bytes(), 16'384U);
-}
-
-TEST(Grid, ARowIsSetWhereItsMaskSaysSo) {
-  std::mt19937_64 random(11);
-  Grid grid;
-  Grid plain;
-  for (int round = 0; round < 400; ++round) {
-    const auto place = [&] { return static_cast<int>(random() % 140) - 70; };
-    const IVec3 row{place(), place() / 20, place() / 20};
-    const std::uint64_t mask = round % 5 == 0 ? ~std::uint64_t{0} : random() & random();
-    const unsigned kinds = round % 3 == 0 ? 2 : round % 3 == 1 ? 5 : 40;
-    std::array<VoxelType, kChunkEdge> types{};
-    std::int64_t changed = 0;
-    for (int x = 0; x < kChunkEdge; ++x) {
-      VoxelType& type = types[static_cast<std::size_t>(x)];
-      type = static_cast<VoxelType>(random() % kinds);
-      if ((mask >> x & 1U) != 0) changed += plain.set({(row.x & ~63) + x, row.y, row.z}, type) ? 1 : 0;
-    }
-    ASSERT_EQ(grid.set_row(row, mask, types), changed);
-    ASSERT_EQ(grid.take_dirty(), plain.take_dirty());
-    ASSERT_EQ(grid.chunks(), plain.chunks());
-  }
-  ASSERT_EQ(grid.voxel_count(), plain.voxel_count());
-  plain.for_each([&](IVec3 voxel, VoxelType type) { ASSERT_EQ(grid.get(voxel), type); });
-  EXPECT_EQ(grid.set_row({std::numeric_limits<int>::max(), 0, 0}, 1, std::array<VoxelType, kChunkEdge>{1}), 0)
-      << "the outermost chunks stay air";
-}
-
-TEST(GridWriter, SetsWhatSetsOneByOneSet) {
-  std::mt19937 random(5);
-  Grid grid;
-  Grid plain;
-  {
-    GridWriter writer(grid);
-    for (int i = 0; i < 30'000; ++i) {
-      const bool is_run = i % 3 != 0;
-      const IVec3 at = is_run ? IVec3{i % 130 - 65, i / 1'000, 3}
-                              : IVec3{static_cast<int>(random() % 90) - 45, static_cast<int>(random() % 9), -1};
-      const auto type = static_cast<VoxelType>(random() % 7);
-      writer.set(at, type);
-      plain.set(at, type);
-    }
-  }
-  EXPECT_EQ(grid.chunks(), plain.chunks());
-  EXPECT_EQ(grid.voxel_count(), plain.voxel_count());
-  plain.for_each([&](IVec3 voxel, VoxelType type) { ASSERT_EQ(grid.get(voxel), type); });
-}
-
-TEST(GridWriter, WhatIsNotFlushedIsNotThereYet) {
-  Grid grid;
-  GridWriter writer(grid);
-  writer.set({1, 2, 3}, 4);
-  EXPECT_EQ(grid.chunk_count(), 0U);
-  EXPECT_EQ(grid.version(), 0U);
-  writer.flush();
-  EXPECT_EQ(grid.get({1, 2, 3}), 4);
-  EXPECT_EQ(grid.version(), 1U);
-  writer.flush();
-  EXPECT_EQ(grid.version(), 1U);
-}
-
 TEST(Grid, CornersOfTheWorldCanBeEdited) {
   constexpr int kLow = std::numeric_limits<int>::min() + 64;
   constexpr int kHigh = std::numeric_limits<int>::max() - 64;
@@ -399,22 +291,6 @@ TEST(Grid, CornersOfTheWorldCanBeEdited) {
       int visited = 0;
       grid.for_each([&](IVec3, VoxelType) { ++visited; });
       EXPECT_EQ(visited, 5);
-    }
-  }
-}
-
-TEST(GridReader, ReadsAsTheGridDoes) {
-  Grid grid;
-  grid.fill_sphere({0, 0, 0}, 20.0, 3);
-  GridReader reader(grid);
-  for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
-  std::mt19937 random(8);
-  for (int i = 0; i < 20'000; ++i) {  // runs along x between jumps, of which some stay in the row
-    const auto place = [&] { return static_cast<int>(random() % 90) - 45; };
-    const IVec3 first{place(), place() / 9, place() / 9};
-    for (int x = 0; x < static_cast<int>(random() % 12); ++x) {
-      const IVec3 at = first + IVec3{x, 0, 0};
-      ASSERT_EQ(reader.get(at), grid.get(at));
     }
   }
 }
