@@ -23,7 +23,10 @@ inline VoxelType terrain_type(double y, double h) {
   return y >= h - 3 ? 2 : 3;
 }
 
-enum class Blocky { W1, W2, W3a, W3b, W3c, W4, Empty, Full };
+/// Glass is W1 with the top voxel of every tenth column made of glass, GlassColumns with all of the column.
+enum class Blocky { W1, W2, W3a, W3b, W3c, W4, Empty, Full, Glass, GlassColumns };
+
+inline constexpr VoxelType kGlass = 4;
 
 /// The part that is meshed: padded coordinates 1 to 62, one row of border all round.
 inline constexpr IBox kInterior = {IVec3{1}, IVec3{63}};
@@ -48,7 +51,7 @@ inline std::vector<VoxelType> noise(bool typed) {
   return dense;
 }
 
-inline std::vector<VoxelType> terrain(bool caves, int column_x, int column_z) {
+inline std::vector<VoxelType> terrain(Blocky which, int column_x, int column_z) {
   std::vector<VoxelType> dense(kChunkVoxels, kAir);
   for (int z = 0; z < 64; ++z) {
     for (int x = 0; x < 64; ++x) {
@@ -57,8 +60,11 @@ inline std::vector<VoxelType> terrain(bool caves, int column_x, int column_z) {
       const double h = height(wx, wz);
       const double cave = std::sin(0.2 * wx) * std::sin(0.19 * wz);
       for (int y = 0; y < 64; ++y) {
-        if (caves && !(cave * std::sin(0.21 * (y - 1)) > -0.35)) continue;
-        dense[static_cast<std::size_t>((z * 64 + y) * 64 + x)] = terrain_type(y - 1, h);
+        if (which == Blocky::W2 && !(cave * std::sin(0.21 * (y - 1)) > -0.35)) continue;
+        VoxelType& type = dense[static_cast<std::size_t>((z * 64 + y) * 64 + x)];
+        type = terrain_type(y - 1, h);
+        const bool has_glass = (which == Blocky::Glass && type == 1) || (which == Blocky::GlassColumns && type != kAir);
+        if (has_glass && (x + 3 * z) % 10 == 0) type = kGlass;
       }
     }
   }
@@ -79,9 +85,10 @@ inline Chunk blocky_chunk(Blocky which, int column_x = 0, int column_z = 0) {
   const auto make = [&]() -> std::vector<VoxelType> {
     switch (which) {
       case Blocky::W1:
-        return detail::terrain(false, column_x, column_z);
       case Blocky::W2:
-        return detail::terrain(true, column_x, column_z);
+      case Blocky::Glass:
+      case Blocky::GlassColumns:
+        return detail::terrain(which, column_x, column_z);
       case Blocky::W3a:
         return detail::filled([](int x, int y, int z) { return static_cast<VoxelType>((x + y + z) & 1); });
       case Blocky::W3b:
@@ -119,6 +126,10 @@ inline std::int64_t expected_faces(Blocky which) {
       return 357'362;
     case Blocky::W4:
       return 14'718;
+    case Blocky::Glass:
+      return 11'379;
+    case Blocky::GlassColumns:
+      return 57'616;
     default:
       return 0;
   }
@@ -132,6 +143,16 @@ inline VoxelRegistry three_types() {
     properties.colour = colour;
     if (!types.add(properties)) break;
   }
+  return types;
+}
+
+/// The same and glass.
+inline VoxelRegistry glass_types() {
+  VoxelRegistry types = three_types();
+  VoxelProperties properties;
+  properties.visibility = Visibility::Transparent;
+  properties.colour = Rgba8{200, 220, 255};
+  static_cast<void>(types.add(properties));
   return types;
 }
 

@@ -9,8 +9,6 @@ namespace quoin {
 namespace blocky {
 namespace {
 
-constexpr std::uint64_t kAllCells = ~std::uint64_t{0};
-
 LevelTables make_level_tables() {
   LevelTables tables{};
   for (unsigned around = 0; around < 512; ++around) {
@@ -28,6 +26,14 @@ LevelTables make_level_tables() {
     tables.u_along_bits[around] = pack({l00, l10, l11, l01});
     tables.u_along_rows[around] = pack({l00, l01, l11, l10});
   }
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    const auto level = [&](unsigned corner) { return static_cast<std::uint8_t>(bits >> (2 * corner) & 3U); };
+    const bool flips = flips_diagonal({level(0), level(1), level(2), level(3)});
+    tables.flips[bits / 32] |= std::uint32_t{flips} << (bits + 6) % 32;
+  }
+  for (std::uint32_t at = 0; at < kBatchWords; ++at) {
+    tables.numbers[at] = (at / kRowStride * 64 + at % kRowStride % 64) * 0x0001'0001U;
+  }
   constexpr int kRowAxis[3] = {1, 2, 1};
   for (int axis = 0; axis < 3; ++axis) {
     for (std::uint64_t at = 0; at < kBatchWords; ++at) {
@@ -37,54 +43,18 @@ LevelTables make_level_tables() {
   return tables;
 }
 
-// Which of a chunk's voxels are opaque, a row or a single voxel at a time.
-class OpaqueVoxels {
- public:
-  OpaqueVoxels(const Chunk* chunk, const VoxelRegistry& types) : chunk_(chunk), types_(&types) {
-    if (chunk == nullptr || chunk->mixed() == nullptr || chunk->mixed()->direct()) return;
-    const Chunk::Mixed& voxels = *chunk->mixed();
-    for (std::size_t i = 0; i < voxels.palette.size(); ++i) is_opaque_[i] = types.is_opaque(voxels.palette[i]);
-  }
-
-  [[nodiscard]] bool none() const {
-    if (chunk_ == nullptr) return true;
-    const auto uniform = chunk_->uniform();
-    return uniform.has_value() && !types_->is_opaque(*uniform);
-  }
-
-  [[nodiscard]] std::uint64_t row(int y, int z) const {
-    if (none()) return 0;
-    if (chunk_->mixed() == nullptr) return kAllCells;
-    std::uint64_t mask = 0;
-    if (chunk_->mixed()->direct()) {
-      for (int x = 0; x < kChunkEdge; ++x) mask |= std::uint64_t{types_->is_opaque(chunk_->get(x, y, z))} << x;
-      return mask;
-    }
-    const Chunk::Mixed& voxels = *chunk_->mixed();
-    for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
-      if (is_opaque_[i] && voxels.counts[i] != 0) mask |= chunk_->row_mask(y, z, voxels.palette[i]);
-    }
-    return mask;
-  }
-
-  [[nodiscard]] std::uint64_t at(int x, int y, int z) const {
-    if (none()) return 0;
-    const Chunk::Mixed* voxels = chunk_->mixed();
-    if (voxels == nullptr) return 1;
-    if (voxels->direct()) return types_->is_opaque(chunk_->get(x, y, z));
-    const std::uint32_t slab = voxels->slabs[Chunk::slab_index(y, z)];
-    const std::uint32_t index = (slab & Chunk::kUniformSlab) != 0 ? slab & ~Chunk::kUniformSlab
-                                                                  : voxels->read(slab, Chunk::row_in_slab(y, z), x);
-    return is_opaque_[index];
-  }
-
- private:
-  const Chunk* chunk_;
-  const VoxelRegistry* types_;
-  std::array<bool, 256> is_opaque_{};
-};
-
 }  // namespace
+
+bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
+  if (!types.has_transparent()) return false;
+  const Chunk::Mixed* voxels = chunk.mixed();
+  if (voxels == nullptr) return types.is_transparent(*chunk.uniform());
+  if (voxels->direct()) return true;
+  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+    if (voxels->counts[i] != 0 && types.is_transparent(voxels->palette[i])) return true;
+  }
+  return false;
+}
 
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
   if (out.size() < used + more) out.resize(std::max(used + more, out.capacity()));
@@ -94,122 +64,71 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
 
 namespace {
 
-constexpr int chunk_offset(int voxel) {
-  return voxel < 0 ? -1 : voxel > 63 ? 1 : 0;
-}
-
-// Rows of the 8 neighbours with the centre's x. Answers whether a voxel of those with another z may be opaque.
-bool gather_rows(const Job& job, Scratch& s) {
-  const auto first = [](int d) { return d > 0 ? 64 : d; };
-  const auto last = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 63; };
-  bool other_z = false;
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      if (dy == 0 && dz == 0) continue;
-      const OpaqueVoxels voxels(job.chunks->at(0, dy, dz), *job.types);
-      other_z |= dz != 0 && !voxels.none();
-      for (int z = first(dz); z <= last(dz); ++z) {
-        for (int y = first(dy); y <= last(dy); ++y) {
-          s.z.opaque.words[word_index(z, y)] = voxels.row(y & 63, z & 63);
-        }
-      }
+// The voxels of a row of the centre chunk that are transparent and of the same type as those of a neighbour's row.
+std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
+  const Chunk& centre = *job.chunks->centre();
+  std::uint64_t mask = 0;
+  const Chunk::Mixed* voxels = centre.mixed();
+  if (voxels != nullptr && !voxels->direct()) {
+    for (const VoxelType type : voxels->palette) {
+      if (!job.types->is_transparent(type)) continue;
+      const std::uint64_t here = centre.row_mask(y, z, type);
+      if (here != 0) mask |= here & other.row_mask(other_y, other_z, type);
     }
+    return mask;
   }
-  return other_z;
-}
-
-// Whether a voxel of the 18 neighbours with another x may be opaque.
-bool has_row_ends(const Job& job) {
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (const int dx : {-1, 1}) {
-        if (!OpaqueVoxels(job.chunks->at(dx, dy, dz), *job.types).none()) return true;
-      }
-    }
-  }
-  return false;
-}
-
-void gather_row_ends(const Job& job, Scratch& s) {
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      const OpaqueVoxels before(job.chunks->at(-1, dy, dz), *job.types);
-      const OpaqueVoxels after(job.chunks->at(1, dy, dz), *job.types);
-      for (int z = -1; z <= 64; ++z) {
-        if (chunk_offset(z) != dz) continue;
-        for (int y = -1; y <= 64; ++y) {
-          if (chunk_offset(y) != dy) continue;
-          s.z.before.words[word_index(z, y)] = before.at(63, y & 63, z & 63);
-          s.z.after.words[word_index(z, y)] = after.at(0, y & 63, z & 63) << 63;
-        }
-      }
-    }
-  }
-}
-
-}  // namespace
-
-bool gather_border(const Job& job, Scratch& s) {
-  // The x view's rows lie along z, so what stands before and after those are voxels of the neighbours in z.
-  const bool other_z = gather_rows(job, s);
-  if (!other_z && !has_row_ends(job)) return false;
-  gather_row_ends(job, s);
-  return true;
-}
-
-namespace {
-
-// The voxels of a row that are transparent and of the same type as the voxels of another row.
-std::uint64_t same_transparent(const Job& job, const Chunk* other, int y, int z, int other_y, int other_z) {
-  if (other == nullptr || !job.has_transparent) return 0;
   std::array<VoxelType, kChunkEdge> row{};
   std::array<VoxelType, kChunkEdge> other_row{};
-  job.chunks->centre()->read_row(y, z, row);
-  other->read_row(other_y, other_z, other_row);
-  std::uint64_t mask = 0;
+  centre.read_row(y, z, row);
+  other.read_row(other_y, other_z, other_row);
   for (std::size_t x = 0; x < kChunkEdge; ++x) {
     mask |= std::uint64_t{row[x] == other_row[x] && job.types->is_transparent(row[x])} << x;
   }
   return mask;
 }
 
-bool same_transparent_voxel(const Job& job, const Chunk* other, IVec3 here, IVec3 there) {
-  if (!job.has_transparent) return false;
-  const VoxelType type = job.chunks->centre()->get(here);
-  return other != nullptr && job.types->is_transparent(type) && other->get(there) == type;
+// The layer of faces towards a direction, where some types are transparent.
+Layer& faces_towards(Direction direction, Scratch& s) {
+  const auto d = static_cast<std::size_t>(direction);
+  return d < 4 ? s.sides[d] : s.z.faces[d - 4];
+}
+
+// The neighbour beyond the border that the region's faces towards a direction reach; null when they reach none.
+const Chunk* chunk_beyond(const Job& job, Direction direction) {
+  const FaceFrame& frame = frame_of(direction);
+  const bool reaches = frame.sign > 0 ? job.region.max[frame.axis] == kChunkEdge : job.region.min[frame.axis] == 0;
+  const IVec3 n = normal_of(direction);
+  return reaches ? job.chunks->at(n.x, n.y, n.z) : nullptr;
 }
 
 }  // namespace
 
-void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& s) {
-  const Neighbourhood& n = *job.chunks;
-  const Layer& opaque = s.z.opaque;
-  for (int z = job.region.min.z; z < job.region.max.z; ++z) {
-    for (int y = job.region.min.y; y < job.region.max.y; ++y) {
-      const int at = word_index(z, y);
-      const std::uint64_t solid = job.has_transparent ? s.solid.words[at] : opaque.words[at];
-      const std::uint64_t transparent = solid & ~opaque.words[at];
-      // A face is hidden by an opaque voxel, and by a transparent one of its own type.
-      const auto visible = [&](std::uint64_t opaque_front, std::uint64_t same) {
-        return solid & ~opaque_front & ~(transparent & same);
-      };
-      const std::uint64_t same_x = s.z.same_bit.words[at];
-      const auto end = [&](int dx, int x) {
-        return std::uint64_t{same_transparent_voxel(job, n.at(dx, 0, 0), {x, y, z}, {63 - x, y, z})} << x;
-      };
-      const std::uint64_t after = row_ends ? s.z.after.words[at] : 0;
-      const std::uint64_t before = row_ends ? s.z.before.words[at] : 0;
-      s.sides[0].words[at] = visible(opaque.words[at] >> 1 | after, (same_x & kAllCells >> 1) | end(1, 63));
-      s.sides[1].words[at] = visible(opaque.words[at] << 1 | before, same_x << 1 | end(-1, 0));
-      s.sides[2].words[at] = visible(
-          opaque.words[at + 1], y < 63 ? s.z.same_row.words[at] : same_transparent(job, n.at(0, 1, 0), y, z, 0, z));
-      s.sides[3].words[at] = visible(opaque.words[at - 1], y > 0 ? s.z.same_row.words[at - 1]
-                                                                 : same_transparent(job, n.at(0, -1, 0), y, z, 63, z));
-      s.z.faces[0].words[at] = visible(opaque.words[at + kRowStride],
-                                       z < 63 ? s.same_z.words[at] : same_transparent(job, n.at(0, 0, 1), y, z, y, 0));
-      s.z.faces[1].words[at] =
-          visible(opaque.words[at - kRowStride],
-                  z > 0 ? s.same_z.words[at - kRowStride] : same_transparent(job, n.at(0, 0, -1), y, z, y, 63));
+void hide_faces_at_border(const Job& job, Scratch& s) {
+  const Chunk& centre = *job.chunks->centre();
+  for (const Direction direction : kDirections) {
+    const Chunk* other = chunk_beyond(job, direction);
+    if (other == nullptr || !holds_transparent(*other, *job.types)) continue;
+    const FaceFrame& frame = frame_of(direction);
+    const int border = frame.sign > 0 ? kChunkEdge - 1 : 0;
+    IBox box = job.region;  // of rows: whatever their x
+    if (frame.axis != 0) {
+      box.min[frame.axis] = border;
+      box.max[frame.axis] = border + 1;
+    }
+    Layer& faces = faces_towards(direction, s);
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        const int at = word_index(z, y);
+        const std::uint64_t transparent = s.solid.words[at] & ~s.z.opaque.words[at];
+        if (frame.axis != 0) {
+          const int other_y = frame.axis == 1 ? kChunkEdge - 1 - y : y;
+          const int other_z = frame.axis == 2 ? kChunkEdge - 1 - z : z;
+          if (transparent != 0) faces.words[at] &= ~same_transparent(job, *other, y, z, other_y, other_z);
+        } else if ((transparent >> border & 1) != 0) {
+          const bool same = centre.get(border, y, z) == other->get(kChunkEdge - 1 - border, y, z);
+          faces.words[at] &= ~(std::uint64_t{same} << border);
+        }
+      }
     }
   }
 }
@@ -231,17 +150,6 @@ bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
   });
 }
 
-bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
-  if (!types.has_transparent()) return false;
-  const Chunk::Mixed* voxels = chunk.mixed();
-  if (voxels == nullptr) return types.is_transparent(*chunk.uniform());
-  if (voxels->direct()) return true;
-  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
-    if (voxels->counts[i] != 0 && types.is_transparent(voxels->palette[i])) return true;
-  }
-  return false;
-}
-
 struct Kernel {
   void (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
   void (*find_faces)(const blocky::Job&, blocky::Scratch&);
@@ -249,7 +157,13 @@ struct Kernel {
 
 Kernel pick_kernel(InstructionSet wanted) {
 #ifdef QUOIN_X86_KERNELS
-  if (resolve(wanted) != InstructionSet::Plain) return {blocky::mesh_avx2, blocky::find_faces_avx2};
+  const InstructionSet found = resolve(wanted);
+  if (found == InstructionSet::Avx512 && __builtin_cpu_supports("avx512vbmi") &&
+      __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512vpopcntdq") &&
+      __builtin_cpu_supports("gfni")) {
+    return {blocky::mesh_avx512, blocky::find_faces_avx512};
+  }
+  if (found != InstructionSet::Plain) return {blocky::mesh_avx2, blocky::find_faces_avx2};
 #endif
   static_cast<void>(wanted);
   return {blocky::mesh_plain, blocky::find_faces_plain};
@@ -276,8 +190,9 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
-      const bool transparent = holds_transparent(*centre, types);
-      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent}, *scratch_, out);
+      const bool transparent = blocky::holds_transparent(*centre, types);
+      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent, false}, *scratch_,
+                            out);
     }
   }
   out.resize(scratch_->quads);
@@ -297,7 +212,8 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
   blocky::Scratch& s = *scratch_;
-  scratch_->kernel.find_faces({&chunks, &types, region, false, false, holds_transparent(*centre, types)}, s);
+  scratch_->kernel.find_faces({&chunks, &types, region, false, false, blocky::holds_transparent(*centre, types), false},
+                              s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;

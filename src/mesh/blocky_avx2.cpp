@@ -5,6 +5,8 @@
 
 #ifdef QUOIN_X86_KERNELS
 
+#include <algorithm>
+
 #include <immintrin.h>
 
 #if defined(__clang__)
@@ -16,6 +18,7 @@
 
 #define QUOIN_KERNEL avx2
 #define QUOIN_KERNEL_AVX2 1
+#define QUOIN_KERNEL_AVX512 0
 #include "mesh/blocky_kernel.inl"
 
 namespace quoin::blocky {

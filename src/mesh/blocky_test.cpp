@@ -105,13 +105,14 @@ TEST(GreedyQuads, FloorSplitsAlongAWallsFoot) {
 }
 
 TEST(GreedyQuads, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
-  const VoxelRegistry types = workloads::three_types();
+  const VoxelRegistry types = workloads::glass_types();
   QuadOptions options;
   options.region = workloads::kInterior;
   QuadBuffer quads;
   BlockyMesher mesher;
   using workloads::Blocky;
-  for (const Blocky which : {Blocky::W1, Blocky::W2, Blocky::W3a, Blocky::W3b, Blocky::W3c, Blocky::W4}) {
+  for (const Blocky which : {Blocky::W1, Blocky::W2, Blocky::W3a, Blocky::W3b, Blocky::W3c, Blocky::W4, Blocky::Glass,
+                             Blocky::GlassColumns}) {
     const Chunk chunk = workloads::blocky_chunk(which);
     mesher.mesh(lone(chunk), types, options, quads);
     EXPECT_EQ(face_count(quads), workloads::expected_faces(which));
@@ -193,14 +194,20 @@ TEST_P(RandomWorld, ChunkedGivesTheFacesOfTheWorldInOnePiece) {
 TEST_P(RandomWorld, EveryInstructionSetGivesTheSameBytes) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = world();
-  BlockyMesher best;
+  BlockyMesher meshers[] = {BlockyMesher(InstructionSet::Avx512), BlockyMesher(InstructionSet::Avx2)};
   BlockyMesher plain(InstructionSet::Plain);
-  QuadBuffer best_quads;
+  QuadBuffer quads;
   QuadBuffer plain_quads;
   for (const IVec3 chunk : grid.chunks()) {
-    best.mesh(grid.neighbourhood(chunk), types, {}, best_quads);
-    plain.mesh(grid.neighbourhood(chunk), types, {}, plain_quads);
-    EXPECT_EQ(best_quads, plain_quads);
+    for (const bool occlusion : {true, false}) {
+      QuadOptions options;
+      options.occlusion = occlusion;
+      plain.mesh(grid.neighbourhood(chunk), types, options, plain_quads);
+      for (BlockyMesher& mesher : meshers) {
+        mesher.mesh(grid.neighbourhood(chunk), types, options, quads);
+        EXPECT_EQ(quads, plain_quads);
+      }
+    }
   }
 }
 
@@ -250,8 +257,9 @@ TEST_P(ManyTypes, MeshLikeAnyOther) {
   }
   Grid grid = oracle::random_world(99, {IVec3{-10, -10, -10}, IVec3{14, 14, 14}}, GetParam(), 0.4);
   const FaceSet expected = oracle::visible_faces(grid, types, true);
-  EXPECT_EQ(faces_of_quads(grid, types, {}, InstructionSet::Best), expected);
-  EXPECT_EQ(faces_of_quads(grid, types, {}, InstructionSet::Plain), expected);
+  for (const InstructionSet set : {InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Plain}) {
+    EXPECT_EQ(faces_of_quads(grid, types, {}, set), expected);
+  }
   grid.compact();
   EXPECT_EQ(faces_of_quads(grid, types, {}, InstructionSet::Best), expected);
 }

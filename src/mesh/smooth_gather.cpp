@@ -75,85 +75,26 @@ void gather_signs(const DensityNeighbourhood& chunks, Work& work) {
   }
 }
 
-// A row of cells is active where its 2x2 rows of points are neither all solid nor all air.
-void find_active(Work& work) {
-  const CellRange& cells = work.cells;
-  const std::uint64_t in_range = kAllSolid >> (kChunkEdge - std::min(cells.last, work.n));
-  const std::uint64_t with_before = cells.first < 0 ? 1 : 0;
-  const int top = work.n - 1;
-  for (int z = cells.first; z < cells.last; ++z) {
-    const auto s = [&](const auto& words, int dy, int dz) { return words[z + 1 + dz] + dy; };
-    const std::uint64_t* const s00 = s(work.solid, 0, 0);
-    const std::uint64_t* const s01 = s(work.solid, 0, 1);
-    const std::uint64_t* const a00 = s(work.after, 0, 0);
-    const std::uint64_t* const a01 = s(work.after, 0, 1);
-    const std::uint64_t* const b00 = s(work.before, 0, 0);
-    const std::uint64_t* const b01 = s(work.before, 0, 1);
-    std::uint64_t* const active = work.active[z + 1];
-    std::uint64_t* const active_before = work.active_before[z + 1];
-    for (int i = cells.first + 1; i <= cells.last; ++i) {
-      const std::uint64_t any = s00[i] | s00[i + 1] | s01[i] | s01[i + 1];
-      const std::uint64_t all = s00[i] & s00[i + 1] & s01[i] & s01[i + 1];
-      const std::uint64_t any_after = a00[i] | a00[i + 1] | a01[i] | a01[i + 1];
-      const std::uint64_t all_after = a00[i] & a00[i + 1] & a01[i] & a01[i + 1];
-      const std::uint64_t any_before = b00[i] | b00[i + 1] | b01[i] | b01[i + 1];
-      const std::uint64_t all_before = b00[i] & b00[i + 1] & b01[i] & b01[i + 1];
-      active[i] = (any | any >> 1 | any_after << top) & ~(all & (all >> 1 | all_after << top)) & in_range;
-      active_before[i] = (any | any_before) & ~(all & all_before) & with_before;
-    }
-    RowSet rows;
-    for (int i = cells.first + 1; i <= cells.last; ++i) {
-      if ((active[i] | active_before[i]) != 0) rows.add(i - 1);
-    }
-    work.active_rows[static_cast<std::size_t>(z + 1)] = rows;
-  }
-}
-
-// Rows of points that are corners of an active cell, and those within the apron of one.
-bool find_needed(Work& work) {
-  work.corner_rows.fill({});
-  work.occlusion_rows.fill({});
-  bool is_any = false;
-  for (int z = work.cells.first; z < work.cells.last; ++z) {
-    RowSet rows = work.active_rows[static_cast<std::size_t>(z + 1)];
-    if (rows.empty()) continue;
-    is_any = true;
-    rows.unite(rows.raised());
-    const auto slice = [z](auto& sets, int dz) -> RowSet& {
-      return sets[static_cast<std::size_t>(z + dz + kWidestApron)];
-    };
-    for (int dz = 0; dz <= 1; ++dz) slice(work.corner_rows, dz).unite(rows);
-    if (work.occlusion.form == SmoothOcclusion::None) continue;
-    for (int i = 0; i < work.apron; ++i) {
-      const RowSet raised = rows.raised();
-      rows.unite(rows.lowered());
-      rows.unite(raised);
-    }
-    for (int dz = -work.apron; dz <= work.apron + 1; ++dz) slice(work.occlusion_rows, dz).unite(rows);
-  }
-  return is_any;
+RowPart row_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z) {
+  if (chunk == nullptr) return {nullptr, outside};
+  const Half* const samples = chunk->row(y.sample, z.sample);
+  return {samples, samples == nullptr ? chunk->get(0, y.sample, z.sample) : Half{0}};
 }
 
 // `kCount` points of a row of one chunk at level 0, from `first` on.
 template <int kCount>
-void copy_points(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int first, Half* to) {
-  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
-  if (from != nullptr) {
-    std::memcpy(to, from + first, kCount * sizeof(Half));
+void copy_points(const RowPart& part, int first, Half* to) {
+  if (part.samples != nullptr) {
+    std::memcpy(to, part.samples + first, kCount * sizeof(Half));
   } else {
-    std::fill_n(to, kCount, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
+    std::fill_n(to, kCount, part.value);
   }
 }
 
 // All points of a row of one chunk at a coarser level.
-void copy_thinned(const DensityChunk* chunk, Half outside, ChunkCoordinate y, ChunkCoordinate z, int level, Half* to) {
+void copy_thinned(const RowPart& part, int level, Half* to) {
   const int n = kChunkEdge >> level;
-  const Half* const from = chunk == nullptr ? nullptr : chunk->row(y.sample, z.sample);
-  if (from == nullptr) {
-    std::fill_n(to, n, chunk == nullptr ? outside : chunk->get(0, y.sample, z.sample));
-    return;
-  }
-  for (int i = 0; i < n; ++i) to[i] = from[i << level];
+  for (int i = 0; i < n; ++i) to[i] = part.samples == nullptr ? part.value : part.samples[i << level];
 }
 
 // Nothing to mesh where the chunk and all that its cells touch are of one sign throughout.
@@ -193,28 +134,31 @@ bool prepare(const DensityNeighbourhood& chunks, Work& work) {
   work.chunks = &chunks;
   work.apron = apron_of(work.occlusion);
   gather_signs(chunks, work);
-  find_active(work);
-  return find_needed(work);
+  return true;
 }
 
-void gather_row(const Work& work, int y, int z, Half* row) {
+std::array<RowPart, 3> row_parts(const Work& work, int y, int z) {
   const ChunkCoordinate cy = chunk_coordinate(y, work.level);
   const ChunkCoordinate cz = chunk_coordinate(z, work.level);
   const DensityNeighbourhood& chunks = *work.chunks;
-  const DensityChunk* const three[3] = {chunks.at(-1, cy.chunk, cz.chunk), chunks.at(0, cy.chunk, cz.chunk),
-                                        chunks.at(1, cy.chunk, cz.chunk)};
+  const auto part = [&](int dx) { return row_part(chunks.at(dx, cy.chunk, cz.chunk), chunks.outside, cy, cz); };
+  return {part(-1), part(0), part(1)};
+}
+
+void gather_row(const Work& work, int y, int z, Half* row) {
+  const std::array<RowPart, 3> parts = row_parts(work, y, z);
   if (work.level == 0) {
-    copy_points<kPointX>(three[0], chunks.outside, cy, cz, kChunkEdge - kPointX, row - kPointX);
-    copy_points<kChunkEdge>(three[1], chunks.outside, cy, cz, 0, row);
-    copy_points<kPointX>(three[2], chunks.outside, cy, cz, 0, row + kChunkEdge);
+    copy_points<kPointX>(parts[0], kChunkEdge - kPointX, row - kPointX);
+    copy_points<kChunkEdge>(parts[1], 0, row);
+    copy_points<kPointX>(parts[2], 0, row + kChunkEdge);
     return;
   }
   std::array<Half, kChunkEdge> before{};
-  copy_thinned(three[0], chunks.outside, cy, cz, work.level, before.data());
+  copy_thinned(parts[0], work.level, before.data());
   const int side = std::min(work.n, kPointX);
   std::copy_n(before.data() + work.n - side, side, row - side);
-  copy_thinned(three[1], chunks.outside, cy, cz, work.level, row);
-  copy_thinned(three[2], chunks.outside, cy, cz, work.level, row + work.n);
+  copy_thinned(parts[1], work.level, row);
+  copy_thinned(parts[2], work.level, row + work.n);
 }
 
 }  // namespace quoin::smooth

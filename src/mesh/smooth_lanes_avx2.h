@@ -41,6 +41,9 @@ inline I gather_pairs(const Half* base, I place) {
 inline F gather(const float* base, I place) {
   return {_mm256_i32gather_ps(base, place.v, 4)};
 }
+inline F look_up(const std::array<float, 16>& table, I index) {
+  return gather(table.data(), index);
+}
 // The first `count` lanes to their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   alignas(32) std::uint32_t places[8];

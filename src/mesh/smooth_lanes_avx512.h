@@ -41,6 +41,10 @@ inline I gather_pairs(const Half* base, I place) {
 inline F gather(const float* base, I place) {
   return {_mm512_i32gather_ps(place.v, base, 4)};
 }
+// Of a table in one register.
+inline F look_up(const std::array<float, 16>& table, I index) {
+  return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
+}
 // The first `count` lanes to their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   const auto mask = static_cast<__mmask16>(count >= 16 ? 0xFFFF : (1U << count) - 1);

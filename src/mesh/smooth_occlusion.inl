@@ -42,27 +42,25 @@ struct NineRows {
   F v[10];
 };
 
-inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane, int spread) {
-  const float* slices[6][kVerticesAtOnce];
-  for (int k = 0; k < 6; ++k) {
-    for (int i = 0; i < kVerticesAtOnce; ++i) {
-      const std::size_t at = lane + static_cast<std::size_t>(i);
-      const int z = (centres.z[at] + (k >> 1) * spread + (k & 1)) & work.decoded_mask;
-      slices[k][i] = work.decoded.data() + z * kDecodedSlice + centres.offset[at];
-    }
+template <int kSpread>
+inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane) {
+  const float* lowest[kVerticesAtOnce];
+  for (std::size_t i = 0; i < kVerticesAtOnce; ++i) {
+    lowest[i] =
+        work.decoded.data() + (centres.z[lane + i] & work.decoded_mask) * kDecodedSlice + centres.offset[lane + i];
   }
   const F fy = spread_out(centres.fy + lane);
   const F fz = spread_out(centres.fz + lane);
   NineRows rows;
   for (int k = 0; k < 3; ++k) {
-    F along_z[6];
-    for (int j = 0; j < 6; ++j) {
-      const int offset = ((j >> 1) * spread + (j & 1)) * kDecodedStride;
-      const F low = load_rows(slices[2 * k], offset);
-      along_z[j] = low + fz * (load_rows(slices[2 * k + 1], offset) - low);
-    }
     for (int j = 0; j < 3; ++j) {
-      rows.v[3 * k + j] = along_z[2 * j] + fy * (along_z[2 * j + 1] - along_z[2 * j]);
+      F along_z[2];
+      for (int i = 0; i < 2; ++i) {
+        const int at = k * kSpread * kDecodedSlice + (j * kSpread + i) * kDecodedStride;
+        const F low = load_rows(lowest, at);
+        along_z[i] = low + fz * (load_rows(lowest, at + kDecodedSlice) - low);
+      }
+      rows.v[3 * k + j] = along_z[0] + fy * (along_z[1] - along_z[0]);
     }
   }
   rows.v[9] = all(0.0F);
@@ -114,19 +112,16 @@ inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions&
   }
 }
 
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
-  if (count == 0) return;
-  decode_around(work, slice.z);
-  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
-  const int spread = static_cast<int>(work.occlusion.spread);
-  const Thirds low_lanes(spread, 0);
-  const Thirds high_lanes(spread, 1);
+template <int kSpread>
+void add_occlusion(const Work& work, const Slice& slice, std::size_t count, float* openness) {
+  const Thirds low_lanes(kSpread, 0);
+  const Thirds high_lanes(kSpread, 1);
   const bool is_counted = work.occlusion.form == SmoothOcclusion::Openness;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const Centres centres = find_centres(work, slice, first);
     const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);
     for (std::size_t lane = 0; lane < lanes; lane += kVerticesAtOnce) {
-      const NineRows rows = rows_around(work, centres, lane, spread);
+      const NineRows rows = rows_around<kSpread>(work, centres, lane);
       const Samples samples = samples_of(rows, spread_out(centres.fx + lane), low_lanes, high_lanes);
       if (is_counted) {
         store_openness(samples, openness + first + lane);
@@ -134,5 +129,16 @@ void add_occlusion(Work& work, const Slice& slice, std::size_t count, const Smoo
         store_weighted(samples, work.occlusion, openness + first + lane);
       }
     }
+  }
+}
+
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+  if (count == 0) return;
+  decode_around(work, slice.z);
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
+  if (work.occlusion.spread == 1.0F) {
+    add_occlusion<1>(work, slice, count, openness);
+  } else {
+    add_occlusion<2>(work, slice, count, openness);
   }
 }

@@ -8,19 +8,42 @@ void gather_slice(Work& work, int z) {
   }
 }
 
+void decode_part(const RowPart& part, int first, int count, float* to) {
+  if (part.samples != nullptr) return decode_row(part.samples + first, to, count);
+  alignas(64) Half same[kChunkEdge];
+  std::fill_n(same, count, part.value);
+  decode_row(same, to, count);
+}
+
+// The row of points (y, z), with sixteen before and after; x = 0 is at `to`.
+void decode_points(const Work& work, int y, int z, float* to) {
+  if (work.level == 0) {
+    const std::array<RowPart, 3> parts = row_parts(work, y, z);
+    decode_part(parts[0], kChunkEdge - kPointX, kPointX, to - kPointX);
+    decode_part(parts[1], 0, kChunkEdge, to);
+    decode_part(parts[2], 0, kPointX, to + kChunkEdge);
+    return;
+  }
+  alignas(64) Half halves[kPlaceStride] = {};
+  gather_row(work, y, z, halves + kPointX);
+  const int count = work.n + 2 * kPointX;
+  decode_row(halves, to - kPointX, count);
+  // Exact: the unit is a power of two.
+  const float unit = depth_unit(work.level);
+  for (int i = 0; i < count; ++i) to[i - kPointX] *= unit;
+}
+
 void decode_slice(Work& work, int z) {
   const RowSet& needed = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
   if (needed.empty()) return;
-  alignas(64) Half halves[kPlaceStride] = {};
+  const int slices = work.decoded_mask + 1;
+  const bool is_repeated = (z & work.decoded_mask) < kRepeatedSlices;
   for (int y = -work.apron - 1; y <= work.n + work.apron; ++y) {
     if (!needed.has(y)) continue;
-    gather_row(work, y, z, halves + kPointX);
-    float* const decoded = work.decoded_row(y, z) - kPointX;
-    decode_row(halves, decoded, work.n + 2 * kPointX);
-    if (work.level == 0) continue;
-    // Exact: the unit is a power of two.
-    const float unit = depth_unit(work.level);
-    for (int i = 0; i < work.n + 2 * kPointX; ++i) decoded[i] *= unit;
+    float* const row = work.decoded_row(y, z);
+    decode_points(work, y, z, row);
+    if (!is_repeated) continue;
+    std::memcpy(row - kPointX + std::ptrdiff_t{slices} * kDecodedSlice, row - kPointX, sizeof(float) * kDecodedStride);
   }
 }
 
@@ -28,7 +51,7 @@ void begin_occlusion(Work& work) {
   // The slices from `apron` below a cell to as many above its upper points.
   const int slices = work.apron <= 6 ? 16 : 32;
   work.decoded_mask = slices - 1;
-  const std::size_t size = static_cast<std::size_t>(slices) * kDecodedSlice + 64;
+  const std::size_t size = static_cast<std::size_t>(slices + kRepeatedSlices) * kDecodedSlice + 64;
   if (work.decoded.size() < size) work.decoded.resize(size);
   work.next_decoded = work.cells.first - work.apron;
 }

@@ -33,6 +33,7 @@ inline constexpr int kApronRows = 64 + 2 * kWidestApron + 2;
 inline constexpr int kPointSlice = 66 * kPlaceStride;
 inline constexpr int kDecodedStride = 96;
 inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
+inline constexpr int kRepeatedSlices = 5;
 
 // Words of signs: rows -1 to 64 of a slice.
 inline constexpr int kSignRows = 72;
@@ -51,9 +52,9 @@ struct RowSet {
   std::uint64_t low = 0;
   std::uint64_t high = 0;
 
-  void add(int y) {
-    const int bit = y + 16;
-    (bit < 64 ? low : high) |= std::uint64_t{1} << (bit & 63);
+  // Row -1, and rows 0 to 63 by their bits.
+  static RowSet of(bool has_first, std::uint64_t rows) {
+    return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
   }
   [[nodiscard]] bool has(int y) const {
     const int bit = y + 16;
@@ -102,7 +103,8 @@ struct Work {
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX].
+  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX]. The first
+  // kRepeatedSlices follow the last again, so that what one vertex reads lies at fixed distances.
   std::vector<float> decoded;
   int decoded_mask = 0;
   int next_decoded = 0;  // the first slice that is not there yet
@@ -131,8 +133,15 @@ inline constexpr int kVertexBits = 13;
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }
 
-// Fills in the signs, the active cells and which points are needed; false when no cell is active.
+// Fills in the signs; false when all are the same.
 [[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
+// A row of one chunk's samples, or the one value that all of them have.
+struct RowPart {
+  const Half* samples;  // null: all are `value`
+  Half value;
+};
+// The row of points (y, z) in the chunk before, the chunk and the chunk after.
+[[nodiscard]] std::array<RowPart, 3> row_parts(const Work& work, int y, int z);
 // Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
 // where x = 0 is.
 void gather_row(const Work& work, int y, int z, Half* row);

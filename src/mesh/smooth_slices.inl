@@ -1,6 +1,8 @@
 // The walk over the slices of a chunk, for every kernel. Included within a namespace, after what finds the places of
 // bits (`append_places`, `append_edges`), makes vertices (`make_vertices`, `add_occlusion`) and quads (`make_quads`).
 
+#include "mesh/smooth_active.inl"
+
 // Lists the active cells of slice z of cells.
 std::size_t list_cells(Work& work, int z) {
   const RowSet& rows = work.active_rows[static_cast<std::size_t>(z + 1)];
@@ -61,6 +63,8 @@ void quads_of_slice(Work& work, const Slice& slice, SmoothChunkMesh& out) {
 }
 
 void mesh_slices(Work& work, SmoothChunkMesh& out) {
+  find_active(work);
+  if (!find_needed(work)) return;
   const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
   Slice slice;
   if (has_occlusion) begin_occlusion(work);

@@ -78,7 +78,7 @@ inline F sum_of_crossings(const F* d, const int (&low)[4], int step) {
 
 inline Lanes3 mean_of_crossings(const CornerLanes& corners) {
   const I counts = gather(kCrossings.data(), corners.configuration);
-  const F inverse = gather(kReciprocals.data(), shift_right<24>(counts));
+  const F inverse = look_up(kReciprocals, shift_right<24>(counts));
   const I byte = all(0xFF);
   return {(sum_of_crossings(corners.d, {0, 2, 4, 6}, 1) + to_float(counts & byte)) * inverse,
           (sum_of_crossings(corners.d, {0, 1, 4, 5}, 2) + to_float(shift_right<8>(counts) & byte)) * inverse,
