@@ -149,7 +149,7 @@ class GridReader {
 /// comes to another row, when it is flushed, and at its end. Until then the grid is as it was.
 ///
 /// Requires: the grid outlives the writer; nobody reads it before a flush and expects what was set.
-/// Cost:     where voxels come in rows, a tenth of `Grid::set`; where every voxel lies in another row, twice as much.
+/// Cost:     where voxels come in rows, a tenth of `Grid::set`; where every voxel lies in another row, more than that.
 class GridWriter {
  public:
   explicit GridWriter(Grid& grid) : grid_(&grid) {}
