@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cstring>
+#include <utility>
 
 #include "grid/packed_row.h"
 
@@ -17,6 +19,46 @@ int bits_for(std::size_t types) {
   if (types <= 4) return 2;
   if (types <= 16) return 4;
   return types <= 256 ? 8 : 16;
+}
+
+// Adds to the counts whose bits are set; in such steps that compilers make vectors of them.
+void add_columns(std::array<std::uint16_t, kChunkEdge>& counts, std::uint64_t mask, int delta) {
+  if (mask == 0) return;
+  const auto addend = static_cast<std::uint16_t>(delta);
+  if (mask == kAllVoxels) {
+    for (std::uint16_t& count : counts) count = static_cast<std::uint16_t>(count + addend);
+    return;
+  }
+  for (std::size_t i = 0; i < kChunkEdge; i += 8) {
+    const auto eight = static_cast<std::uint16_t>(mask >> i & 0xFFU);
+    for (unsigned k = 0; k < 8; ++k) {
+      const auto bit = static_cast<std::uint16_t>(1U << k);
+      const auto all_or_none = static_cast<std::uint16_t>((eight & bit) == bit ? ~0U : 0U);
+      counts[i + k] = static_cast<std::uint16_t>(counts[i + k] + (all_or_none & addend));
+    }
+  }
+}
+
+bool is_one_type(std::span<const VoxelType> types) {
+  return std::memcmp(types.data(), types.data() + 1, types.size_bytes() - sizeof(VoxelType)) == 0;
+}
+
+// Calls `visit(type, voxels)` for the types of a row in the order in which they come; where there are many, for some of
+// them more than once.
+template <class Visit>
+void for_each_run(std::span<const VoxelType, kChunkEdge> row, Visit&& visit) {
+  constexpr int kFewTypes = 6;
+  if (is_one_type(row)) return visit(row[0], kAllVoxels);
+  std::uint64_t left = kAllVoxels;
+  for (int i = 0; i < kFewTypes && left != 0; ++i) {
+    const VoxelType type = row[static_cast<std::size_t>(std::countr_zero(left))];
+    const std::uint64_t same = packed_row::where_equal(row.data(), type);
+    visit(type, same);
+    left &= ~same;
+  }
+  for (; left != 0; left &= left - 1) {
+    visit(row[static_cast<std::size_t>(std::countr_zero(left))], left & (~left + 1));
+  }
 }
 
 // The rows of a slab, in the order in which they are stored.
@@ -44,92 +86,14 @@ void Chunk::fill(VoxelType type) {
   uniform_ = type;
 }
 
-void Chunk::make_mixed() {
-  mixed_ = std::make_unique<Mixed>();
-  Mixed& m = *mixed_;
-  m.palette.push_back(uniform_);
-  m.counts.push_back(kChunkVoxels);
-  m.slabs.fill(kUniformSlab | 0U);
-  if (uniform_ != kAir) {
-    m.non_air = kChunkVoxels;
-    for (auto& axis : m.layer_counts) axis.fill(kChunkEdge * kChunkEdge);
-  }
-}
-
-// The palette index of a type, adding it where it is new; may widen the voxels.
-std::uint32_t Chunk::index_for(VoxelType type) {
-  Mixed& m = *mixed_;
-  if (m.direct()) return type;
-  std::size_t unused = m.palette.size();
-  for (std::size_t i = 0; i < m.palette.size(); ++i) {
-    if (m.palette[i] == type) return static_cast<std::uint32_t>(i);
-    if (m.counts[i] == 0) unused = i;
-  }
-  if (unused < m.palette.size()) {
-    m.palette[unused] = type;
-    return static_cast<std::uint32_t>(unused);
-  }
-  if (m.palette.size() == std::size_t{1} << m.bits) widen(m.bits * 2);
-  if (m.direct()) return type;
-  m.counts.reserve(m.counts.size() + 1);  // so that both grow or neither
-  m.palette.push_back(type);
-  m.counts.push_back(0);
-  return static_cast<std::uint32_t>(m.palette.size() - 1);
-}
-
-void Chunk::widen(int bits) {
-  Mixed& m = *mixed_;
-  const auto stored_as = [&](std::uint32_t index) { return bits == 16 ? std::uint32_t{m.palette[index]} : index; };
-  const std::size_t rows = m.words.size() / static_cast<std::size_t>(m.bits);
-  std::vector<std::uint64_t> words(rows * static_cast<std::size_t>(bits));
-  for (std::size_t row = 0; row < rows; ++row) {
-    const std::uint64_t* from = m.words.data() + row * static_cast<std::size_t>(m.bits);
-    std::uint64_t* to = words.data() + row * static_cast<std::size_t>(bits);
-    for (int x = 0; x < kChunkEdge; ++x) packed_row::write(to, bits, x, stored_as(packed_row::read(from, m.bits, x)));
-  }
-  for (std::uint32_t& slab : m.slabs) {
-    if ((slab & kUniformSlab) != 0) slab = kUniformSlab | stored_as(slab & ~kUniformSlab);
-  }
-  m.words = std::move(words);
-  m.bits = bits;
-  if (m.direct()) {
-    m.palette = {};
-    m.counts = {};
-  }
-}
-
-// A slot of its own for a slab, filled with the slab's type where it had none.
-std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
-  Mixed& m = *mixed_;
-  const std::uint32_t entry = m.slabs[slab];
-  if ((entry & kUniformSlab) == 0) return entry;
-  const auto slab_words = static_cast<std::size_t>(kSlabRows * m.bits);
-  std::uint32_t slot = 0;
-  if (!m.free_slots.empty()) {
-    slot = m.free_slots.back();
-    m.free_slots.pop_back();
-  } else {
-    slot = static_cast<std::uint32_t>(m.words.size() / slab_words);
-    m.words.resize(m.words.size() + slab_words);
-  }
-  std::fill_n(m.row(slot, 0), slab_words, packed_row::repeat(m.bits, entry & ~kUniformSlab));
-  m.slabs[slab] = slot;
-  return slot;
-}
-
 void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid) {
   Mixed& m = *mixed_;
   const int delta = std::popcount(became_solid) - std::popcount(became_air);
   m.non_air += delta;
   m.layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
   m.layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
-  auto& columns = m.layer_counts[0];
-  if (became_solid == kAllVoxels) {
-    for (std::uint16_t& count : columns) ++count;
-    return;
-  }
-  for (std::uint64_t w = became_air; w != 0; w &= w - 1) --columns[static_cast<std::size_t>(std::countr_zero(w))];
-  for (std::uint64_t w = became_solid; w != 0; w &= w - 1) ++columns[static_cast<std::size_t>(std::countr_zero(w))];
+  add_columns(m.layer_counts[0], became_solid, 1);
+  add_columns(m.layer_counts[0], became_air, -1);
 }
 
 std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
@@ -146,65 +110,98 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
   return packed_row::equal_mask(m.row(slab, row_in_slab(y, z)), m.bits, index);
 }
 
-std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
-  const std::uint64_t changed = mask & ~row_mask(y, z, type);
-  if (changed == 0) return 0;
+// Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
+std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   if (mixed_ == nullptr) make_mixed();
-  const std::uint64_t air = row_mask(y, z, kAir);
   const std::uint32_t index = index_for(type);
   Mixed& m = *mixed_;
   std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
-  if (!m.direct()) {
-    for (std::uint64_t left = changed; left != 0;) {
-      const std::uint32_t old = packed_row::read(row, m.bits, std::countr_zero(left));
-      const std::uint64_t same = left & packed_row::equal_mask(row, m.bits, old);
-      m.counts[old] -= static_cast<std::uint32_t>(std::popcount(same));
-      left &= ~same;
-    }
-    m.counts[index] += static_cast<std::uint32_t>(std::popcount(changed));
+  const std::uint32_t first = packed_row::read(row, m.bits, 0);
+  if (packed_row::all_equal(row, m.bits, 1, first)) {
+    m.move_counts(first, index, static_cast<std::uint32_t>(std::popcount(changed)));
+    packed_row::write_masked(row, m.bits, changed, index);
+    return index;
+  }
+  for (std::uint64_t left = changed; left != 0;) {
+    const std::uint32_t old = packed_row::read(row, m.bits, std::countr_zero(left));
+    const std::uint64_t same = left & packed_row::equal_mask(row, m.bits, old);
+    m.move_counts(old, index, static_cast<std::uint32_t>(std::popcount(same)));
+    left &= ~same;
   }
   packed_row::write_masked(row, m.bits, changed, index);
-  if (type == kAir) {
-    count_change(y, z, changed, 0);
-  } else {
-    count_change(y, z, 0, changed & air);
-  }
-  if (!m.direct() && m.counts[index] == kChunkVoxels) fill(type);
+  return index;
+}
+
+std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
+  const std::uint64_t changed = mask & ~row_mask(y, z, type);
+  if (changed == 0) return 0;
+  const std::uint64_t air = type == kAir ? 0 : row_mask(y, z, kAir);
+  const std::uint32_t index = replace(y, z, changed, type);
+  count_change(y, z, type == kAir ? changed : 0, changed & air);
+  after_writing(y, z, index, static_cast<std::uint32_t>(std::popcount(changed)));
   return changed;
 }
 
 bool Chunk::set(int x, int y, int z, VoxelType type) {
   assert((x | y | z) >= 0 && (x | y | z) < kChunkEdge);
+  if (mixed_ == nullptr) return type != uniform_ && set_anywhere(x, y, z, type);
+  Mixed& m = *mixed_;
+  const std::uint32_t slot = m.slabs[slab_index(y, z)];
+  if ((slot & kUniformSlab) != 0 || m.direct() || m.palette[m.recent] != type) return set_anywhere(x, y, z, type);
+  const auto bit = static_cast<unsigned>(x * m.bits);
+  std::uint64_t& word = m.row(slot, row_in_slab(y, z))[bit >> 6];
+  const std::uint32_t old = static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << m.bits) - 1U);
+  if (old == m.recent) return false;
+  word ^= std::uint64_t{old ^ m.recent} << (bit & 63U);
+  m.move_counts(old, m.recent, 1);
+  if (type == kAir) {
+    m.count_voxel(x, y, z, -1);
+  } else if (m.palette[old] == kAir) {
+    m.count_voxel(x, y, z, 1);
+  }
+  after_writing(y, z, m.recent, 1);
+  return true;
+}
+
+// Also where the slab has no voxels of its own yet, and for types that were not the last to be written.
+bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = get(x, y, z);
   if (old == type) return false;
   if (mixed_ == nullptr) make_mixed();
   const std::uint32_t index = index_for(type);
   Mixed& m = *mixed_;
   std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
-  if (!m.direct()) {
-    --m.counts[packed_row::read(row, m.bits, x)];
-    ++m.counts[index];
-  }
+  m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);
-  if ((old == kAir) != (type == kAir)) {
-    const int delta = type == kAir ? -1 : 1;
-    m.non_air += delta;
-    m.layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
-    m.layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
-    m.layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
-  }
-  if (!m.direct() && m.counts[index] == kChunkVoxels) fill(type);
+  if ((old == kAir) != (type == kAir)) m.count_voxel(x, y, z, type == kAir ? -1 : 1);
+  after_writing(y, z, index, 1);
   return true;
 }
 
-std::uint64_t Chunk::write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
+std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) {
+  constexpr int kFewTypes = 6;
+  const std::uint64_t air = row_mask(y, z, kAir);
   std::uint64_t changed = 0;
-  for (std::uint64_t left = kAllVoxels; left != 0;) {
+  std::uint64_t became_air = 0;
+  std::uint64_t left = mask;
+  std::uint32_t index = 0;
+  for (int i = 0; i < kFewTypes && left != 0; ++i) {
     const VoxelType type = types[static_cast<std::size_t>(std::countr_zero(left))];
-    std::uint64_t same = 0;
-    for (std::size_t x = 0; x < kChunkEdge; ++x) same |= std::uint64_t{types[x] == type} << x;
-    changed |= set_row(y, z, same & left, type);
+    const std::uint64_t same = left & packed_row::where_equal(types.data(), type);
+    const std::uint64_t others = same & ~row_mask(y, z, type);
     left &= ~same;
+    if (others == 0) continue;
+    index = replace(y, z, others, type);
+    changed |= others;
+    if (type == kAir) became_air = others;
+  }
+  if (changed != 0) {
+    count_change(y, z, became_air, changed & air);
+    after_writing(y, z, index, static_cast<std::uint32_t>(std::popcount(changed)));
+  }
+  for (; left != 0; left &= left - 1) {
+    const int x = std::countr_zero(left);
+    if (set(x, y, z, types[static_cast<std::size_t>(x)])) changed |= std::uint64_t{1} << x;
   }
   return changed;
 }
@@ -223,8 +220,7 @@ void Chunk::read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const {
     std::fill(out.begin(), out.end(), type_of(slab & ~kUniformSlab));
     return;
   }
-  const std::uint64_t* row = m.row(slab, row_in_slab(y, z));
-  for (int x = 0; x < kChunkEdge; ++x) out[static_cast<std::size_t>(x)] = type_of(packed_row::read(row, m.bits, x));
+  packed_row::unpack(m.row(slab, row_in_slab(y, z)), m.bits, m.palette.data(), m.palette.size(), out.data());
 }
 
 void Chunk::fill_box(const IBox& box, VoxelType type,
@@ -244,40 +240,38 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
         if (changed != 0) on_change(row_y, row_z, changed);
       }
     }
-    if (mask == kAllVoxels && part.size().y == 4 && part.size().z == 4) make_slab_uniform(slab, type);
   }
   if (inside == IBox{IVec3{0}, IVec3{kChunkEdge}}) fill(type);
 }
 
-// Requires: every voxel of the slab is of this type already.
-void Chunk::make_slab_uniform(std::size_t slab, VoxelType type) {
-  if (mixed_ == nullptr || (mixed_->slabs[slab] & kUniformSlab) != 0) return;
-  mixed_->free_slots.push_back(mixed_->slabs[slab]);
-  mixed_->slabs[slab] = kUniformSlab | index_for(type);
-}
-
 Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   Chunk chunk(types[0]);
-  if (std::all_of(types.begin(), types.end(), [&](VoxelType t) { return t == types[0]; })) return chunk;
+  if (is_one_type(types)) return chunk;
   chunk.mixed_ = std::make_unique<Mixed>();
   Mixed& m = *chunk.mixed_;
   constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
   std::vector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
-  for (const VoxelType type : types) {
-    if (index_of[type] != kUnseen) {
-      ++m.counts[index_of[type]];
-      continue;
-    }
-    index_of[type] = static_cast<std::uint32_t>(m.palette.size());
-    m.palette.push_back(type);
-    m.counts.push_back(1);
+  for (std::size_t first = 0; first < types.size(); first += kChunkEdge) {
+    for_each_run(types.subspan(first).first<kChunkEdge>(), [&](VoxelType type, std::uint64_t voxels) {
+      if (index_of[type] == kUnseen) {
+        index_of[type] = static_cast<std::uint32_t>(m.palette.size());
+        m.palette.push_back(type);
+        m.counts.push_back(0);
+      }
+      m.counts[index_of[type]] += static_cast<std::uint32_t>(std::popcount(voxels));
+    });
   }
   m.bits = bits_for(m.palette.size());
   if (m.direct()) {
-    for (const VoxelType type : m.palette) index_of[type] = type;
+    std::vector<std::uint32_t> counts(Mixed::kRemainders);
+    for (const VoxelType type : m.palette) {
+      counts[type % Mixed::kRemainders] += m.counts[index_of[type]];
+      index_of[type] = type;
+    }
     m.palette = {};
-    m.counts = {};
+    m.counts = std::move(counts);
   }
+  m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
   for (std::size_t slab = 0; slab < m.slabs.size(); ++slab) chunk.pack_slab(slab, types, index_of);
   return chunk;
 }
@@ -286,36 +280,27 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
                       const std::vector<std::uint32_t>& index_of) {
   Mixed& m = *mixed_;
   const auto row_of = [&](int y, int z) {
-    return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge), kChunkEdge);
+    return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge)).first<kChunkEdge>();
   };
   const VoxelType first = row_of(static_cast<int>(slab % 16) * 4, static_cast<int>(slab / 16) * 4)[0];
   bool is_uniform = true;
   for_each_row_of_slab(slab, [&](int, int y, int z) {
     const auto row = row_of(y, z);
-    std::uint64_t solid = 0;
-    for (std::size_t x = 0; x < kChunkEdge; ++x) {
-      is_uniform &= row[x] == first;
-      solid |= std::uint64_t{row[x] != kAir} << x;
+    is_uniform = is_uniform && row[0] == first && is_one_type(row);
+  });
+  m.slabs[slab] = kUniformSlab | index_of[first];
+  const std::uint32_t slot = is_uniform ? 0 : slot_for_writing(slab);
+  for_each_row_of_slab(slab, [&](int stored, int y, int z) {
+    std::uint64_t solid = first == kAir ? 0 : kAllVoxels;
+    if (!is_uniform) {
+      solid = 0;
+      for_each_run(row_of(y, z), [&](VoxelType type, std::uint64_t voxels) {
+        packed_row::write_masked(m.row(slot, stored), m.bits, voxels, index_of[type]);
+        if (type != kAir) solid |= voxels;
+      });
     }
     if (solid != 0) count_change(y, z, 0, solid);
   });
-  m.slabs[slab] = kUniformSlab | index_of[first];
-  if (is_uniform) return;
-  const std::uint32_t slot = slot_for_writing(slab);
-  for_each_row_of_slab(slab, [&](int stored, int y, int z) {
-    const auto row = row_of(y, z);
-    std::uint64_t* packed = m.row(slot, stored);
-    std::fill_n(packed, m.bits, 0);
-    for (std::size_t x = 0; x < kChunkEdge; ++x) {
-      const std::size_t bit = x * static_cast<std::size_t>(m.bits);
-      packed[bit >> 6] |= std::uint64_t{index_of[row[x]]} << (bit & 63);
-    }
-  });
-}
-
-int Chunk::non_air_count() const {
-  if (mixed_ != nullptr) return mixed_->non_air;
-  return uniform_ == kAir ? 0 : static_cast<int>(kChunkVoxels);
 }
 
 int Chunk::count(VoxelType type) const {
@@ -368,26 +353,6 @@ IBox Chunk::bounds() const {
     box.max[axis] = static_cast<int>(counts.rend() - std::find_if(counts.rbegin(), counts.rend(), is_filled));
   }
   return box;
-}
-
-std::size_t Chunk::bytes() const {
-  if (mixed_ == nullptr) return sizeof(Chunk);
-  const Mixed& m = *mixed_;
-  return sizeof(Chunk) + sizeof(Mixed) + m.palette.capacity() * sizeof(VoxelType) +
-         m.counts.capacity() * sizeof(std::uint32_t) + m.words.capacity() * sizeof(std::uint64_t) +
-         m.free_slots.capacity() * sizeof(std::uint32_t);
-}
-
-void Chunk::compact() {
-  if (mixed_ == nullptr) return;
-  std::vector<VoxelType> dense(kChunkVoxels);
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      read_row(y, z, std::span<VoxelType, kChunkEdge>(dense.data() + (z * kChunkEdge + y) * kChunkEdge, kChunkEdge));
-    }
-  }
-  *this = from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
-  if (mixed_ != nullptr) mixed_->words.shrink_to_fit();
 }
 
 }  // namespace quoin

@@ -1,114 +1,15 @@
 #include <quoin/grid/downsample.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <iterator>
-#include <limits>
-#include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
+#include "grid/chunk_halver.h"
 #include "grid/chunk_order.h"
-#include "grid/halving.h"
 
 namespace quoin {
 namespace {
-
-constexpr int kHalfEdge = kChunkEdge / 2;
-
-// The voxels of the two by two rows that make one row of cells: [z][y].
-using Rows = std::array<std::array<VoxelType, kChunkEdge>, 4>;
-
-// The one type of the 4 x 4 rows in which (y, z) lies, if they are stored as such.
-std::optional<VoxelType> uniform_rows(const Chunk& chunk, int y, int z) {
-  const Chunk::Mixed* mixed = chunk.mixed();
-  if (mixed == nullptr) return chunk.uniform();
-  const std::uint32_t slab = mixed->slabs[Chunk::slab_index(y, z)];
-  if ((slab & Chunk::kUniformSlab) == 0) return std::nullopt;
-  const std::uint32_t index = slab & ~Chunk::kUniformSlab;
-  return mixed->direct() ? static_cast<VoxelType>(index) : mixed->palette[index];
-}
-
-// Makes one chunk of cells.
-class ChunkHalver {
- public:
-  ChunkHalver(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) : masks_(grid, chunk), types_(&types) {}
-
-  [[nodiscard]] Chunk make() {
-    cells_.assign(kChunkVoxels, kAir);
-    for (int octant = 0; octant < 8; ++octant) fill_octant({octant & 1, octant >> 1 & 1, octant >> 2});
-    return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(cells_));
-  }
-
- private:
-  void fill_octant(IVec3 octant) {
-    const Chunk* chunk = masks_.octant(octant);
-    if (chunk == nullptr) return;
-    for (int z = 0; z < kHalfEdge; ++z) {
-      for (int y = 0; y < kHalfEdge; ++y) {
-        const IVec3 first = octant * kHalfEdge + IVec3{0, y, z};
-        const std::uint64_t row = masks_.solid_cells(first.y, first.z) >> first.x & 0xFFFF'FFFFU;
-        if (row != 0) fill_row(*chunk, first, row);
-      }
-    }
-  }
-
-  // `first`: the row's first cell; `solid`: which of its 32 cells to fill.
-  void fill_row(const Chunk& chunk, IVec3 first, std::uint64_t solid) {
-    VoxelType* out = cells_.data() + (first.z * kChunkEdge + first.y) * kChunkEdge + first.x;
-    const int y = 2 * (first.y % kHalfEdge);
-    const int z = 2 * (first.z % kHalfEdge);
-    if (const auto type = uniform_rows(chunk, y, z)) {
-      std::fill_n(out, kHalfEdge, *type);
-      return;
-    }
-    for (int i = 0; i < 4; ++i) chunk.read_row(y + (i & 1), z + (i >> 1), rows_[static_cast<std::size_t>(i)]);
-    for (std::uint64_t left = solid; left != 0; left &= left - 1) {
-      const int x = std::countr_zero(left);
-      out[x] = type_of(x, 2 * (first + IVec3{x, 0, 0}));
-    }
-  }
-
-  // `x`: of the cell in its row; `fine`: its first voxel.
-  [[nodiscard]] VoxelType type_of(int x, IVec3 fine) const {
-    std::array<VoxelType, 8> found{};
-    VoxelType least = std::numeric_limits<VoxelType>::max();
-    VoxelType greatest = kAir;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      found[i] = rows_[i >> 1][static_cast<std::size_t>(2 * x) + (i & 1)];
-      if (found[i] == kAir) continue;
-      least = std::min(least, found[i]);
-      greatest = std::max(greatest, found[i]);
-    }
-    return least == greatest ? least : heaviest(found, fine);
-  }
-
-  [[nodiscard]] VoxelType heaviest(const std::array<VoxelType, 8>& found, IVec3 fine) const {
-    const bool has_opaque = std::any_of(found.begin(), found.end(),
-                                        [&](VoxelType type) { return type != kAir && types_->is_opaque(type); });
-    std::array<int, 8> weights{};
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      if (found[i] == kAir || (has_opaque && !types_->is_opaque(found[i]))) continue;
-      const auto bits = static_cast<int>(i);
-      const int weight = 1 + 8 * masks_.exposed_faces(fine + IVec3{bits & 1, bits >> 1 & 1, bits >> 2});
-      const auto first = static_cast<std::size_t>(std::find(found.begin(), found.end(), found[i]) - found.begin());
-      weights[first] += weight;
-    }
-    std::size_t best = 0;
-    for (std::size_t i = 1; i < found.size(); ++i) {
-      const bool is_lower = weights[i] == weights[best] && found[i] < found[best];
-      if (weights[i] > weights[best] || (is_lower && weights[i] > 0)) best = i;
-    }
-    return found[best];
-  }
-
-  HalvingMasks masks_;
-  const VoxelRegistry* types_;
-  std::vector<VoxelType> cells_;
-  Rows rows_{};
-};
 
 IVec3 halved_coordinates(IVec3 chunk) {
   return {chunk.x >> 1, chunk.y >> 1, chunk.z >> 1};

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <set>
 
 #include <tsl/robin_map.h>
 
 #include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
 #include "grid/long_box.h"
 #include "grid/reach.h"
 
@@ -20,6 +20,17 @@ std::uint64_t next_identity() {
   return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
+// Spreads chunks over the table. The three products do not wait for each other, and a voxel that is looked up because
+// of the one before waits for all of this.
+struct ChunkHash {
+  std::size_t operator()(IVec3 c) const {
+    const auto times = [](int i, std::uint64_t factor) { return static_cast<std::uint32_t>(i) * factor; };
+    const std::uint64_t sum =
+        times(c.x, 0x9E37'79B9'7F4A'7C15U) + times(c.y, 0xC2B2'AE3D'27D4'EB4FU) + times(c.z, 0x1656'67B1'9E37'79F9U);
+    return static_cast<std::size_t>(sum >> 32);
+  }
+};
+
 }  // namespace
 
 struct Grid::Impl {
@@ -29,7 +40,7 @@ struct Grid::Impl {
     std::uint64_t neighbourhood_version = 0;
     bool is_dirty = false;  ///< its coordinates stand in `dirty`
   };
-  tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries;
+  tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
   std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
   std::uint64_t identity = next_identity();
@@ -69,14 +80,10 @@ struct Grid::Impl {
   }
 
   void touch_neighbours(IVec3 chunk, std::uint32_t mask) {
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          if ((mask >> Neighbourhood::index(dx, dy, dz) & 1U) == 0) continue;
-          const IVec3 at = chunk + IVec3{dx, dy, dz};
-          if (Entry* neighbour = find(at)) touch(at, *neighbour);
-        }
-      }
+    for (std::uint32_t left = mask & ~Reach::kCentreOnly; left != 0; left &= left - 1) {
+      const int i = std::countr_zero(left);
+      const IVec3 at = chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      if (Entry* neighbour = find(at)) touch(at, *neighbour);
     }
   }
 
@@ -123,7 +130,10 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   return changed;
 }
 
-Grid::Grid() : impl_(std::make_unique<Impl>()) {}
+// The table of chunks shrinks again where few of many are left.
+Grid::Grid() : impl_(std::make_unique<Impl>()) {
+  impl_->entries.min_load_factor(0.1F);
+}
 Grid::Grid(Grid&&) noexcept = default;
 Grid& Grid::operator=(Grid&&) noexcept = default;
 Grid::~Grid() = default;
@@ -153,10 +163,34 @@ bool Grid::set(IVec3 voxel, VoxelType type) {
   }
   if (!entry->chunk.set(local, type)) return false;
   ++impl_->version;
+  const auto is_inner = [](int i) { return i != 0 && i != kChunkEdge - 1; };
+  if (is_inner(local.x) && is_inner(local.y) && is_inner(local.z)) {
+    impl_->finish_edit(at, *entry, {.voxels = 1, .mask = Reach::kCentreOnly});
+    return true;
+  }
   Reach reach;
   reach.add(local.y, local.z, std::uint64_t{1} << local.x);
   impl_->finish_edit(at, *entry, reach);
   return true;
+}
+
+std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) {
+  const IVec3 at = chunk_of(row);
+  const IVec3 local = local_of(row);
+  if (mask == 0 || !is_inside_world(at)) return 0;
+  Impl::Entry& entry = impl_->find_or_create(at);
+  ++impl_->version;
+  Reach reach;
+  try {
+    reach.add(local.y, local.z, entry.chunk.write_row(local.y, local.z, mask, types));
+  } catch (...) {
+    reach.add_all();
+    impl_->finish_edit(at, entry, reach);
+    throw;
+  }
+  if (reach.voxels == 0) --impl_->version;
+  impl_->finish_edit(at, entry, reach);
+  return reach.voxels;
 }
 
 std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {

@@ -4,6 +4,8 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 
@@ -72,7 +74,49 @@ void get_dependent(benchmark::State& state) {
 }
 BENCHMARK(get_dependent)->Name("grid/get_dependent")->Unit(benchmark::kMillisecond);
 
+// The same walk through a plain array of bytes, which takes 8,388,608 of them.
+void get_dependent_dense(benchmark::State& state) {
+  constexpr int kGets = 1'000'000;
+  std::vector<std::uint8_t> dense;
+  for (int z = 0; z < kWidth; ++z) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) dense.push_back(static_cast<std::uint8_t>(world().get({x, y, z})));
+    }
+  }
+  for (auto _ : state) {
+    std::uint32_t s = 12'345;
+    for (int i = 0; i < kGets; ++i) {
+      const std::size_t at =
+          (static_cast<std::size_t>(s >> 24) * kHeight + (s >> 16 & 127U)) * kWidth + (s >> 8 & 255U);
+      s = s * 1'664'525U + 1'013'904'223U + dense[at];
+    }
+    benchmark::DoNotOptimize(s);
+  }
+  state.counters["seconds_per_get"] =
+      benchmark::Counter(double{kGets}, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(get_dependent_dense)->Name("grid/dense/get_dependent")->Unit(benchmark::kMillisecond);
+
 void set_sequential(benchmark::State& state) {
+  constexpr int kEdge = 128;
+  for (auto _ : state) {
+    Grid grid;
+    GridWriter writer(grid);
+    for (int z = 0; z < kEdge; ++z) {
+      for (int y = 0; y < kEdge; ++y) {
+        for (int x = 0; x < kEdge; ++x) writer.set({x, y, z}, static_cast<VoxelType>(1 + (x & y & 1)));
+      }
+    }
+    writer.flush();
+    if (grid.voxel_count() != kEdge * kEdge * kEdge) std::exit(1);
+  }
+  state.counters["seconds_per_set"] = benchmark::Counter(
+      double{kEdge} * kEdge * kEdge, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(set_sequential)->Name("grid/set_sequential")->Unit(benchmark::kMillisecond);
+
+// The same, each voxel by an edit of its own.
+void set_alone(benchmark::State& state) {
   constexpr int kEdge = 128;
   for (auto _ : state) {
     Grid grid;
@@ -86,7 +130,34 @@ void set_sequential(benchmark::State& state) {
   state.counters["seconds_per_set"] = benchmark::Counter(
       double{kEdge} * kEdge * kEdge, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
-BENCHMARK(set_sequential)->Name("grid/set_sequential")->Unit(benchmark::kMillisecond);
+BENCHMARK(set_alone)->Name("grid/set_alone")->Unit(benchmark::kMillisecond);
+
+// Rounds of a million voxels set to random ones of `types` types, and back: what the grid takes then, beside what a new
+// one takes.
+void edits_undone(benchmark::State& state, std::uint32_t types) {
+  constexpr int kEdits = 1'000'000;
+  Grid grid = world().clone();
+  std::vector<std::pair<IVec3, VoxelType>> undo(kEdits);
+  std::uint64_t s = 42;
+  for (auto _ : state) {
+    for (auto& [at, old] : undo) {
+      s ^= s << 13;
+      s ^= s >> 7;
+      s ^= s << 17;
+      at = {static_cast<int>(s >> 8 & 255U), static_cast<int>(s >> 16 & 127U), static_cast<int>(s >> 24 & 255U)};
+      old = grid.get(at);
+      grid.set(at, static_cast<VoxelType>((s >> 32) % types));
+    }
+    for (auto it = undo.rbegin(); it != undo.rend(); ++it) grid.set(it->first, it->second);
+    if (grid.voxel_count() != kSolid) std::exit(1);
+  }
+  state.counters["bytes"] = static_cast<double>(grid.bytes());
+  state.counters["bytes_of_a_new_one"] = static_cast<double>(world().bytes());
+  state.counters["seconds_per_set"] =
+      benchmark::Counter(2.0 * kEdits, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+BENCHMARK_CAPTURE(edits_undone, few, 4U)->Name("grid/edits_undone/4_types")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(edits_undone, many, 60'000U)->Name("grid/edits_undone/60000_types")->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace quoin

@@ -1,11 +1,14 @@
 #include <quoin/grid/grid.h>
 
+#include <array>
 #include <limits>
 #include <map>
 #include <new>
 #include <random>
 #include <set>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -290,13 +293,6 @@ TEST(Grid, CornersOfTheWorldCanBeEdited) {
       EXPECT_EQ(visited, 5);
     }
   }
-}
-
-TEST(GridReader, ReadsAsTheGridDoes) {
-  Grid grid;
-  grid.fill_sphere({0, 0, 0}, 20.0, 3);
-  GridReader reader(grid);
-  for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
 }
 
 TEST(Grid, ItsIdentityGoesWithTheVoxelsAndIsNoOthers) {

@@ -2,23 +2,13 @@
 
 #include <algorithm>
 
-#include <quoin/core/direction.h>
+#include "grid/packed_row.h"
 
 namespace quoin {
 namespace {
 
 constexpr std::uint64_t kEven = 0x5555'5555'5555'5555U;
 constexpr std::uint64_t kOdd = ~kEven;
-
-// The 32 even bits, side by side.
-std::uint64_t even_bits(std::uint64_t bits) {
-  bits &= kEven;
-  bits = (bits | bits >> 1) & 0x3333'3333'3333'3333U;
-  bits = (bits | bits >> 2) & 0x0F0F'0F0F'0F0F'0F0FU;
-  bits = (bits | bits >> 4) & 0x00FF'00FF'00FF'00FFU;
-  bits = (bits | bits >> 8) & 0x0000'FFFF'0000'FFFFU;
-  return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
-}
 
 // Cells of one word of voxels, at its even bits.
 struct WordCells {
@@ -56,6 +46,36 @@ WordCells cells_of(const std::array<std::uint64_t, 4>& rows) {
   return cells;
 }
 
+// The rows of a chunk as masks of what is not air; looks air up in the palette once.
+class SolidRows {
+ public:
+  explicit SolidRows(const Chunk& chunk) : voxels_(chunk.mixed()) {
+    if (voxels_ == nullptr) {
+      uniform_ = chunk.uniform() == kAir ? 0 : ~std::uint64_t{0};
+      return;
+    }
+    if (voxels_->direct()) return;
+    const auto& palette = voxels_->palette;
+    const auto found = std::find(palette.begin(), palette.end(), kAir);
+    has_air_ = found != palette.end();
+    air_ = static_cast<std::uint32_t>(found - palette.begin());
+  }
+
+  [[nodiscard]] std::uint64_t row(int y, int z) const {
+    if (voxels_ == nullptr) return uniform_;
+    if (!has_air_) return ~std::uint64_t{0};
+    const std::uint32_t slab = voxels_->slabs[Chunk::slab_index(y, z)];
+    if ((slab & Chunk::kUniformSlab) != 0) return (slab & ~Chunk::kUniformSlab) == air_ ? 0 : ~std::uint64_t{0};
+    return ~packed_row::equal_mask(voxels_->row(slab, Chunk::row_in_slab(y, z)), voxels_->bits, air_);
+  }
+
+ private:
+  const Chunk::Mixed* voxels_;
+  std::uint64_t uniform_ = 0;
+  std::uint32_t air_ = kAir;
+  bool has_air_ = true;
+};
+
 }  // namespace
 
 HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
@@ -78,13 +98,13 @@ HalvingMasks::HalvingMasks(const Grid& grid, IVec3 chunk)
 }
 
 void HalvingMasks::read_voxels(IVec3 octant) {
-  const Chunk& chunk = *chunks_[slot(octant)];
+  const SolidRows solid(*chunks_[slot(octant)]);
   const IVec3 first = octant * kChunkEdge;
   const IVec3 low = glm::max(IVec3(-2) - first, IVec3(0));
   const IVec3 high = glm::min(IVec3(kFineEdge + 2) - first, IVec3(kChunkEdge));
   const auto word = static_cast<std::size_t>(octant.x + 1);
   for (int z = low.z; z < high.z; ++z) {
-    for (int y = low.y; y < high.y; ++y) fine(first.y + y, first.z + z)[word] = ~chunk.row_mask(y, z, kAir);
+    for (int y = low.y; y < high.y; ++y) fine(first.y + y, first.z + z)[word] = solid.row(y, z);
   }
 }
 
@@ -143,15 +163,24 @@ std::uint64_t HalvingMasks::solid_cells(int y, int z) const {
   return solid;
 }
 
-bool HalvingMasks::is_solid(IVec3 at) const {
-  const int bit = at.x + kChunkEdge;
-  return (fine(at.y, at.z)[static_cast<std::size_t>(bit >> kChunkShift)] >> (bit & (kChunkEdge - 1)) & 1U) != 0;
-}
-
-int HalvingMasks::exposed_faces(IVec3 at) const {
-  int exposed = 0;
-  for (const Direction face : kDirections) exposed += static_cast<int>(!is_solid(at + normal_of(face)));
-  return exposed;
+std::array<std::uint64_t, 3> HalvingMasks::exposed_faces(int half, int y, int z) const {
+  const auto word = static_cast<std::size_t>(half + 1);
+  const FineRow& row = fine(y, z);
+  const std::uint64_t lower_x = ~(row[word] << 1 | row[word - 1] >> 63);
+  const std::uint64_t upper_x = ~(row[word] >> 1 | row[word + 1] << 63);
+  const std::array<std::uint64_t, 4> others = {~fine(y - 1, z)[word], ~fine(y + 1, z)[word], ~fine(y, z - 1)[word],
+                                               ~fine(y, z + 1)[word]};
+  struct Sum {
+    std::uint64_t ones;
+    std::uint64_t twos;
+  };
+  const auto add = [](std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+    return Sum{a ^ b ^ c, (a & b) | (c & (a ^ b))};
+  };
+  const Sum first = add(lower_x, upper_x, others[0]);
+  const Sum second = add(others[1], others[2], others[3]);
+  const Sum twos = add(first.twos, second.twos, first.ones & second.ones);
+  return {first.ones ^ second.ones, twos.ones, twos.twos};
 }
 
 }  // namespace quoin

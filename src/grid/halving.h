@@ -8,6 +8,16 @@
 
 namespace quoin {
 
+/// The 32 even bits, side by side.
+constexpr std::uint64_t even_bits(std::uint64_t bits) {
+  bits &= 0x5555'5555'5555'5555U;
+  bits = (bits | bits >> 1) & 0x3333'3333'3333'3333U;
+  bits = (bits | bits >> 2) & 0x0F0F'0F0F'0F0F'0F0FU;
+  bits = (bits | bits >> 4) & 0x00FF'00FF'00FF'00FFU;
+  bits = (bits | bits >> 8) & 0x0000'FFFF'0000'FFFFU;
+  return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
+}
+
 /// Which voxels around one chunk of a halved grid are not air, and which of its cells are solid for that.
 ///
 /// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Of what lies outside
@@ -21,8 +31,12 @@ class HalvingMasks {
   [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
   /// The solid cells of a row, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
-  /// How many faces of a voxel meet air. Requires: 0 <= x, y, z < 128.
-  [[nodiscard]] int exposed_faces(IVec3 fine) const;
+  /// The voxels of half a row that are not air, 0 <= y, z < 128; `half` 0 or 1.
+  [[nodiscard]] std::uint64_t voxels(int half, int y, int z) const {
+    return fine(y, z)[static_cast<std::size_t>(half + 1)];
+  }
+  /// How many faces of each voxel of half a row meet air, as binary numbers: [0] the ones, [1] the twos, [2] the fours.
+  [[nodiscard]] std::array<std::uint64_t, 3> exposed_faces(int half, int y, int z) const;
 
  private:
   static constexpr int kFineEdge = 2 * kChunkEdge;
@@ -58,7 +72,6 @@ class HalvingMasks {
   void read_voxels(IVec3 octant);
   void count_cells(int y, int z);
   [[nodiscard]] std::uint64_t kept_rods(int y, int z, int axis) const;
-  [[nodiscard]] bool is_solid(IVec3 fine) const;
 
   std::array<const Chunk*, 64> chunks_{};
   std::vector<FineRow> fine_;

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 namespace quoin::packed_row {
 
@@ -36,20 +39,41 @@ constexpr std::uint64_t gather_half_bits(std::uint64_t w) {
   return ((w & 0x0001'0001'0001'0001U) * 0x0001'0002'0004'0008U) >> 48;
 }
 
+/// Bit i of the lowest 32 in bits 2i and 2i + 1.
+constexpr std::uint64_t spread_to_pairs(std::uint64_t w) {
+  w &= 0x0000'0000'FFFF'FFFFU;
+  w = (w | (w << 16)) & 0x0000'FFFF'0000'FFFFU;
+  w = (w | (w << 8)) & 0x00FF'00FF'00FF'00FFU;
+  w = (w | (w << 4)) & 0x0F0F'0F0F'0F0F'0F0FU;
+  w = (w | (w << 2)) & 0x3333'3333'3333'3333U;
+  return ((w | (w << 1)) & 0x5555'5555'5555'5555U) * 3;
+}
+
+/// Bit i of the lowest 16 in all bits of nibble i.
+constexpr std::uint64_t spread_to_nibbles(std::uint64_t w) {
+  w &= 0xFFFFU;
+  w = (w | (w << 24)) & 0x0000'00FF'0000'00FFU;
+  w = (w | (w << 12)) & 0x000F'000F'000F'000FU;
+  w = (w | (w << 6)) & 0x0303'0303'0303'0303U;
+  return ((w | (w << 3)) & 0x1111'1111'1111'1111U) * 15;
+}
+
+/// Bit i of the lowest 8 in all bits of byte i.
+constexpr std::uint64_t spread_to_bytes(std::uint64_t w) {
+  w = ((w & 0xFFU) * 0x0101'0101'0101'0101U) & 0x8040'2010'0804'0201U;
+  return (((w + 0x7F7F'7F7F'7F7F'7F7FU) | w) >> 7 & 0x0101'0101'0101'0101U) * 0xFF;
+}
+
+/// Bit i of the lowest 4 in all bits of halfword i.
+constexpr std::uint64_t spread_to_halves(std::uint64_t w) {
+  return ((w & 1U) | (w & 2U) << 15 | (w & 4U) << 30 | (w & 8U) << 45) * 0xFFFF;
+}
+
 /// `index` repeated over a word.
 constexpr std::uint64_t repeat(int bits, std::uint32_t index) {
-  switch (bits) {
-    case 1:
-      return index * ~std::uint64_t{0};
-    case 2:
-      return index * 0x5555'5555'5555'5555U;
-    case 4:
-      return index * 0x1111'1111'1111'1111U;
-    case 8:
-      return index * 0x0101'0101'0101'0101U;
-    default:
-      return index * 0x0001'0001'0001'0001U;
-  }
+  constexpr std::uint64_t kOnes[] = {~std::uint64_t{0}, 0x5555'5555'5555'5555U, 0x1111'1111'1111'1111U,
+                                     0x0101'0101'0101'0101U, 0x0001'0001'0001'0001U};
+  return index * kOnes[std::countr_zero(static_cast<unsigned>(bits) | 16U)];
 }
 
 /// Which voxels of the row hold `index`: bit x for voxel x.
@@ -106,16 +130,96 @@ inline void write(std::uint64_t* row, int bits, int x, std::uint32_t index) {
 
 /// Writes `index` where `mask` has a bit.
 inline void write_masked(std::uint64_t* row, int bits, std::uint64_t mask, std::uint32_t index) {
+  const std::uint64_t pattern = repeat(bits, index);
   if (mask == ~std::uint64_t{0}) {
-    const std::uint64_t pattern = repeat(bits, index);
     for (int i = 0; i < bits; ++i) row[i] = pattern;
     return;
   }
-  if (bits == 1) {
-    row[0] = (row[0] & ~mask) | (repeat(1, index) & mask);
-    return;
+  const auto write_where = [&](int word, std::uint64_t field) { row[word] = (row[word] & ~field) | (pattern & field); };
+  switch (bits) {
+    case 1:
+      return write_where(0, mask);
+    case 2:
+      for (int i = 0; i < 2; ++i) write_where(i, spread_to_pairs(mask >> (32 * i)));
+      return;
+    case 4:
+      for (int i = 0; i < 4; ++i) write_where(i, spread_to_nibbles(mask >> (16 * i)));
+      return;
+    case 8:
+      for (int i = 0; i < 8; ++i) write_where(i, spread_to_bytes(mask >> (8 * i)));
+      return;
+    default:
+      for (int i = 0; i < 16; ++i) write_where(i, spread_to_halves(mask >> (4 * i)));
   }
-  for (; mask != 0; mask &= mask - 1) write(row, bits, __builtin_ctzll(mask), index);
+}
+
+/// Whether all voxels of `rows` rows that follow each other hold `index`; looks from the last row back, which where
+/// rows are filled in order is the one that does not.
+inline bool all_equal(const std::uint64_t* row, int bits, int rows, std::uint32_t index) {
+  const std::uint64_t pattern = repeat(bits, index);
+  for (int i = rows * bits; i-- > 0;) {
+    if (row[i] != pattern) return false;
+  }
+  return true;
+}
+
+/// The 64 indices of a row, each through `value_of`.
+template <int Bits, class Out, class ValueOf>
+void unpack_as(const std::uint64_t* row, Out* out, ValueOf&& value_of) {
+  constexpr int kPerWord = 64 / Bits;
+  constexpr std::uint64_t kField = (std::uint64_t{1} << Bits) - 1;
+  for (int i = 0; i < Bits; ++i) {
+    const std::uint64_t word = row[i];
+    for (int k = 0; k < kPerWord; ++k)
+      out[i * kPerWord + k] = value_of(static_cast<std::uint32_t>(word >> (k * Bits) & kField));
+  }
+}
+
+/// One of two values for each of the 64 bits of a word; in such steps that compilers make vectors of them.
+template <class Value>
+void unpack_bits(std::uint64_t word, Value zero, Value one, Value* out) {
+  const auto flip = static_cast<Value>(zero ^ one);
+  for (int i = 0; i < 8; ++i) {
+    const auto eight = static_cast<Value>(word >> (8 * i) & 0xFFU);
+    for (int k = 0; k < 8; ++k) {
+      const auto bit = static_cast<Value>(1U << k);
+      const auto all_or_none = static_cast<Value>((eight & bit) == bit ? ~0U : 0U);
+      out[8 * i + k] = static_cast<Value>(zero ^ (all_or_none & flip));
+    }
+  }
+}
+
+/// The 64 values of a row, `bits` wide, by a palette; at 16 bits they are the indices themselves.
+template <class Value>
+void unpack(const std::uint64_t* row, int bits, const Value* palette, std::size_t palette_size, Value* out) {
+  const auto type_of = [palette](std::uint32_t index) { return palette[index]; };
+  switch (bits) {
+    case 1:
+      return unpack_bits(row[0], palette[0], palette[palette_size > 1 ? 1 : 0], out);
+    case 2:
+      return unpack_as<2>(row, out, type_of);
+    case 4:
+      return unpack_as<4>(row, out, type_of);
+    case 8:
+      return unpack_as<8>(row, out, type_of);
+    default:
+      unpack_as<16>(row, out, [](std::uint32_t index) { return static_cast<Value>(index); });
+  }
+}
+
+/// Which of 64 values are `wanted`.
+template <class Value>
+std::uint64_t where_equal(const Value* values, Value wanted) {
+  std::uint8_t equal[64];
+  for (int x = 0; x < 64; ++x) equal[x] = values[x] == wanted ? 1 : 0;
+  std::uint64_t mask = 0;
+  for (int i = 0; i < 8; ++i) {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, equal + 8 * i, sizeof eight);
+    if constexpr (std::endian::native == std::endian::big) eight = __builtin_bswap64(eight);
+    mask |= gather_byte_bits(eight) << (8 * i);
+  }
+  return mask;
 }
 
 }  // namespace quoin::packed_row

@@ -34,6 +34,14 @@ class BlockWriter {
   }
 
   void put(std::span<const std::byte> bytes);
+  /// Room for text of at most `most` bytes; `advance` says where what was written into it ends.
+  [[nodiscard]] char* room(std::size_t most) {
+    if (used_ + most > kBlockBytes) flush();
+    return reinterpret_cast<char*>(block_.data() + used_);
+  }
+  void advance(const char* end) {
+    used_ = static_cast<std::size_t>(reinterpret_cast<const std::byte*>(end) - block_.data());
+  }
   void put_text(std::string_view text) { put(std::as_bytes(std::span(text))); }
   /// Fills up to a multiple of four bytes since the start.
   void align(char filler);

@@ -30,6 +30,21 @@ void append(const BlockyTriangles& triangles, const std::vector<LinearRgba16>& a
   for (const std::uint32_t index : triangles.indices) mesh.indices.push_back(first + index);
 }
 
+/// Makes room for all surfaces of a grid and no more.
+void reserve_for(const GridMesh& grid, bool occlusion, SmoothMesh& mesh) {
+  std::size_t vertices = 0;
+  std::size_t indices = 0;
+  for (const BlockyTriangles& triangles : grid.mesh.surfaces) {
+    vertices += triangles.positions.size();
+    indices += triangles.indices.size();
+  }
+  mesh.positions.reserve(vertices);
+  mesh.normals.reserve(vertices);
+  mesh.albedo.reserve(vertices);
+  if (occlusion) mesh.openness.reserve(vertices);
+  mesh.indices.reserve(indices);
+}
+
 /// The blocks of a scene in the form of smooth meshes, each grid once.
 std::vector<SmoothPart> parts_of(const Scene& scene, const SceneMeshes& meshes) {
   std::vector<LinearRgba16> albedo_of;
@@ -41,6 +56,7 @@ std::vector<SmoothPart> parts_of(const Scene& scene, const SceneMeshes& meshes) 
     SmoothPart& part = parts[grid.grid];
     part.name = scene.grids()[grid.grid].name;
     part.pivot = scene.grids()[grid.grid].pivot;
+    reserve_for(grid, meshes.occlusion, part.mesh);
     for (const BlockyTriangles& triangles : grid.mesh.surfaces) {
       append(triangles, albedo_of, meshes.occlusion, part.mesh);
     }

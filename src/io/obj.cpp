@@ -14,6 +14,7 @@
 #include "io/obj_lines.h"
 #include "io/placement.h"
 #include "io/surface_parts.h"
+#include "scene/instance_axes.h"
 
 namespace quoin {
 
@@ -23,7 +24,12 @@ namespace {
 class ObjText {
  public:
   ObjText(const Scene& scene, const SceneMeshes& meshes, BlockWriter& out)
-      : scene_(scene), meshes_(meshes), lines_(out), out_(out), palette_(scene.types, meshes) {}
+      : scene_(scene), meshes_(meshes), lines_(out), out_(out), palette_(scene.types, meshes) {
+    for (std::uint8_t level = 0; level < greys_.size(); ++level) {
+      const std::string grey = " " + ObjLines::text_of(occlusion_brightness(level));
+      greys_[level] = grey + grey + grey;
+    }
+  }
 
   void write(const std::string& material_file) {
     out_.put_text("# Quoin " QUOIN_VERSION "\nmtllib " + material_file + "\n");
@@ -77,12 +83,11 @@ class ObjText {
   }
 
   void write_vertices(const Instance& instance, const SceneGrid& grid, const BlockyTriangles& triangles) {
+    const glm::dmat3 axes = world_axes(instance);
     for (std::size_t i = 0; i < triangles.positions.size() && !out_.failed(); ++i) {
-      lines_.triple("v", world_from_grid(instance, grid, DVec3(triangles.positions[i])));
-      if (meshes_.occlusion) {
-        const double grey = occlusion_brightness(triangles.levels[i]);
-        lines_.triple("", DVec3(grey));
-      }
+      const DVec3 from_pivot = (DVec3(triangles.positions[i]) - grid.pivot) * instance.voxel_size;
+      lines_.triple("v", instance.position + axes * from_pivot);
+      if (meshes_.occlusion) out_.put_text(greys_[triangles.levels[i]]);
       out_.put('\n');
     }
   }
@@ -99,12 +104,16 @@ class ObjText {
   }
 
   void write_corner(const BlockyTriangles& triangles, std::uint32_t vertex) {
-    out_.put(' ');
-    lines_.index(vertices_ + vertex + 1);
-    out_.put('/');
-    lines_.index(triangles.types[vertex]);
-    out_.put('/');
-    lines_.index(normals_ + static_cast<std::uint64_t>(triangles.directions[vertex]) + 1);
+    constexpr std::size_t kMost = 64;
+    char* text = out_.room(kMost);
+    char* const end = text + kMost;
+    *text++ = ' ';
+    text = std::to_chars(text, end, vertices_ + vertex + 1).ptr;
+    *text++ = '/';
+    text = std::to_chars(text, end, triangles.types[vertex]).ptr;
+    *text++ = '/';
+    text = std::to_chars(text, end, normals_ + static_cast<std::uint64_t>(triangles.directions[vertex]) + 1).ptr;
+    out_.advance(text);
   }
 
   const Scene& scene_;
@@ -112,6 +121,7 @@ class ObjText {
   ObjLines lines_;
   BlockWriter& out_;
   MaterialPalette palette_;
+  std::array<std::string, 4> greys_;  ///< " r g b" by level of occlusion
   std::uint64_t vertices_ = 0;
   std::uint64_t normals_ = 0;
 };

@@ -3,6 +3,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 namespace quoin {
 
@@ -17,26 +19,51 @@ std::string one_word(const std::string& name) {
   return word;
 }
 
+constexpr std::size_t kMostDigits = 40;
+
+/// Writes what the corners of voxels are mostly, whole and half numbers, as std::to_chars does; null for other ones.
+/// From 100,000 on that may choose an exponent.
+char* write_halves(double value, char* out) {
+  constexpr double kMost = 99'999.0;
+  if (!(value >= -kMost && value <= kMost)) return nullptr;
+  const auto halves = static_cast<std::int32_t>(value * 2.0);
+  if (static_cast<double>(halves) != value * 2.0) return nullptr;
+  if (halves < 0) *out++ = '-';
+  const auto size = static_cast<std::uint32_t>(halves < 0 ? -halves : halves);
+  out = std::to_chars(out, out + kMostDigits, size / 2).ptr;
+  if (size % 2 != 0) {
+    *out++ = '.';
+    *out++ = '5';
+  }
+  return out;
+}
+
+char* write_number(double value, char* out) {
+  if (char* end = write_halves(value, out)) return end;
+  const double rounded = std::round(value * 1e6) / 1e6 + 0.0;
+  return std::to_chars(out, out + kMostDigits, rounded).ptr;
+}
+
 }  // namespace
 
 void ObjLines::index(std::uint64_t value) {
-  std::array<char, 24> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  out_.put_text({digits.data(), end});
+  char* room = out_.room(kMostDigits);
+  out_.advance(std::to_chars(room, room + kMostDigits, value).ptr);
 }
 
 void ObjLines::number(double value) {
-  std::array<char, 40> digits{};
-  const double rounded = std::round(value * 1e6) / 1e6 + 0.0;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), rounded).ptr;
-  out_.put_text({digits.data(), end});
+  char* room = out_.room(kMostDigits);
+  out_.advance(write_number(value, room));
+}
+
+std::string ObjLines::text_of(double value) {
+  std::array<char, kMostDigits> room{};
+  return {room.data(), write_number(value, room.data())};
 }
 
 void ObjLines::number(double value, int digits) {
-  std::array<char, 40> text{};
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value + 0.0, std::chars_format::general, digits).ptr;
-  out_.put_text({text.data(), end});
+  char* room = out_.room(kMostDigits);
+  out_.advance(std::to_chars(room, room + kMostDigits, value + 0.0, std::chars_format::general, digits).ptr);
 }
 
 void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {

@@ -22,6 +22,8 @@ class ObjLines {
   void index(std::uint64_t value);
   /// Rounded to a millionth.
   void number(double value);
+  /// What `number` writes.
+  [[nodiscard]] static std::string text_of(double value);
   /// Rounded to that many significant digits.
   void number(double value, int digits);
   /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth.

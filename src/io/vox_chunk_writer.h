@@ -16,12 +16,10 @@ class ChunkWriter {
  public:
   using Entries = std::vector<std::pair<std::string, std::string>>;
 
+  /// Has room for so many bytes more, so that they are not moved as it grows.
+  void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   void text(std::string_view text) { raw(std::as_bytes(std::span(text.data(), text.size()))); }
-  void raw(std::span<const std::byte> bytes) {
-    const std::size_t at = bytes_.size();
-    bytes_.resize(at + bytes.size());
-    std::ranges::copy(bytes, bytes_.begin() + static_cast<std::ptrdiff_t>(at));
-  }
+  void raw(std::span<const std::byte> bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
   void u32(std::uint32_t value) {
     bytes_.resize(bytes_.size() + 4);
     patch(bytes_.size() - 4, value);
@@ -50,6 +48,10 @@ class ChunkWriter {
   void end_chunk(std::size_t begin) { patch(begin - 8, bytes_.size() - begin); }
   /// As end_chunk, for a chunk that holds nothing but other chunks.
   void end_parent(std::size_t begin) { patch(begin - 4, bytes_.size() - begin); }
+
+  /// Makes room for bytes that are written through `bytes` later.
+  void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
+  [[nodiscard]] std::span<std::byte> bytes() { return bytes_; }
 
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }

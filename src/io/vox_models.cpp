@@ -1,6 +1,8 @@
 #include "io/vox_models.h"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 
 namespace quoin::vox {
 
@@ -34,11 +36,13 @@ IVec3 local_from_place(std::uint32_t place) {
 template <class Visit>
 void for_each_voxel(const Model& model, Visit visit) {
   for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
-    const int x = std::to_integer<int>(model.voxels[i]);
-    const int y = std::to_integer<int>(model.voxels[i + 1]);
-    const int z = std::to_integer<int>(model.voxels[i + 2]);
+    std::array<std::uint8_t, 4> bytes{};  // as one load
+    std::memcpy(bytes.data(), model.voxels.data() + i, bytes.size());
+    const int x = bytes[0];
+    const int y = bytes[1];
+    const int z = bytes[2];
     if (x >= model.size.x || y >= model.size.y || z >= model.size.z) continue;
-    visit(IVec3{x, z, model.size.y - 1 - y}, std::to_integer<std::uint8_t>(model.voxels[i + 3]));
+    visit(IVec3{x, z, model.size.y - 1 - y}, bytes[3]);
   }
 }
 

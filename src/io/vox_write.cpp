@@ -47,9 +47,9 @@ class Writer {
   Result<std::vector<std::byte>> run(std::vector<std::string>& warnings);
 
  private:
-  void gather_grids(const vox::TypeTable& table);
+  void gather_grids();
   void gather_instances();
-  void write_models();
+  void write_models(const vox::TypeTable& table);
   Status write_nodes();
   void write_instance(const Instance& instance, const GridParts& parts, TransformChunk transform);
   void write_transform(const TransformChunk& transform);
@@ -88,12 +88,12 @@ GridParts* Writer::parts_of(GridHandle grid) {
   return found != grids_.end() && found->grid == grid ? &*found : nullptr;
 }
 
-void Writer::gather_grids(const vox::TypeTable& table) {
+void Writer::gather_grids() {
   std::uint32_t model = 0;
   for (const GridHandle handle : scene_.grids().handles()) {
     GridParts parts;
     parts.grid = handle;
-    parts.pieces = vox::cut_into_pieces(scene_.grids()[handle], table.index_of_type);
+    parts.pieces = vox::cut_into_pieces(scene_.grids()[handle]);
     parts.first_model = model;
     model += static_cast<std::uint32_t>(parts.pieces.size());
     grids_.push_back(std::move(parts));
@@ -111,8 +111,22 @@ void Writer::gather_instances() {
   }
 }
 
-void Writer::write_models() {
+/// The voxels are what takes memory: they go where they belong in the file at once, and the file has room for all that
+/// follows, so that it is not moved.
+void Writer::write_models(const vox::TypeTable& table) {
+  constexpr std::size_t kHeadBytes = 64;          // of a model, and more
+  constexpr std::size_t kNodeBytes = 128;         // of a node, with a name that is not long
+  constexpr std::size_t kPaletteBytes = 262'144;  // with materials, and more
+  std::size_t bytes = kPaletteBytes;
+  for (const InstanceHandle handle : instances_) {
+    bytes += kNodeBytes * static_cast<std::size_t>(nodes_of(*parts_of(scene_.instances()[handle].grid)));
+  }
   for (const GridParts& parts : grids_) {
+    for (const vox::Piece& piece : parts.pieces) bytes += kHeadBytes + 4 * piece.voxels;
+  }
+  out_.reserve(bytes);
+  for (const GridParts& parts : grids_) {
+    std::vector<std::size_t> starts;
     for (const vox::Piece& piece : parts.pieces) {
       const std::size_t size_chunk = out_.begin_chunk("SIZE");
       out_.i32(piece.size.x);
@@ -120,10 +134,12 @@ void Writer::write_models() {
       out_.i32(piece.size.y);
       out_.end_chunk(size_chunk);
       const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
-      out_.u32(static_cast<std::uint32_t>(piece.voxels.size() / 4));
-      out_.raw(piece.voxels);
+      out_.u32(static_cast<std::uint32_t>(piece.voxels));
+      starts.push_back(out_.size());
+      out_.leave(4 * piece.voxels);
       out_.end_chunk(voxel_chunk);
     }
+    vox::write_voxels(scene_.grids()[parts.grid].grid, table.index_of_type, parts.pieces, starts, out_.bytes());
   }
 }
 
@@ -283,12 +299,12 @@ void Writer::write_materials(const vox::TypeTable& table) {
 Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
   const Result<vox::TypeTable> table = vox::make_type_table(scene_);
   if (!table) return tl::unexpected(table.error());
-  gather_grids(*table);
+  gather_grids();
   gather_instances();
   out_.text("VOX ");
   out_.u32(kVersion);
   const std::size_t main = out_.begin_chunk("MAIN");
-  write_models();
+  write_models(*table);
   if (Status status = write_nodes(); !status) return tl::unexpected(status.error());
   write_layer();
   write_palette(*table);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <quoin/scene/scene.h>
@@ -26,14 +27,20 @@ struct TypeTable {
 
 /// A model to write, cut from a grid.
 struct Piece {
-  IVec3 min{0};                   ///< the grid's voxel that is lowest on each axis
-  IVec3 size{1};                  ///< along Quoin's axes, at most 256 each
-  std::vector<std::byte> voxels;  ///< as in XYZI: MagicaVoxel's axes
+  IVec3 min{0};            ///< the grid's voxel that is lowest on each axis
+  IVec3 size{1};           ///< along Quoin's axes, at most 256 each
+  std::size_t voxels = 0;  ///< how many
 };
 
 /// Cuts a grid's declared box into pieces of at most 256 voxels a side, sorted by z, then y, then x; pieces without
 /// voxels are left out unless they are all there is.
-[[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid, const std::vector<std::uint8_t>& index_of_type);
+[[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid);
+
+/// Writes the voxels of all pieces of a grid as XYZI has them, each piece's from its place in `starts` on.
+///
+/// Requires: `pieces` were cut from this grid; there is room for four bytes a voxel.
+void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
+                  std::span<const std::size_t> starts, std::span<std::byte> out);
 
 /// The point of the grid that MagicaVoxel's pivot of that piece's model is.
 [[nodiscard]] DVec3 pivot_of(const Piece& piece);

@@ -33,7 +33,8 @@ inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
 ///
 /// Voxels lie in rows of 64 along x, so one bit plane of a row is one word. 4x4 rows (64x4x4 voxels) are a slab, the
 /// unit of uniformity: a slab of one type holds no voxel data, a chunk of one type holds nothing but that type.
-/// Single writes notice that a chunk became uniform below 16 bits a voxel; otherwise fills and `compact` do.
+/// Writes notice that a slab or the chunk became uniform and that fewer bits would do, so that edits and their undoing
+/// leave about the memory that a new chunk takes; `compact` gives back the rest.
 /// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and
 /// tight bounds cost nothing to ask.
 class Chunk {
@@ -61,7 +62,11 @@ class Chunk {
   /// Sets the voxels of one row whose bits are set in `mask`; answers which of them had another type before.
   std::uint64_t set_row(int y, int z, std::uint64_t mask, VoxelType type);
   /// Sets the 64 voxels of one row; answers which of them had another type before.
-  std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types);
+  std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
+    return write_row(y, z, ~std::uint64_t{0}, types);
+  }
+  /// Sets those of the 64 voxels of one row whose bits are set in `mask`; answers which had another type before.
+  std::uint64_t write_row(int y, int z, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
   void read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const;
   /// True when the voxel had another type before. Requires: 0 <= x, y, z < 64.
   bool set(int x, int y, int z, VoxelType type);
@@ -79,7 +84,10 @@ class Chunk {
   [[nodiscard]] std::optional<VoxelType> uniform() const {
     return mixed_ == nullptr ? std::optional(uniform_) : std::nullopt;
   }
-  [[nodiscard]] int non_air_count() const;
+  [[nodiscard]] int non_air_count() const {
+    if (mixed_ != nullptr) return mixed_->non_air;
+    return uniform_ == kAir ? 0 : static_cast<int>(kChunkVoxels);
+  }
   /// How many voxels have this type. Cost: O(palette), or O(voxels) at 16 bits a voxel.
   [[nodiscard]] int count(VoxelType type) const;
   /// The types that occur, ascending. Cost: as `count`.
@@ -93,16 +101,43 @@ class Chunk {
 
   /// The storage itself, for code that turns voxels into masks (meshing, tracing).
   struct Mixed {
+    static constexpr std::uint32_t kNoSlot = 0xFFFF'FFFFU;
+    /// Of types at 16 bits: so few that a chunk can keep their counts, so many that 256 types or fewer show.
+    static constexpr std::uint32_t kRemainders = 1'024;
     int bits = 1;                            ///< a voxel: 1, 2, 4, 8 or 16
     std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
-    std::vector<std::uint32_t> counts;       ///< voxels of each index; unused at 16 bits
+    std::vector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
     std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
     std::vector<std::uint64_t> words;        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
-    std::vector<std::uint32_t> free_slots;
     std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer
     int non_air = 0;
+    std::uint32_t used = 0;              ///< entries of `counts` that are not 0
+    std::uint32_t recent = 0;            ///< palette index that was written last
+    std::uint32_t credit = 0;            ///< voxels that changed, less what storing them anew has cost since
+    std::uint32_t count_at = 0;          ///< at 16 bits: the credit from which on types may be counted
+    std::uint32_t first_free = kNoSlot;  ///< a slot that no slab has; its first word holds the next one
+    std::uint32_t free_count = 0;
+    std::uint32_t slot_count = 0;  ///< free ones included
 
     [[nodiscard]] bool direct() const { return bits == 16; }
+    /// The entry of `counts` for an index.
+    [[nodiscard]] std::uint32_t counted_at(std::uint32_t index) const { return direct() ? index % kRemainders : index; }
+    /// Books voxels that change from one index to another.
+    void move_counts(std::uint32_t from_index, std::uint32_t to_index, std::uint32_t voxels) {
+      const std::uint32_t from = counted_at(from_index);
+      const std::uint32_t to = counted_at(to_index);
+      if (counts[to] == 0) ++used;
+      counts[to] += voxels;
+      counts[from] -= voxels;
+      if (counts[from] == 0) --used;
+    }
+    /// Books that a voxel became air, or was: -1 or 1.
+    void count_voxel(int x, int y, int z, int delta) {
+      non_air += delta;
+      layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
+      layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
+      layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
+    }
     [[nodiscard]] const std::uint64_t* row(std::uint32_t slot, int row_in_slab) const {
       return words.data() + (static_cast<std::size_t>(slot) * 16 + static_cast<std::size_t>(row_in_slab)) *
                                 static_cast<std::size_t>(bits);
@@ -126,12 +161,19 @@ class Chunk {
  private:
   void make_mixed();
   std::uint32_t index_for(VoxelType type);
-  void widen(int bits);
+  std::uint32_t find_or_add(VoxelType type);
   std::uint32_t slot_for_writing(std::size_t slab);
+  void release_slot(std::size_t slab, std::uint32_t index);
   void count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid);
-  void make_slab_uniform(std::size_t slab, VoxelType type);
+  std::uint32_t replace(int y, int z, std::uint64_t changed, VoxelType type);
+  bool set_anywhere(int x, int y, int z, VoxelType type);
+  void after_writing(int y, int z, std::uint32_t index, std::uint32_t changed);
   void pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels> types,
                  const std::vector<std::uint32_t>& index_of);
+  void tidy();
+  void repack(int bits);
+  [[nodiscard]] std::size_t used_types() const;
+  [[nodiscard]] bool is_one_entry() const;
 
   VoxelType uniform_;
   std::unique_ptr<Mixed> mixed_;
