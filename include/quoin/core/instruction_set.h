@@ -8,7 +8,7 @@ namespace quoin {
 /// gives the widest that it has below.
 enum class InstructionSet : std::uint8_t {
   Best,    ///< the widest that this machine has
-  Avx512,  ///< AVX-512 F, BW, DQ, VL; where a kernel has no such path, AVX2
+  Avx512,  ///< AVX-512 F, BW, DQ, VL, and what a kernel needs besides (meshing: VBMI, VBMI2, GFNI); otherwise AVX2
   Avx2,    ///< AVX2, BMI, BMI2
   Plain,   ///< none beyond the build's baseline
 };
