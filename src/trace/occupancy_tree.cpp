@@ -83,6 +83,8 @@ struct OccupancyTree::Impl {
   tsl::robin_map<IVec3, IBox, CoordinateHash> chunk_bounds;  // occupied voxels of each chunk, in grid coordinates
   IBox bounds;
   FlatTables flat;  // no chunks: none
+  std::vector<trace::FlatChunk> flat_nodes;
+  const ChunkNode* known_nodes = nullptr;  // where they were when `flat_nodes` was made
   IBox flat_chunks;
   trace::TreeView view{};
 
@@ -227,11 +229,23 @@ struct OccupancyTree::Impl {
     words[word + 1] = static_cast<std::uint32_t>(both >> 32);
   }
 
+  [[nodiscard]] const ChunkNode& node_of(IVec3 chunk) const {
+    const RegionNode* region = find({chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift});
+    return chunk_nodes[region == nullptr ? 0 : region->nodes[table_index(chunk & 15)]];
+  }
+
+  void name_node(IVec3 chunk) {
+    const ChunkNode& node = node_of(chunk);
+    std::uint64_t bricks_there = 0;
+    for (std::size_t i = 0; i < 64; ++i) bricks_there |= std::uint64_t{node.cells[i] != 0} << i;
+    const IVec3 at = chunk - flat_chunks.min;
+    flat_nodes[static_cast<std::size_t>(at.x + flat.chunks.x * (at.y + flat.chunks.y * at.z))] = {bricks_there, &node};
+  }
+
   // Copies a chunk's cells and bricks into the flat tables.
   void flatten(IVec3 chunk) {
-    const RegionNode* region = find({chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift});
-    const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
-    const ChunkNode& node = chunk_nodes[index];
+    name_node(chunk);
+    const ChunkNode& node = node_of(chunk);
     const IVec3 at = chunk - flat_chunks.min;
     const IVec3 cells = flat.cell_strides();
     const IVec3 bricks_at = flat.brick_strides();
@@ -279,6 +293,9 @@ struct OccupancyTree::Impl {
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
     flat.bricks.assign(
         64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
+    flat_nodes.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
+                      {0, chunk_nodes.data()});
+    known_nodes = chunk_nodes.data();
     flat_chunks = chunks;
     for (const auto& [chunk, box] : chunk_bounds) flatten(chunk);
   }
@@ -286,7 +303,7 @@ struct OccupancyTree::Impl {
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
   void finish(std::span<const IVec3> changed) {
     renew_tables(changed);
-    if (!flat_chunks.empty()) view = trace::make_view(flat, bricks.data(), bounds);
+    if (!flat_chunks.empty()) view = trace::make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 
   void renew_tables(std::span<const IVec3> changed) {
@@ -299,10 +316,15 @@ struct OccupancyTree::Impl {
     // As a tree built from scratch would have it.
     if (!can_be_flat(chunks)) {
       flat = {};
+      flat_nodes = {};
       flat_chunks = {};
       return;
     }
     if (!(chunks == flat_chunks)) return make_flat(chunks);
+    if (chunk_nodes.data() != known_nodes) {
+      known_nodes = chunk_nodes.data();
+      for (const auto& [chunk, box] : chunk_bounds) name_node(chunk);
+    }
     for (const IVec3 chunk : changed) {
       if (flat_chunks.contains(chunk)) flatten(chunk);
     }
@@ -350,6 +372,7 @@ std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
          impl_->chunk_bounds.bucket_count() * (sizeof(IVec3) + sizeof(IBox)) +
+         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 

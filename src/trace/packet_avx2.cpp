@@ -30,7 +30,22 @@ namespace {
 
 #include "trace/lockstep.inl"
 
+inline F4 floor_of(F4 a) {
+  return reinterpret_cast<F4>(_mm_floor_ps(reinterpret_cast<__m128>(a)));
+}
+inline D4 floor_of(D4 a) {
+  return reinterpret_cast<D4>(_mm256_floor_pd(reinterpret_cast<__m256d>(a)));
+}
+#define QUOIN_LANES_FLOOR
 #include "trace/single.inl"
+
+#include "trace/path_ray.inl"
+
+#include "trace/path_units.inl"
+
+#include "trace/path_avx2.inl"
+
+#include "trace/path_walk.inl"
 
 #include "trace/single_hit.inl"
 

@@ -21,6 +21,11 @@ inline int mask3(I4 a) {
 
 #include "trace/single.inl"
 
+template <Ask>
+inline SingleHit trace_one(const TreeView& tree, const Ray& ray, double max_t) {
+  return trace_single(tree, ray, max_t);
+}
+
 #include "trace/single_hit.inl"
 
 void first_one_by_one(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
