@@ -306,6 +306,8 @@ struct OccupancyTree::Impl {
     if (!flat_chunks.empty()) view = trace::make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 
+  [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
+
   void renew_tables(std::span<const IVec3> changed) {
     bounds = {};
     IBox chunks;
@@ -345,12 +347,14 @@ OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types,
   tree.impl_->chunk_nodes.shrink_to_fit();
   tree.impl_->bricks.shrink_to_fit();
   tree.impl_->finish({});
+  tree.view_ = tree.impl_->kernel_view();
   return tree;
 }
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks) {
   for (const IVec3 chunk : chunks) impl_->put(grid.find_chunk(chunk), types, chunk);
   impl_->finish(chunks);
+  view_ = impl_->kernel_view();
 }
 
 IBox OccupancyTree::bounds() const {
@@ -385,9 +389,6 @@ const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
 }
 const OccupancyTree::Node* OccupancyTree::bricks() const {
   return impl_->bricks.data();
-}
-const trace::TreeView* OccupancyTree::view() const {
-  return impl_->flat_chunks.empty() ? nullptr : &impl_->view;
 }
 const OccupancyTree::FlatTables* OccupancyTree::flat_tables() const {
   return impl_->flat_chunks.empty() ? nullptr : &impl_->flat;

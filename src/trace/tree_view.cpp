@@ -4,16 +4,16 @@
 
 namespace quoin::trace {
 
-const Kernel& kernel_of(InstructionSet instructions) {
 #ifdef QUOIN_X86_KERNELS
-  static const Kernel* const kernels[] = {nullptr, &kAvx512Kernel, &kAvx2Kernel, &kPlainKernel};
-  static const InstructionSet best = resolve(InstructionSet::Best);
-  return *kernels[static_cast<int>(std::max(instructions, best))];
-#else
-  static_cast<void>(instructions);
-  return kPlainKernel;
-#endif
+Kernels kernels_here() {
+  const Kernel* const all[] = {nullptr, &kAvx512Kernel, &kAvx2Kernel, &kPlainKernel};
+  Kernels here{};
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    here[i] = all[static_cast<std::size_t>(resolve(static_cast<InstructionSet>(i)))];
+  }
+  return here;
 }
+#endif
 
 TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks,
                    const OccupancyTree::Node* bricks, const IBox& bounds) {

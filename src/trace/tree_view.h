@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <quoin/trace/occupancy_tree.h>
@@ -65,7 +67,20 @@ extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 #endif
 
-[[nodiscard]] const Kernel& kernel_of(InstructionSet instructions);
+#ifdef QUOIN_X86_KERNELS
+/// By instruction set, the widest that this machine has and that is no wider than asked.
+using Kernels = std::array<const Kernel*, 4>;
+[[nodiscard]] Kernels kernels_here();
+
+[[nodiscard]] inline const Kernel& kernel_of(InstructionSet instructions) {
+  static const Kernels kernels = kernels_here();
+  return *kernels[static_cast<std::size_t>(instructions)];
+}
+#else
+[[nodiscard]] inline const Kernel& kernel_of(InstructionSet) {
+  return kPlainKernel;
+}
+#endif
 [[nodiscard]] TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks,
                                  const OccupancyTree::Node* bricks, const IBox& bounds);
 

@@ -91,11 +91,12 @@ class OccupancyTree {
   /// Null where the world is so sparse (islands far apart) that the tables would be larger than all the rest.
   [[nodiscard]] const FlatTables* flat_tables() const;
   /// The same for the library's own kernels.
-  [[nodiscard]] const trace::TreeView* view() const;
+  [[nodiscard]] const trace::TreeView* view() const { return view_; }
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
+  const trace::TreeView* view_ = nullptr;  // in `impl_`
 };
 
 }  // namespace quoin
