@@ -43,8 +43,10 @@ class PathWalk {
       const std::uint64_t own_brick = std::uint64_t{1} << brick;
       block = Paths::brick_of(chunk_, brick);
       if ((bits_of_bricks() & own_brick) != 0) {
-        const std::uint64_t met = voxels_of(block, brick, cell) & kUnits.from[voxel];
-        if (met != 0) return hit<kAsk>(brick, cell, met);
+        if ((node().cells[static_cast<std::size_t>(brick ^ flip_)] >> (cell ^ flip_) & 1U) != 0) {
+          const std::uint64_t met = voxels_of(block, brick, cell) & kUnits.from[voxel];
+          if (met != 0) return hit<kAsk>(brick, cell, met);
+        }
         cells = cells_of(brick) & kUnits.from[cell] & ~own_cell;
       }
       allowed = kUnits.from[brick] & ~own_brick;
