@@ -22,7 +22,7 @@
 namespace quoin::trace {
 namespace {
 
-#include "trace/lanes_avx2.h"
+#include "trace/lanes_avx2_pair.h"
 
 #include "trace/kernel_common.inl"
 
