@@ -21,9 +21,9 @@ class ChunkRows {
   [[nodiscard]] bool all() const { return out_.empty(); }
 
   enum class Slab : std::uint8_t { Empty, Full, Mixed };
-  /// Of the 4x4 rows from (y, z) on, which are multiples of 4: what is stored as one type, and what is not.
-  [[nodiscard]] Slab slab(int y, int z) const;
-  [[nodiscard]] std::uint64_t row(int y, int z) const;
+  using SlabRows = std::array<std::uint64_t, 16>;
+  /// The 4x4 rows from (y, z) on, which are multiples of 4; they are set only where they are mixed.
+  [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
  private:
   [[nodiscard]] bool belongs(VoxelType type) const;
@@ -33,6 +33,8 @@ class ChunkRows {
   Occupancy which_;
   std::vector<VoxelType> in_;
   std::vector<VoxelType> out_;
+  std::vector<std::uint32_t> asked_;  // indices of the palette: whichever list is shorter
+  std::uint64_t inverted_ = 0;        // all ones where that is of those which do not count
 };
 
 /// The box of the voxels that count, row by row.
