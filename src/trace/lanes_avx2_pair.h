@@ -8,6 +8,8 @@ namespace half {
 using half::mask3;
 
 constexpr int kWidth = 2 * half::kWidth;
+// Rays that start further apart, in voxels, are walked in lockstep instead of as a beam: measured.
+constexpr float kBeamWidth = 6.0F;
 
 struct Mask {
   half::Mask low, high;
@@ -154,6 +156,13 @@ inline F narrow(const double* from) {
 inline void split(const double* from, I& base, F& rest, F& whole) {
   half::split(from, base.low, rest.low, whole.low);
   half::split(from + half::kWidth, base.high, rest.high, whole.high);
+}
+
+inline float least_of(F a) {
+  const __m256 v = _mm256_min_ps(a.low.v, a.high.v);
+  __m128 least = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+  least = _mm_min_ps(least, _mm_movehl_ps(least, least));
+  return _mm_cvtss_f32(_mm_min_ss(least, _mm_movehdup_ps(least)));
 }
 
 class BrickWindow {

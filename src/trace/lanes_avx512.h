@@ -2,6 +2,9 @@
 
 #include "core/lanes_avx512.h"
 
+// As for AVX2, whose lockstep is slower: only rays from one point are a beam.
+constexpr float kBeamWidth = 0.0F;
+
 inline __m512 join(__m256 low, __m256 high) {
   return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
 }
@@ -32,8 +35,8 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
 inline I as_bits(F a) {
   return {_mm512_castps_si512(a.v)};
 }
-inline float least_of(Mask m, F a) {
-  return _mm512_mask_reduce_min_ps(m.m, a.v);
+inline float least_of(F a) {
+  return _mm512_reduce_min_ps(a.v);
 }
 // Entry `at % 16`, or `at % 32`, of a table.
 inline I from_16(I table, I at) {

@@ -241,8 +241,9 @@ struct OccupancyTree::Impl {
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
     flat.bricks.assign(
         64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
-    flat_nodes.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
-                      {0, chunk_nodes.data()});
+    flat_nodes.assign(
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
+        {0, chunk_nodes.data()});
     known_nodes = chunk_nodes.data();
     flat_chunks = chunks;
     for (const auto& [chunk, box] : chunk_bounds) flatten(chunk, kAll);
@@ -279,7 +280,6 @@ struct OccupancyTree::Impl {
       if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
     }
   }
-
 };
 
 OccupancyTree::OccupancyTree() : impl_(std::make_unique<Impl>()) {}

@@ -29,8 +29,6 @@ namespace {
 
 #include "trace/lockstep_setup.inl"
 
-#include "trace/lockstep.inl"
-
 inline F4 floor_of(F4 a) {
   return reinterpret_cast<F4>(_mm_floor_ps(reinterpret_cast<__m128>(a)));
 }
@@ -47,6 +45,14 @@ inline D4 floor_of(D4 a) {
 #include "trace/path_avx512.inl"
 
 #include "trace/path_walk.inl"
+
+#include "trace/lockstep.inl"
+
+#include "trace/beam_paths.inl"
+
+#include "trace/beam.inl"
+
+#include "trace/packet_hits.inl"
 
 #include "trace/single_hit.inl"
 

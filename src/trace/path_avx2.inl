@@ -58,7 +58,8 @@ class Paths {
     const __m256 upper = _mm256_add_ps(lower, _mm256_set1_ps(1 << (2 * kLevel)));
     Times t = {_mm256_mul_ps(_mm256_sub_ps(lower, origin), inverse),
                _mm256_mul_ps(_mm256_sub_ps(upper, origin), inverse)};
-    if (nudges_) [[unlikely]] t = {_mm256_sub_ps(t.lower, nudge), _mm256_sub_ps(t.upper, nudge)};
+    if (nudges_) [[unlikely]]
+      t = {_mm256_sub_ps(t.lower, nudge), _mm256_sub_ps(t.upper, nudge)};
     return {t.lower, _mm256_min_ps(t.upper, end_)};
   }
   // Units 0 and 1, or 2 and 3, each in four lanes.

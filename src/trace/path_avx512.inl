@@ -3,10 +3,10 @@
 // passed are those whose x and y, x and z, y and z overlap. Crossings at the same t are ordered by axis.
 
 struct alignas(64) PathTables {
-  std::int32_t axis[kWidth];         // five planes of x, of y, of z
-  float number[kWidth];              // of the plane
-  float unit[64][kWidth];            // the same, plus four times where a unit lies
-  std::int32_t pattern[8][kWidth];   // pairs: lower and upper planes of x, y (first), y, z (second)
+  std::int32_t axis[kWidth];        // five planes of x, of y, of z
+  float number[kWidth];             // of the plane
+  float unit[64][kWidth];           // the same, plus four times where a unit lies
+  std::int32_t pattern[8][kWidth];  // pairs: lower and upper planes of x, y (first), y, z (second)
 };
 
 constexpr PathTables make_path_tables() {
@@ -16,7 +16,8 @@ constexpr PathTables make_path_tables() {
     const int number = i < 15 ? i % 5 : 0;
     tables.axis[i] = axis;
     tables.number[i] = static_cast<float>(number);
-    for (int unit = 0; unit < 64; ++unit) tables.unit[unit][i] = static_cast<float>(number + 4 * (unit >> (2 * axis) & 3));
+    for (int unit = 0; unit < 64; ++unit)
+      tables.unit[unit][i] = static_cast<float>(number + 4 * (unit >> (2 * axis) & 3));
     for (int upper = 0; upper < 2; ++upper) {
       tables.pattern[0 + upper][i] = (i & 3) + upper;
       tables.pattern[2 + upper][i] = 5 + (i & 3) + upper;
@@ -72,7 +73,8 @@ class Paths {
   }
   [[nodiscard]] std::uint64_t through(__m512 planes) const {
     __m512 t = _mm512_mul_ps(_mm512_sub_ps(planes, origin_), inverse_);
-    if (nudges_) [[unlikely]] t = _mm512_sub_ps(t, nudge_);
+    if (nudges_) [[unlikely]]
+      t = _mm512_sub_ps(t, nudge_);
     const __m512 until = _mm512_min_ps(t, end_);
     const __m512 x_lower = pairs(0, t);
     const __m512 x_upper = pairs(1, until);

@@ -112,6 +112,17 @@ inline SetUp clip_path(PathRay& ray, const PathBox& box, F4 speed, int moved) {
   return SetUp::Ready;
 }
 
+// Moves the start of a ray that is far away to where it enters the bounds; false when it misses them.
+inline bool bring_near(const TreeView& tree, const Ray& ray, double max_t, D4& position, float& limit, int& moved) {
+  const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
+  Move move{{position[0], position[1], position[2]}, max_t, -1};
+  if (!move_to_bounds(tree, direction, move)) return false;
+  position = D4{move.position[0], move.position[1], move.position[2], move.position[2]};
+  limit = static_cast<float>(move.max_t);
+  moved = move.entered;
+  return true;
+}
+
 inline SetUp set_up_path(const TreeView& tree, const Ray& ray, double max_t, PathRay& out) {
   static_assert(sizeof(Ray) == 6 * sizeof(double));
   D4 p;
@@ -135,12 +146,7 @@ inline SetUp set_up_path(const TreeView& tree, const Ray& ray, double max_t, Pat
   if (mask3(leaves) != 0) return SetUp::Misses;
   int moved = -1;
   if (mask3((low - kNearby <= rough) & (rough <= high + kNearby)) != 7) {
-    const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
-    Move move{{p[0], p[1], p[2]}, max_t, -1};
-    if (!move_to_bounds(tree, direction, move)) return SetUp::Misses;
-    p = D4{move.position[0], move.position[1], move.position[2], move.position[2]};
-    limit = static_cast<float>(move.max_t);
-    moved = move.entered;
+    if (!bring_near(tree, ray, max_t, p, limit, moved)) return SetUp::Misses;
   }
   const D4 base = floor_of(p * (1.0 / 64.0)) * 64.0;
   const F4 whole = __builtin_convertvector(floor_of(p) - base, F4);

@@ -25,6 +25,11 @@ inline F4 corner_of(int unit) {
   return corner;
 }
 
+// What turns the index of a unit into that of the unit that it is mirrored to.
+inline int flip_of(int octant) {
+  return (octant & 1) * 3 + (octant & 2) * 6 + (octant & 4) * 12;
+}
+
 // How the bits of blocks are mirrored: bytes change places, then each half of a byte is looked up.
 struct alignas(16) MirrorTables {
   std::uint8_t bytes[8][16];

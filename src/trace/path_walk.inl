@@ -9,7 +9,7 @@ class PathWalk {
       : tree_(tree),
         ray_(ray),
         octant_(mask3(ray.backward)),
-        flip_((octant_ & 1) * 3 + (octant_ & 2) * 6 + (octant_ & 4) * 12),
+        flip_(flip_of(octant_)),
         paths_(ray, ray.exit_t * 1.001F + 1e-6F),
         mirrored_(octant_),
         chunk_(Paths::block(ray.chunk)) {
@@ -35,21 +35,17 @@ class PathWalk {
     auto block = chunk_;
     if (ray_.is_inside) {
       // From the voxel in which it starts: mostly what it meets is near.
-      const I4 own = ray_.own ^ (ray_.backward & 63);
-      brick = (own[0] >> 4) + (own[1] >> 4) * 4 + (own[2] >> 4) * 16;
-      const int cell = (own[0] >> 2 & 3) + (own[1] & 12) + (own[2] & 12) * 4;
-      const int voxel = (own[0] & 3) + (own[1] & 3) * 4 + (own[2] & 3) * 16;
-      const std::uint64_t own_cell = std::uint64_t{1} << cell;
-      const std::uint64_t own_brick = std::uint64_t{1} << brick;
+      const Own own = own_units();
+      brick = own.brick;
       block = Paths::brick_of(chunk_, brick);
-      if ((bits_of_bricks() & own_brick) != 0) {
-        if ((node().cells[static_cast<std::size_t>(brick ^ flip_)] >> (cell ^ flip_) & 1U) != 0) {
-          const std::uint64_t met = voxels_of(block, brick, cell) & kUnits.from[voxel];
-          if (met != 0) return hit<kAsk>(brick, cell, met);
+      if (is_set(tree_.chunks[index_].bricks, brick)) {
+        if (is_set(node().cells[static_cast<std::size_t>(brick ^ flip_)], own.cell)) {
+          const std::uint64_t met = voxels_of(block, brick, own.cell) & kUnits.from[own.voxel];
+          if (met != 0) return hit<kAsk>(brick, own.cell, met);
         }
-        cells = cells_of(brick) & kUnits.from[cell] & ~own_cell;
+        cells = cells_of(brick) & kUnits.from[own.cell] & ~(std::uint64_t{1} << own.cell);
       }
-      allowed = kUnits.from[brick] & ~own_brick;
+      allowed = kUnits.from[brick] & ~(std::uint64_t{1} << brick);
     }
     for (bool is_known = false;; is_known = true) {
       for (; cells != 0; cells &= cells - 1) {
@@ -71,6 +67,16 @@ class PathWalk {
   }
 
  private:
+  // The units in which a ray starts, mirrored.
+  struct Own {
+    int brick, cell, voxel;
+  };
+  [[nodiscard]] Own own_units() const {
+    const I4 own = ray_.own ^ (ray_.backward & 63);
+    return {(own[0] >> 4) + (own[1] >> 4) * 4 + (own[2] >> 4) * 16,
+            (own[0] >> 2 & 3) + (own[1] & 12) + (own[2] & 12) * 4, (own[0] & 3) + (own[1] & 3) * 4 + (own[2] & 3) * 16};
+  }
+  [[nodiscard]] bool is_set(std::uint64_t word, int unit) const { return (word >> (unit ^ flip_) & 1U) != 0; }
   [[nodiscard]] std::uint64_t bits_of_bricks() const { return mirrored_(&tree_.chunks[index_].bricks); }
   [[nodiscard]] const OccupancyTree::ChunkNode& node() const { return *tree_.chunks[index_].node; }
   [[nodiscard]] std::uint64_t bricks_of_chunk() const {
@@ -80,8 +86,8 @@ class PathWalk {
     return paths_.cells(chunk_, brick) & mirrored_(&node().cells[static_cast<std::size_t>(brick ^ flip_)]);
   }
   [[nodiscard]] std::uint64_t voxels_of(const Paths::Block& block, int brick, int cell) const {
-    const std::size_t index = node().bricks[static_cast<std::size_t>(brick ^ flip_)];
-    return paths_.voxels(block, cell) & mirrored_(tree_.words + index * 128 + 2 * (cell ^ flip_));
+    const OccupancyTree::Node& words = tree_.nodes[node().bricks[static_cast<std::size_t>(brick ^ flip_)]];
+    return paths_.voxels(block, cell) & mirrored_(&words[static_cast<std::size_t>(cell ^ flip_)]);
   }
 
   // Into the next chunk; false when the ray has left its box.
@@ -107,7 +113,8 @@ class PathWalk {
     const F4 lower = F4{plane_[0], plane_[1], plane_[2], 0.0F} - kChunkSize;
     const F4 in_cell = lower + corner_of(brick) * 16.0F + corner_of(cell) * 4.0F;
     // What lies further than single precision serves is left to others.
-    if (ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t) return {false, true, -1, IVec3{0}};
+    if (ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t)
+      return {false, true, -1, IVec3{0}};
     if (kAsk == Ask::Whether) return {true, false, -1, IVec3{0}};
     const F4 voxel = in_cell + corner_of(std::countr_zero(voxels));
     const F4 nudge = ray_.is_on_plane ? (ray_.forward ? all4(kNudge) : all4(0.0F)) : all4(0.0F);

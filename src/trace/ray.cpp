@@ -248,7 +248,8 @@ std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, doubl
   RayHit hit;
   bool is_unfinished = false;
   if (!trace::kernel_of(instructions).first_hit(*view, ray, max_t, hit, is_unfinished)) {
-    if (is_unfinished) [[unlikely]] return trace::walk_to_first_hit(tree, ray, max_t);
+    if (is_unfinished) [[unlikely]]
+      return trace::walk_to_first_hit(tree, ray, max_t);
     return std::nullopt;
   }
   if (hit.starts_inside) hit.face = trace::facing(ray.direction);

@@ -15,11 +15,12 @@ Kernels kernels_here() {
 }
 #endif
 
-TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks,
-                   const OccupancyTree::Node* bricks, const IBox& bounds) {
+TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks, const OccupancyTree::Node* bricks,
+                   const IBox& bounds) {
   TreeView view{};
   view.cells = tables.cells.data();
   view.bricks = tables.bricks.data();
+  view.nodes = bricks;
   view.chunks = chunks;
   view.words = reinterpret_cast<const std::uint32_t*>(bricks);
   view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);

@@ -17,10 +17,11 @@ struct FlatChunk {
 
 /// What the kernels read of a tree with flat tables.
 struct TreeView {
-  const std::uint32_t* cells;   ///< bits
-  const std::uint32_t* bricks;  ///< indices
-  const std::uint32_t* words;   ///< of bricks: 128 halves each, the lower half of a cell's word first
-  const FlatChunk* chunks;      ///< x first, then y, then z
+  const std::uint32_t* cells;        ///< bits
+  const std::uint32_t* bricks;       ///< indices
+  const std::uint32_t* words;        ///< of bricks: 128 halves each, the lower half of a cell's word first
+  const OccupancyTree::Node* nodes;  ///< the bricks again
+  const FlatChunk* chunks;           ///< x first, then y, then z
   std::uint32_t last_cell_word;
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
