@@ -28,13 +28,8 @@ namespace {
 
 #include "trace/lockstep_setup.inl"
 
-inline F4 floor_of(F4 a) {
-  return reinterpret_cast<F4>(_mm_floor_ps(reinterpret_cast<__m128>(a)));
-}
-inline D4 floor_of(D4 a) {
-  return reinterpret_cast<D4>(_mm256_floor_pd(reinterpret_cast<__m256d>(a)));
-}
-#define QUOIN_LANES_FLOOR
+#include "trace/floor_x86.inl"
+
 #include "trace/single.inl"
 
 #include "trace/path_ray.inl"

@@ -19,6 +19,11 @@ inline int mask3(I4 a) {
 
 #include "trace/kernel_common.inl"
 
+inline F4 floor_of(F4 a) {
+  const F4 whole = __builtin_convertvector(__builtin_convertvector(a, I4), F4);
+  return whole > a ? whole - 1.0F : whole;
+}
+
 #include "trace/single.inl"
 
 template <Ask>

@@ -2,12 +2,7 @@
 // explain the arithmetic. Included once for each instruction set, within its namespace, after the kernel.
 
 inline F4 floor4(F4 a) {
-#ifdef QUOIN_LANES_FLOOR
   return floor_of(a);
-#else
-  const F4 whole = __builtin_convertvector(__builtin_convertvector(a, I4), F4);
-  return whole > a ? whole - 1.0F : whole;
-#endif
 }
 inline F4 min4(F4 a, F4 b) {
   return a < b ? a : b;
