@@ -2,6 +2,12 @@
 // order in which each of them passes those that it does; which rays pass an occupied voxel is then asked of all lanes.
 // The same answers as the walk in trace/lockstep.inl, after which it is included.
 
+// A ray passes at most ten of the 64 units of a block; a beam that passes more than this meets voxels that most of its
+// rays do not.
+constexpr int kWideBeam = 24;
+// How wide a beam may be at its end, in voxels: measured. Wider ones walk in lockstep.
+constexpr float kBeamWidth = 4.0F;
+
 struct BeamAxis {
   F origin;   // mirrored
   F inverse;  // 1e37 where it is still
@@ -64,6 +70,19 @@ inline Beam beam_of(const BeamLanes& lanes, F exit_t) {
   return beam;
 }
 
+// Whether no ray is far from the first one, where it starts and where it ends.
+inline bool is_narrow(const Lanes& lanes) {
+  const int first = std::countr_zero(bits(lanes.live) | 1U << (kWidth - 1));
+  const auto apart = [first](F a) {
+    alignas(64) float each[kWidth];
+    store(each, a);
+    return abs(a - all(each[first]));
+  };
+  const auto width = [&](const Axis& axis) { return apart(axis.origin) + apart(axis.direction) * lanes.exit_t; };
+  const F widest = max(max(width(lanes.x), width(lanes.y)), width(lanes.z));
+  return !any(lanes.live & (all(kBeamWidth) < widest));
+}
+
 inline F beam_t(const BeamAxis& axis, float plane, bool nudges) {
   const F t = (all(plane) - axis.origin) * axis.inverse;
   return nudges ? t - axis.nudge : t;
@@ -110,8 +129,8 @@ inline void trace_brick(const OccupancyTree::Node& words, std::uint64_t cells, B
   }
 }
 
-// Traces the lanes through the 4^3 chunks with these lower planes.
-inline void trace_chunks(const TreeView& tree, BeamLanes& lanes, const BeamPaths& paths, F4 block, Met& met) {
+// Traces the lanes through the 4^3 chunks with these lower planes; false when the beam is too wide to be worth it.
+inline bool trace_chunks(const TreeView& tree, BeamLanes& lanes, const BeamPaths& paths, F4 block, Met& met) {
   const Mirror mirrored(lanes.octant);
   for (std::uint64_t chunks = paths.units<3>(block); chunks != 0; chunks &= chunks - 1) {
     const F4 chunk = block + corner_of(std::countr_zero(chunks)) * kChunkSize;
@@ -122,16 +141,21 @@ inline void trace_chunks(const TreeView& tree, BeamLanes& lanes, const BeamPaths
     const FlatChunk& entry =
         tree.chunks[place[0] + place[1] * tree.chunk_strides[1] + place[2] * tree.chunk_strides[2]];
     if (entry.bricks == 0) continue;
-    std::uint64_t bricks = paths.units<2>(chunk) & mirrored(&entry.bricks);
+    const std::uint64_t passed = paths.units<2>(chunk);
+    if (std::popcount(passed) > kWideBeam) return false;
+    std::uint64_t bricks = passed & mirrored(&entry.bricks);
     for (; bricks != 0; bricks &= bricks - 1) {
       const int brick = std::countr_zero(bricks);
       const F4 in_brick = chunk + corner_of(brick) * 16.0F;
       const auto at = static_cast<std::size_t>(brick ^ flip_of(lanes.octant));
-      const std::uint64_t cells = paths.units<1>(in_brick) & mirrored(&entry.node->cells[at]);
-      trace_brick(tree.nodes[entry.node->bricks[at]], cells, lanes, paths, in_brick, met);
-      if (!any(lanes.left)) return;
+      const std::uint64_t cells = paths.units<1>(in_brick);
+      if (std::popcount(cells) > kWideBeam) return false;
+      trace_brick(tree.nodes[entry.node->bricks[at]], cells & mirrored(&entry.node->cells[at]), lanes, paths, in_brick,
+                  met);
+      if (!any(lanes.left)) return true;
     }
   }
+  return true;
 }
 
 inline F4 chunk_block(const BeamLanes& lanes, F t) {
@@ -144,6 +168,7 @@ inline F4 chunk_block(const BeamLanes& lanes, F t) {
 
 // Answers the lanes that are to be traced otherwise: it was not asked to serve them, or did not get on.
 inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Crossing& entered, Met& met) {
+  if (!is_narrow(lanes)) return lanes.live;
   BeamLanes beam;
   beam.left = lanes.live;
   const Mask starts_there = ~(entered.x | entered.y | entered.z) | (t == all(0.0F));
@@ -152,12 +177,10 @@ inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Cros
       !mirror_axis(lanes.z, lanes.live, starts_there, 2, beam, beam.z)) {
     return lanes.live;
   }
-  const Beam bounds = beam_of(beam, lanes.exit_t);
-  if (greatest3(bounds.greatest_origin - bounds.least_origin) > kBeamWidth) return lanes.live;
-  const BeamPaths paths(bounds);
+  const BeamPaths paths(beam_of(beam, lanes.exit_t));
   F4 block = chunk_block(beam, t);
   for (;;) {
-    trace_chunks(tree, beam, paths, block, met);
+    if (!trace_chunks(tree, beam, paths, block, met)) return beam.left;
     const F4 far = block + 4.0F * kChunkSize;
     const F out = min(min(beam_t(beam.x, far[0], false), beam_t(beam.y, far[1], false)), beam_t(beam.z, far[2], false));
     beam.left = beam.left & (out <= lanes.exit_t);
@@ -166,4 +189,10 @@ inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Cros
     if (mask3((next < block)) != 0 || mask3(next > block) == 0) return beam.left;
     block = next;
   }
+}
+
+inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered) {
+  Met met{mask_of(0), mask_of(0), all(0), all(0), all(0), all(0)};
+  lanes.live = trace_beam(tree, lanes, t, entered, met);
+  return any(lanes.live) ? trace_apart(tree, lanes, t, entered, met) : met;
 }

@@ -8,8 +8,6 @@ namespace half {
 using half::mask3;
 
 constexpr int kWidth = 2 * half::kWidth;
-// Rays that start further apart, in voxels, are walked in lockstep instead of as a beam: measured.
-constexpr float kBeamWidth = 6.0F;
 
 struct Mask {
   half::Mask low, high;
@@ -144,6 +142,10 @@ inline F to_float(I a) {
   return {half::to_float(a.low), half::to_float(a.high)};
 }
 inline void store(std::int32_t* to, I a) {
+  half::store(to, a.low);
+  half::store(to + half::kWidth, a.high);
+}
+inline void store(float* to, F a) {
   half::store(to, a.low);
   half::store(to + half::kWidth, a.high);
 }

@@ -2,9 +2,6 @@
 
 #include "core/lanes_avx512.h"
 
-// As for AVX2, whose lockstep is slower: only rays from one point are a beam.
-constexpr float kBeamWidth = 0.0F;
-
 inline __m512 join(__m256 low, __m256 high) {
   return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
 }

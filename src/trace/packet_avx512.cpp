@@ -43,9 +43,7 @@ namespace {
 
 #include "trace/lockstep.inl"
 
-#include "trace/beam_paths.inl"
-
-#include "trace/beam.inl"
+#include "trace/no_beam.inl"
 
 #include "trace/packet_hits.inl"
 

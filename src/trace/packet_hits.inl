@@ -1,11 +1,5 @@
 // What packets of rays come to, in double precision. Included once for each instruction set, within its namespace,
-// after trace/beam.inl.
-
-inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered) {
-  Met met{mask_of(0), mask_of(0), all(0), all(0), all(0), all(0)};
-  lanes.live = trace_beam(tree, lanes, t, entered, met);
-  return any(lanes.live) ? trace_apart(tree, lanes, t, entered, met) : met;
-}
+// after the file that has `trace`.
 
 inline void keep(const Met& met, int first, LaneHits& out) {
   out.hit |= bits(met.hit) << first;
