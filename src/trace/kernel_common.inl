@@ -17,6 +17,14 @@ constexpr int kCodeY = 4 + 256 * 8;
 constexpr int kCodeZ = 16 + 256 * 64;
 constexpr int kLeft = 256 * (4 + 4 * 8 + 4 * 64);
 
+// Four numbers side by side: x, y, z and one that means nothing.
+using F4 = float __attribute__((vector_size(16)));
+using I4 = std::int32_t __attribute__((vector_size(16)));
+using D4 = double __attribute__((vector_size(32)));
+
+// What is asked of a single ray.
+enum class Ask : std::uint8_t { Where, Whether };
+
 // Where a ray starts, in voxels from the tables' origin.
 struct Move {
   double position[3];

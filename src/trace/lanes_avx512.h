@@ -32,8 +32,8 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
 inline I as_bits(F a) {
   return {_mm512_castps_si512(a.v)};
 }
-inline float least_of(Mask m, F a) {
-  return _mm512_mask_reduce_min_ps(m.m, a.v);
+inline float least_of(F a) {
+  return _mm512_reduce_min_ps(a.v);
 }
 // Entry `at % 16`, or `at % 32`, of a table.
 inline I from_16(I table, I at) {

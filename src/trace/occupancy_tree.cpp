@@ -6,6 +6,7 @@
 #include <tsl/robin_map.h>
 
 #include "grid/coordinate_hash.h"
+#include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
 
 namespace quoin {
@@ -15,50 +16,6 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
 // Flat tables up to this size are made however sparse the world is.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
-
-bool belongs(const VoxelRegistry& types, VoxelType type, Occupancy which) {
-  if (type == kAir) return false;
-  if (which == Occupancy::NonAir) return true;
-  return types.is_transparent(type) == (which == Occupancy::Transparent);
-}
-
-// Rows of a chunk as bits, by asking the palette which types count.
-class Rows {
- public:
-  Rows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which) : chunk_(&chunk) {
-    for (const VoxelType type : chunk.types()) (belongs(types, type, which) ? in_ : out_).push_back(type);
-  }
-  [[nodiscard]] bool none() const { return in_.empty(); }
-  [[nodiscard]] bool all() const { return out_.empty(); }
-  [[nodiscard]] std::uint64_t row(int y, int z) const {
-    // Whichever list is shorter.
-    const bool by_absence = out_.size() < in_.size();
-    std::uint64_t mask = 0;
-    for (const VoxelType type : by_absence ? out_ : in_) mask |= chunk_->row_mask(y, z, type);
-    return by_absence ? ~mask : mask;
-  }
-
- private:
-  const Chunk* chunk_;
-  std::vector<VoxelType> in_;
-  std::vector<VoxelType> out_;
-};
-
-// 16 rows of 16 nibbles, [z][y][x / 4], become 16 words of 4^3 bits: nibble j of word i becomes nibble i of word j.
-void transpose_nibbles(std::array<std::uint64_t, 16>& w) {
-  constexpr std::uint64_t kMasks[] = {0x0F0F'0F0F'0F0F'0F0FU, 0x00FF'00FF'00FF'00FFU, 0x0000'FFFF'0000'FFFFU,
-                                      0x0000'0000'FFFF'FFFFU};
-  for (unsigned stage = 0; stage < 4; ++stage) {
-    const unsigned distance = 1U << stage;
-    const unsigned shift = 4U << stage;
-    for (unsigned i = 0; i < 16; ++i) {
-      if ((i & distance) != 0) continue;
-      const std::uint64_t t = ((w[i] >> shift) ^ w[i + distance]) & kMasks[stage];
-      w[i + distance] ^= t;
-      w[i] ^= t << shift;
-    }
-  }
-}
 
 // Index of a unit in a node's table of 16^3, and its word and bit in a node.
 std::size_t table_index(IVec3 unit) {
@@ -74,6 +31,12 @@ unsigned bit_of(IVec3 unit) {
 }  // namespace
 
 struct OccupancyTree::Impl {
+  // Bricks of a chunk that an update changed.
+  struct Changed {
+    IVec3 chunk;
+    std::uint64_t bricks;
+  };
+
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
   std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // 0: none
@@ -83,6 +46,8 @@ struct OccupancyTree::Impl {
   tsl::robin_map<IVec3, IBox, CoordinateHash> chunk_bounds;  // occupied voxels of each chunk, in grid coordinates
   IBox bounds;
   FlatTables flat;  // no chunks: none
+  std::vector<trace::FlatChunk> flat_nodes;
+  const ChunkNode* known_nodes = nullptr;  // where they were when `flat_nodes` was made
   IBox flat_chunks;
   trace::TreeView view{};
 
@@ -141,113 +106,110 @@ struct OccupancyTree::Impl {
     return chunk_nodes[index];
   }
 
-  // Puts the words of one brick in place.
-  void set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
+  // Puts the words of one brick in place; answers whether they are others than before.
+  bool set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
+    std::uint32_t& index = node.bricks[brick];
+    if (bricks[index] == words) return false;
     std::uint64_t cells = 0;
     bool is_full = true;
     for (std::size_t i = 0; i < 64; ++i) {
       cells |= std::uint64_t{words[i] != 0} << i;
       is_full &= words[i] == kAll;
     }
+    if (cells == 0 || is_full) return set_uniform(node, brick, is_full);
     node.cells[brick] = cells;
-    if (cells == 0 || is_full) {
-      node.bricks[brick] = is_full ? 1 : 0;
-      return;
-    }
-    const std::uint32_t index = allocate_brick();
+    if (index <= 1) index = allocate_brick();
     bricks[index] = words;
-    node.bricks[brick] = index;
+    return true;
   }
 
-  // Answers the box of the chunk's occupied voxels, in chunk coordinates.
-  IBox fill(ChunkNode& node, const Rows& rows) {
-    IBox box;
-    std::array<Node, 4> four{};  // the bricks along x
-    for (int brick_z = 0; brick_z < 4; ++brick_z) {
-      for (int brick_y = 0; brick_y < 4; ++brick_y) {
-        for (int slab = 0; slab < 16; ++slab) {
-          const int y = brick_y * 16 + (slab & 3) * 4;
-          const int z = brick_z * 16 + (slab >> 2) * 4;
-          std::array<std::uint64_t, 16> words{};
-          for (int i = 0; i < 16; ++i) {
-            const std::uint64_t row = rows.row(y + (i & 3), z + (i >> 2));
-            words[static_cast<std::size_t>(i)] = row;
-            if (row == 0) continue;
-            const IVec3 low{std::countr_zero(row), y + (i & 3), z + (i >> 2)};
-            box = unite(box, {low, {64 - std::countl_zero(row), low.y + 1, low.z + 1}});
-          }
-          transpose_nibbles(words);
-          for (std::size_t i = 0; i < 16; ++i) four[i / 4][i % 4 + static_cast<std::size_t>(slab) * 4] = words[i];
-        }
-        for (int brick_x = 0; brick_x < 4; ++brick_x) {
-          const auto brick = static_cast<std::size_t>(brick_x + 4 * brick_y + 16 * brick_z);
-          set_brick(node, brick, four[static_cast<std::size_t>(brick_x)]);
-        }
+  bool set_uniform(ChunkNode& node, std::size_t brick, bool is_full) {
+    std::uint32_t& index = node.bricks[brick];
+    if (index == (is_full ? 1 : 0)) return false;
+    if (index > 1) free_bricks.push_back(index);
+    index = is_full ? 1 : 0;
+    node.cells[brick] = is_full ? kAll : 0;
+    return true;
+  }
+
+  // Answers which bricks changed; `box` becomes that of the chunk's occupied voxels, in chunk coordinates.
+  std::uint64_t fill(ChunkNode& node, const trace::ChunkRows& rows, IBox& box) {
+    std::uint64_t changed = 0;
+    trace::RowsBox rows_box;
+    trace::BrickRow four;
+    for (int row = 0; row < 16; ++row) {
+      const bool is_mixed = four.read(rows, (row & 3) * 16, (row >> 2) * 16, rows_box);
+      for (std::size_t x = 0; x < 4; ++x) {
+        const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
+        const bool is_other =
+            is_mixed ? set_brick(node, brick, four.bricks[x]) : set_uniform(node, brick, four.is_full);
+        changed |= std::uint64_t{is_other} << brick;
       }
     }
-    return box;
+    box = rows_box.box();
+    return changed;
   }
 
-  void put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
-    chunk_bounds.erase(chunk);
-    if (voxels == nullptr) return remove(chunk);
-    const Rows rows(*voxels, types, which);
-    if (rows.none()) return remove(chunk);
-    ChunkNode& node = find_or_create(chunk);
-    release_bricks(node);
-    IBox box = kWholeChunkBox;
-    if (rows.all()) {
-      node.cells.fill(kAll);
-      node.bricks.fill(1);
-    } else {
-      box = fill(node, rows);
-      if (box.empty()) return remove(chunk);
-    }
+  // Answers which bricks changed.
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
+    const auto drop = [&] {
+      chunk_bounds.erase(chunk);
+      remove(chunk);
+      return kAll;
+    };
+    if (voxels == nullptr) return drop();
+    const trace::ChunkRows rows(*voxels, types, which);
+    if (rows.none()) return drop();
+    IBox box;
+    const std::uint64_t changed = fill(find_or_create(chunk), rows, box);
+    if (box.empty()) return drop();
     chunk_bounds[chunk] = {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge};
+    return changed;
   }
 
-  // The 16 cells along x at (y, z) of a chunk, as bits.
-  static std::uint64_t cell_row(const ChunkNode& node, int y, int z) {
-    std::uint64_t row = 0;
-    for (int brick_x = 0; brick_x < 4; ++brick_x) {
-      const auto brick = static_cast<std::size_t>(brick_x + 4 * (y >> 2) + 16 * (z >> 2));
-      row |= (node.cells[brick] >> (4 * (y & 3) + 16 * (z & 3)) & 15U) << (4 * brick_x);
-    }
-    return row;
-  }
-
-  // Puts 16 bits in place of those at `bit`.
+  // Puts 4 bits in place of those at `bit`.
   static void put_bits(std::vector<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
     const std::size_t word = bit / 32;
     const unsigned shift = bit % 32;
-    const std::uint64_t mask = std::uint64_t{0xFFFF} << shift;
+    const std::uint64_t mask = std::uint64_t{15} << shift;
     std::uint64_t both = words[word] | std::uint64_t{words[word + 1]} << 32;
     both = (both & ~mask) | bits << shift;
     words[word] = static_cast<std::uint32_t>(both);
     words[word + 1] = static_cast<std::uint32_t>(both >> 32);
   }
 
-  // Copies a chunk's cells and bricks into the flat tables.
-  void flatten(IVec3 chunk) {
+  [[nodiscard]] const ChunkNode& node_of(IVec3 chunk) const {
     const RegionNode* region = find({chunk.x >> kRegionShift, chunk.y >> kRegionShift, chunk.z >> kRegionShift});
-    const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
-    const ChunkNode& node = chunk_nodes[index];
+    return chunk_nodes[region == nullptr ? 0 : region->nodes[table_index(chunk & 15)]];
+  }
+
+  void name_node(IVec3 chunk) {
+    const ChunkNode& node = node_of(chunk);
+    std::uint64_t bricks_there = 0;
+    for (std::size_t i = 0; i < 64; ++i) bricks_there |= std::uint64_t{node.cells[i] != 0} << i;
     const IVec3 at = chunk - flat_chunks.min;
+    flat_nodes[static_cast<std::size_t>(at.x + flat.chunks.x * (at.y + flat.chunks.y * at.z))] = {bricks_there, &node};
+  }
+
+  // Copies some of a chunk's bricks and their cells into the flat tables.
+  void flatten(IVec3 chunk, std::uint64_t changed) {
+    if (changed == 0) return;
+    name_node(chunk);
+    const ChunkNode& node = node_of(chunk);
     const IVec3 cells = flat.cell_strides();
     const IVec3 bricks_at = flat.brick_strides();
-    for (int z = 0; z < 16; ++z) {
-      for (int y = 0; y < 16; ++y) {
-        const IVec3 cell = at * 16 + IVec3{1, y + 1, z + 1};
-        const auto bit = static_cast<std::size_t>(cell.x) + static_cast<std::size_t>(cell.y) * cells.y +
-                         static_cast<std::size_t>(cell.z) * cells.z;
-        put_bits(flat.cells, bit, cell_row(node, y, z));
-      }
-    }
-    for (int i = 0; i < 64; ++i) {
-      const IVec3 brick = at * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
+    for (; changed != 0; changed &= changed - 1) {
+      const int i = std::countr_zero(changed);
+      const IVec3 brick = (chunk - flat_chunks.min) * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
       const auto to = static_cast<std::size_t>(brick.x) + static_cast<std::size_t>(brick.y) * bricks_at.y +
                       static_cast<std::size_t>(brick.z) * bricks_at.z;
       flat.bricks[to] = node.bricks[static_cast<std::size_t>(i)];
+      for (int row = 0; row < 16; ++row) {
+        const IVec3 cell = brick * 4 + IVec3{1, (row & 3) + 1, (row >> 2) + 1};
+        const auto bit = static_cast<std::size_t>(cell.x) + static_cast<std::size_t>(cell.y) * cells.y +
+                         static_cast<std::size_t>(cell.z) * cells.z;
+        put_bits(flat.cells, bit, node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
+      }
     }
   }
 
@@ -279,17 +241,23 @@ struct OccupancyTree::Impl {
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
     flat.bricks.assign(
         64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
+    flat_nodes.assign(
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
+        {0, chunk_nodes.data()});
+    known_nodes = chunk_nodes.data();
     flat_chunks = chunks;
-    for (const auto& [chunk, box] : chunk_bounds) flatten(chunk);
+    for (const auto& [chunk, box] : chunk_bounds) flatten(chunk, kAll);
   }
 
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
-  void finish(std::span<const IVec3> changed) {
+  void finish(std::span<const Changed> changed) {
     renew_tables(changed);
-    if (!flat_chunks.empty()) view = trace::make_view(flat, bricks.data(), bounds);
+    if (!flat_chunks.empty()) view = trace::make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 
-  void renew_tables(std::span<const IVec3> changed) {
+  [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
+
+  void renew_tables(std::span<const Changed> changed) {
     bounds = {};
     IBox chunks;
     for (const auto& [chunk, box] : chunk_bounds) {
@@ -299,16 +267,19 @@ struct OccupancyTree::Impl {
     // As a tree built from scratch would have it.
     if (!can_be_flat(chunks)) {
       flat = {};
+      flat_nodes = {};
       flat_chunks = {};
       return;
     }
     if (!(chunks == flat_chunks)) return make_flat(chunks);
-    for (const IVec3 chunk : changed) {
-      if (flat_chunks.contains(chunk)) flatten(chunk);
+    if (chunk_nodes.data() != known_nodes) {
+      known_nodes = chunk_nodes.data();
+      for (const auto& [chunk, box] : chunk_bounds) name_node(chunk);
+    }
+    for (const auto& [chunk, changed_bricks] : changed) {
+      if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
     }
   }
-
-  static constexpr IBox kWholeChunkBox = {IVec3{0}, IVec3{kChunkEdge}};
 };
 
 OccupancyTree::OccupancyTree() : impl_(std::make_unique<Impl>()) {}
@@ -323,12 +294,16 @@ OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types,
   tree.impl_->chunk_nodes.shrink_to_fit();
   tree.impl_->bricks.shrink_to_fit();
   tree.impl_->finish({});
+  tree.view_ = tree.impl_->kernel_view();
   return tree;
 }
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks) {
-  for (const IVec3 chunk : chunks) impl_->put(grid.find_chunk(chunk), types, chunk);
-  impl_->finish(chunks);
+  std::vector<Impl::Changed> changed;
+  changed.reserve(chunks.size());
+  for (const IVec3 chunk : chunks) changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk)});
+  impl_->finish(changed);
+  view_ = impl_->kernel_view();
 }
 
 IBox OccupancyTree::bounds() const {
@@ -350,6 +325,7 @@ std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
          impl_->chunk_bounds.bucket_count() * (sizeof(IVec3) + sizeof(IBox)) +
+         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 
@@ -362,9 +338,6 @@ const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
 }
 const OccupancyTree::Node* OccupancyTree::bricks() const {
   return impl_->bricks.data();
-}
-const trace::TreeView* OccupancyTree::view() const {
-  return impl_->flat_chunks.empty() ? nullptr : &impl_->view;
 }
 const OccupancyTree::FlatTables* OccupancyTree::flat_tables() const {
   return impl_->flat_chunks.empty() ? nullptr : &impl_->flat;

@@ -22,15 +22,31 @@
 namespace quoin::trace {
 namespace {
 
-#include "trace/lanes_avx2.h"
+#include "trace/lanes_avx2_pair.h"
 
 #include "trace/kernel_common.inl"
 
 #include "trace/lockstep_setup.inl"
 
-#include "trace/lockstep.inl"
+#include "trace/floor_x86.inl"
 
 #include "trace/single.inl"
+
+#include "trace/path_ray.inl"
+
+#include "trace/path_units.inl"
+
+#include "trace/path_avx2.inl"
+
+#include "trace/path_walk.inl"
+
+#include "trace/lockstep.inl"
+
+#include "trace/beam_paths.inl"
+
+#include "trace/beam.inl"
+
+#include "trace/packet_hits.inl"
 
 #include "trace/single_hit.inl"
 

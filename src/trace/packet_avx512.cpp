@@ -29,9 +29,23 @@ namespace {
 
 #include "trace/lockstep_setup.inl"
 
-#include "trace/lockstep.inl"
+#include "trace/floor_x86.inl"
 
 #include "trace/single.inl"
+
+#include "trace/path_ray.inl"
+
+#include "trace/path_units.inl"
+
+#include "trace/path_avx512.inl"
+
+#include "trace/path_walk.inl"
+
+#include "trace/lockstep.inl"
+
+#include "trace/no_beam.inl"
+
+#include "trace/packet_hits.inl"
 
 #include "trace/single_hit.inl"
 

@@ -19,7 +19,17 @@ inline int mask3(I4 a) {
 
 #include "trace/kernel_common.inl"
 
+inline F4 floor_of(F4 a) {
+  const F4 whole = __builtin_convertvector(__builtin_convertvector(a, I4), F4);
+  return whole > a ? whole - 1.0F : whole;
+}
+
 #include "trace/single.inl"
+
+template <Ask>
+inline SingleHit trace_one(const TreeView& tree, const Ray& ray, double max_t) {
+  return trace_single(tree, ray, max_t);
+}
 
 #include "trace/single_hit.inl"
 

@@ -76,37 +76,97 @@ class Packets : public testing::TestWithParam<unsigned> {
     return rays;
   }
 
+  // From one point, or from near it, in about one direction.
+  RayPacket beam() {
+    const Ray middle = ray();
+    const double apart = whole(0, 1) == 0 ? 0.0 : uniform(0, 8);
+    const double spread = std::exp2(whole(-12, -1));
+    RayPacket rays;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      Ray one = middle;
+      for (int axis = 0; axis < 3; ++axis) {
+        one.origin[axis] += apart * uniform(-0.5, 0.5);
+        if (whole(0, 7) != 0) one.direction[axis] *= 1 + spread * uniform(-1, 1);
+        if (whole(0, 40) == 0) one.direction[axis] = 0;
+        if (whole(0, 9) == 0) one.origin[axis] = std::floor(one.origin[axis]);
+      }
+      if (whole(0, 15) != 0) rays.set(lane, one, whole(0, 3) == 0 ? uniform(0, 200) : kInfinity);
+    }
+    return rays;
+  }
+
   std::mt19937 random_{GetParam()};
   Grid grid_;
   OccupancyTree tree_;
 };
 
-TEST_P(Packets, AnswerTheSameWithEveryInstructionSetAndOneByOne) {
+// Every kernel, in a packet and alone; answers how many hit.
+int hits_if_all_agree(const OccupancyTree& tree, const RayPacket& rays) {
   int hits = 0;
-  for (int i = 0; i < 5'000; ++i) {
-    const RayPacket rays = packet();
+  const auto check = [&] {
     std::array<PacketHits, 3> found;
     for (std::size_t set = 0; set < 3; ++set) {
-      first_hits(tree_, rays, found[set], kSets[set]);
-      ASSERT_EQ(any_hits(tree_, rays, kSets[set]), found[set].hit);
+      first_hits(tree, rays, found[set], kSets[set]);
+      ASSERT_EQ(any_hits(tree, rays, kSets[set]), found[set].hit);
     }
     ASSERT_NO_FATAL_FAILURE(expect_same(found[0], found[1]));
     ASSERT_NO_FATAL_FAILURE(expect_same(found[0], found[2]));
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
       if ((rays.active >> lane & 1U) == 0) continue;
-      const auto single = first_hit(tree_, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
-      ASSERT_EQ(single.has_value(), (found[0].hit >> lane & 1U) != 0);
+      const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
       for (const InstructionSet set : kSets) {
-        const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
-        ASSERT_EQ(any_hit(tree_, rays.ray(lane), max_t, set), single.has_value());
-        ASSERT_EQ(first_hit(tree_, rays.ray(lane), max_t, set).has_value(), single.has_value());
+        const auto single = first_hit(tree, rays.ray(lane), max_t, set);
+        ASSERT_EQ(single.has_value(), (found[0].hit >> lane & 1U) != 0);
+        ASSERT_EQ(any_hit(tree, rays.ray(lane), max_t, set), single.has_value());
+        if (!single) continue;
+        ASSERT_EQ(single->voxel, found[0][lane].voxel);
+        ASSERT_EQ(single->t, found[0][lane].t);
+        ASSERT_EQ(single->face, found[0][lane].face);
+        ASSERT_EQ(single->starts_inside, found[0][lane].starts_inside);
       }
-      if (!single) continue;
-      ++hits;
-      ASSERT_EQ(single->voxel, found[0][lane].voxel);
-      ASSERT_EQ(single->t, found[0][lane].t);
-      ASSERT_EQ(single->face, found[0][lane].face);
+      hits += (found[0].hit >> lane & 1U) != 0 ? 1 : 0;
     }
+  };
+  check();
+  return hits;
+}
+
+TEST_P(Packets, AnswerTheSameWithEveryInstructionSetAndOneByOne) {
+  int hits = 0;
+  for (int i = 0; i < 5'000; ++i) {
+    hits += hits_if_all_agree(tree_, packet());
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 500);
+}
+
+TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
+  int hits = 0;
+  for (int i = 0; i < 4'000; ++i) {
+    hits += hits_if_all_agree(tree_, beam());
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 1'000);
+}
+
+// Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.
+TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAnswerTheSame) {
+  Grid grid;
+  for (int i = 0; i < 400; ++i) {
+    const IVec3 corner{whole(-1'500, 2'500), whole(-40, 90), whole(-70, 75)};
+    grid.fill_box(corner, corner + IVec3{whole(1, 4), whole(1, 4), whole(1, 4)}, VoxelType{1});
+  }
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  ASSERT_NE(tree.flat_tables(), nullptr);
+  int hits = 0;
+  for (int i = 0; i < 3'000; ++i) {
+    RayPacket rays = beam();
+    for (std::size_t lane = 0; lane < RayPacket::kSize; ++lane) {
+      rays.direction_x[lane] *= 20;
+      rays.origin_x[lane] *= 15;
+    }
+    hits += hits_if_all_agree(tree, rays);
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 500);
 }

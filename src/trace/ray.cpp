@@ -245,16 +245,14 @@ std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const 
 std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
   const trace::TreeView* view = tree.view();
   if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
-  std::optional<RayHit> hit(std::in_place);
+  RayHit hit;
   bool is_unfinished = false;
-  const bool is_hit = trace::kernel_of(instructions).first_hit(*view, ray, max_t, *hit, is_unfinished);
-  if (is_hit) {
-    if (hit->starts_inside) hit->face = trace::facing(ray.direction);
-  } else if (is_unfinished) {
-    hit = trace::walk_to_first_hit(tree, ray, max_t);
-  } else {
-    hit.reset();
+  if (!trace::kernel_of(instructions).first_hit(*view, ray, max_t, hit, is_unfinished)) {
+    if (is_unfinished) [[unlikely]]
+      return trace::walk_to_first_hit(tree, ray, max_t);
+    return std::nullopt;
   }
+  if (hit.starts_inside) hit.face = trace::facing(ray.direction);
   return hit;
 }
 

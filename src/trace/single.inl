@@ -1,13 +1,8 @@
 // One ray, walked in plain code; the same answers as the lockstep kernel in trace/lockstep_setup.inl, whose comments
 // explain the arithmetic. Included once for each instruction set, within its namespace, after the kernel.
 
-using F4 = float __attribute__((vector_size(16)));
-using I4 = std::int32_t __attribute__((vector_size(16)));
-using D4 = double __attribute__((vector_size(32)));
-
 inline F4 floor4(F4 a) {
-  const F4 whole = __builtin_convertvector(__builtin_convertvector(a, I4), F4);
-  return whole > a ? whole - 1.0F : whole;
+  return floor_of(a);
 }
 inline F4 min4(F4 a, F4 b) {
   return a < b ? a : b;

@@ -7,7 +7,7 @@ inline double distance_of(const TreeView& tree, const Ray& ray, const SingleHit&
 }
 
 inline bool first_single(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished) {
-  const SingleHit found = trace_single(tree, ray, max_t);
+  const SingleHit found = trace_one<Ask::Where>(tree, ray, max_t);
   unfinished = found.is_unfinished;
   if (!found.is_hit) return false;
   hit.voxel = found.voxel + IVec3(tree.origin);
@@ -18,8 +18,12 @@ inline bool first_single(const TreeView& tree, const Ray& ray, double max_t, Ray
 }
 
 inline bool any_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
-  const SingleHit found = trace_single(tree, ray, max_t);
+  if (max_t == std::numeric_limits<double>::infinity()) {
+    const SingleHit found = trace_one<Ask::Whether>(tree, ray, max_t);
+    unfinished = found.is_unfinished;
+    return found.is_hit;
+  }
+  const SingleHit found = trace_one<Ask::Where>(tree, ray, max_t);
   unfinished = found.is_unfinished;
-  return found.is_hit &&
-         (max_t == std::numeric_limits<double>::infinity() || found.axis < 0 || distance_of(tree, ray, found) <= max_t);
+  return found.is_hit && (found.axis < 0 || distance_of(tree, ray, found) <= max_t);
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <quoin/trace/occupancy_tree.h>
@@ -7,11 +9,19 @@
 
 namespace quoin::trace {
 
+/// A chunk as walks of single rays read it.
+struct FlatChunk {
+  std::uint64_t bricks = 0;  ///< those that are not empty, x + 4 y + 16 z
+  const OccupancyTree::ChunkNode* node = nullptr;
+};
+
 /// What the kernels read of a tree with flat tables.
 struct TreeView {
-  const std::uint32_t* cells;   ///< bits
-  const std::uint32_t* bricks;  ///< indices
-  const std::uint32_t* words;   ///< of bricks: 128 halves each, the lower half of a cell's word first
+  const std::uint32_t* cells;        ///< bits
+  const std::uint32_t* bricks;       ///< indices
+  const std::uint32_t* words;        ///< of bricks: 128 halves each, the lower half of a cell's word first
+  const OccupancyTree::Node* nodes;  ///< the bricks again
+  const FlatChunk* chunks;           ///< x first, then y, then z
   std::uint32_t last_cell_word;
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
@@ -24,6 +34,9 @@ struct TreeView {
   alignas(32) double corner[4];
   alignas(16) float low[4];
   alignas(16) float high[4];
+  alignas(16) std::int32_t low_voxel[4];
+  alignas(16) std::int32_t high_voxel[4];
+  alignas(16) std::int32_t chunk_strides[4];
 };
 
 /// What a kernel leaves of the lanes it was asked about.
@@ -55,8 +68,21 @@ extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 #endif
 
-[[nodiscard]] const Kernel& kernel_of(InstructionSet instructions);
-[[nodiscard]] TreeView make_view(const OccupancyTree::FlatTables& tables, const OccupancyTree::Node* bricks,
-                                 const IBox& bounds);
+#ifdef QUOIN_X86_KERNELS
+/// By instruction set, the widest that this machine has and that is no wider than asked.
+using Kernels = std::array<const Kernel*, 4>;
+[[nodiscard]] Kernels kernels_here();
+
+[[nodiscard]] inline const Kernel& kernel_of(InstructionSet instructions) {
+  static const Kernels kernels = kernels_here();
+  return *kernels[static_cast<std::size_t>(instructions)];
+}
+#else
+[[nodiscard]] inline const Kernel& kernel_of(InstructionSet) {
+  return kPlainKernel;
+}
+#endif
+[[nodiscard]] TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks,
+                                 const OccupancyTree::Node* bricks, const IBox& bounds);
 
 }  // namespace quoin::trace
