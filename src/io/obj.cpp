@@ -26,7 +26,8 @@ class ObjText {
   ObjText(const Scene& scene, const SceneMeshes& meshes, BlockWriter& out)
       : scene_(scene), meshes_(meshes), lines_(out), out_(out), palette_(scene.types, meshes) {
     for (std::uint8_t level = 0; level < greys_.size(); ++level) {
-      const std::string grey = " " + ObjLines::text_of(occlusion_brightness(level));
+      std::string grey = " ";
+      grey += ObjLines::text_of(occlusion_brightness(level));
       greys_[level] = grey + grey + grey;
     }
   }
