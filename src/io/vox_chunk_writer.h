@@ -19,7 +19,12 @@ class ChunkWriter {
   /// Has room for so many bytes more, so that they are not moved as it grows.
   void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   void text(std::string_view text) { raw(std::as_bytes(std::span(text.data(), text.size()))); }
-  void raw(std::span<const std::byte> bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
+  void raw(std::span<const std::byte> bytes) {
+    // Not `insert`, of which GCC 12 warns wrongly where it is inlined.
+    const std::size_t at = bytes_.size();
+    bytes_.resize(at + bytes.size());
+    std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at));
+  }
   void u32(std::uint32_t value) {
     bytes_.resize(bytes_.size() + 4);
     patch(bytes_.size() - 4, value);
