@@ -116,13 +116,14 @@ bool gather_rows(const Job& job, Scratch& s) {
   return other_z;
 }
 
-// Whether a voxel of the 18 neighbours with another x may be opaque.
+// Whether a voxel of the 18 neighbours with another x may be opaque: their palettes need not be read for that.
 bool has_row_ends(const Job& job) {
+  const auto may_be_opaque = [&](const Chunk* chunk) {
+    return chunk != nullptr && (chunk->mixed() != nullptr || job.types->is_opaque(*chunk->uniform()));
+  };
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (const int dx : {-1, 1}) {
-        if (!OpaqueVoxels(job.chunks->at(dx, dy, dz), *job.types).none()) return true;
-      }
+      if (may_be_opaque(job.chunks->at(-1, dy, dz)) || may_be_opaque(job.chunks->at(1, dy, dz))) return true;
     }
   }
   return false;
