@@ -119,10 +119,14 @@ inline Mask test(I a, I b) {
 }
 // Bit `at % 32` of each lane.
 inline Mask test_bit(I a, I at) {
-  return test(a, I{_mm512_sllv_epi32(_mm512_set1_epi32(1), _mm512_and_si512(at.v, _mm512_set1_epi32(31)))});
+  return test(I{_mm512_rorv_epi32(a.v, at.v)}, I{_mm512_set1_epi32(1)});
 }
 inline I gather(const std::uint32_t* base, I at) {
-  return {_mm512_i32gather_epi32(at.v, base, 4)};
+  // Into zeros under a mask that compilers cannot see through: else they gather into any register, whose content, the
+  // last gather's mostly, has to be waited for.
+  __mmask16 each = 0xFFFF;
+  __asm__("" : "+Yk"(each));
+  return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each, at.v, base, 4)};
 }
 inline I to_int(F a) {
   return {_mm512_cvttps_epi32(a.v)};

@@ -191,8 +191,9 @@ inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Cros
   }
 }
 
+template <Ask kAsk>
 inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered) {
   Met met{mask_of(0), mask_of(0), all(0), all(0), all(0), all(0)};
   lanes.live = trace_beam(tree, lanes, t, entered, met);
-  return any(lanes.live) ? trace_apart(tree, lanes, t, entered, met) : met;
+  return any(lanes.live) ? trace_apart<kAsk>(tree, lanes, t, entered, met) : met;
 }

@@ -3,6 +3,7 @@
 
 // Further than any crossing; adding a step to it changes nothing.
 constexpr float kNever = 1e37F;
+constexpr float kEndless = std::numeric_limits<float>::infinity();
 // How far a lane goes, along its greatest component, before single precision would no longer do.
 constexpr float kReach = 2048.0F;
 // How far beyond the bounds a ray may start without being moved to them first.

@@ -2,6 +2,8 @@
 
 #include "core/lanes_avx2.h"
 
+constexpr std::size_t kDoubles = 4;
+
 inline F narrow(const double* from) {
   return {_mm256_set_m128(_mm256_cvtpd_ps(_mm256_loadu_pd(from + 4)), _mm256_cvtpd_ps(_mm256_loadu_pd(from)))};
 }
@@ -23,6 +25,12 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   base.v = _mm256_set_m128i(b[1], b[0]);
   rest.v = _mm256_set_m128(r[1], r[0]);
   whole.v = _mm256_set_m128(w[1], w[0]);
+}
+
+inline F just_below(F a) {
+  const __m256 less = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a.v), _mm256_set1_epi32(1)));
+  const __m256 is_positive = _mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ);
+  return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
 // The indices of 4^3 bricks.

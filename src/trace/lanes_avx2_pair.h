@@ -5,6 +5,7 @@ namespace half {
 #include "trace/lanes_avx2.h"
 }  // namespace half
 
+using half::kDoubles;
 using half::mask3;
 
 constexpr int kWidth = 2 * half::kWidth;
@@ -160,6 +161,9 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   half::split(from + half::kWidth, base.high, rest.high, whole.high);
 }
 
+inline F just_below(F a) {
+  return {half::just_below(a.low), half::just_below(a.high)};
+}
 inline float least_of(F a) {
   const __m256 v = _mm256_min_ps(a.low.v, a.high.v);
   __m128 least = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));

@@ -2,6 +2,8 @@
 
 #include "core/lanes_avx512.h"
 
+constexpr std::size_t kDoubles = 8;
+
 inline __m512 join(__m256 low, __m256 high) {
   return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
 }
@@ -27,6 +29,14 @@ inline void split(const double* from, I& base, F& rest, F& whole) {
   base.v = _mm512_inserti64x4(_mm512_castsi256_si512(b[0]), b[1], 1);
   rest.v = join(r[0], r[1]);
   whole.v = join(w[0], w[1]);
+}
+
+// The next number below one that is not negative: all that lie below it and are no closer to it than 1e-30.
+inline F just_below(F a) {
+  const __mmask16 is_positive = _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GT_OQ);
+  const __m512i less = _mm512_mask_sub_epi32(_mm512_castps_si512(_mm512_set1_ps(-1e-30F)), is_positive,
+                                             _mm512_castps_si512(a.v), _mm512_set1_epi32(1));
+  return {_mm512_castsi512_ps(less)};
 }
 
 inline I as_bits(F a) {

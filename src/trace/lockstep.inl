@@ -5,6 +5,59 @@
 // left; the second goes from voxel to voxel through the cells found, each held in registers. Lanes that are done keep
 // walking, over harmless addresses, so that no step waits for the last look-up; what counts is recorded under masks.
 // A lane's answer depends on its own ray only.
+//
+// Which plane a ray crossed last follows from where it stands: the one that it crossed latest of those through which it
+// came into its unit. So walks need not keep it.
+
+// Where an axis of a walk stands: when it crosses the next plane, and the plane after that.
+struct Next {
+  F t;
+  F after;
+  F after_t;  // nothing waits for it
+};
+
+struct Nexts {
+  Next x, y, z;
+};
+
+inline Next next_planes(const Axis& axis, F after, F step) {
+  return {crossing_t(axis, after - step), after, crossing_t(axis, after)};
+}
+
+inline void cross_if(Mask crossed, const Axis& axis, F step, Next& next) {
+  next.t = select(crossed, next.after_t, next.t);
+  next.after = add_if(crossed, next.after, step);
+  next.after_t = crossing_t(axis, next.after);
+}
+
+// Goes through the next plane of each lane; answers when.
+inline F cross_next(const Lanes& lanes, const Planes& steps, Nexts& nexts, Crossing& crossing) {
+  const F t = first_of({nexts.x.t, nexts.y.t, nexts.z.t}, crossing);
+  cross_if(crossing.x, lanes.x, steps.x, nexts.x);
+  cross_if(crossing.y, lanes.y, steps.y, nexts.y);
+  cross_if(crossing.z, lanes.z, steps.z, nexts.z);
+  return t;
+}
+
+// The same for numbers that change by a constant with each plane.
+struct Strides {
+  I x, y, z;
+};
+
+inline Strides strides_of(const Lanes& lanes, int x, int y, int z) {
+  const auto stride = [](const Axis& axis, int step) { return select(axis.forward, all(step), all(-step)); };
+  return {stride(lanes.x, x), stride(lanes.y, y), stride(lanes.z, z)};
+}
+
+inline I stepped(I index, const Crossing& crossing, const Strides& strides) {
+  return add_if(crossing.z, add_if(crossing.y, add_if(crossing.x, index, strides.x), strides.y), strides.z);
+}
+
+// A walk from cell to cell.
+struct CellWalk {
+  Planes after;  // as in Next
+  I index;       // into the table's bits
+};
 
 // The cell at which an axis stands just after entering.
 inline F first_cell(const Axis& axis, F t, Mask entered, Mask ties_before, Mask ties_after) {
@@ -14,108 +67,18 @@ inline F first_cell(const Axis& axis, F t, Mask entered, Mask ties_before, Mask 
   return select(entered, select(axis.forward, low, high), at);
 }
 
-// The plane through which an axis leaves the unit whose lower plane is `lower`.
-inline F exit_plane(const Axis& axis, F lower, float size) {
-  return select(axis.still, all(kNever), add_if(axis.forward, lower, all(size)));
-}
-
-// A walk through voxels of the cells in which lanes stand.
-struct VoxelWalk {
-  I low_half;
-  I high_half;
-  I code;  // x + 4 y + 16 z, and 256 times x + 8 y + 64 z, whose bits 2, 5 and 8 tell that it has left
-  Planes planes;
-};
-
-// The voxel at which an axis stands just after entering a box, whose first and last voxels these are.
-inline F first_voxel(const Axis& axis, F t, F lower, F upper, Mask entered, Mask ties_before, Mask ties_after) {
-  const F at = coordinate_after<1>(axis, t, lower, upper, ties_before, ties_after);
-  return select(entered, select(axis.forward, lower, upper), at);
-}
-
-inline VoxelWalk enter_cells(const TreeView& tree, const Lanes& lanes, Mask which, const Planes& lower, F t,
-                             const Crossing& entered) {
-  const F last = all(3.0F);
-  const F vx = first_voxel(lanes.x, t, lower.x, lower.x + last, entered.x, entered.y | entered.z, mask_of(0));
-  const F vy = first_voxel(lanes.y, t, lower.y, lower.y + last, entered.y, entered.z, entered.x);
-  const F vz = first_voxel(lanes.z, t, lower.z, lower.z + last, entered.z, mask_of(0), entered.x | entered.y);
-  VoxelWalk walk;
-  walk.planes = {exit_plane(lanes.x, vx, 1.0F), exit_plane(lanes.y, vy, 1.0F), exit_plane(lanes.z, vz, 1.0F)};
-  walk.code =
-      to_int(vx - lower.x) * all(kCodeX) + to_int(vy - lower.y) * all(kCodeY) + to_int(vz - lower.z) * all(kCodeZ);
-  const I cx = shift_right<2>(to_int(lower.x) + lanes.x.base);
-  const I cy = shift_right<2>(to_int(lower.y) + lanes.y.base);
-  const I cz = shift_right<2>(to_int(lower.z) + lanes.z.base);
-  const I brick = shift_right<2>(cx) + shift_right<2>(cy) * all(tree.brick_strides.y) +
-                  shift_right<2>(cz) * all(tree.brick_strides.z);
-  const I index = gather(tree.bricks, select(which, brick, all(0)));
-  const I cell = (cx & all(3)) + shift_left<2>(cy & all(3)) + shift_left<4>(cz & all(3));
-  const I half = shift_left<7>(index) + shift_left<1>(cell);
-  walk.low_half = gather(tree.words, half);
-  walk.high_half = gather(tree.words, half + all(1));
-  return walk;
-}
-
-inline I code_step(const Axis& axis, int step) {
-  return select(axis.forward, all(step), all(-step));
-}
-
-// Walks until each lane of `walking` has met a voxel, whose code and axis it leaves, or has left its cell.
-inline Mask find_voxels(const Lanes& lanes, VoxelWalk& walk, Mask walking, Crossing& crossing, I& code) {
-  const I step_x = code_step(lanes.x, kCodeX);
-  const I step_y = code_step(lanes.y, kCodeY);
-  const I step_z = code_step(lanes.z, kCodeZ);
-  const Planes one = steps_of(lanes, 1.0F);
-  Crossing last = crossing;
-  Mask hit = mask_of(0);
-  for (;;) {
-    const I half = select(test(walk.code, all(32)), walk.high_half, walk.low_half);
-    const Mask met = test_bit(half, walk.code) & walking;
-    hit = hit | met;
-    code = select(met, walk.code, code);
-    crossing.x = (crossing.x & ~met) | (last.x & met);
-    crossing.y = (crossing.y & ~met) | (last.y & met);
-    crossing.z = (crossing.z & ~met) | (last.z & met);
-    walking = walking & ~met;
-    const Planes t = crossings(lanes, walk.planes);
-    first_of(t, last);
-    step_over(last, one, walk.planes);
-    walk.code = add_if(last.z, add_if(last.y, add_if(last.x, walk.code, step_x), step_y), step_z);
-    walking = walking & ~test(walk.code, all(kLeft));
-    if (!any(walking)) return hit;
-  }
-}
-
-// A walk from cell to cell.
-struct CellWalk {
-  Planes planes;  // through which each axis leaves its cell
-  F t;            // of the last crossing
-  Crossing crossing;
-  I index;  // into the table's bits
-};
-
-inline Planes lower_planes(const Lanes& lanes, const Planes& planes) {
-  const auto lower = [](const Axis& axis, F plane) {
-    const F moving = add_if(axis.forward, plane, all(-4.0F));
-    return select(axis.still, floor(axis.origin * all(0.25F)) * all(4.0F), moving);
-  };
-  return {lower(lanes.x, planes.x), lower(lanes.y, planes.y), lower(lanes.z, planes.z)};
-}
-
 inline CellWalk enter_box(const TreeView& tree, const Lanes& lanes, F t, const Crossing& entered) {
   const F cx = first_cell(lanes.x, t, entered.x, entered.y | entered.z, mask_of(0));
   const F cy = first_cell(lanes.y, t, entered.y, entered.z, entered.x);
   const F cz = first_cell(lanes.z, t, entered.z, mask_of(0), entered.x | entered.y);
-  CellWalk walk;
-  const F four = all(4.0F);
-  walk.planes = {exit_plane(lanes.x, cx * four, 4.0F), exit_plane(lanes.y, cy * four, 4.0F),
-                 exit_plane(lanes.z, cz * four, 4.0F)};
-  walk.t = t;
-  walk.crossing = entered;
-  const auto place = [](F cell, const Axis& axis) { return to_int(cell) + shift_right_signed<2>(axis.base); };
-  walk.index = all(tree.first_cell) + place(cx, lanes.x) + place(cy, lanes.y) * all(tree.cell_strides.y) +
-               place(cz, lanes.z) * all(tree.cell_strides.z);
-  return walk;
+  const auto after = [](const Axis& axis, F cell) {
+    const F corner = cell * all(4.0F);
+    return select(axis.still, all(kNever), select(axis.forward, corner + all(8.0F), corner - all(4.0F)));
+  };
+  const auto place = [](const Axis& axis, F cell) { return to_int(cell) + shift_right_signed<2>(axis.base); };
+  return {{after(lanes.x, cx), after(lanes.y, cy), after(lanes.z, cz)},
+          all(tree.first_cell) + place(lanes.x, cx) + place(lanes.y, cy) * all(tree.cell_strides.y) +
+              place(lanes.z, cz) * all(tree.cell_strides.z)};
 }
 
 inline Mask is_occupied(const TreeView& tree, I index) {
@@ -123,35 +86,155 @@ inline Mask is_occupied(const TreeView& tree, I index) {
   return test_bit(gather(tree.cells, word), index);
 }
 
-inline CellWalk select(Mask m, const CellWalk& a, const CellWalk& b) {
-  const auto choose = [m](Mask p, Mask q) { return (p & m) | (q & ~m); };
-  return {{select(m, a.planes.x, b.planes.x), select(m, a.planes.y, b.planes.y), select(m, a.planes.z, b.planes.z)},
-          select(m, a.t, b.t),
-          {choose(a.crossing.x, b.crossing.x), choose(a.crossing.y, b.crossing.y), choose(a.crossing.z, b.crossing.z)},
-          select(m, a.index, b.index)};
-}
-
 // Walks until each lane of `walking` stands in an occupied cell, where `at` then holds it, or has left its box.
 // Answers the lanes that found one.
 inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, Mask walking) {
-  const I step_x = code_step(lanes.x, tree.cell_strides.x);
-  const I step_y = code_step(lanes.y, tree.cell_strides.y);
-  const I step_z = code_step(lanes.z, tree.cell_strides.z);
+  const Strides strides = strides_of(lanes, tree.cell_strides.x, tree.cell_strides.y, tree.cell_strides.z);
   const Planes four = steps_of(lanes, 4.0F);
-  CellWalk walk = at;
+  Nexts nexts = {next_planes(lanes.x, at.after.x, four.x), next_planes(lanes.y, at.after.y, four.y),
+                 next_planes(lanes.z, at.after.z, four.z)};
+  I index = at.index;
   Mask found_any = mask_of(0);
   while (any(walking)) {
-    walk.t = first_of(crossings(lanes, walk.planes), walk.crossing);
-    step_over(walk.crossing, four, walk.planes);
-    walk.index =
-        add_if(walk.crossing.z, add_if(walk.crossing.y, add_if(walk.crossing.x, walk.index, step_x), step_y), step_z);
-    walking = walking & (walk.t <= lanes.exit_t);
-    const Mask found = walking & is_occupied(tree, walk.index);
-    at = select(found, walk, at);
+    Crossing crossing;
+    const F t = cross_next(lanes, four, nexts, crossing);
+    index = stepped(index, crossing, strides);
+    walking = walking & (t <= lanes.exit_t);
+    const Mask found = walking & is_occupied(tree, index);
+    at.after.x = select(found, nexts.x.after, at.after.x);
+    at.after.y = select(found, nexts.y.after, at.after.y);
+    at.after.z = select(found, nexts.z.after, at.after.z);
+    at.index = select(found, index, at.index);
     found_any = found_any | found;
     walking = walking & ~found;
   }
   return found_any;
+}
+
+// When a lane came through this plane; before its start where it never did.
+inline F entry_t(const Axis& axis, F plane) {
+  const F t = crossing_t(axis, plane);
+  const Mask never = axis.still | ((t == all(0.0F)) & axis.forward & ~axis.moved);
+  return select(never, all(-1.0F), t);
+}
+
+// When lanes came into the units with these planes of entry, which may be before their start, and through which.
+inline F last_entry(const Lanes& lanes, const Planes& entries, Crossing& entered) {
+  const F tx = entry_t(lanes.x, entries.x);
+  const F ty = entry_t(lanes.y, entries.y);
+  const F tz = entry_t(lanes.z, entries.z);
+  const F last = max(max(tx, ty), tz);
+  entered.z = tz == last;
+  entered.y = (ty == last) & ~entered.z;
+  entered.x = ~(entered.z | entered.y);
+  return last;
+}
+
+// A walk from voxel to voxel of the cells in which lanes stand.
+struct VoxelWalk {
+  I low_half;
+  I high_half;
+  I code;  // x + 4 y + 16 z, and 256 times x + 8 y + 64 z, whose bits 2, 5 and 8 tell that it has left
+  Nexts nexts;
+};
+
+// From the plane of entry of a cell to the voxel at `t`: those planes within the cell that are crossed until then, up
+// to and including `t` for the lanes of `ties`.
+inline Next enter_cell(const Axis& axis, F entry, F t, F before_t, Mask ties, F one, I stride, I& code) {
+  const F until = select(ties, t, before_t);
+  const F second = entry + one;
+  const F third = second + one;
+  const F fourth = third + one;
+  const F second_t = crossing_t(axis, second);
+  const F third_t = crossing_t(axis, third);
+  const F fourth_t = crossing_t(axis, fourth);
+  const F exit_t = crossing_t(axis, fourth + one);
+  const Mask in_second = second_t <= until;
+  const Mask in_third = third_t <= until;
+  const Mask in_fourth = fourth_t <= until;
+  code = add_if(in_fourth, add_if(in_third, add_if(in_second, code, stride), stride), stride);
+  Next next;
+  next.t = select(in_fourth, exit_t, select(in_third, fourth_t, select(in_second, third_t, second_t)));
+  next.after = add_if(in_fourth, add_if(in_third, add_if(in_second, third, one), one), one);
+  next.after_t = crossing_t(axis, next.after);
+  return next;
+}
+
+// The coordinate of the cell with this plane of entry.
+inline I cell_of(const Axis& axis, F entry) {
+  const F moving = add_if(~axis.forward, entry, all(-4.0F));
+  return shift_right_signed<2>(to_int(select(axis.still, floor(axis.origin), moving)) + axis.base);
+}
+
+struct Cells {
+  I x, y, z;
+};
+
+inline void read_words(const TreeView& tree, const Cells& cells, Mask which, VoxelWalk& walk) {
+  const I brick = shift_right<2>(cells.x) + shift_right<2>(cells.y) * all(tree.brick_strides.y) +
+                  shift_right<2>(cells.z) * all(tree.brick_strides.z);
+  const I index = gather(tree.bricks, select(which, brick, all(0)));
+  const I cell = (cells.x & all(3)) + shift_left<2>(cells.y & all(3)) + shift_left<4>(cells.z & all(3));
+  const I half = shift_left<7>(index) + shift_left<1>(cell);
+  walk.low_half = gather(tree.words, half);
+  walk.high_half = gather(tree.words, half + all(1));
+}
+
+// Where a lane stands within a cell before it crosses any of its planes.
+inline I code_at_entry(const Axis& axis, int stride) {
+  const I still = (to_int(floor(axis.origin)) & all(3)) * all(stride);
+  return select(axis.still, still, select(axis.forward, all(0), all(3 * stride)));
+}
+
+struct VoxelSteps {
+  Planes one;
+  Strides strides;
+  I first_code;
+};
+
+inline VoxelSteps voxel_steps(const Lanes& lanes) {
+  return {steps_of(lanes, 1.0F), strides_of(lanes, kCodeX, kCodeY, kCodeZ),
+          code_at_entry(lanes.x, kCodeX) + code_at_entry(lanes.y, kCodeY) + code_at_entry(lanes.z, kCodeZ)};
+}
+
+inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const VoxelSteps& steps) {
+  Crossing entered;
+  const F last = last_entry(lanes, entries, entered);
+  const F t = max(last, all(0.0F));
+  // At a tie planes of earlier axes are crossed first; those upon which a ray starts, before all others.
+  const Mask is_start = t == all(0.0F);
+  const Mask is_inside = last < all(0.0F);
+  const auto ties = [&](const Axis& axis, Mask earlier) {
+    return (earlier & ~is_inside) | (is_start & axis.forward & ~axis.moved);
+  };
+  const F before_t = just_below(t);
+  VoxelWalk walk;
+  walk.code = steps.first_code;
+  walk.nexts.x = enter_cell(lanes.x, entries.x, t, before_t, ties(lanes.x, entered.y | entered.z), steps.one.x,
+                            steps.strides.x, walk.code);
+  walk.nexts.y =
+      enter_cell(lanes.y, entries.y, t, before_t, ties(lanes.y, entered.z), steps.one.y, steps.strides.y, walk.code);
+  walk.nexts.z =
+      enter_cell(lanes.z, entries.z, t, before_t, ties(lanes.z, mask_of(0)), steps.one.z, steps.strides.z, walk.code);
+  return walk;
+}
+
+// Walks until each lane of `walking` has met a voxel, whose code it leaves, or has left its cell.
+template <Ask kAsk>
+inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking, I& code) {
+  Mask hit = mask_of(0);
+  for (;;) {
+    const I half = select(test(walk.code, all(32)), walk.high_half, walk.low_half);
+    const Mask met = test_bit(half, walk.code) & walking;
+    hit = hit | met;
+    if (kAsk == Ask::Where) code = select(met, walk.code, code);
+    walking = walking & ~met;
+    Crossing crossing;
+    cross_next(lanes, steps.one, walk.nexts, crossing);
+    walk.code = stepped(walk.code, crossing, steps.strides);
+    walking = walking & ~test(walk.code, all(kLeft));
+    if (!any(walking)) return hit;
+  }
 }
 
 // Where lanes met a voxel.
@@ -162,28 +245,45 @@ struct Met {
   I axis;
 };
 
+// The faces through which lanes came into the voxels that they met.
+inline void find_faces(const Lanes& lanes, Mask hit, Met& met) {
+  const auto entry = [](const Axis& axis, I voxel) {
+    return add_if(~axis.forward, to_float(voxel - axis.base), all(1.0F));
+  };
+  Crossing entered;
+  const F last = last_entry(lanes, {entry(lanes.x, met.x), entry(lanes.y, met.y), entry(lanes.z, met.z)}, entered);
+  met.inside = met.inside | (hit & (last < all(0.0F)));
+  met.axis = select(hit, crossed(entered, all(0), all(1), all(2)), met.axis);
+}
+
+// Asked whether alone, it does not say where.
+template <Ask kAsk>
 inline Met trace_apart(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered, Met met) {
   CellWalk cells = enter_box(tree, lanes, t, entered);
+  const Planes eight = steps_of(lanes, 8.0F);
+  const VoxelSteps steps = voxel_steps(lanes);
   Mask searching = lanes.live;
   Mask found = searching & is_occupied(tree, cells.index);
+  Mask hit_any = mask_of(0);
   for (;;) {
     found = found | find_cells(tree, lanes, cells, searching & ~found);
-    if (!any(found)) return met;
-    const Planes lower = lower_planes(lanes, cells.planes);
-    VoxelWalk voxels = enter_cells(tree, lanes, found, lower, cells.t, cells.crossing);
-    Crossing crossing = cells.crossing;
+    if (!any(found)) break;
+    const Planes entries = {cells.after.x - eight.x, cells.after.y - eight.y, cells.after.z - eight.z};
+    const Cells at = {cell_of(lanes.x, entries.x), cell_of(lanes.y, entries.y), cell_of(lanes.z, entries.z)};
+    VoxelWalk voxels = enter_cells(lanes, entries, steps);
+    read_words(tree, at, found, voxels);
     I code = all(0);
-    const Mask hit = find_voxels(lanes, voxels, found, crossing, code);
-    const auto put = [hit](I& to, const Axis& axis, F low, I within) {
-      to = select(hit, to_int(low) + axis.base + within, to);
-    };
-    put(met.x, lanes.x, lower.x, code & all(3));
-    put(met.y, lanes.y, lower.y, shift_right<2>(code) & all(3));
-    put(met.z, lanes.z, lower.z, shift_right<4>(code) & all(3));
-    met.axis = select(hit, select(crossing.y, all(1), select(crossing.z, all(2), all(0))), met.axis);
-    met.inside = met.inside | (hit & ~(crossing.x | crossing.y | crossing.z));
-    met.hit = met.hit | hit;
+    const Mask hit = find_voxels<kAsk>(lanes, steps, voxels, found, code);
+    if (kAsk == Ask::Where) {
+      met.x = select(hit, shift_left<2>(at.x) + (code & all(3)), met.x);
+      met.y = select(hit, shift_left<2>(at.y) + (shift_right<2>(code) & all(3)), met.y);
+      met.z = select(hit, shift_left<2>(at.z) + (shift_right<4>(code) & all(3)), met.z);
+    }
+    hit_any = hit_any | hit;
     searching = found & ~hit;
     found = mask_of(0);
   }
+  met.hit = met.hit | hit_any;
+  if (kAsk == Ask::Where && any(hit_any)) find_faces(lanes, hit_any, met);
+  return met;
 }

@@ -176,17 +176,21 @@ inline void find_starts(const TreeView& tree, const Rays& rays, std::uint32_t wa
   }
   Mask usual = all(0.0F) <= narrow(starts.max_t);
   Mask nearby = mask_of(kAllLanes);
+  Mask leaves = mask_of(0);
   F greatest = all(0.0F);
   for (int axis = 0; axis < 3; ++axis) {
-    const F size = abs(narrow(rays.directions[axis]));
+    const F direction = narrow(rays.directions[axis]);
+    const F size = abs(direction);
     usual = usual & (size <= all(0x1p20F));
     greatest = max(greatest, size);
     const F p = narrow(starts.position[axis]);
-    nearby = nearby & (all(static_cast<float>(tree.box.min[axis]) - kNearby) <= p) &
-             (p <= all(static_cast<float>(tree.box.max[axis]) + kNearby));
+    const float low = tree.low[axis];
+    const float high = tree.high[axis];
+    nearby = nearby & (all(low - kNearby) <= p) & (p <= all(high + kNearby));
+    leaves = leaves | ((all(high) < p) & (all(0.0F) <= direction)) | ((p < all(low)) & (direction <= all(0.0F)));
   }
   usual = usual & (all(0x1p-20F) <= greatest);
-  lanes.live = mask_of(wanted) & usual;
+  lanes.live = mask_of(wanted) & usual & ~leaves;
   lanes.unfinished = mask_of(wanted) & ~usual;
   lanes.reach_scale = greatest;
   const std::uint32_t missing = move_all_to_bounds(tree, rays, bits(lanes.live & ~nearby), starts);
@@ -200,6 +204,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   Lanes lanes;
   const Rays rays = lanes_from(packet, first);
   find_starts(tree, rays, wanted, starts, lanes);
+  if (!any(lanes.live)) return lanes;
   const F furthest = all(kReach) / lanes.reach_scale;
   const F max_t = narrow(starts.max_t);
   const F reach = min(max_t, furthest);

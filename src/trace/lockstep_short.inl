@@ -39,6 +39,17 @@ inline SpreadStep spread_step(const Axis& axis) {
           select(axis.forward, all(1 << kShift), all(-(1 << kShift)))};
 }
 
+// The plane through which an axis leaves the unit whose lower plane is `lower`.
+inline F exit_plane(const Axis& axis, F lower, float size) {
+  return select(axis.still, all(kNever), add_if(axis.forward, lower, all(size)));
+}
+
+// The voxel at which an axis stands just after entering a box, whose first and last voxels these are.
+inline F first_voxel(const Axis& axis, F t, F lower, F upper, Mask entered, Mask ties_before, Mask ties_after) {
+  const F at = coordinate_after<1>(axis, t, lower, upper, ties_before, ties_after);
+  return select(entered, select(axis.forward, lower, upper), at);
+}
+
 inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3& origin, F t, const Crossing& entered,
                            F max_t) {
   const BrickWindow window(tree, origin);
@@ -48,14 +59,16 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
   const F vy = first_voxel(lanes.y, t, lanes.y.low, lanes.y.high - one_voxel, entered.y, entered.z, entered.x);
   const F vz =
       first_voxel(lanes.z, t, lanes.z.low, lanes.z.high - one_voxel, entered.z, mask_of(0), entered.x | entered.y);
-  Planes planes = {exit_plane(lanes.x, vx, 1.0F), exit_plane(lanes.y, vy, 1.0F), exit_plane(lanes.z, vz, 1.0F)};
+  const Planes one = steps_of(lanes, 1.0F);
+  Nexts nexts = {next_planes(lanes.x, exit_plane(lanes.x, vx, 1.0F) + one.x, one.x),
+                 next_planes(lanes.y, exit_plane(lanes.y, vy, 1.0F) + one.y, one.y),
+                 next_planes(lanes.z, exit_plane(lanes.z, vz, 1.0F) + one.z, one.z)};
   I code = spread(to_int(vx) + lanes.x.base - all(origin.x)) +
            shift_left<2>(spread(to_int(vy) + lanes.y.base - all(origin.y))) +
            shift_left<4>(spread(to_int(vz) + lanes.z.base - all(origin.z)));
   const SpreadStep sx = spread_step<0>(lanes.x);
   const SpreadStep sy = spread_step<2>(lanes.y);
   const SpreadStep sz = spread_step<4>(lanes.z);
-  const Planes one = steps_of(lanes, 1.0F);
   // Crossings up to here are surely within reach.
   const F sure_x = max_t - all(0.01F) * abs(lanes.x.inverse);
   const F sure_y = max_t - all(0.01F) * abs(lanes.y.inverse);
@@ -71,8 +84,7 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
     out.doubtful = out.doubtful | (met & unsure);
     walking = walking & ~met;
     Crossing crossing;
-    const F now = first_of(crossings(lanes, planes), crossing);
-    step_over(crossing, one, planes);
+    const F now = cross_next(lanes, one, nexts, crossing);
     const I bits_of_axis = crossed(crossing, all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
     const I filled = or_of(code & bits_of_axis, crossed(crossing, sx.fill, sy.fill, sz.fill));
     const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
@@ -100,7 +112,11 @@ inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std:
     if (any(lanes.x.moved & lanes.live) || !place_window(lanes.x, lanes.live, tree.brick_sizes.x, origin.x) ||
         !place_window(lanes.y, lanes.live, tree.brick_sizes.y, origin.y) ||
         !place_window(lanes.z, lanes.live, tree.brick_sizes.z, origin.z)) {
-      keep(trace(tree, lanes, t, entered), first, others);
+      if (any(lanes.live & (narrow(rays.max_t.data() + first) < all(kEndless)))) {
+        keep(trace<Ask::Where>(tree, lanes, t, entered), first, others);
+      } else {
+        blocked |= bits(trace<Ask::Whether>(tree, lanes, t, entered).hit) << first;
+      }
       continue;
     }
     const ShortRays found = any_short(tree, lanes, origin, t, entered, narrow(rays.max_t.data() + first));
@@ -109,8 +125,9 @@ inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std:
   }
   unfinished = others.unfinished & ~(others.hit | blocked);
   if (others.hit != 0) {
-    alignas(64) double t[RayPacket::kSize];
-    blocked |= measure(tree, rays, others, t);
+    RayPacket::Lanes<double> t;
+    RayPacket::Lanes<std::int32_t> forward;
+    blocked |= measure(tree, rays, others, t, forward);
   }
   for (; doubtful != 0; doubtful &= doubtful - 1) {
     const int lane = std::countr_zero(doubtful);

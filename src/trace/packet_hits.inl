@@ -17,46 +17,82 @@ inline void trace_packet(const TreeView& tree, const RayPacket& rays, LaneHits& 
     F t;
     Crossing entered;
     Lanes lanes = set_up(tree, rays, first, wanted, t, entered);
-    if (any(lanes.live)) keep(trace(tree, lanes, t, entered), first, out);
+    if (any(lanes.live)) keep(trace<Ask::Where>(tree, lanes, t, entered), first, out);
     out.unfinished |= bits(lanes.unfinished) << first;
   }
   out.unfinished &= ~out.hit;
 }
 
-// The distances of the faces met, in double precision, and which of them lie within reach.
-inline std::uint32_t measure(const TreeView& tree, const RayPacket& rays, const LaneHits& lanes, double* t) {
-  alignas(64) std::int64_t is_within[RayPacket::kSize];
-  for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
-    const bool is_x = lanes.axis[i] == 0;
-    const bool is_y = lanes.axis[i] == 1;
-    const double direction = is_x ? rays.direction_x[i] : is_y ? rays.direction_y[i] : rays.direction_z[i];
-    const double origin = is_x ? rays.origin_x[i] : is_y ? rays.origin_y[i] : rays.origin_z[i];
-    const double corner = is_x ? tree.origin.x : is_y ? tree.origin.y : tree.origin.z;
-    const std::int32_t voxel = is_x ? lanes.x[i] : is_y ? lanes.y[i] : lanes.z[i];
-    const double plane = voxel + corner + (direction > 0.0 ? 0.0 : 1.0);
-    const double inside = (lanes.starts_inside >> i & 1U) != 0 ? 0.0 : 1.0;
-    const double distance = (plane - origin) * (1.0 / direction);
-    t[i] = inside != 0.0 ? distance : 0.0;
-    is_within[i] = t[i] <= rays.max_t[i] ? 1 : 0;
-  }
+// Lanes in double precision, as many as a register holds.
+using Doubles = double __attribute__((vector_size(kDoubles * 8)));
+using Longs = std::int64_t __attribute__((vector_size(kDoubles * 8)));
+using Ints = std::int32_t __attribute__((vector_size(kDoubles * 4)));
+
+template <class Vector, class T>
+inline Vector lanes_at(const RayPacket::Lanes<T>& from, std::size_t first) {
+  Vector out;
+  std::memcpy(&out, from.data() + first, sizeof out);
+  return out;
+}
+
+// The distances of the faces met by the lanes from `first` on, in double precision, and which way rays go through them,
+// 1 where forward; answers the lanes within reach.
+inline std::uint32_t measure_some(const TreeView& tree, const RayPacket& rays, const LaneHits& lanes, std::size_t first,
+                                  RayPacket::Lanes<double>& t, RayPacket::Lanes<std::int32_t>& forward) {
+  const Longs axis = __builtin_convertvector(lanes_at<Ints>(lanes.axis, first), Longs);
+  const Longs is_x = axis == 0;
+  const Longs is_y = axis == 1;
+  const auto of_axis = [&](const auto& x, const auto& y, const auto& z) {
+    const auto y_or_z = is_y ? lanes_at<Doubles>(y, first) : lanes_at<Doubles>(z, first);
+    return is_x ? lanes_at<Doubles>(x, first) : y_or_z;
+  };
+  const auto to_grid = [&](const RayPacket::Lanes<std::int32_t>& at, double origin) {
+    return __builtin_convertvector(lanes_at<Ints>(at, first), Doubles) + origin;
+  };
+  const Doubles y_or_z = is_y ? to_grid(lanes.y, tree.origin.y) : to_grid(lanes.z, tree.origin.z);
+  const Doubles lower = is_x ? to_grid(lanes.x, tree.origin.x) : y_or_z;
+  const Doubles direction = of_axis(rays.direction_x, rays.direction_y, rays.direction_z);
+  const Longs is_forward = direction > 0.0;
+  const Doubles plane = lower + (is_forward ? Doubles{} : Doubles{} + 1.0);
+  const Doubles distance = (plane - of_axis(rays.origin_x, rays.origin_y, rays.origin_z)) * (1.0 / direction);
+  Longs lane;
+  for (std::size_t i = 0; i < kDoubles; ++i) lane[i] = std::int64_t{1} << i;
+  const Longs inside = (lane & static_cast<std::int64_t>(lanes.starts_inside >> first)) != 0;
+  const Doubles result = inside ? Doubles{} : distance;
+  std::memcpy(t.data() + first, &result, sizeof result);
+  const Ints ones = __builtin_convertvector(-is_forward, Ints);
+  std::memcpy(forward.data() + first, &ones, sizeof ones);
+  const Longs within = lane & (result <= lanes_at<Doubles>(rays.max_t, first));
+  std::int64_t bits = 0;
+  for (std::size_t i = 0; i < kDoubles; ++i) bits |= within[i];
+  return static_cast<std::uint32_t>(bits) << first;
+}
+
+inline std::uint32_t measure(const TreeView& tree, const RayPacket& rays, const LaneHits& lanes,
+                             RayPacket::Lanes<double>& t, RayPacket::Lanes<std::int32_t>& forward) {
   std::uint32_t within = 0;
-  for (std::size_t i = 0; i < RayPacket::kSize; ++i) within |= static_cast<std::uint32_t>(is_within[i]) << i;
+  for (std::size_t first = 0; first < RayPacket::kSize; first += kDoubles) {
+    within |= measure_some(tree, rays, lanes, first, t, forward);
+  }
   return within & lanes.hit;
 }
 
 inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
   LaneHits lanes;
   trace_packet(tree, rays, lanes);
-  hits.hit = measure(tree, rays, lanes, hits.t.data());
-  hits.starts_inside = lanes.starts_inside & hits.hit;
-  for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
-    hits.x[i] = lanes.x[i] + static_cast<std::int32_t>(tree.origin.x);
-    hits.y[i] = lanes.y[i] + static_cast<std::int32_t>(tree.origin.y);
-    hits.z[i] = lanes.z[i] + static_cast<std::int32_t>(tree.origin.z);
-    const double d = lanes.axis[i] == 0   ? rays.direction_x[i]
-                     : lanes.axis[i] == 1 ? rays.direction_y[i]
-                                          : rays.direction_z[i];
-    hits.face[i] = static_cast<Direction>(2 * lanes.axis[i] + (d > 0.0 ? 1 : 0));
-  }
   unfinished = lanes.unfinished;
+  if (lanes.hit == 0) {
+    hits.hit = hits.starts_inside = 0;
+    return;
+  }
+  RayPacket::Lanes<std::int32_t> forward;
+  hits.hit = measure(tree, rays, lanes, hits.t, forward);
+  hits.starts_inside = lanes.starts_inside & hits.hit;
+  const IVec3 corner(tree.origin);
+  for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+    hits.x[i] = lanes.x[i] + corner.x;
+    hits.y[i] = lanes.y[i] + corner.y;
+    hits.z[i] = lanes.z[i] + corner.z;
+    hits.face[i] = static_cast<Direction>(2 * lanes.axis[i] + forward[i]);
+  }
 }
