@@ -14,21 +14,16 @@ inline F narrow(const double* from) {
 
 // Positions as multiples of 64 and what is left of them, and the whole number below what is left.
 inline void split(const double* from, I& base, F& rest, F& whole) {
-  __m256i b[2];
-  __m256 r[2];
-  __m256 w[2];
-  for (int half = 0; half < 2; ++half) {
-    const __m512d x = _mm512_loadu_pd(from + 8 * half);
-    const __m512d v = _mm512_floor_pd(x);
-    const __m512d start =
-        _mm512_mul_pd(_mm512_floor_pd(_mm512_mul_pd(x, _mm512_set1_pd(0.015625))), _mm512_set1_pd(64.0));
-    b[half] = _mm512_cvttpd_epi32(start);
-    r[half] = _mm512_cvtpd_ps(_mm512_sub_pd(x, start));
-    w[half] = _mm512_cvtpd_ps(_mm512_sub_pd(v, start));
-  }
-  base.v = _mm512_inserti64x4(_mm512_castsi256_si512(b[0]), b[1], 1);
-  rest.v = join(r[0], r[1]);
-  whole.v = join(w[0], w[1]);
+  constexpr int kDown = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+  const __m512d low = _mm512_loadu_pd(from);
+  const __m512d high = _mm512_loadu_pd(from + 8);
+  const __m512i floor = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvt_roundpd_epi32(low, kDown)),
+                                           _mm512_cvt_roundpd_epi32(high, kDown), 1);
+  base.v = _mm512_and_si512(floor, _mm512_set1_epi32(~63));
+  const __m512d low_base = _mm512_cvtepi32_pd(_mm512_castsi512_si256(base.v));
+  const __m512d high_base = _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(base.v, 1));
+  rest.v = join(_mm512_cvtpd_ps(_mm512_sub_pd(low, low_base)), _mm512_cvtpd_ps(_mm512_sub_pd(high, high_base)));
+  whole.v = _mm512_cvtepi32_ps(_mm512_and_si512(floor, _mm512_set1_epi32(63)));
 }
 
 // The next number below one that is not negative: all that lie below it and are no closer to it than 1e-30.

@@ -76,23 +76,25 @@ struct Starts {
   alignas(64) std::int32_t entered[kWidth];
 };
 
-// Answers where a lane enters through a plane of this axis; -1 when it starts between its planes.
-inline F clip(Axis& axis, F low, F high, F reach, Mask entered, Mask& live, F& bounds_exit) {
+// Cuts an axis' box to what the lanes can come to until `reach`; answers when they would leave the whole box.
+inline F limit_reach(Axis& axis, F reach) {
+  const F bounds_exit = crossing_t(axis, select(axis.forward, axis.high, axis.low));
   const F end = axis.origin + reach * axis.direction;
-  const F far_before = select(axis.forward, high, low);
-  low = max(low, floor(min(axis.origin, end) - all(kSlack)));
-  high = min(high, floor(max(axis.origin, end) + all(kSlack)) + all(1.0F));
-  const F far = select(axis.forward, high, low);
-  bounds_exit = min(bounds_exit, select(axis.still, all(kNever), crossing_t(axis, far_before)));
-  const Mask is_low = axis.origin < low;
-  const Mask is_high = high <= axis.origin;
+  axis.low = max(axis.low, floor(min(axis.origin, end) - all(kSlack)));
+  axis.high = min(axis.high, floor(max(axis.origin, end) + all(kSlack)) + all(1.0F));
+  return select(axis.still, all(kNever), bounds_exit);
+}
+
+// Answers where a lane enters through a plane of this axis; -1 when it starts between its planes.
+inline F clip(Axis& axis, Mask entered, Mask& live) {
+  const F far = select(axis.forward, axis.high, axis.low);
+  const Mask is_low = axis.origin < axis.low;
+  const Mask is_high = axis.high <= axis.origin;
   const Mask before = (((axis.forward & is_low) | (~axis.forward & is_high)) & ~axis.still) | entered;
   const Mask past = ((axis.forward & is_high) | (~axis.forward & is_low)) & ~entered;
   live = live & ~past & ~(axis.still & is_high);
   axis.far_t = select(axis.still, all(kNever), crossing_t(axis, far));
-  axis.low = low;
-  axis.high = high;
-  return select(before, crossing_t(axis, select(axis.forward, low, high)), all(-1.0F));
+  return select(before, crossing_t(axis, select(axis.forward, axis.low, axis.high)), all(-1.0F));
 }
 
 inline Axis make_axis(const double* position, F direction) {
@@ -205,17 +207,19 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   const Rays rays = lanes_from(packet, first);
   find_starts(tree, rays, wanted, starts, lanes);
   if (!any(lanes.live)) return lanes;
-  const F furthest = all(kReach) / lanes.reach_scale;
   const F max_t = narrow(starts.max_t);
-  const F reach = min(max_t, furthest);
+  const F furthest = all(kReach) / lanes.reach_scale;
+  // Endless rays leave a small world before they reach further than they may.
+  const bool is_limited = !tree.is_small || any(lanes.live & (max_t < all(kEndless)));
   const I moved = load(starts.entered);
   F bounds_exit = all(kNever);
   const auto limit = [&](Axis& axis, int index) {
     axis = make_axis(starts.position[index], narrow(rays.directions[index]));
     axis.moved = ~equals(moved, -1);
-    const F low = to_bound(tree.box.min[index], axis.base);
-    const F high = to_bound(tree.box.max[index], axis.base);
-    return clip(axis, low, high, reach, equals(moved, index), lanes.live, bounds_exit);
+    axis.low = to_bound(tree.box.min[index], axis.base);
+    axis.high = to_bound(tree.box.max[index], axis.base);
+    if (is_limited) bounds_exit = min(bounds_exit, limit_reach(axis, min(max_t, furthest)));
+    return clip(axis, equals(moved, index), lanes.live);
   };
   const F near_x = limit(lanes.x, 0);
   const F near_y = limit(lanes.y, 1);
@@ -232,7 +236,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   const Mask left = (lanes.x.far_t < t) | (lanes.y.far_t < t) | (lanes.z.far_t < t) |
                     ((lanes.x.far_t == t) & (entered.y | entered.z)) | ((lanes.y.far_t == t) & entered.z);
   lanes.live = lanes.live & ~left;
-  lanes.unfinished = lanes.unfinished | (lanes.live & (furthest < max_t) & (furthest < bounds_exit));
+  if (is_limited) lanes.unfinished = lanes.unfinished | (lanes.live & (furthest < max_t) & (furthest < bounds_exit));
   lanes.exit_t = min(min(lanes.x.far_t, lanes.y.far_t), lanes.z.far_t);
   return lanes;
 }

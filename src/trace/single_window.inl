@@ -105,7 +105,10 @@ inline I bricks_about(const TreeView& tree, I4 brick) {
   return eight_of(tree.bricks + near[0] + near[1] + near[2], step[0], step[1], step[2]);
 }
 
-enum class Blocked : std::uint8_t { No, Yes, Doubtful };
+struct Blocked {
+  bool is_sure;
+  bool is_doubtful;
+};
 
 inline Blocked any_in_window(const TreeView& tree, const SingleRay& ray, float max_t) {
   const F4 lower = floor4(ray.origin);
@@ -123,8 +126,9 @@ inline Blocked any_in_window(const TreeView& tree, const SingleRay& ray, float m
   // Crossings up to here are surely within reach.
   const F4 sure_t = max_t - 0.01F * max4(ray.inverse, -ray.inverse);
   const Mask sure = met & (window.t < of_axis(sure_t, window.axis));
-  if (any(met) && !any(sure)) return Blocked::Doubtful;
-  return any(sure) ? Blocked::Yes : Blocked::No;
+  // By sums instead of a branch on whether it met anything, which no processor foresees.
+  const auto none_is_sure = static_cast<std::int32_t>(bits(sure) - 1) >> 31;
+  return {none_is_sure == 0, (bits(met) & static_cast<std::uint32_t>(none_is_sure)) != 0};
 }
 
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
@@ -136,6 +140,6 @@ inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t,
   if (ready != SetUp::Ready) return false;
   if (single.enter_axis >= 0) return any_single(tree, ray, max_t, unfinished);
   const Blocked blocked = any_in_window(tree, single, static_cast<float>(max_t));
-  if (blocked == Blocked::Doubtful) return any_single(tree, ray, max_t, unfinished);
-  return blocked == Blocked::Yes;
+  if (blocked.is_doubtful) return any_single(tree, ray, max_t, unfinished);
+  return blocked.is_sure;
 }
