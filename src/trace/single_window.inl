@@ -7,6 +7,11 @@
 
 // Voxels along |x| + |y| + |z| that a ray may reach: with one crossing more on each axis they are at most fifteen.
 constexpr float kWindowReach = 11.0F;
+// How far from the tables' ends it starts, in voxels, so that it does not come to them.
+constexpr std::int32_t kWindowMargin = 12;
+// How much longer than any other a component of its direction may be: rounding then moves no crossing of one axis
+// beyond one of another by more than the slack.
+constexpr float kWindowRatio = 2048.0F;
 // Later than any crossing.
 constexpr float kAfterAll = 2e37F;
 // The lane that holds where the ray starts.
@@ -41,36 +46,79 @@ inline F of_axis(F4 numbers, I axis) {
   return from_16(F{_mm512_castps128_ps512(reinterpret_cast<__m128>(numbers))}, axis);
 }
 
+// A short ray that stays within the tables.
+struct ShortRay {
+  F4 origin;
+  F4 inverse;  // 1 where it is still
+  F4 sign;
+  I4 forward;
+  I4 base;
+  I4 own;      // the voxel in which it starts, from `base`
+  I4 crossed;  // planes that it may cross; none where it is still
+  float max_t;
+};
+
+// False where another way is to be taken.
+inline bool set_up_short(const TreeView& tree, const Ray& ray, double max_t, ShortRay& out) {
+  D4 p;
+  D4 direction64;
+  D4 corner;
+  std::memcpy(&p, &ray.origin.x, sizeof p);
+  std::memcpy(&direction64, &ray.origin.z, sizeof direction64);
+  std::memcpy(&corner, tree.corner, sizeof corner);
+  p -= corner;
+  const F4 d = __builtin_convertvector(__builtin_shufflevector(direction64, direction64, 1, 2, 3, 3), F4);
+  const F4 size = max4(d, -d);
+  const float greatest = greatest3(size);
+  out.max_t = static_cast<float>(max_t);
+  const F4 reach = size * out.max_t;
+  if (!(out.max_t >= 0.0F && greatest >= 0x1p-20F && greatest <= 0x1p20F &&
+        reach[0] + reach[1] + reach[2] <= kWindowReach))
+    return false;
+  const I4 still = size < all4(0x1p-100F);
+  const I4 own = __builtin_convertvector(floor_of(p), I4);
+  const I4 last = I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 0} * 16 - kWindowMargin;
+  const I4 is_outside = (own < kWindowMargin) | (own >= last) | ((size * kWindowRatio < greatest) & ~still);
+  if (mask3(is_outside) != 0) return false;
+  out.base = own & ~63;
+  out.own = own & 63;
+  const F4 inside = __builtin_convertvector(p - __builtin_convertvector(out.base, D4), F4);
+  out.origin = min4(inside, __builtin_convertvector(out.own, F4) + (1.0F - 0x1p-17F));
+  out.forward = (d > 0.0F) & ~still;
+  out.sign = out.forward ? all4(1.0F) : all4(-1.0F);
+  out.inverse = 1.0F / (still ? all4(1.0F) : d);
+  out.crossed = (__builtin_convertvector(reach + kSlack, I4) + 1) & ~still;
+  return true;
+}
+
 struct CrossingWindow {
   F t;
   I axis;
-  Mask valid;  // within the box, or where the ray starts
+  Mask valid;  // perhaps within reach, or where the ray starts
+  Mask sure;   // surely
 };
 
-// All crossings of a ray that starts in the voxel whose lower planes these are.
-inline CrossingWindow all_crossings(const SingleRay& ray, F4 lower) {
-  const F4 first = ray.forward ? lower + 1.0F : lower;
-  const F4 ends = ray.forward ? ray.high : ray.low;
-  // Those within the box; the one that leaves it does not count.
-  const I4 count = ~ray.still & __builtin_convertvector((ends - first) * ray.sign, I4);
-  const int x = count[0];
-  const int xy = x + count[1];
+// All crossings of a ray.
+inline CrossingWindow all_crossings(const ShortRay& ray) {
+  const F4 first = __builtin_convertvector(ray.own - ray.forward, F4);
+  const int x = ray.crossed[0];
+  const int xy = x + ray.crossed[1];
   const I lane = load(kTables.lane);
   const Mask from_y = all(x - 1) < lane;
   const Mask from_z = all(xy - 1) < lane;
   CrossingWindow window;
   window.axis = add_if(from_z, add_if(from_y, all(0), all(1)), all(1));
-  const Mask is_crossing = lane < all(std::min(xy + count[2], kStartLane));
+  const Mask is_crossing = lane < all(xy + ray.crossed[2]);
   const I number = add_if(from_z, add_if(from_y, lane, all(-x)), all(x - xy));
   const F plane = of_axis(first, window.axis) + to_float(number) * of_axis(ray.sign, window.axis);
   const F t = (plane - of_axis(ray.origin, window.axis)) * of_axis(ray.inverse, window.axis);
   // No negative zeros: times are compared as whole numbers.
   const Mask is_start = ~(lane < all(kStartLane));
   window.t = select(is_crossing, t + all(0.0F), select(is_start, all(-1.0F), all(kAfterAll)));
-  const int exit_axis = std::countr_zero(static_cast<std::uint32_t>(mask3(ray.far_t == all4(ray.exit_t))));
-  const Mask before_exit =
-      (window.t < all(ray.exit_t)) | ((window.t == all(ray.exit_t)) & (window.axis < all(exit_axis)));
-  window.valid = (is_crossing & before_exit) | is_start;
+  // More than rounding can move a crossing.
+  const F doubt = of_axis(0.01F * max4(ray.inverse, -ray.inverse), window.axis);
+  window.valid = (is_crossing & (window.t <= all(ray.max_t) + doubt)) | is_start;
+  window.sure = (is_crossing & (window.t < all(ray.max_t) - doubt)) | is_start;
   return window;
 }
 
@@ -110,10 +158,9 @@ struct Blocked {
   bool is_doubtful;
 };
 
-inline Blocked any_in_window(const TreeView& tree, const SingleRay& ray, float max_t) {
-  const F4 lower = floor4(ray.origin);
-  const CrossingWindow window = all_crossings(ray, lower);
-  const I4 at = __builtin_convertvector(lower, I4) + ray.base;
+inline Blocked any_in_window(const TreeView& tree, const ShortRay& ray) {
+  const CrossingWindow window = all_crossings(ray);
+  const I4 at = ray.own + ray.base;
   const I4 brick = (ray.forward ? at : at - 15) >> 4;
   const I4 within = at - (brick << 4);
   const I4 step = I4{1, 1 << 5, 1 << 10, 0};
@@ -123,23 +170,15 @@ inline Blocked any_in_window(const TreeView& tree, const SingleRay& ray, float m
   const I half =
       from_16(bricks_about(tree, brick), shift_right<12>(spread_code)) + (shift_right<5>(spread_code) & all(127));
   const Mask met = test_bit(gather(tree.words, half), spread_code) & window.valid;
-  // Crossings up to here are surely within reach.
-  const F4 sure_t = max_t - 0.01F * max4(ray.inverse, -ray.inverse);
-  const Mask sure = met & (window.t < of_axis(sure_t, window.axis));
   // By sums instead of a branch on whether it met anything, which no processor foresees.
-  const auto none_is_sure = static_cast<std::int32_t>(bits(sure) - 1) >> 31;
+  const auto none_is_sure = static_cast<std::int32_t>(bits(met & window.sure) - 1) >> 31;
   return {none_is_sure == 0, (bits(met) & static_cast<std::uint32_t>(none_is_sure)) != 0};
 }
 
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
-  const double reach = max_t * (std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z));
-  if (!(reach <= kWindowReach)) return any_single(tree, ray, max_t, unfinished);
-  SingleRay single;
-  const SetUp ready = set_up_single(tree, ray, max_t, single);
-  unfinished = ready == SetUp::Unusual;
-  if (ready != SetUp::Ready) return false;
-  if (single.enter_axis >= 0) return any_single(tree, ray, max_t, unfinished);
-  const Blocked blocked = any_in_window(tree, single, static_cast<float>(max_t));
-  if (blocked.is_doubtful) return any_single(tree, ray, max_t, unfinished);
-  return blocked.is_sure;
+  ShortRay single;
+  if (!set_up_short(tree, ray, max_t, single)) return any_single(tree, ray, max_t, unfinished);
+  const Blocked blocked = any_in_window(tree, single);
+  unfinished = false;
+  return blocked.is_doubtful ? any_single(tree, ray, max_t, unfinished) : blocked.is_sure;
 }
