@@ -60,9 +60,7 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
   const F vz =
       first_voxel(lanes.z, t, lanes.z.low, lanes.z.high - one_voxel, entered.z, mask_of(0), entered.x | entered.y);
   const Planes one = steps_of(lanes, 1.0F);
-  Nexts nexts = {next_planes(lanes.x, exit_plane(lanes.x, vx, 1.0F) + one.x, one.x),
-                 next_planes(lanes.y, exit_plane(lanes.y, vy, 1.0F) + one.y, one.y),
-                 next_planes(lanes.z, exit_plane(lanes.z, vz, 1.0F) + one.z, one.z)};
+  Planes planes = {exit_plane(lanes.x, vx, 1.0F), exit_plane(lanes.y, vy, 1.0F), exit_plane(lanes.z, vz, 1.0F)};
   I code = spread(to_int(vx) + lanes.x.base - all(origin.x)) +
            shift_left<2>(spread(to_int(vy) + lanes.y.base - all(origin.y))) +
            shift_left<4>(spread(to_int(vz) + lanes.z.base - all(origin.z)));
@@ -84,7 +82,8 @@ inline ShortRays any_short(const TreeView& tree, const Lanes& lanes, const IVec3
     out.doubtful = out.doubtful | (met & unsure);
     walking = walking & ~met;
     Crossing crossing;
-    const F now = cross_next(lanes, one, nexts, crossing);
+    const F now = first_of(crossings(lanes, planes), crossing);
+    step_over(crossing, one, planes);
     const I bits_of_axis = crossed(crossing, all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
     const I filled = or_of(code & bits_of_axis, crossed(crossing, sx.fill, sy.fill, sz.fill));
     const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
