@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <quoin/trace/ray.h>
@@ -118,6 +119,13 @@ inline const RayWorkload& ray_workload() {
   return shared;
 }
 
+/// The rays of `ray_workload` in an order in which neighbours have nothing in common. Made at the first call.
+struct ShuffledRays {
+  std::vector<RayQuery> primary;
+  std::vector<RayQuery> shadow;
+  std::vector<RayQuery> occlusion;
+};
+
 /// rays/random600: the same terrain over 2048x2048 columns, and rays from just above it into every direction.
 struct RandomRayWorkload {
   static constexpr int kWidth = 2'048;
@@ -155,6 +163,21 @@ inline DVec3 random_direction(FixedRandom& random) {
 }
 
 }  // namespace detail
+
+inline const ShuffledRays& shuffled_rays() {
+  static const ShuffledRays shared = [] {
+    const RayWorkload& in_order = ray_workload();
+    ShuffledRays rays{in_order.primary, in_order.shadow, in_order.occlusion};
+    detail::FixedRandom random;
+    for (std::vector<RayQuery>* each : {&rays.primary, &rays.shadow, &rays.occlusion}) {
+      for (std::size_t left = each->size(); left > 1; --left) {
+        std::swap((*each)[left - 1], (*each)[static_cast<std::size_t>(random.next() * static_cast<double>(left))]);
+      }
+    }
+    return rays;
+  }();
+  return shared;
+}
 
 /// 20,000 rays from 1 to 20 units above the surface, up to 600 units long. Made at the first call, then shared.
 inline const RandomRayWorkload& random_ray_workload() {

@@ -37,21 +37,30 @@ void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
 }
 
-/// The three parts of the rays workload: `prefix` + "rays/primary/" + `kind` and so on.
+/// The three parts of the rays workload, in order and shuffled: `prefix` + "rays/primary/" + `kind` and so on.
 template <class Primary, class Shadow, class Occlusion>
 void add_workload(const std::string& prefix, const std::string& kind, Primary primary, Shadow shadow,
                   Occlusion occlusion) {
   using workloads::ray_workload;
   using Rays = const std::vector<workloads::RayQuery>&;
+  constexpr auto kPrimary = +[] { return workloads::kPrimaryHits; };
+  constexpr auto kShadow = +[] { return workloads::kShadowHits; };
+  constexpr auto kOcclusion = +[] { return workloads::kOcclusionHits; };
+  const std::string name = prefix + "rays/";
   add_rays(
-      prefix + "rays/primary/" + kind, +[]() -> Rays { return ray_workload().primary; },
-      +[] { return workloads::kPrimaryHits; }, primary);
+      name + "primary/" + kind, +[]() -> Rays { return ray_workload().primary; }, kPrimary, primary);
   add_rays(
-      prefix + "rays/shadow/" + kind, +[]() -> Rays { return ray_workload().shadow; },
-      +[] { return workloads::kShadowHits; }, shadow);
+      name + "shadow/" + kind, +[]() -> Rays { return ray_workload().shadow; }, kShadow, shadow);
   add_rays(
-      prefix + "rays/ao/" + kind, +[]() -> Rays { return ray_workload().occlusion; },
-      +[] { return workloads::kOcclusionHits; }, occlusion);
+      name + "ao/" + kind, +[]() -> Rays { return ray_workload().occlusion; }, kOcclusion, occlusion);
+  using workloads::shuffled_rays;
+  const std::string suffix = kind + "/shuffled";
+  add_rays(
+      name + "primary/" + suffix, +[]() -> Rays { return shuffled_rays().primary; }, kPrimary, primary);
+  add_rays(
+      name + "shadow/" + suffix, +[]() -> Rays { return shuffled_rays().shadow; }, kShadow, shadow);
+  add_rays(
+      name + "ao/" + suffix, +[]() -> Rays { return shuffled_rays().occlusion; }, kOcclusion, occlusion);
 }
 
 /// rays/random600: first hits, one ray at a time.

@@ -20,6 +20,7 @@ namespace {
 using workloads::random_ray_workload;
 using workloads::ray_workload;
 using workloads::RayQuery;
+using workloads::shuffled_rays;
 
 void report(benchmark::State& state, std::size_t rays, int hits, int expected) {
   if (std::abs(hits - expected) > workloads::kHitTolerance) {
@@ -46,6 +47,15 @@ const Case kCases[] = {
     {"shadow", Ask::Any, []() -> const std::vector<RayQuery>& { return ray_workload().shadow; },
      workloads::kShadowHits},
     {"ao", Ask::Any, []() -> const std::vector<RayQuery>& { return ray_workload().occlusion; },
+     workloads::kOcclusionHits},
+};
+
+const Case kShuffled[] = {
+    {"primary", Ask::First, []() -> const std::vector<RayQuery>& { return shuffled_rays().primary; },
+     workloads::kPrimaryHits},
+    {"shadow", Ask::Any, []() -> const std::vector<RayQuery>& { return shuffled_rays().shadow; },
+     workloads::kShadowHits},
+    {"ao", Ask::Any, []() -> const std::vector<RayQuery>& { return shuffled_rays().occlusion; },
      workloads::kOcclusionHits},
 };
 
@@ -88,20 +98,16 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
 }
 
 [[maybe_unused]] const bool registered = [] {
-  const struct {
-    const char* suffix;
-    InstructionSet set;
-  } sets[] = {{"", InstructionSet::Best}, {"/avx2", InstructionSet::Avx2}, {"/plain", InstructionSet::Plain}};
-  for (const auto& s : sets) {
-    for (const Case& c : kCases) {
-      const auto add = [&](const std::string& kind, void (*run)(benchmark::State&, const Case&, InstructionSet)) {
-        benchmark::RegisterBenchmark(("rays/" + std::string(c.name) + kind + s.suffix).c_str(), run, c, s.set)
-            ->Unit(benchmark::kMillisecond);
-      };
-      add("/single", trace);
-      add("/packet", trace_packets);
-    }
-  }
+  const auto add = [](const Case& c, const std::string& suffix, InstructionSet set) {
+    const std::string name = "rays/" + std::string(c.name);
+    benchmark::RegisterBenchmark((name + "/single" + suffix).c_str(), trace, c, set)->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark((name + "/packet" + suffix).c_str(), trace_packets, c, set)
+        ->Unit(benchmark::kMillisecond);
+  };
+  for (const Case& c : kCases) add(c, "", InstructionSet::Best);
+  for (const Case& c : kShuffled) add(c, "/shuffled", InstructionSet::Best);
+  for (const Case& c : kCases) add(c, "/avx2", InstructionSet::Avx2);
+  for (const Case& c : kCases) add(c, "/plain", InstructionSet::Plain);
   return true;
 }();
 
