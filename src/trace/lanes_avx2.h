@@ -8,13 +8,13 @@ inline F narrow(const double* from) {
   return {_mm256_set_m128(_mm256_cvtpd_ps(_mm256_loadu_pd(from + 4)), _mm256_cvtpd_ps(_mm256_loadu_pd(from)))};
 }
 
-// Positions as multiples of 64 and what is left of them, and the whole number below what is left.
-inline void split(const double* from, I& base, F& rest, F& whole) {
+// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
   __m128i b[2];
   __m128 r[2];
   __m128 w[2];
   for (int half = 0; half < 2; ++half) {
-    const __m256d x = _mm256_loadu_pd(from + 4 * half);
+    const __m256d x = _mm256_sub_pd(_mm256_loadu_pd(from + 4 * half), _mm256_set1_pd(corner));
     const __m256d v = _mm256_floor_pd(x);
     const __m256d start =
         _mm256_mul_pd(_mm256_floor_pd(_mm256_mul_pd(x, _mm256_set1_pd(0.015625))), _mm256_set1_pd(64.0));

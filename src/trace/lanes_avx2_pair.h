@@ -127,6 +127,9 @@ inline Mask test(I a, I b) {
 inline Mask test_bit(I a, I at) {
   return {half::test_bit(a.low, at.low), half::test_bit(a.high, at.high)};
 }
+inline Mask operator<(I a, I b) {
+  return {a.low < b.low, a.high < b.high};
+}
 inline I or_of(I a, I b) {
   return {half::or_of(a.low, b.low), half::or_of(a.high, b.high)};
 }
@@ -156,9 +159,9 @@ inline I load(const std::int32_t* from) {
 inline F narrow(const double* from) {
   return {half::narrow(from), half::narrow(from + half::kWidth)};
 }
-inline void split(const double* from, I& base, F& rest, F& whole) {
-  half::split(from, base.low, rest.low, whole.low);
-  half::split(from + half::kWidth, base.high, rest.high, whole.high);
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
+  half::split(from, corner, base.low, rest.low, whole.low);
+  half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
 }
 
 inline F just_below(F a) {

@@ -12,11 +12,11 @@ inline F narrow(const double* from) {
   return {join(_mm512_cvtpd_ps(_mm512_loadu_pd(from)), _mm512_cvtpd_ps(_mm512_loadu_pd(from + 8)))};
 }
 
-// Positions as multiples of 64 and what is left of them, and the whole number below what is left.
-inline void split(const double* from, I& base, F& rest, F& whole) {
+// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
   constexpr int kDown = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
-  const __m512d low = _mm512_loadu_pd(from);
-  const __m512d high = _mm512_loadu_pd(from + 8);
+  const __m512d low = _mm512_sub_pd(_mm512_loadu_pd(from), _mm512_set1_pd(corner));
+  const __m512d high = _mm512_sub_pd(_mm512_loadu_pd(from + 8), _mm512_set1_pd(corner));
   const __m512i floor = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvt_roundpd_epi32(low, kDown)),
                                            _mm512_cvt_roundpd_epi32(high, kDown), 1);
   base.v = _mm512_and_si512(floor, _mm512_set1_epi32(~63));

@@ -97,10 +97,10 @@ inline F clip(Axis& axis, Mask entered, Mask& live) {
   return select(before, crossing_t(axis, select(axis.forward, axis.low, axis.high)), all(-1.0F));
 }
 
-inline Axis make_axis(const double* position, F direction) {
+// `whole` is the voxel in which a lane starts.
+inline Axis make_axis(const double* position, double corner, F direction, F& whole) {
   Axis axis;
-  F whole;
-  split(position, axis.base, axis.origin, whole);
+  split(position, corner, axis.base, axis.origin, whole);
   // Stays within the voxel it starts in, however it rounds.
   axis.origin = min(axis.origin, whole + all(1.0F - 0x1p-17F));
   axis.still = abs(direction) < all(0x1p-100F);
@@ -214,7 +214,8 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   const I moved = load(starts.entered);
   F bounds_exit = all(kNever);
   const auto limit = [&](Axis& axis, int index) {
-    axis = make_axis(starts.position[index], narrow(rays.directions[index]));
+    F whole;
+    axis = make_axis(starts.position[index], 0.0, narrow(rays.directions[index]), whole);
     axis.moved = ~equals(moved, -1);
     axis.low = to_bound(tree.box.min[index], axis.base);
     axis.high = to_bound(tree.box.max[index], axis.base);
