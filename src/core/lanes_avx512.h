@@ -121,12 +121,15 @@ inline Mask test(I a, I b) {
 inline Mask test_bit(I a, I at) {
   return test(I{_mm512_rorv_epi32(a.v, at.v)}, I{_mm512_set1_epi32(1)});
 }
-inline I gather(const std::uint32_t* base, I at) {
-  // Into zeros under a mask that compilers cannot see through: else they gather into any register, whose content, the
-  // last gather's mostly, has to be waited for.
+// All lanes, as compilers cannot see: under a mask that they know to be full they gather into any register, whose
+// content, mostly that of the last gather, the processor then waits for.
+inline __mmask16 each_lane() {
   __mmask16 each = 0xFFFF;
   __asm__("" : "+Yk"(each));
-  return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each, at.v, base, 4)};
+  return each;
+}
+inline I gather(const std::uint32_t* base, I at) {
+  return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
 }
 inline I to_int(F a) {
   return {_mm512_cvttps_epi32(a.v)};

@@ -6,13 +6,12 @@
 class PathWalk {
  public:
   PathWalk(const TreeView& tree, const PathRay& ray)
-      : tree_(tree),
-        ray_(ray),
-        octant_(mask3(ray.backward)),
-        flip_(flip_of(octant_)),
+      : chunk_(Paths::block(ray.chunk)),
         paths_(ray, ray.exit_t * 1.001F + 1e-6F),
-        mirrored_(octant_),
-        chunk_(Paths::block(ray.chunk)) {
+        mirrored_(mask3(ray.backward)),
+        tree_(tree),
+        ray_(ray),
+        flip_(flip_of(mask3(ray.backward))) {
     const F4 upper = ray.chunk + kChunkSize;
     const F4 t = (upper - ray.origin) * ray.inverse;
     const F4 native = mirrored_planes(ray.backward ? upper : ray.chunk, ray.backward);
@@ -127,17 +126,16 @@ class PathWalk {
     return {true, false, axis, IVec3{at[0], at[1], at[2]}};
   }
 
-  const TreeView& tree_;
-  const PathRay& ray_;
-  int octant_;
-  int flip_;  // from a mirrored unit to the unit
+  Paths::Block chunk_;
   Paths paths_;
   Mirror mirrored_;
-  Paths::Block chunk_;
+  const TreeView& tree_;
+  const PathRay& ray_;
+  int flip_;  // from a mirrored unit to the unit
+  int index_;
   float plane_[3];  // through which it leaves the chunk
   float t_[3];
   int stride_[3];
-  int index_;
 };
 
 template <Ask kAsk>

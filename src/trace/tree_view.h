@@ -17,26 +17,27 @@ struct FlatChunk {
 
 /// What the kernels read of a tree with flat tables.
 struct TreeView {
-  const std::uint32_t* cells;        ///< bits
-  const std::uint32_t* bricks;       ///< indices
-  const std::uint32_t* words;        ///< of bricks: 128 halves each, the lower half of a cell's word first
-  const OccupancyTree::Node* nodes;  ///< the bricks again
-  const FlatChunk* chunks;           ///< x first, then y, then z
-  std::uint32_t last_cell_word;
-  int first_cell;  ///< bit of the table's cell (0, 0, 0)
-  IVec3 cell_strides;
-  IVec3 brick_strides;
-  IVec3 brick_sizes;
-  DVec3 origin;   ///< of the tables, in the grid
-  IBox box;       ///< tight, from `origin`
-  bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
-  // The same again, as single rays read it.
+  // `origin`, `box` and the strides of chunks, as registers read them.
   alignas(32) double corner[4];
   alignas(16) float low[4];
   alignas(16) float high[4];
   alignas(16) std::int32_t low_voxel[4];
   alignas(16) std::int32_t high_voxel[4];
   alignas(16) std::int32_t chunk_strides[4];
+  // As everything else reads it.
+  const std::uint32_t* cells;        ///< bits
+  const std::uint32_t* bricks;       ///< indices
+  const std::uint32_t* words;        ///< of bricks: 128 halves each, the lower half of a cell's word first
+  const OccupancyTree::Node* nodes;  ///< the bricks again
+  const FlatChunk* chunks;           ///< x first, then y, then z
+  DVec3 origin;                      ///< of the tables, in the grid
+  std::uint32_t last_cell_word;
+  int first_cell;  ///< bit of the table's cell (0, 0, 0)
+  IVec3 cell_strides;
+  IVec3 brick_strides;
+  IVec3 brick_sizes;
+  IBox box;       ///< tight, from `origin`
+  bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
 };
 
 /// What a kernel leaves of the lanes it was asked about.
