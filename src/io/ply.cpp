@@ -1,5 +1,3 @@
-#include <array>
-#include <bit>
 #include <cstdint>
 #include <string>
 
@@ -7,39 +5,21 @@
 #include <quoin/io/smooth_files.h>
 
 #include "io/block_writer.h"
+#include "io/ply_layout.h"
 #include "io/smooth_parts.h"
 
 namespace quoin {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
-
-constexpr std::uint64_t kVertexBytes = 6 * 4 + 3;
-constexpr std::uint64_t kFaceBytes = 1 + 3 * 4;
-
-struct Counts {
-  std::uint64_t vertices = 0;
-  std::uint64_t faces = 0;
-};
-
-Counts count(std::span<const SmoothPart> parts) {
-  Counts counts;
+PlyCounts count(std::span<const SmoothPart> parts) {
+  PlyCounts counts;
   for (const SmoothPart& part : parts) {
     if (!is_drawn(part)) continue;
     counts.vertices += part.mesh.positions.size() * part.placements.size();
     counts.faces += part.mesh.indices.size() / 3 * part.placements.size();
   }
   return counts;
-}
-
-std::string header_of(const Counts& counts) {
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin " QUOIN_VERSION "\n";
-  text += "element vertex " + std::to_string(counts.vertices) + "\n";
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) text += "property float " + std::string(name) + "\n";
-  for (const char* name : {"red", "green", "blue"}) text += "property uchar " + std::string(name) + "\n";
-  text += "element face " + std::to_string(counts.faces) + "\n";
-  return text + "property list uchar int vertex_indices\nend_header\n";
 }
 
 /// Calls `write(part, transform)` for every placement that is drawn.
@@ -71,18 +51,12 @@ void write_faces(const SmoothMesh& mesh, bool turned, std::uint64_t first, Block
 
 Result<std::uint64_t> write_checked(std::span<const SmoothPart> parts, const std::filesystem::path& path,
                                     bool occlusion, const Progress& progress) {
-  const Counts counts = count(parts);
-  constexpr std::uint64_t kMost = 0x7FFF'FFFF;
-  if (counts.vertices > kMost || counts.faces > kMost) {
-    return fail(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(counts.vertices) + " vertices and " +
-                                              std::to_string(counts.faces) +
-                                              " triangles, and a PLY file holds 2147483647 of each");
-  }
+  const PlyCounts counts = count(parts);
+  if (auto possible = check_counts(counts); !possible) return tl::unexpected<Error>(possible.error());
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected<Error>(file.error());
-  const std::string header = header_of(counts);
-  BlockWriter out(*file, progress, header.size() + counts.vertices * kVertexBytes + counts.faces * kFaceBytes);
-  out.put_text(header);
+  BlockWriter out(*file, progress, ply_bytes(counts));
+  out.put_text(ply_header(counts));
   for_each_placement(parts, out, [&](const SmoothMesh& mesh, const VertexTransform& transform) {
     write_vertices(mesh, transform, occlusion, out);
   });

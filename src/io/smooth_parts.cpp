@@ -62,26 +62,28 @@ bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
   return true;
 }
 
-/// What is wrong with where a part lies. Requires: its mesh and pivot are sound.
-const char* fault_of_places(const SmoothPart& part) {
-  const DBox box = bounds_of(part.mesh);
-  const DBox from_pivot{box.min - part.pivot, box.max - part.pivot};
-  for (const SmoothPlacement& placement : part.placements) {
+}  // namespace
+
+const char* fault_of_places(const DBox& bounds, const DVec3& pivot, std::span<const SmoothPlacement> placements) {
+  const DBox from_pivot{bounds.min - pivot, bounds.max - pivot};
+  for (const SmoothPlacement& placement : placements) {
     if (const char* fault = fault_of(placement.world_from_mesh); fault != nullptr) return fault;
-    const bool is_within = part.mesh.positions.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
-                                                           stays_within_floats(from_pivot, placement.world_from_mesh));
+    const bool is_within = bounds.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
+                                              stays_within_floats(from_pivot, placement.world_from_mesh));
     if (!is_within) return "a vertex farther away than a float can say";
   }
   return nullptr;
 }
 
-}  // namespace
+Status unsound_part(const std::string& name, const char* fault) {
+  return fail(ErrorCode::InvalidArgument, "part \"" + name + "\" has " + fault);
+}
 
 Status check_parts(std::span<const SmoothPart> parts) {
   for (const SmoothPart& part : parts) {
     const char* fault = is_finite(part.pivot) ? fault_of(part.mesh) : "a pivot that is not finite";
-    if (fault == nullptr) fault = fault_of_places(part);
-    if (fault != nullptr) return fail(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
+    if (fault == nullptr) fault = fault_of_places(bounds_of(part.mesh), part.pivot, part.placements);
+    if (fault != nullptr) return unsound_part(part.name, fault);
   }
   return {};
 }

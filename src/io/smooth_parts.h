@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <span>
+#include <string>
 
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
@@ -15,6 +16,14 @@ namespace quoin {
 
 /// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see smooth_files.h).
 [[nodiscard]] Status check_parts(std::span<const SmoothPart> parts);
+
+/// What is wrong with where a mesh of these bounds, without a vertex where they are empty, is placed; null when nothing
+/// is. Requires: finite bounds and pivot.
+[[nodiscard]] const char* fault_of_places(const DBox& bounds, const DVec3& pivot,
+                                          std::span<const SmoothPlacement> placements);
+
+/// The error that says so.
+[[nodiscard]] Status unsound_part(const std::string& name, const char* fault);
 
 /// What `write()` answers, once the parts are found sound; every error names the file.
 template <class Write>
