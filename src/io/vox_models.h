@@ -30,6 +30,7 @@ class ModelBuilder {
   [[nodiscard]] const ModelLosses& losses() const { return losses_; }
 
  private:
+  void build_densely(const Model& model, Grid& grid);
   void sort_into_chunks(const Model& model);
   void fill_chunk(IVec3 chunk, std::size_t first, std::size_t count, Grid& grid);
 
@@ -37,7 +38,7 @@ class ModelBuilder {
   ModelLosses losses_;
   std::array<std::size_t, 65> chunk_begins_{};
   std::vector<std::uint32_t> sorted_;  ///< by chunk: place in the chunk in bits 0-17, type above
-  std::vector<VoxelType> dense_;
+  std::vector<VoxelType> dense_;       ///< chunks, one after the other
 };
 
 /// The box and pivot of a grid made from a model of that size.
