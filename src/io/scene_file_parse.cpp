@@ -21,11 +21,28 @@ constexpr std::size_t kMostFiles = 65'536;
 constexpr std::size_t kMostInstances = std::size_t{1} << 22;
 constexpr int kVersion = 1;
 
+/// A place in the file: a key or an index below another place, the file itself without. Text is made of it only where
+/// something is wrong.
+struct Place {
+  const Place* parent = nullptr;
+  std::string_view key;
+  std::optional<std::size_t> index;
+};
+
+std::string text_of(const Place& place) {
+  const std::string above = place.parent != nullptr ? text_of(*place.parent) : std::string();
+  if (place.index) return above + "[" + std::to_string(*place.index) + "]";
+  if (above.empty()) return std::string(place.key);
+  return above + "." + std::string(place.key);
+}
+
 // The first fault found, with its place; reading goes on after it, and nothing of it is used.
 class Faults {
  public:
-  void add(const std::string& place, const std::string& what, ErrorCode code = ErrorCode::BadFormat) {
-    if (!error_) error_ = Error{code, place.empty() ? what : place + ": " + what, {}, std::nullopt};
+  void add(const Place& place, const std::string& what, ErrorCode code = ErrorCode::BadFormat) {
+    if (error_) return;
+    const std::string where = text_of(place);
+    error_ = Error{code, where.empty() ? what : where + ": " + what, {}, std::nullopt};
   }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
@@ -41,22 +58,18 @@ std::string excerpt(std::string_view text) {
   return out;
 }
 
-std::string joined(const std::string& place, std::string_view key) {
-  return place.empty() ? std::string(key) : place + "." + std::string(key);
-}
-
 /// An object of the file, whose keys are asked for one by one.
 class Object {
  public:
-  Object(const Json& json, std::string place, std::initializer_list<std::string_view> keys, Faults& faults)
-      : json_(json), place_(std::move(place)), faults_(faults) {
+  Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults)
+      : json_(json), place_(place), faults_(faults) {
     if (!json.is_object()) {
-      faults.add(place_, "must be an object");
+      faults.add(place, "must be an object");
       return;
     }
     for (const auto& [key, value] : json.items()) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        faults.add(place_, excerpt(key) + " is not known here");
+        faults.add(place, excerpt(key) + " is not known here");
       }
     }
   }
@@ -71,7 +84,8 @@ class Object {
     if (found == nullptr && json_.is_object()) faults_.add(place_, excerpt(key) + " is missing");
     return found;
   }
-  [[nodiscard]] std::string place_of(std::string_view key) const { return joined(place_, key); }
+  /// Requires: this object outlives it.
+  [[nodiscard]] Place place_of(std::string_view key) const { return {&place_, key, std::nullopt}; }
 
   void read(std::string_view key, std::string& out) const {
     const Json* json = find(key);
@@ -99,23 +113,23 @@ class Object {
     const Json* json = find(key);
     if (json != nullptr) out = triple(*json, place_of(key));
   }
-  [[nodiscard]] std::vector<double> numbers(const Json& json, const std::string& place, std::size_t count) const {
+  [[nodiscard]] std::vector<double> numbers(const Json& json, const Place& place, std::size_t count) const {
     std::vector<double> values(count, 0.0);
     if (!json.is_array() || json.size() != count) {
       faults_.add(place, "must be a list of " + std::to_string(count) + " numbers");
       return values;
     }
-    for (std::size_t i = 0; i < count; ++i) values[i] = number(json[i], place + "[" + std::to_string(i) + "]");
+    for (std::size_t i = 0; i < count; ++i) values[i] = number(json[i], {&place, {}, i});
     return values;
   }
-  [[nodiscard]] DVec3 triple(const Json& json, const std::string& place) const {
+  [[nodiscard]] DVec3 triple(const Json& json, const Place& place) const {
     const std::vector<double> v = numbers(json, place, 3);
     return {v[0], v[1], v[2]};
   }
   Faults& faults() const { return faults_; }
 
  private:
-  [[nodiscard]] double number(const Json& json, const std::string& place) const {
+  [[nodiscard]] double number(const Json& json, const Place& place) const {
     if (!json.is_number()) {
       faults_.add(place, "must be a number");
       return 0.0;
@@ -126,12 +140,12 @@ class Object {
   }
 
   const Json& json_;
-  std::string place_;
+  const Place& place_;
   Faults& faults_;
 };
 
 // A vector made unit; scaled first, since the square of a very small or large number is 0 or infinite.
-std::vector<double> unit(std::vector<double> v, const std::string& place, Faults& faults) {
+std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults) {
   double largest = 0.0;
   for (const double x : v) largest = std::max(largest, std::abs(x));
   if (!(largest > 0.0)) {
@@ -145,7 +159,7 @@ std::vector<double> unit(std::vector<double> v, const std::string& place, Faults
 }
 
 DQuat rotation_of(const Object& instance, const Json& json) {
-  const std::string place = instance.place_of("rotation");
+  const Place place = instance.place_of("rotation");
   Faults& faults = instance.faults();
   if (json.is_array()) {
     const std::vector<double> q = unit(instance.numbers(json, place, 4), place, faults);
@@ -160,12 +174,12 @@ DQuat rotation_of(const Object& instance, const Json& json) {
   const Json* axis = turn.need("axis");
   if (turn.need("degrees") == nullptr || axis == nullptr) return {1.0, 0.0, 0.0, 0.0};
   turn.read("degrees", degrees);
-  const std::vector<double> a = unit(turn.numbers(*axis, joined(place, "axis"), 3), joined(place, "axis"), faults);
+  const std::vector<double> a = unit(turn.numbers(*axis, turn.place_of("axis"), 3), turn.place_of("axis"), faults);
   const double half = std::fmod(degrees, 720.0) * std::numbers::pi / 360.0;
   return {std::cos(half), a[0] * std::sin(half), a[1] * std::sin(half), a[2] * std::sin(half)};
 }
 
-SceneFile::Placement placement_of(const Json& json, const std::string& place, Faults& faults) {
+SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
   const Object instance(json, place, {"file", "name", "position", "rotation", "scale", "mirrored", "visible"}, faults);
   SceneFile::Placement placement;
   if (instance.need("file") != nullptr) instance.read("file", placement.source);
@@ -175,23 +189,24 @@ SceneFile::Placement placement_of(const Json& json, const std::string& place, Fa
   instance.read("mirrored", placement.mirrored);
   instance.read("visible", placement.visible);
   if (const Json* rotation = instance.find("rotation")) placement.rotation = rotation_of(instance, *rotation);
-  if (!(placement.scale > 0.0)) faults.add(joined(place, "scale"), "must be more than 0");
+  if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
   return placement;
 }
 
-SceneFile::Source source_of(const Json& json, const std::string& place, Faults& faults) {
+SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"id", "path"}, faults);
   SceneFile::Source source;
   if (object.need("id") != nullptr) object.read("id", source.id);
   if (object.need("path") != nullptr) object.read("path", source.file);
   if (source.file.empty() || source.file.find('\0') != std::string::npos) {
-    faults.add(joined(place, "path"), "must name a file");
+    faults.add(object.place_of("path"), "must name a file");
   }
   return source;
 }
 
 Camera camera_of(const Json& json, Faults& faults) {
-  const Object object(json, "camera", {"position", "look_at", "fov"}, faults);
+  const Place place{nullptr, "camera", std::nullopt};
+  const Object object(json, place, {"position", "look_at", "fov"}, faults);
   DVec3 position(0.0);
   DVec3 target(0.0);
   double fov = 50.0;
@@ -199,7 +214,7 @@ Camera camera_of(const Json& json, Faults& faults) {
   if (object.need("look_at") != nullptr) object.read("look_at", target);
   object.read("fov", fov);
   const auto camera = look_at(position, target, fov * std::numbers::pi / 180.0);
-  if (!camera) faults.add("camera", camera.error().message);
+  if (!camera) faults.add(place, camera.error().message);
   return camera.value_or(Camera{});
 }
 
@@ -207,52 +222,58 @@ Camera camera_of(const Json& json, Faults& faults) {
 template <class Read>
 void read_list(const Object& file, std::string_view key, std::size_t most, Read read) {
   const Json* list = file.need(key);
+  const Place place = file.place_of(key);
   if (list == nullptr) return;
   if (!list->is_array()) {
-    file.faults().add(std::string(key), "must be a list");
+    file.faults().add(place, "must be a list");
     return;
   }
   if (list->size() > most) {
-    file.faults().add(std::string(key), "more than " + std::to_string(most) + " entries", ErrorCode::LimitExceeded);
+    file.faults().add(place, "more than " + std::to_string(most) + " entries", ErrorCode::LimitExceeded);
     return;
   }
   for (std::size_t i = 0; i < list->size() && !file.faults().error(); ++i) {
-    read((*list)[i], std::string(key) + "[" + std::to_string(i) + "]");
+    read((*list)[i], {&place, {}, i});
   }
 }
 
 // Sources' ids differ, and placements name one of them.
 void check_ids(const SceneFile& scene, Faults& faults) {
   std::set<std::string_view> ids;
+  const auto add = [&](std::string_view list, std::size_t i, std::string_view key, const std::string& what) {
+    const Place whole{nullptr, list, std::nullopt};
+    const Place entry{&whole, {}, i};
+    faults.add({&entry, key, std::nullopt}, what);
+  };
   for (std::size_t i = 0; i < scene.sources.size(); ++i) {
     if (!ids.insert(scene.sources[i].id).second) {
-      faults.add("files[" + std::to_string(i) + "].id", excerpt(scene.sources[i].id) + " was given before");
+      add("files", i, "id", excerpt(scene.sources[i].id) + " was given before");
     }
   }
   for (std::size_t i = 0; i < scene.placements.size(); ++i) {
     if (!ids.contains(scene.placements[i].source)) {
-      faults.add("instances[" + std::to_string(i) + "].file",
-                 "no file has the id " + excerpt(scene.placements[i].source));
+      add("instances", i, "file", "no file has the id " + excerpt(scene.placements[i].source));
     }
   }
 }
 
 void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
-  const Object file(json, "", {"quoin_scene", "files", "instances", "sun", "camera"}, faults);
+  const Place root;
+  const Object file(json, root, {"quoin_scene", "files", "instances", "sun", "camera"}, faults);
   const Json* version = file.need("quoin_scene");
   if (version != nullptr && !version->is_number_unsigned())
-    faults.add("quoin_scene", "must be a version, a whole number");
+    faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && *version != kVersion) {
-    faults.add("quoin_scene", "version " + version->dump() + " is not known; 1 is", ErrorCode::Unsupported);
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 is",
+               ErrorCode::Unsupported);
   }
-  read_list(file, "files", kMostFiles, [&](const Json& each, const std::string& place) {
-    scene.sources.push_back(source_of(each, place, faults));
-  });
-  read_list(file, "instances", kMostInstances, [&](const Json& each, const std::string& place) {
+  read_list(file, "files", kMostFiles,
+            [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
+  read_list(file, "instances", kMostInstances, [&](const Json& each, const Place& place) {
     scene.placements.push_back(placement_of(each, place, faults));
   });
   if (const Json* sun = file.find("sun")) {
-    const std::vector<double> v = unit(file.numbers(*sun, "sun", 3), "sun", faults);
+    const std::vector<double> v = unit(file.numbers(*sun, file.place_of("sun"), 3), file.place_of("sun"), faults);
     scene.sun = DVec3(v[0], v[1], v[2]);
   }
   if (const Json* camera = file.find("camera")) scene.camera = camera_of(*camera, faults);
