@@ -69,16 +69,33 @@ class Samples {
   std::size_t plane_;
 };
 
-// Appends the steepness wherever the surface crosses an edge that starts in a row.
-void measure_row(const Samples& samples, float iso, int y, int z, std::vector<double>& out) {
-  for (int x = 0; x < samples.size().x; ++x) {
-    const IVec3 p{x, y, z};
-    const bool is_solid = samples.at(p) > iso;
+// Which of the edges that start at the samples of a row the surface crosses: bit `axis` of each.
+void find_crossings(const Samples& samples, float iso, int y, int z, std::vector<std::uint8_t>& crossed) {
+  const IVec3 size = samples.size();
+  const auto width = static_cast<std::size_t>(size.x);
+  crossed.assign(width, 0);
+  const float* row = samples.row(y, z);
+  const auto add = [&](const float* next, std::size_t count, unsigned axis) {
+    std::uint8_t* out = crossed.data();
+    for (std::size_t x = 0; x < count; ++x) {
+      const auto differs = static_cast<std::uint8_t>((row[x] > iso) != (next[x] > iso));
+      out[x] = static_cast<std::uint8_t>(out[x] | differs << axis);
+    }
+  };
+  add(row + 1, width - 1, 0);
+  if (y + 1 < size.y) add(samples.row(y + 1, z), width, 1);
+  if (z + 1 < size.z) add(samples.row(y, z + 1), width, 2);
+}
+
+// Appends the steepness wherever the surface crosses an edge that starts in a row; `crossed` is room to work in.
+void measure_row(const Samples& samples, float iso, int y, int z, std::vector<std::uint8_t>& crossed,
+                 std::vector<double>& out) {
+  find_crossings(samples, iso, y, z, crossed);
+  for (std::size_t x = 0; x < crossed.size(); ++x) {
+    if (crossed[x] == 0) continue;
     for (int axis = 0; axis < 3; ++axis) {
-      IVec3 next = p;
-      ++next[axis];
-      if (next[axis] == samples.size()[axis] || (samples.at(next) > iso) == is_solid) continue;
-      const double steepness = samples.steepness(p, axis);
+      if ((crossed[x] >> axis & 1) == 0) continue;
+      const double steepness = samples.steepness({static_cast<int>(x), y, z}, axis);
       if (steepness > 0.0 && std::isfinite(steepness)) out.push_back(steepness);
     }
   }
@@ -90,9 +107,10 @@ std::vector<double> steepness_at_surface(const Samples& samples, float iso, std:
   std::vector<std::vector<double>> found(static_cast<std::size_t>(size.z));
   parallel_for(found.size(), threads, [&](std::size_t i) {
     const int z = static_cast<int>(i);
+    std::vector<std::uint8_t> crossed;
     for (int y = 0; y < size.y; ++y) {
       const std::uint32_t shuffled = mix_bits(mix_bits(static_cast<std::uint32_t>(z)) ^ static_cast<std::uint32_t>(y));
-      if (shuffled % stride == 0) measure_row(samples, iso, y, z, found[i]);
+      if (shuffled % stride == 0) measure_row(samples, iso, y, z, crossed, found[i]);
     }
   });
   std::vector<double> all;
