@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <map>
 
@@ -31,7 +32,7 @@ std::vector<Srgb> colours_of(const VoxelRegistry& types) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   // By way of 16 bits, as smooth meshes hold their colours.
   const auto darkened = [&](std::uint8_t byte, std::uint8_t level) {
-    const auto linear = static_cast<std::uint16_t>(linear_from_srgb(byte) * 65'535.0F + 0.5F);
+    const auto linear = static_cast<std::uint16_t>(std::lround(linear_from_srgb(byte) * 65'535.0F));
     return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(level));
   };
   std::vector<Srgb> colours;
