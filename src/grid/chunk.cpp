@@ -4,6 +4,7 @@
 #include <bit>
 #include <cassert>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "grid/packed_row.h"
@@ -21,21 +22,30 @@ int bits_for(std::size_t types) {
   return types <= 256 ? 8 : 16;
 }
 
-// Adds to the counts whose bits are set; in such steps that compilers make vectors of them.
+// A one in each of four counts whose bit is set.
+constexpr auto kFourOnes = [] {
+  std::array<std::uint64_t, 16> ones{};
+  for (unsigned bits = 0; bits < ones.size(); ++bits) {
+    std::array<std::uint16_t, 4> counts{};
+    for (unsigned i = 0; i < counts.size(); ++i) counts.at(i) = static_cast<std::uint16_t>(bits >> i & 1U);
+    ones.at(bits) = std::bit_cast<std::uint64_t>(counts);
+  }
+  return ones;
+}();
+
+// Adds 1 or -1 to the counts whose bits are set, four at once: none leaves 0 to 4,096, so that none carries.
 void add_columns(std::array<std::uint16_t, kChunkEdge>& counts, std::uint64_t mask, int delta) {
   if (mask == 0) return;
-  const auto addend = static_cast<std::uint16_t>(delta);
   if (mask == kAllVoxels) {
-    for (std::uint16_t& count : counts) count = static_cast<std::uint16_t>(count + addend);
+    for (std::uint16_t& count : counts) count = static_cast<std::uint16_t>(count + delta);
     return;
   }
-  for (std::size_t i = 0; i < kChunkEdge; i += 8) {
-    const auto eight = static_cast<std::uint16_t>(mask >> i & 0xFFU);
-    for (unsigned k = 0; k < 8; ++k) {
-      const auto bit = static_cast<std::uint16_t>(1U << k);
-      const auto all_or_none = static_cast<std::uint16_t>((eight & bit) == bit ? ~0U : 0U);
-      counts[i + k] = static_cast<std::uint16_t>(counts[i + k] + (all_or_none & addend));
-    }
+  for (std::size_t i = 0; i < kChunkEdge; i += 4) {
+    std::uint64_t four = 0;
+    std::memcpy(&four, &counts[i], sizeof four);
+    const std::uint64_t ones = kFourOnes[mask >> i & 15U];
+    four = delta > 0 ? four + ones : four - ones;
+    std::memcpy(&counts[i], &four, sizeof four);
   }
 }
 
@@ -67,6 +77,20 @@ void for_each_row_of_slab(std::size_t slab, Visit&& visit) {
   const int first_y = static_cast<int>(slab % 16) * 4;
   const int first_z = static_cast<int>(slab / 16) * 4;
   for (int row = 0; row < kSlabRows; ++row) visit(row, first_y + (row & 3), first_z + (row >> 2));
+}
+
+// The type of all voxels of a row, where there is one and it is quick to see.
+std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
+  const Chunk::Mixed* m = chunk.mixed();
+  if (m == nullptr) return chunk.uniform();
+  const std::uint32_t slab = m->slabs[Chunk::slab_index(y, z)];
+  std::uint32_t index = slab & ~Chunk::kUniformSlab;
+  if ((slab & Chunk::kUniformSlab) == 0) {
+    const std::uint64_t* row = m->row(slab, Chunk::row_in_slab(y, z));
+    index = packed_row::read(row, m->bits, 0);
+    if (!packed_row::all_equal(row, m->bits, 1, index)) return std::nullopt;
+  }
+  return m->direct() ? static_cast<VoxelType>(index) : m->palette[index];
 }
 
 }  // namespace
@@ -133,9 +157,14 @@ std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type
 }
 
 std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
-  const std::uint64_t changed = mask & ~row_mask(y, z, type);
+  const std::optional<VoxelType> old = one_type_of_row(*this, y, z);
+  const auto where = [&](VoxelType wanted) {
+    if (old.has_value()) return *old == wanted ? kAllVoxels : 0;
+    return row_mask(y, z, wanted);
+  };
+  const std::uint64_t changed = mask & ~where(type);
   if (changed == 0) return 0;
-  const std::uint64_t air = type == kAir ? 0 : row_mask(y, z, kAir);
+  const std::uint64_t air = type == kAir ? 0 : where(kAir);
   const std::uint32_t index = replace(y, z, changed, type);
   count_change(y, z, type == kAir ? changed : 0, changed & air);
   after_writing(y, z, index, static_cast<std::uint32_t>(std::popcount(changed)));

@@ -6,9 +6,8 @@
 #include <bit>
 #include <set>
 
-#include <tsl/robin_map.h>
-
 #include "grid/chunk_order.h"
+#include "grid/chunk_table.h"
 #include "grid/long_box.h"
 #include "grid/reach.h"
 
@@ -20,42 +19,16 @@ std::uint64_t next_identity() {
   return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
-// Spreads chunks over the table. The three products do not wait for each other, and a voxel that is looked up because
-// of the one before waits for all of this.
-struct ChunkHash {
-  std::size_t operator()(IVec3 c) const {
-    const auto times = [](int i, std::uint64_t factor) { return static_cast<std::uint32_t>(i) * factor; };
-    const std::uint64_t sum =
-        times(c.x, 0x9E37'79B9'7F4A'7C15U) + times(c.y, 0xC2B2'AE3D'27D4'EB4FU) + times(c.z, 0x1656'67B1'9E37'79F9U);
-    return static_cast<std::size_t>(sum >> 32);
-  }
-};
-
 }  // namespace
 
 struct Grid::Impl {
-  struct Entry {
-    Chunk chunk;
-    std::uint64_t version = 0;
-    std::uint64_t neighbourhood_version = 0;
-    bool is_dirty = false;  ///< its coordinates stand in `dirty`
-  };
-  tsl::robin_map<IVec3, std::unique_ptr<Entry>, ChunkHash> entries;
+  ChunkTable entries;
   std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
   std::uint64_t version = 0;
   std::uint64_t identity = next_identity();
 
-  Entry* find(IVec3 chunk) const {
-    const auto it = entries.find(chunk);
-    return it == entries.end() ? nullptr : it->second.get();
-  }
-  Entry& find_or_create(IVec3 chunk) {
-    if (Entry* entry = find(chunk)) return *entry;
-    return *entries.emplace(chunk, std::make_unique<Entry>()).first->second;
-  }
-
   // Books that the mesh of a chunk may have changed.
-  void touch(IVec3 chunk, Entry& entry) {
+  void touch(const IVec3& chunk, ChunkEntry& entry) {
     entry.neighbourhood_version = version;
     if (entry.is_dirty) return;
     if (dirty.size() == dirty.capacity()) make_room_in_dirty();
@@ -70,20 +43,24 @@ struct Grid::Impl {
   }
 
   // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
-  void finish_edit(IVec3 chunk, Entry& entry, const Reach& reach) {
+  void finish_edit(const IVec3& chunk, ChunkEntry& entry, const Reach& reach) {
     if (reach.voxels != 0) {
       entry.version = version;
       touch(chunk, entry);
       if (reach.mask != Reach::kCentreOnly) touch_neighbours(chunk, reach.mask);
     }
-    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+    if (entry.chunk.non_air_count() == 0) {
+      entries.erase(chunk);
+    } else {
+      entries.voxels_changed(chunk, entry);
+    }
   }
 
-  void touch_neighbours(IVec3 chunk, std::uint32_t mask) {
+  void touch_neighbours(const IVec3& chunk, std::uint32_t mask) {
     for (std::uint32_t left = mask & ~Reach::kCentreOnly; left != 0; left &= left - 1) {
       const int i = std::countr_zero(left);
       const IVec3 at = chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-      if (Entry* neighbour = find(at)) touch(at, *neighbour);
+      if (ChunkEntry* neighbour = entries.find(at)) touch(at, *neighbour);
     }
   }
 
@@ -100,7 +77,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   const IBox chunks = chunks_of(box);
   ++version;
   std::int64_t changed = 0;
-  const auto edit_chunk = [&](IVec3 chunk, Entry& entry) {
+  const auto edit_chunk = [&](IVec3 chunk, ChunkEntry& entry) {
     Reach reach;
     try {
       change(chunk, entry.chunk, part_of(box, chunk), reach);
@@ -115,25 +92,22 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   if (create) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
-        for (int x = chunks.min.x; x < chunks.max.x; ++x) edit_chunk({x, y, z}, find_or_create({x, y, z}));
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) edit_chunk({x, y, z}, entries.find_or_create({x, y, z}));
       }
     }
   } else {
     std::vector<IVec3> present;
-    for (const auto& [at, entry] : entries) {
+    entries.for_each([&](IVec3 at, const ChunkEntry&) {
       if (chunks.contains(at)) present.push_back(at);
-    }
+    });
     std::sort(present.begin(), present.end(), by_zyx);
-    for (const IVec3 at : present) edit_chunk(at, *find(at));
+    for (const IVec3 at : present) edit_chunk(at, *entries.find(at));
   }
   if (changed == 0) --version;
   return changed;
 }
 
-// The table of chunks shrinks again where few of many are left.
-Grid::Grid() : impl_(std::make_unique<Impl>()) {
-  impl_->entries.min_load_factor(0.1F);
-}
+Grid::Grid() : impl_(std::make_unique<Impl>()) {}
 Grid::Grid(Grid&&) noexcept = default;
 Grid& Grid::operator=(Grid&&) noexcept = default;
 Grid::~Grid() = default;
@@ -142,33 +116,39 @@ Grid Grid::clone() const {
   Grid copy;
   copy.impl_->version = impl_->version;
   copy.impl_->dirty = impl_->dirty;
-  for (const auto& [at, entry] : impl_->entries) {
-    copy.impl_->entries.emplace(at, std::make_unique<Impl::Entry>(*entry));
-  }
+  impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
+    ChunkEntry& made = copy.impl_->entries.find_or_create(at);
+    made = entry;
+    copy.impl_->entries.voxels_changed(at, made);
+  });
   return copy;
 }
 
-VoxelType Grid::get(IVec3 voxel) const {
-  const Impl::Entry* entry = impl_->find(chunk_of(voxel));
-  return entry == nullptr ? kAir : entry->chunk.get(local_of(voxel));
+VoxelType Grid::get(int x, int y, int z) const {
+  return impl_->entries.voxel(x, y, z);
 }
 
-bool Grid::set(IVec3 voxel, VoxelType type) {
-  const IVec3 at = chunk_of(voxel);
-  const IVec3 local = local_of(voxel);
-  Impl::Entry* entry = impl_->find(at);
+bool Grid::set(int x, int y, int z, VoxelType type) {
+  const IVec3 at{x >> kChunkShift, y >> kChunkShift, z >> kChunkShift};
+  const IVec3 local{x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1)};
+  ChunkEntry* entry = impl_->entries.find(at);
   if (entry == nullptr) {
     if (type == kAir || !is_inside_world(at)) return false;
-    entry = &impl_->find_or_create(at);
+    entry = &impl_->entries.find_or_create(at);
   }
-  if (!entry->chunk.set(local, type)) return false;
+  Reach reach;
+  try {
+    if (!entry->chunk.set(local, type)) return false;
+  } catch (...) {
+    impl_->finish_edit(at, *entry, reach);
+    throw;
+  }
   ++impl_->version;
   const auto is_inner = [](int i) { return i != 0 && i != kChunkEdge - 1; };
   if (is_inner(local.x) && is_inner(local.y) && is_inner(local.z)) {
     impl_->finish_edit(at, *entry, {.voxels = 1, .mask = Reach::kCentreOnly});
     return true;
   }
-  Reach reach;
   reach.add(local.y, local.z, std::uint64_t{1} << local.x);
   impl_->finish_edit(at, *entry, reach);
   return true;
@@ -178,7 +158,7 @@ std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelT
   const IVec3 at = chunk_of(row);
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
-  Impl::Entry& entry = impl_->find_or_create(at);
+  ChunkEntry& entry = impl_->entries.find_or_create(at);
   ++impl_->version;
   Reach reach;
   try {
@@ -240,9 +220,9 @@ std::int64_t Grid::edit(const IBox& wanted, const std::function<VoxelType(IVec3 
 
 void Grid::put_chunk(IVec3 at, Chunk voxels) {
   if (!is_inside_world(at)) return;
-  Impl::Entry* present = impl_->find(at);
+  ChunkEntry* present = impl_->entries.find(at);
   if (present == nullptr && voxels.non_air_count() == 0) return;
-  Impl::Entry& entry = present != nullptr ? *present : impl_->find_or_create(at);
+  ChunkEntry& entry = present != nullptr ? *present : impl_->entries.find_or_create(at);
   Reach reach;
   std::array<VoxelType, kChunkEdge> old_row{};
   std::array<VoxelType, kChunkEdge> new_row{};
@@ -267,19 +247,19 @@ void Grid::put_chunk(IVec3 at, Chunk voxels) {
 void Grid::clear() {
   if (impl_->entries.empty()) return;
   ++impl_->version;
-  for (auto it = impl_->entries.begin(); it != impl_->entries.end(); ++it) impl_->touch(it.key(), *it.value());
+  impl_->entries.for_each([&](IVec3 at, ChunkEntry& entry) { impl_->touch(at, entry); });
   impl_->entries.clear();
 }
 
-const Chunk* Grid::find_chunk(IVec3 chunk) const {
-  const Impl::Entry* entry = impl_->find(chunk);
+const Chunk* Grid::find_chunk(int x, int y, int z) const {
+  const ChunkEntry* entry = impl_->entries.find(x, y, z);
   return entry == nullptr ? nullptr : &entry->chunk;
 }
 
 std::vector<IVec3> Grid::chunks() const {
   std::vector<IVec3> all;
   all.reserve(impl_->entries.size());
-  for (const auto& [at, entry] : impl_->entries) all.push_back(at);
+  impl_->entries.for_each([&](IVec3 at, const ChunkEntry&) { all.push_back(at); });
   std::sort(all.begin(), all.end(), by_zyx);
   return all;
 }
@@ -301,12 +281,12 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 std::uint64_t Grid::version(IVec3 chunk) const {
-  const Impl::Entry* entry = impl_->find(chunk);
+  const ChunkEntry* entry = impl_->entries.find(chunk);
   return entry == nullptr ? 0 : entry->version;
 }
 
 std::uint64_t Grid::neighbourhood_version(IVec3 chunk) const {
-  const Impl::Entry* entry = impl_->find(chunk);
+  const ChunkEntry* entry = impl_->entries.find(chunk);
   return entry == nullptr ? 0 : entry->neighbourhood_version;
 }
 
@@ -322,7 +302,7 @@ std::vector<IVec3> Grid::take_dirty() {
   std::vector<IVec3> taken = std::move(impl_->dirty);
   impl_->dirty.clear();
   for (const IVec3 at : taken) {
-    if (Impl::Entry* entry = impl_->find(at)) entry->is_dirty = false;
+    if (ChunkEntry* entry = impl_->entries.find(at)) entry->is_dirty = false;
   }
   sort_and_unite(taken);
   return taken;
@@ -330,26 +310,26 @@ std::vector<IVec3> Grid::take_dirty() {
 
 IBox Grid::bounds() const {
   IBox box;
-  for (const auto& [at, entry] : impl_->entries) {
-    const IBox inside = entry->chunk.bounds();
+  impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
+    const IBox inside = entry.chunk.bounds();
     box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
-  }
+  });
   return box;
 }
 
 std::int64_t Grid::voxel_count() const {
   std::int64_t total = 0;
-  for (const auto& [at, entry] : impl_->entries) total += entry->chunk.non_air_count();
+  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.non_air_count(); });
   return total;
 }
 
 std::vector<VoxelType> Grid::types() const {
   std::set<VoxelType> all;
-  for (const auto& [at, entry] : impl_->entries) {
-    for (const VoxelType type : entry->chunk.types()) {
+  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) {
+    for (const VoxelType type : entry.chunk.types()) {
       if (type != kAir) all.insert(type);
     }
-  }
+  });
   return {all.begin(), all.end()};
 }
 
@@ -371,14 +351,17 @@ void Grid::for_each(const std::function<void(IVec3 voxel, VoxelType type)>& visi
 }
 
 std::size_t Grid::bytes() const {
-  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bucket_count() * sizeof(void*) * 4 +
-                      impl_->dirty.capacity() * sizeof(IVec3);
-  for (const auto& [at, entry] : impl_->entries) total += sizeof(Impl::Entry) - sizeof(Chunk) + entry->chunk.bytes();
+  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->dirty.capacity() * sizeof(IVec3);
+  impl_->entries.for_each(
+      [&](IVec3, const ChunkEntry& entry) { total += sizeof(ChunkEntry) - sizeof(Chunk) + entry.chunk.bytes(); });
   return total;
 }
 
 void Grid::compact() {
-  for (auto it = impl_->entries.begin(); it != impl_->entries.end(); ++it) it.value()->chunk.compact();
+  impl_->entries.for_each([&](IVec3 at, ChunkEntry& entry) {
+    entry.chunk.compact();
+    impl_->entries.voxels_changed(at, entry);
+  });
 }
 
 }  // namespace quoin

@@ -4,25 +4,34 @@
 
 namespace quoin {
 
-void GridReader::find_chunk(int x, int y, int z) {
-  const IVec3 at = chunk_of({x, y, z});
-  chunk_x_ = at.x;
-  chunk_y_ = at.y;
-  chunk_z_ = at.z;
-  known_ = true;
-  chunk_ = grid_->find_chunk(at);
+VoxelType GridReader::get_in_other_chunk(int x, int y, int z) {
+  unknown_ = 0;
+  chunk_ = grid_->find_chunk(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
+  voxels_ = chunk_ == nullptr ? nullptr : chunk_->mixed();
+  uniform_ = chunk_ == nullptr ? kAir : chunk_->uniform().value_or(kAir);
+  last_x_ = x;
+  if (goes_on(x)) return get_in_new_row(x, y, z);
+  last_y_ = y;
+  last_z_ = z;
+  reads_of_row_ = 0;
+  if (voxels_ == nullptr) return uniform_;
+  return voxels_->type(x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1));
 }
 
-void GridReader::unpack_row(int x, int y, int z) {
-  row_x_ = x & ~(kChunkEdge - 1);
-  row_y_ = y;
-  row_z_ = z;
-  const IVec3 local = local_of({x, y, z});
-  if (chunk_ == nullptr) {
-    row_.fill(kAir);
+// Unpacks the row. Requires: it lies in the chunk.
+VoxelType GridReader::get_in_new_row(int x, int y, int z) {
+  last_y_ = y;
+  last_z_ = z;
+  reads_of_row_ = kReadsAlongX;
+  row_x_ = static_cast<std::uint32_t>(x & ~(kChunkEdge - 1));
+  row_yz_ = both(y, z);
+  row_length_ = kChunkEdge;
+  if (voxels_ == nullptr) {
+    row_.fill(uniform_);
   } else {
-    chunk_->read_row(local.y, local.z, row_);
+    chunk_->read_row(y & (kChunkEdge - 1), z & (kChunkEdge - 1), row_);
   }
+  return row_[static_cast<std::size_t>(x & (kChunkEdge - 1))];
 }
 
 void GridWriter::go_to(int x, int y, int z) {

@@ -7,42 +7,40 @@
 namespace quoin {
 namespace {
 
-constexpr std::uint64_t kEven = 0x5555'5555'5555'5555U;
-constexpr std::uint64_t kOdd = ~kEven;
+constexpr std::uint64_t kOdd = 0xAAAA'AAAA'AAAA'AAAAU;
+constexpr std::uint64_t kLowHalf = 0xFFFF'FFFFU;
 
-// Cells of one word of voxels, at its even bits.
+// A bit a cell.
 struct WordCells {
   std::uint64_t any = 0;
   std::uint64_t half = 0;
   std::array<std::uint64_t, 3> rod{};
 };
 
-// `rows`: [z][y]. Adds up each cell's eight voxels, 32 cells at once: a bit of each sum in each word.
-WordCells cells_of(const std::array<std::uint64_t, 4>& rows) {
-  std::uint64_t ones = 0;
-  std::uint64_t twos = 0;
-  std::uint64_t fours = 0;
-  std::uint64_t eights = 0;
-  const auto add = [&](std::uint64_t bits) {
-    const std::uint64_t carry = ones & bits;
-    ones ^= bits;
-    const std::uint64_t carry_two = twos & carry;
-    twos ^= carry;
-    eights |= fours & carry_two;
-    fours ^= carry_two;
-  };
-  for (const std::uint64_t row : rows) {
-    add(row & kEven);
-    add(row >> 1 & kEven);
-  }
-  const std::uint64_t all = rows[0] | rows[1] | rows[2] | rows[3];
-  const auto both = [](std::uint64_t a, std::uint64_t b) { return (a | a >> 1) & (b | b >> 1); };
+// The voxels in four rows [z][y] that make a row of cells: of each cell the one with the lower x, and the other.
+struct CellVoxels {
+  std::array<std::uint64_t, 4> lower{};
+  std::array<std::uint64_t, 4> upper{};
+};
+
+std::uint64_t at_least_two(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+  return (a & b) | (c & (a ^ b));
+}
+
+// Adds up each cell's eight voxels, 64 cells at once.
+WordCells cells_of(const CellVoxels& voxels) {
+  const auto& [lower, upper] = voxels;
+  const std::array<std::uint64_t, 4> pairs = {
+      at_least_two(lower[0], upper[0], lower[1]), at_least_two(upper[1], lower[2], upper[2]), lower[3] & upper[3],
+      at_least_two(lower[0] ^ upper[0] ^ lower[1], upper[1] ^ lower[2] ^ upper[2], lower[3] ^ upper[3])};
+  std::array<std::uint64_t, 4> any{};
+  for (std::size_t i = 0; i < any.size(); ++i) any[i] = lower[i] | upper[i];
   WordCells cells;
-  cells.any = (all | all >> 1) & kEven;
-  cells.half = fours | eights;
-  const std::uint64_t few = twos & ~cells.half;
-  cells.rod = {few & all & all >> 1, few & both(rows[0] | rows[2], rows[1] | rows[3]),
-               few & both(rows[0] | rows[1], rows[2] | rows[3])};
+  cells.any = any[0] | any[1] | any[2] | any[3];
+  cells.half = (pairs[0] & pairs[1]) | (pairs[2] & pairs[3]) | ((pairs[0] | pairs[1]) & (pairs[2] | pairs[3]));
+  const std::uint64_t few = (pairs[0] | pairs[1] | pairs[2] | pairs[3]) & ~cells.half;
+  cells.rod = {few & (lower[0] | lower[1] | lower[2] | lower[3]) & (upper[0] | upper[1] | upper[2] | upper[3]),
+               few & (any[0] | any[2]) & (any[1] | any[3]), few & (any[0] | any[1]) & (any[2] | any[3])};
   return cells;
 }
 
@@ -69,7 +67,48 @@ class SolidRows {
     return ~packed_row::equal_mask(voxels_->row(slab, Chunk::row_in_slab(y, z)), voxels_->bits, air_);
   }
 
+  /// The first two voxels of a row, at their bits, or the last two.
+  [[nodiscard]] std::uint64_t end_of_row(int y, int z, bool is_first) const {
+    const std::uint64_t ends = is_first ? 3U : std::uint64_t{3} << 62;
+    if (voxels_ == nullptr) return uniform_ & ends;
+    if (!has_air_) return ends;
+    const std::uint32_t slab = voxels_->slabs[Chunk::slab_index(y, z)];
+    if ((slab & Chunk::kUniformSlab) != 0) return (slab & ~Chunk::kUniformSlab) == air_ ? 0 : ends;
+    const int row = Chunk::row_in_slab(y, z);
+    const int x = is_first ? 0 : kChunkEdge - 2;
+    return (std::uint64_t{voxels_->read(slab, row, x) != air_} | std::uint64_t{voxels_->read(slab, row, x + 1) != air_}
+                                                                     << 1)
+           << x;
+  }
+
+  /// The 16 rows of a slab in the order in which they are stored.
+  void slab(std::size_t index, std::array<std::uint64_t, 16>& out) const {
+    const std::uint32_t slot = voxels_ == nullptr ? Chunk::kUniformSlab : voxels_->slabs[index];
+    if ((slot & Chunk::kUniformSlab) != 0 || !has_air_) {
+      const int y = static_cast<int>(index % 16) * 4;
+      const int z = static_cast<int>(index / 16) * 4;
+      out.fill(row(y, z));
+    } else if (voxels_->bits == 2) {
+      where_not_air_of_two_bits(voxels_->row(slot, 0), out);
+    } else {
+      for (int i = 0; i < 16; ++i) {
+        out[static_cast<std::size_t>(i)] = ~packed_row::equal_mask(voxels_->row(slot, i), voxels_->bits, air_);
+      }
+    }
+  }
+
  private:
+  // All words first, in a loop of which compilers make vectors.
+  void where_not_air_of_two_bits(const std::uint64_t* words, std::array<std::uint64_t, 16>& out) const {
+    const std::uint64_t air = packed_row::repeat(2, air_);
+    std::array<std::uint64_t, 32> halves;
+    for (std::size_t i = 0; i < halves.size(); ++i) {
+      const std::uint64_t other = words[i] ^ air;
+      halves[i] = packed_row::gather_even_bits(other | other >> 1);
+    }
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = halves[2 * i] | halves[2 * i + 1] << 32;
+  }
+
   const Chunk::Mixed* voxels_;
   std::uint64_t uniform_ = 0;
   std::uint32_t air_ = kAir;
@@ -103,29 +142,64 @@ void HalvingMasks::read_voxels(IVec3 octant) {
   const IVec3 low = glm::max(IVec3(-2) - first, IVec3(0));
   const IVec3 high = glm::min(IVec3(kFineEdge + 2) - first, IVec3(kChunkEdge));
   const auto word = static_cast<std::size_t>(octant.x + 1);
-  for (int z = low.z; z < high.z; ++z) {
-    for (int y = low.y; y < high.y; ++y) fine(first.y + y, first.z + z)[word] = solid.row(y, z);
+  if (high.x - low.x < kChunkEdge) {
+    for (int z = low.z; z < high.z; ++z) {
+      for (int y = low.y; y < high.y; ++y) fine(first.y + y, first.z + z)[word] = solid.end_of_row(y, z, low.x == 0);
+    }
+    return;
+  }
+  std::array<std::uint64_t, 16> rows;
+  for (int z = low.z & ~3; z < high.z; z += 4) {
+    for (int y = low.y & ~3; y < high.y; y += 4) {
+      solid.slab(Chunk::slab_index(y, z), rows);
+      const int last_y = std::min(y + 4, high.y);
+      const int last_z = std::min(z + 4, high.z);
+      for (int row_z = std::max(z, low.z); row_z < last_z; ++row_z) {
+        for (int row_y = std::max(y, low.y); row_y < last_y; ++row_y) {
+          fine(first.y + row_y, first.z + row_z)[word] =
+              rows[static_cast<std::size_t>(Chunk::row_in_slab(row_y, row_z))];
+        }
+      }
+    }
   }
 }
 
 void HalvingMasks::count_cells(int y, int z) {
-  const FineRow* rows[] = {&fine(2 * y, 2 * z), &fine(2 * y + 1, 2 * z), &fine(2 * y, 2 * z + 1),
-                           &fine(2 * y + 1, 2 * z + 1)};
+  const std::array<const FineRow*, 4> rows = {&fine(2 * y, 2 * z), &fine(2 * y + 1, 2 * z), &fine(2 * y, 2 * z + 1),
+                                              &fine(2 * y + 1, 2 * z + 1)};
+  const auto any_of = [&rows](std::size_t word) {
+    return (*rows[0])[word] | (*rows[1])[word] | (*rows[2])[word] | (*rows[3])[word];
+  };
   CellRow& row = cells_[static_cast<std::size_t>((z + 1) * kCellRows + y + 1)];
-  for (std::size_t word = 0; word < 4; ++word) {
-    const std::array<std::uint64_t, 4> bits = {(*rows[0])[word], (*rows[1])[word], (*rows[2])[word], (*rows[3])[word]};
-    if ((bits[0] | bits[1] | bits[2] | bits[3]) == 0) continue;
-    const WordCells cells = cells_of(bits);
-    const auto put = [word](CellBits& to, std::uint64_t from) {
-      if (word == 0) to.before = (from >> 62 & 1U) != 0;
-      if (word == 3) to.after = (from & 1U) != 0;
-      if (word == 1) to.bits |= even_bits(from);
-      if (word == 2) to.bits |= even_bits(from) << 32;
-    };
-    put(row.any, cells.any);
-    put(row.half, cells.half);
-    for (std::size_t axis = 0; axis < 3; ++axis) put(row.rod[axis], cells.rod[axis]);
+  if ((any_of(1) | any_of(2)) != 0) {
+    std::array<std::uint64_t, 8> words;
+    for (std::size_t i = 0; i < words.size(); ++i) words[i] = (*rows[i / 2])[1 + i % 2];
+    for (std::uint64_t& word : words) word = packed_row::split_pairs(word);
+    CellVoxels voxels;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      voxels.lower[i] = (words[2 * i] & kLowHalf) | words[2 * i + 1] << 32;
+      voxels.upper[i] = words[2 * i] >> 32 | (words[2 * i + 1] & ~kLowHalf);
+    }
+    const WordCells cells = cells_of(voxels);
+    row.any.bits = cells.any;
+    row.half.bits = cells.half;
+    for (std::size_t axis = 0; axis < 3; ++axis) row.rod[axis].bits = cells.rod[axis];
   }
+  if ((any_of(0) | any_of(3)) == 0) return;
+  CellVoxels voxels;  // the cell before as bit 0, the one after as bit 1
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const FineRow& of = *rows[i];
+    voxels.lower[i] = (of[0] >> 62 & 1U) | (of[3] & 1U) << 1;
+    voxels.upper[i] = of[0] >> 63 | (of[3] & 2U);
+  }
+  const WordCells cells = cells_of(voxels);
+  const auto put = [](CellBits& to, std::uint64_t from) {
+    to.before = (from & 1U) != 0;
+    to.after = (from & 2U) != 0;
+  };
+  put(row.any, cells.any);
+  put(row.half, cells.half);
+  for (std::size_t axis = 0; axis < 3; ++axis) put(row.rod[axis], cells.rod[axis]);
 }
 
 std::uint64_t HalvingMasks::kept_rods(int y, int z, int axis) const {

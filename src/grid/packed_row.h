@@ -20,6 +20,20 @@ constexpr std::uint64_t gather_even_bits(std::uint64_t w) {
   return (w | (w >> 16)) & 0x0000'0000'FFFF'FFFFU;
 }
 
+/// The even bits of `w`, packed, in the lower half, and the odd ones in the upper.
+constexpr std::uint64_t split_pairs(std::uint64_t w) {
+  const auto swap = [&w](int distance, std::uint64_t lower) {
+    const std::uint64_t changed = (w ^ (w >> distance)) & lower;
+    w ^= changed ^ (changed << distance);
+  };
+  swap(1, 0x2222'2222'2222'2222U);
+  swap(2, 0x0C0C'0C0C'0C0C'0C0CU);
+  swap(4, 0x00F0'00F0'00F0'00F0U);
+  swap(8, 0x0000'FF00'0000'FF00U);
+  swap(16, 0x0000'0000'FFFF'0000U);
+  return w;
+}
+
 /// The lowest bit of each of the 16 nibbles of `w`, packed.
 constexpr std::uint64_t gather_nibble_bits(std::uint64_t w) {
   w &= 0x1111'1111'1111'1111U;

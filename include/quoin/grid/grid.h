@@ -33,10 +33,13 @@ class Grid {
   /// A copy of voxels and versions; copying is explicit because it is dear.
   [[nodiscard]] Grid clone() const;
 
-  [[nodiscard]] VoxelType get(IVec3 voxel) const;
+  // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
+  [[nodiscard]] VoxelType get(IVec3 voxel) const { return get(voxel.x, voxel.y, voxel.z); }
+  [[nodiscard]] VoxelType get(int x, int y, int z) const;
 
   /// True when the voxel had another type before.
-  bool set(IVec3 voxel, VoxelType type);
+  bool set(IVec3 voxel, VoxelType type) { return set(voxel.x, voxel.y, voxel.z, type); }
+  bool set(int x, int y, int z, VoxelType type);
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
   /// one edit. Answers how many changed.
   std::int64_t set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
@@ -55,7 +58,8 @@ class Grid {
   void clear();
 
   /// Null where all is air.
-  [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const;
+  [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const { return find_chunk(chunk.x, chunk.y, chunk.z); }
+  [[nodiscard]] const Chunk* find_chunk(int x, int y, int z) const;
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
@@ -101,49 +105,55 @@ class GridReader {
 
   [[nodiscard]] VoxelType get(IVec3 voxel) { return get(voxel.x, voxel.y, voxel.z); }
   [[nodiscard]] VoxelType get(int x, int y, int z) {
-    if ((x & ~(kChunkEdge - 1)) == row_x_ && y == row_y_ && z == row_z_) [[likely]] {
-      return row_[static_cast<std::size_t>(x & (kChunkEdge - 1))];
-    }
+    const std::uint32_t along = static_cast<std::uint32_t>(x) - row_x_;
+    if (along < row_length_ && both(y, z) == row_yz_) [[likely]]
+      return row_[along];
     return get_elsewhere(x, y, z);
   }
 
  private:
-  // Coordinates one by one: a vector would be stored in memory for the call, at every read.
-  VoxelType get_elsewhere(int x, int y, int z) {
-    const bool is_new_chunk =
-        (x >> kChunkShift) != chunk_x_ || (y >> kChunkShift) != chunk_y_ || (z >> kChunkShift) != chunk_z_ || !known_;
-    if (is_new_chunk) find_chunk(x, y, z);
-    if (is_new_chunk || y != last_y_ || z != last_z_) {
-      last_y_ = y;
-      last_z_ = z;
-      // Who read the last row along x and begins another at its start goes on like that.
-      const bool goes_on = reads_of_row_ >= kReadsAlongX && (x & (kChunkEdge - 1)) == 0;
-      reads_of_row_ = goes_on ? kReadsAlongX : 0;
-      if (goes_on) unpack_row(x, y, z);
-    } else if (++reads_of_row_ == kReadsAlongX) {
-      unpack_row(x, y, z);
-    }
-    return chunk_ == nullptr ? kAir : chunk_->get(local_of({x, y, z}));
+  // One number, which who reads along x makes once a row.
+  static std::uint64_t both(int y, int z) {
+    return std::uint64_t{static_cast<std::uint32_t>(y)} << 32 | static_cast<std::uint32_t>(z);
   }
-  void find_chunk(int x, int y, int z);
-  void unpack_row(int x, int y, int z);
+  // Coordinates one by one: a vector would be stored in memory for the call, at every read.
+  VoxelType get_elsewhere(int x, int y, int z);
+  VoxelType get_in_other_chunk(int x, int y, int z);
+  VoxelType get_in_new_row(int x, int y, int z);
+  // Who read the last row along x and begins another at its start goes on like that.
+  [[nodiscard]] bool goes_on(int x) const { return reads_of_row_ >= kReadsAlongX && (x & (kChunkEdge - 1)) == 0; }
 
   static constexpr int kReadsAlongX = 4;  // so many in one row, and the next ones are expected there too
-  static constexpr int kNoRow = 1;        // no row starts there
   const Grid* grid_;
-  const Chunk* chunk_ = nullptr;
-  int chunk_x_ = 0;
-  int chunk_y_ = 0;
-  int chunk_z_ = 0;
-  bool known_ = false;
+  std::uint32_t row_x_ = 0;
+  std::uint32_t row_length_ = 0;  // of what is unpacked: nothing, or a row
+  std::uint64_t row_yz_ = 0;
+  std::array<VoxelType, kChunkEdge> row_{};
+  const Chunk* chunk_ = nullptr;          // that of the last voxel read elsewhere than in the row
+  const Chunk::Mixed* voxels_ = nullptr;  // its voxels; null where they are all of `uniform_`
+  VoxelType uniform_ = kAir;
+  std::uint32_t unknown_ = ~std::uint32_t{0};  // 0 from the first read on
+  int last_x_ = 0;
   int last_y_ = 0;
   int last_z_ = 0;
   int reads_of_row_ = 0;
-  int row_x_ = kNoRow;
-  int row_y_ = 0;
-  int row_z_ = 0;
-  std::array<VoxelType, kChunkEdge> row_{};
 };
+
+inline VoxelType GridReader::get_elsewhere(int x, int y, int z) {
+  const auto other_yz = static_cast<std::uint32_t>((y ^ last_y_) | (z ^ last_z_));
+  const std::uint32_t other = other_yz | static_cast<std::uint32_t>(x ^ last_x_) | unknown_;
+  if (other >= kChunkEdge) return get_in_other_chunk(x, y, z);
+  if (other_yz != 0) {
+    if (goes_on(x)) return get_in_new_row(x, y, z);
+    last_y_ = y;
+    last_z_ = z;
+    reads_of_row_ = 0;
+  } else if (++reads_of_row_ == kReadsAlongX) {
+    return get_in_new_row(x, y, z);
+  }
+  if (voxels_ == nullptr) return uniform_;
+  return voxels_->type(x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1));
+}
 
 /// Sets many voxels that lie near each other: collects those of a row of 64 along x and sets them in one edit when it
 /// comes to another row, when it is flushed, and at its end. Until then the grid is as it was.

@@ -1,0 +1,183 @@
+#include "grid/chunk_table.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <new>
+#include <utility>
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kFewCells = 64;
+constexpr std::size_t kCellsPerChunk = 8;
+// A window of so many times what its chunks may have is made smaller; so it does not come and go with one chunk.
+constexpr std::size_t kSlack = 4;
+
+const Chunk::Mixed& all_air() {
+  static const Chunk::Mixed air = [] {
+    Chunk::Mixed made;
+    made.palette = {kAir};
+    made.slabs.fill(Chunk::kUniformSlab | 0U);
+    return made;
+  }();
+  return air;
+}
+
+}  // namespace
+
+ChunkWindow::Box ChunkWindow::Box::grown_to(IVec3 chunk) const {
+  Box grown = *this;
+  for (int axis = 0; axis < 3; ++axis) {
+    int& log_size = grown.log.at(static_cast<std::size_t>(axis));
+    for (; chunk[axis] < grown.first[axis]; ++log_size) grown.first[axis] -= 1 << log_size;
+    while (chunk[axis] - grown.first[axis] >= 1 << log_size) ++log_size;
+  }
+  return grown;
+}
+
+// Air outlives every window, as it is there before the first.
+ChunkWindow::ChunkWindow() : air_(&all_air()) {}
+
+void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry) {
+  entries_[cell] = entry;
+  voxels_[cell] = entry == nullptr ? air_ : entry->chunk.mixed();
+}
+
+void ChunkWindow::move_to(const Box& box) {
+  const std::size_t cells = std::size_t{1} << box.log_cells();
+  std::vector<ChunkEntry*> entries(cells, nullptr);
+  voxels_ = std::vector<const Chunk::Mixed*>(cells, air_);
+  entries_ = std::move(entries);
+  box_ = box;
+  first_x_ = static_cast<std::uint32_t>(box.first.x);
+  first_y_ = static_cast<std::uint32_t>(box.first.y);
+  first_z_ = static_cast<std::uint32_t>(box.first.z);
+  size_x_ = 1U << box.log[0];
+  size_y_ = 1U << box.log[1];
+  size_z_ = 1U << box.log[2];
+  shift_y_ = box.log[0];
+  shift_z_ = box.log[0] + box.log[1];
+}
+
+void ChunkWindow::close() {
+  voxels_ = {};
+  entries_ = {};
+  box_ = {};
+  size_x_ = size_y_ = size_z_ = 0;
+}
+
+// The table shrinks again where few of many chunks are left.
+ChunkTable::ChunkTable() {
+  entries_.min_load_factor(0.1F);
+}
+
+ChunkEntry* ChunkTable::find_by_hash(int x, int y, int z) const {
+  const auto it = entries_.find(IVec3{x, y, z});
+  return it == entries_.end() ? nullptr : it->second.get();
+}
+
+ChunkEntry& ChunkTable::find_or_create(const IVec3& chunk) {
+  if (ChunkEntry* entry = find(chunk)) return *entry;
+  ChunkEntry& made = *entries_.emplace(chunk, std::make_unique<ChunkEntry>()).first->second;
+  place(chunk, made);
+  return made;
+}
+
+VoxelType ChunkTable::voxel(int x, int y, int z) const {
+  const int local_x = x & (kChunkEdge - 1);
+  const int local_y = y & (kChunkEdge - 1);
+  const int local_z = z & (kChunkEdge - 1);
+  const std::uint32_t cell = window_.cell(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
+  if (cell == ChunkWindow::kOutside) [[unlikely]] {
+    if (outside_ == 0) return kAir;
+    const ChunkEntry* entry = find_by_hash(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
+    return entry == nullptr ? kAir : entry->chunk.get(local_x, local_y, local_z);
+  }
+  if (const Chunk::Mixed* voxels = window_.voxels(cell)) [[likely]]
+    return voxels->type(local_x, local_y, local_z);
+  return window_.entry(cell)->chunk.get(local_x, local_y, local_z);
+}
+
+void ChunkTable::erase(const IVec3& chunk) {
+  const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
+  const std::size_t erased = entries_.erase(chunk);
+  if (cell != ChunkWindow::kOutside) {
+    window_.put(cell, nullptr);
+  } else {
+    outside_ -= erased;
+  }
+  if (window_.cells() > kSlack * most_cells()) plan();
+}
+
+void ChunkTable::clear() {
+  entries_.clear();
+  window_.close();
+  outside_ = 0;
+  outside_since_plan_ = 0;
+}
+
+std::size_t ChunkTable::bytes() const {
+  return entries_.bucket_count() * sizeof(void*) * 4 + window_.bytes();
+}
+
+std::size_t ChunkTable::most_cells() const {
+  return std::max(kFewCells, kCellsPerChunk * entries_.size());
+}
+
+// A new chunk. Where the window cannot grow to hold it, it stays outside, until so many do that it is worth looking
+// where all of them lie.
+void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
+  const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
+  if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry);
+  ++outside_;
+  ++outside_since_plan_;
+  const auto fits = [this](const ChunkWindow::Box& box) {
+    return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells();
+  };
+  if (window_.cells() != 0) {
+    const ChunkWindow::Box grown = window_.box().grown_to(chunk);
+    if (fits(grown)) return try_to_move(grown);
+  }
+  if (4 * outside_since_plan_ >= entries_.size()) plan();
+}
+
+// Moves the window to where all chunks are; where they lie too far from each other it stays if most are in it.
+void ChunkTable::plan() {
+  outside_since_plan_ = 0;
+  if (entries_.empty()) return window_.close();
+  IVec3 low{std::numeric_limits<int>::max()};
+  IVec3 high{std::numeric_limits<int>::min()};
+  for (const auto& [at, entry] : entries_) {
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+  }
+  ChunkWindow::Box box{.first = low};
+  for (int axis = 0; axis < 3; ++axis) {
+    box.log.at(static_cast<std::size_t>(axis)) = std::bit_width(static_cast<unsigned>(high[axis] - low[axis]));
+  }
+  if (box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells()) return try_to_move(box);
+  if (window_.cells() <= kSlack * most_cells() && 2 * outside_ <= entries_.size()) return;
+  window_.close();
+  outside_ = entries_.size();
+}
+
+// Where there is no memory for it the window stays as it is: chunks outside are found by their hashes.
+void ChunkTable::try_to_move(const ChunkWindow::Box& box) {
+  try {
+    window_.move_to(box);
+  } catch (const std::bad_alloc&) {
+    return;
+  }
+  outside_ = 0;
+  for (const auto& [at, entry] : entries_) {
+    const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
+    if (cell != ChunkWindow::kOutside) {
+      window_.put(cell, entry.get());
+    } else {
+      ++outside_;
+    }
+  }
+}
+
+}  // namespace quoin

@@ -1,0 +1,119 @@
+#include "grid/chunk_table.h"
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+using Key = std::tuple<int, int, int>;
+
+Key key_of(IVec3 at) {
+  return {at.x, at.y, at.z};
+}
+
+ChunkEntry& add(ChunkTable& table, IVec3 at, VoxelType type) {
+  ChunkEntry& entry = table.find_or_create(at);
+  entry.chunk.set(1, 2, 3, type);
+  table.voxels_changed(at, entry);
+  return entry;
+}
+
+// A crowd that moves away bit by bit, and a few far from it and from each other.
+IVec3 random_place(std::mt19937& random, int round) {
+  const auto below = [&](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
+  if (random() % 8 == 0) return {below(40'000) - 20'000, below(40'000) - 20'000, below(40'000) - 20'000};
+  return IVec3{below(9) - 4, below(3) - 1, below(9) - 4} + IVec3(round / 400, 0, -round / 300);
+}
+
+TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    ChunkTable table;
+    std::map<Key, const ChunkEntry*> plain;
+    std::vector<IVec3> places;
+    for (int round = 0; round < 12'000; ++round) {
+      const IVec3 at = random_place(random, round);
+      const bool grows = (round / 3'000) % 2 == 0;
+      if (random() % 8 < (grows ? 6U : 1U)) {
+        plain[key_of(at)] = &add(table, at, 7);
+        places.push_back(at);
+      } else if (!places.empty()) {
+        const std::size_t i = random() % places.size();
+        table.erase(places[i]);
+        plain.erase(key_of(places[i]));
+        places[i] = places.back();
+        places.pop_back();
+      }
+      if (round % 5'000 == 4'999) {
+        table.clear();
+        plain.clear();
+      }
+      ASSERT_EQ(table.size(), plain.size());
+      ASSERT_LE(table.window_cells(), std::max<std::size_t>(256, 32 * plain.size()));
+      for (const IVec3 asked : {at, random_place(random, round), places.empty() ? at : places[0]}) {
+        const auto found = plain.find(key_of(asked));
+        ASSERT_EQ(table.find(asked), found == plain.end() ? nullptr : found->second);
+        const VoxelType expected = found == plain.end() ? kAir : VoxelType{7};
+        ASSERT_EQ(table.voxel(asked.x * 64 + 1, asked.y * 64 + 2, asked.z * 64 + 3), expected);
+        ASSERT_EQ(table.voxel(asked.x * 64, asked.y * 64, asked.z * 64), kAir);
+      }
+    }
+  }
+}
+
+TEST(ChunkTable, ChunksSideBySideAllStandInTheWindowInWhateverOrderTheyCome) {
+  std::mt19937 random(3);
+  std::vector<IVec3> places;
+  for (int i = 0; i < 12 * 3 * 12; ++i) places.push_back(IVec3{i % 12, i / 12 % 3, i / 36} - IVec3{5, 1, 700});
+  for (int order = 0; order < 4; ++order) {
+    ChunkTable table;
+    for (const IVec3 at : places) add(table, at, 1);
+    EXPECT_EQ(table.outside(), 0U) << order;
+    EXPECT_LE(table.window_cells(), 8 * places.size());
+    std::shuffle(places.begin(), places.end(), random);
+  }
+}
+
+TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
+  ChunkTable table;
+  for (int x = 0; x < 3'000; ++x) {
+    for (int z = 0; z < 16; ++z) add(table, {x, 0, z}, 1);
+    for (int z = 0; x >= 16 && z < 16; ++z) table.erase({x - 16, 0, z});
+    ASSERT_LE(table.outside(), table.size() / 3);
+    ASSERT_LE(table.window_cells(), 32 * table.size());
+  }
+}
+
+TEST(ChunkTable, FarFromEachOtherChunksTakeNoWindow) {
+  ChunkTable table;
+  for (int i = 0; i < 100; ++i) add(table, {i * 1'000, -i * 900, i % 7 * 5'000}, 1);
+  EXPECT_LE(table.window_cells(), 64U);
+  EXPECT_GE(table.outside(), 99U);
+}
+
+TEST(ChunkTable, VoxelsAreThoseOfTheStorageThatAnEditMoved) {
+  ChunkTable table;
+  const IVec3 at{-3, 4, 5};
+  ChunkEntry& entry = add(table, at, 2);
+  const auto voxel = [&] { return table.voxel(-3 * 64 + 1, 4 * 64 + 2, 5 * 64 + 3); };
+  EXPECT_EQ(voxel(), 2);
+  entry.chunk.fill(9);
+  table.voxels_changed(at, entry);
+  EXPECT_EQ(voxel(), 9);
+  entry.chunk = Chunk(4);
+  entry.chunk.set(0, 0, 0, 5);
+  table.voxels_changed(at, entry);
+  EXPECT_EQ(voxel(), 4);
+  table.erase(at);
+  EXPECT_EQ(voxel(), kAir);
+}
+
+}  // namespace
+}  // namespace quoin
