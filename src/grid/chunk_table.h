@@ -55,6 +55,8 @@ class ChunkWindow {
 
   /// A chunk that came or went, or whose storage may have moved.
   void put(std::uint32_t cell, ChunkEntry* entry);
+  /// Of a chunk that is there; until it is put again its voxels are found through its entry.
+  void forget_voxels(std::uint32_t cell) { voxels_[cell] = nullptr; }
   /// Another box, in which no chunk stands yet. When it throws, all is as it was.
   void move_to(const Box& box);
   /// A box of nothing.
@@ -83,6 +85,8 @@ class ChunkWindow {
 class ChunkTable {
  public:
   ChunkTable();
+  ChunkTable(const ChunkTable&) = delete;
+  ChunkTable& operator=(const ChunkTable&) = delete;
 
   [[nodiscard]] ChunkEntry* find(int x, int y, int z) const {
     const std::uint32_t cell = window_.cell(x, y, z);
@@ -95,6 +99,11 @@ class ChunkTable {
   /// Of one voxel, by its own coordinates.
   [[nodiscard]] VoxelType voxel(int x, int y, int z) const;
 
+  /// To be called before a change during which the chunk may be read: it is then read through its entry.
+  void voxels_change(const IVec3& chunk) {
+    const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
+    if (cell != ChunkWindow::kOutside) window_.forget_voxels(cell);
+  }
   /// To be called after every change of a chunk's voxels.
   void voxels_changed(const IVec3& chunk, ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);

@@ -270,6 +270,22 @@ TEST(Grid, AnEditThatThrowsIsBooked) {
   EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
+// The storage of a chunk comes and goes while it is edited.
+TEST(Grid, AnEditMayReadWhatItChanges) {
+  Grid grid;
+  const IBox box{{0, 0, 0}, {64, 64, 64}};
+  const auto below = [&grid](IVec3 v) { return grid.get(v - IVec3{0, 1, 0}); };
+  for (const VoxelType seed : {VoxelType{7}, VoxelType{9}, kAir}) {
+    grid.fill_box({0, -1, 0}, {63, -1, 63}, seed);
+    // Mixed at first, of one type at the end, and the other way round.
+    if (seed != kAir) grid.set({5, 6, 7}, 3);
+    grid.edit(box, [&](IVec3 v, VoxelType) { return below(v); });
+    EXPECT_EQ(grid.get({63, 63, 63}), seed);
+    EXPECT_EQ(grid.get({5, 6, 7}), seed);
+    EXPECT_EQ(grid.find_chunk({0, 0, 0}) == nullptr, seed == kAir);
+  }
+}
+
 TEST(Grid, ChunksThatComeAndGoDoNotFillTheDirtyListForEver) {
   Grid grid;
   for (int i = 0; i < 100'000; ++i) grid.set({i % 3 * 64, 0, 0}, static_cast<VoxelType>(i / 3 % 2));
