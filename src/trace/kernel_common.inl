@@ -40,6 +40,7 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
   for (int axis = 0; axis < 3; ++axis) {
     const double p = ray.position[axis];
     const double d = direction[axis];
+    if (std::isnan(p)) return false;
     const bool is_low = p < tree.box.min[axis];
     if (!is_low && p < tree.box.max[axis]) continue;
     if (is_low ? !(d > 0.0) : !(d < 0.0)) return false;

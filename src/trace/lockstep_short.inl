@@ -58,7 +58,9 @@ inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double*
   const F reach = abs(axis.direction) * rays.max_t;
   const I margin = to_int(reach) + all(2);
   const I from = at - margin;
-  return (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
+  // Starts too far away for whole numbers come out as any, but not as these.
+  const Mask is_near = equals(at & all(~(kWindow - 1)), 0);
+  return is_near & (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
 }
 
 // What a ray's crossings of one axis leave in doubt.

@@ -1,5 +1,6 @@
 #include <quoin/trace/packet.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -95,6 +96,28 @@ class Packets : public testing::TestWithParam<unsigned> {
     return rays;
   }
 
+  // Short ones from about one point in any direction, as occlusion asks for them; at times one that has no place there.
+  RayPacket bunch() {
+    const DVec3 middle = glm::floor(ray().origin * 0.9);
+    const double length = std::exp2(whole(0, 3) == 0 ? whole(-18, 18) : 0);
+    RayPacket rays;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      Ray one = ray();
+      one.direction *= length / std::max(1e-300, glm::length(one.direction));
+      const double limit = (whole(0, 2) == 0 ? whole(0, 20) : uniform(0, 20)) / length;
+      for (int axis = 0; axis < 3; ++axis) {
+        one.origin[axis] = middle[axis] + (whole(0, 3) == 0 ? 0.5 * whole(-2, 2) : uniform(-3, 3));
+        if (whole(0, 9) == 0) one.direction[axis] *= std::exp2(whole(-60, -8));
+      }
+      if (whole(0, 15) != 0) rays.set(lane, one, limit);
+    }
+    const double strays[] = {5e9,        -5e9,         4e9 + 65,     1e12,         kInfinity,
+                             -kInfinity, std::nan(""), 2147483647.0, -2147483648.0};
+    const auto lane = static_cast<std::size_t>(whole(1, RayPacket::kSize - 1));
+    if (whole(0, 3) == 0) rays.origin_x[lane] = strays[whole(0, 8)] + whole(-2, 2);
+    return rays;
+  }
+
   std::mt19937 random_{GetParam()};
   Grid grid_;
   OccupancyTree tree_;
@@ -147,6 +170,15 @@ TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
     ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 1'000);
+}
+
+TEST_P(Packets, OfShortRaysFromAboutOnePlaceAnswerTheSame) {
+  int hits = 0;
+  for (int i = 0; i < 5'000; ++i) {
+    hits += hits_if_all_agree(tree_, bunch());
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 300);
 }
 
 // Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.
