@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 #include <new>
 #include <utility>
 
@@ -104,8 +103,9 @@ void ChunkTable::erase(const IVec3& chunk) {
   const std::size_t erased = entries_.erase(chunk);
   if (cell != ChunkWindow::kOutside) {
     window_.put(cell, nullptr);
-  } else {
-    outside_ -= erased;
+  } else if (erased != 0) {
+    --outside_;
+    outside_changed();
   }
   if (window_.cells() > kSlack * most_cells()) plan();
 }
@@ -125,50 +125,72 @@ std::size_t ChunkTable::most_cells() const {
   return std::max(kFewCells, kCellsPerChunk * entries_.size());
 }
 
+bool ChunkTable::fits(const ChunkWindow::Box& box) const {
+  return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells();
+}
+
 // A new chunk. Where the window cannot grow to hold it, it stays outside, until so many do that it is worth looking
 // where all of them lie.
 void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
   const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
   if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry);
   ++outside_;
-  ++outside_since_plan_;
-  const auto fits = [this](const ChunkWindow::Box& box) {
-    return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells();
-  };
   if (window_.cells() != 0) {
     const ChunkWindow::Box grown = window_.box().grown_to(chunk);
-    if (fits(grown)) return try_to_move(grown);
+    try {
+      if (fits(grown)) return move_to(grown);
+    } catch (const std::bad_alloc&) {
+    }
   }
+  outside_changed();
+}
+
+// Looks where the chunks are now and then, so that all of it costs no more than a few visits a change.
+void ChunkTable::outside_changed() {
+  ++outside_since_plan_;
   if (4 * outside_since_plan_ >= entries_.size()) plan();
 }
 
-// Moves the window to where all chunks are; where they lie too far from each other it stays if most are in it.
+// Around all chunks but so many at either end of each axis.
+ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
+  std::vector<int> along(entries_.size());
+  ChunkWindow::Box box;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(entries_.begin(), entries_.end(), along.begin(), [axis](const auto& e) { return e.first[axis]; });
+    const auto low = along.begin() + static_cast<std::ptrdiff_t>(left_out);
+    const auto high = along.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
+    std::nth_element(along.begin(), low, along.end());
+    const int first = *low;
+    std::nth_element(low, high, along.end());
+    box.first[axis] = first;
+    box.log.at(static_cast<std::size_t>(axis)) = std::bit_width(static_cast<unsigned>(*high - first));
+  }
+  return box;
+}
+
+// Where there is no memory for another window the one there is stays: chunks outside are found by their hashes.
 void ChunkTable::plan() {
+  try {
+    try_to_plan();
+  } catch (const std::bad_alloc&) {
+  }
+}
+
+// Moves the window to where all chunks are, or most; where they lie too far from each other it stays if most are in it.
+void ChunkTable::try_to_plan() {
   outside_since_plan_ = 0;
   if (entries_.empty()) return window_.close();
-  IVec3 low{std::numeric_limits<int>::max()};
-  IVec3 high{std::numeric_limits<int>::min()};
-  for (const auto& [at, entry] : entries_) {
-    low = glm::min(low, at);
-    high = glm::max(high, at);
+  for (const std::size_t left_out : {std::size_t{0}, entries_.size() / 16}) {
+    const ChunkWindow::Box box = box_of_most(left_out);
+    if (fits(box)) return move_to(box);
   }
-  ChunkWindow::Box box{.first = low};
-  for (int axis = 0; axis < 3; ++axis) {
-    box.log.at(static_cast<std::size_t>(axis)) = std::bit_width(static_cast<unsigned>(high[axis] - low[axis]));
-  }
-  if (box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells()) return try_to_move(box);
   if (window_.cells() <= kSlack * most_cells() && 2 * outside_ <= entries_.size()) return;
   window_.close();
   outside_ = entries_.size();
 }
 
-// Where there is no memory for it the window stays as it is: chunks outside are found by their hashes.
-void ChunkTable::try_to_move(const ChunkWindow::Box& box) {
-  try {
-    window_.move_to(box);
-  } catch (const std::bad_alloc&) {
-    return;
-  }
+void ChunkTable::move_to(const ChunkWindow::Box& box) {
+  window_.move_to(box);
   outside_ = 0;
   for (const auto& [at, entry] : entries_) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);

@@ -34,6 +34,8 @@ class ChunkWindow {
   };
 
   ChunkWindow();
+  ChunkWindow(const ChunkWindow&) = delete;
+  ChunkWindow& operator=(const ChunkWindow&) = delete;
 
   /// Where a chunk stands, or kOutside.
   [[nodiscard]] std::uint32_t cell(int x, int y, int z) const {
@@ -79,8 +81,9 @@ class ChunkWindow {
 
 /// The chunks of a grid by their coordinates: in a hash table, and those that lie close together in a window besides.
 ///
-/// The window grows with the chunks and goes where they go, and never has more than 8 places a chunk (or 64), 32 where
-/// chunks were dropped. What lies outside it is found by its hash.
+/// The window grows with the chunks and goes where they go, without the outermost eighth along each axis where these
+/// lie too far out, and never has more than 8 places a chunk (or 64), 32 where chunks were dropped. What lies outside
+/// it is found by its hash.
 /// Threads: any number may read; a change needs it to itself.
 class ChunkTable {
  public:
@@ -141,9 +144,13 @@ class ChunkTable {
 
   [[nodiscard]] ChunkEntry* find_by_hash(int x, int y, int z) const;
   [[nodiscard]] std::size_t most_cells() const;
+  [[nodiscard]] bool fits(const ChunkWindow::Box& box) const;
+  [[nodiscard]] ChunkWindow::Box box_of_most(std::size_t left_out) const;
   void place(const IVec3& chunk, ChunkEntry& entry);
+  void outside_changed();
   void plan();
-  void try_to_move(const ChunkWindow::Box& box);
+  void try_to_plan();
+  void move_to(const ChunkWindow::Box& box);
 
   tsl::robin_map<IVec3, std::unique_ptr<ChunkEntry>, Hash> entries_;
   ChunkWindow window_;

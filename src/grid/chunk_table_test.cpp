@@ -25,9 +25,9 @@ ChunkEntry& add(ChunkTable& table, IVec3 at, VoxelType type) {
 }
 
 // A crowd that moves away bit by bit, and a few far from it and from each other.
-IVec3 random_place(std::mt19937& random, int round) {
+IVec3 random_place(std::mt19937& random, int round, bool strays) {
   const auto below = [&](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
-  if (random() % 8 == 0) return {below(40'000) - 20'000, below(40'000) - 20'000, below(40'000) - 20'000};
+  if (strays && random() % 8 == 0) return {below(40'000) - 20'000, below(40'000) - 20'000, below(40'000) - 20'000};
   return IVec3{below(9) - 4, below(3) - 1, below(9) - 4} + IVec3(round / 400, 0, -round / 300);
 }
 
@@ -39,7 +39,7 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
     std::map<Key, const ChunkEntry*> plain;
     std::vector<IVec3> places;
     for (int round = 0; round < 12'000; ++round) {
-      const IVec3 at = random_place(random, round);
+      const IVec3 at = random_place(random, round, seed % 2 == 0);
       const bool grows = (round / 3'000) % 2 == 0;
       if (random() % 8 < (grows ? 6U : 1U)) {
         plain[key_of(at)] = &add(table, at, 7);
@@ -56,8 +56,9 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
         plain.clear();
       }
       ASSERT_EQ(table.size(), plain.size());
+      ASSERT_LE(table.outside(), table.size());
       ASSERT_LE(table.window_cells(), std::max<std::size_t>(256, 32 * plain.size()));
-      for (const IVec3 asked : {at, random_place(random, round), places.empty() ? at : places[0]}) {
+      for (const IVec3 asked : {at, random_place(random, round, seed % 2 == 0), places.empty() ? at : places[0]}) {
         const auto found = plain.find(key_of(asked));
         ASSERT_EQ(table.find(asked), found == plain.end() ? nullptr : found->second);
         const VoxelType expected = found == plain.end() ? kAir : VoxelType{7};
@@ -88,6 +89,24 @@ TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
     for (int z = 0; x >= 16 && z < 16; ++z) table.erase({x - 16, 0, z});
     ASSERT_LE(table.outside(), table.size() / 3);
     ASSERT_LE(table.window_cells(), 32 * table.size());
+  }
+}
+
+TEST(ChunkTable, AFewFarAwayDoNotKeepTheOthersOutOfTheWindow) {
+  for (const bool far_first : {true, false}) {
+    ChunkTable table;
+    const auto add_far = [&table] {
+      for (int i = 0; i < 8; ++i) add(table, IVec3{i % 2, i / 2 % 2, i / 4} * 40'000 - 20'000, 1);
+    };
+    if (far_first) add_far();
+    for (int i = 0; i < 4'096; ++i) add(table, {i % 16, i / 16 % 16, i / 256}, 1);
+    if (!far_first) add_far();
+    EXPECT_LE(table.outside(), 8U + 1'024U) << "but for those that came last";
+    EXPECT_GE(table.window_cells(), 2'048U);
+    EXPECT_EQ(table.voxel(1, 2, 3), 1);
+    EXPECT_EQ(table.voxel(20'000 * 64 + 1, 20'000 * 64 + 2, -20'000 * 64 + 3), 1);
+    for (int i = 0; i < 8; ++i) table.erase(IVec3{i % 2, i / 2 % 2, i / 4} * 40'000 - 20'000);
+    for (int i = 0; i < 4'096; ++i) EXPECT_EQ(table.voxel(i % 16 * 64 + 1, i / 16 % 16 * 64 + 2, i / 256 * 64 + 3), 1);
   }
 }
 

@@ -44,16 +44,14 @@ struct Grid::Impl {
 
   // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
   void finish_edit(const IVec3& chunk, ChunkEntry& entry, const Reach& reach) {
+    // Before anything that may throw: the storage that was known may be gone.
+    entries.voxels_changed(chunk, entry);
     if (reach.voxels != 0) {
       entry.version = version;
       touch(chunk, entry);
       if (reach.mask != Reach::kCentreOnly) touch_neighbours(chunk, reach.mask);
     }
-    if (entry.chunk.non_air_count() == 0) {
-      entries.erase(chunk);
-    } else {
-      entries.voxels_changed(chunk, entry);
-    }
+    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
   }
 
   void touch_neighbours(const IVec3& chunk, std::uint32_t mask) {

@@ -27,6 +27,32 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   }
 }
 
+// Uniform chunks of air and of something, mixed ones of few types and of many; rows one after the other, to and fro.
+TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
+  std::mt19937 random(4);
+  const auto below = [&random](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
+  Grid grid;
+  for (int i = 0; i < 27; ++i) {
+    const IVec3 corner = IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1} * kChunkEdge;
+    const int kinds = i % 5 == 0 ? 700 : 3;
+    if (i % 3 != 0) grid.fill_box(corner, corner + 63, static_cast<VoxelType>(i));
+    if (i % 2 == 0) continue;
+    grid.edit({corner, corner + kChunkEdge}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(below(kinds)); });
+  }
+  GridReader reader(grid);
+  for (int round = 0; round < 3'000; ++round) {
+    IVec3 at{below(3) * 64 - 64 - below(2), below(200) - 100, below(200) - 100};
+    const int rows = 1 + below(3);
+    const IVec3 step{0, below(3) - 1, below(2)};
+    for (int row = 0; row < rows; ++row) {
+      for (int x = 0; x < 64 + below(70); ++x)
+        ASSERT_EQ(reader.get(at + IVec3{x, 0, 0}), grid.get(at + IVec3{x, 0, 0}));
+      at = below(4) == 0 ? at - step : at + step;
+    }
+    ASSERT_EQ(reader.get({at.x, 0, at.z}), grid.get({at.x, 0, at.z}));
+  }
+}
+
 TEST(Grid, ARowIsSetWhereItsMaskSaysSo) {
   std::mt19937_64 random(11);
   Grid grid;

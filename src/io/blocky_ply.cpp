@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -62,11 +63,33 @@ std::vector<BlockyPart> parts_of(const Scene& scene, const SceneMeshes& meshes) 
   return list;
 }
 
+/// What is wrong with a surface; null when nothing is.
+const char* fault_of(const BlockyTriangles& triangles, const VoxelRegistry& types) {
+  const std::size_t count = triangles.positions.size();
+  const bool has_all = triangles.directions.size() == count && triangles.types.size() == count &&
+                       (triangles.levels.empty() || triangles.levels.size() == count);
+  if (!has_all) return "not one direction, type and level a vertex";
+  if (triangles.indices.size() % 3 != 0) return "indices that are not three a triangle";
+  const auto is_known = [&](VoxelType type) { return type < types.size(); };
+  if (!std::all_of(triangles.types.begin(), triangles.types.end(), is_known)) return "a type that the scene has not";
+  const auto is_level = [](std::uint8_t level) { return level < kLevels; };
+  if (!std::all_of(triangles.levels.begin(), triangles.levels.end(), is_level)) return "a level beyond 3";
+  const auto is_vertex = [count](std::uint32_t index) { return index < count; };
+  if (!std::all_of(triangles.indices.begin(), triangles.indices.end(), is_vertex))
+    return "an index beyond its vertices";
+  const auto is_sound = [](const Vec3& p) { return is_finite(DVec3(p)); };
+  if (!std::all_of(triangles.positions.begin(), triangles.positions.end(), is_sound)) {
+    return "a position that is not finite";
+  }
+  return nullptr;
+}
+
 Status check_parts(const Scene& scene, const std::vector<BlockyPart>& parts) {
   for (const BlockyPart& part : parts) {
     const SceneGrid& grid = scene.grids()[part.grid->grid];
     DBox bounds;
     for (const BlockyTriangles& triangles : part.grid->mesh.surfaces) {
+      if (const char* fault = fault_of(triangles, scene.types)) return unsound_part(grid.name, fault);
       for (const Vec3& position : triangles.positions) bounds.extend(DVec3(position));
     }
     const char* fault =

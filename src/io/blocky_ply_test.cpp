@@ -1,6 +1,8 @@
 #include <quoin/io/ply.h>
 
 #include <array>
+#include <functional>
+#include <limits>
 #include <map>
 
 #include "io/gltf_fixture.h"
@@ -54,6 +56,27 @@ TEST(BlockyPly, failures_leave_no_file) {
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
   EXPECT_EQ(refused.error().path, folder.file("out.ply").string());
   EXPECT_EQ(folder.count(), 0U);
+}
+
+TEST(BlockyPly, meshes_that_do_not_hang_together_are_refused) {
+  Scene scene;
+  place(scene, add_asymmetric_grid(scene, "L"), {});
+  const TestFolder folder("blocky_ply_unsound");
+  const auto sound = mesh_scene(scene, {});
+  const auto refuses = [&](const std::function<void(BlockyTriangles&)>& spoil) {
+    SceneMeshes meshes = *sound;
+    for (BlockyTriangles& surface : meshes.grids[0].mesh.surfaces) {
+      if (!surface.positions.empty()) spoil(surface);
+    }
+    const auto written = write_ply(scene, meshes, folder.file("out.ply"));
+    return !written && written.error().code == ErrorCode::InvalidArgument && folder.count() == 0;
+  };
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.directions.pop_back(); }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.types[0] = 60'000; }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.levels[0] = 4; }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.indices.pop_back(); }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.indices[0] = static_cast<std::uint32_t>(t.positions.size()); }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.positions[0].y = std::numeric_limits<float>::infinity(); }));
 }
 
 }  // namespace

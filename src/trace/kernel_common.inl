@@ -10,6 +10,9 @@ constexpr float kReach = 2048.0F;
 constexpr float kNearby = 64.0F;
 // More than rounding can move the end of a ray, in voxels.
 constexpr float kSlack = 0.02F;
+// More than rounding can move a short ray's crossing, in voxels along its axis: an origin below 64 by 2^-17 at most,
+// its distance to a plane by 2^-18, and products by 2^-22 of 22 voxels.
+constexpr float kDoubt = 4e-5F;
 
 // A voxel of a cell as kernels count it: x + 4 y + 16 z, and 256 times x + 8 y + 64 z, whose bits 2, 5 and 8 tell that
 // a step has left the cell.

@@ -8,8 +8,6 @@ constexpr int kAxisBits = 3 | 3 << 6 | 3 << 12;
 constexpr int kWindow = 64;
 // In voxels, along any axis; what goes further mostly leaves the window.
 constexpr float kShortReach = 22.0F;
-// More than rounding can move a crossing, in voxels along its axis.
-constexpr float kDoubt = 4e-5F;
 // A component of a direction that is smaller than the greatest by more than this leaves its axis out of what is said of
 // the others.
 constexpr float kShortRatio = 2048.0F;
@@ -170,6 +168,7 @@ inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std:
     RayPacket::Lanes<std::int32_t> forward;
     blocked |= measure(tree, rays, others, t, forward);
   }
+  // Short rays are never left unfinished.
   for (; doubtful != 0; doubtful &= doubtful - 1) {
     const int lane = std::countr_zero(doubtful);
     RayHit hit;

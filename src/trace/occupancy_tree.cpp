@@ -226,8 +226,9 @@ struct OccupancyTree::Impl {
                                    (chunk_nodes.size() - free_chunks.size()) * sizeof(ChunkNode);
     const auto limit = static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(used_bytes)));
     const double brick_bytes = 4.0 * 64.0 * size.x * static_cast<double>(size.y) * size.z;
-    // Kernels count bits in 32 bits.
-    return !chunks.empty() && bits_of(cells, size.z) / 8 + brick_bytes <= limit && bits_of(cells, size.z) <= 2e9;
+    // Kernels count bits of cells, and halves of words of bricks, in 32 bits.
+    return !chunks.empty() && bricks.size() <= std::size_t{1} << 24 &&
+           bits_of(cells, size.z) / 8 + brick_bytes <= limit && bits_of(cells, size.z) <= 2e9;
   }
   static double bits_of(std::int64_t cells, int chunks_along_z) {
     return static_cast<double>(cells) * (16.0 * chunks_along_z + 2.0);

@@ -114,7 +114,8 @@ class Packets : public testing::TestWithParam<unsigned> {
     const double strays[] = {5e9,        -5e9,         4e9 + 65,     1e12,         kInfinity,
                              -kInfinity, std::nan(""), 2147483647.0, -2147483648.0};
     const auto lane = static_cast<std::size_t>(whole(1, RayPacket::kSize - 1));
-    if (whole(0, 3) == 0) rays.origin_x[lane] = strays[whole(0, 8)] + whole(-2, 2);
+    RayPacket::Lanes<double>* const axes[] = {&rays.origin_x, &rays.origin_y, &rays.origin_z};
+    if (whole(0, 3) == 0) (*axes[whole(0, 2)])[lane] = strays[whole(0, 8)] + whole(-2, 2);
     return rays;
   }
 
@@ -172,13 +173,50 @@ TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
   EXPECT_GT(hits, 1'000);
 }
 
+// Each ray to where it meets something, exactly, and to the numbers next to that.
+void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, std::mt19937& random) {
+  for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+    const auto hit = first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
+    if (!hit) continue;
+    const double towards[] = {0.0, hit->t, kInfinity};
+    rays.max_t[static_cast<std::size_t>(lane)] = std::nextafter(hit->t, towards[random() % 3]);
+  }
+}
+
 TEST_P(Packets, OfShortRaysFromAboutOnePlaceAnswerTheSame) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
-    hits += hits_if_all_agree(tree_, bunch());
+    RayPacket rays = bunch();
+    hits += hits_if_all_agree(tree_, rays);
+    limit_to_hits(tree_, rays, random_);
+    hits_if_all_agree(tree_, rays);
     ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 300);
+}
+
+// Voxels fill whole chunks, so that rays come to the ends of the tables.
+TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAnswerTheSame) {
+  Grid grid;
+  const IVec3 corner = IVec3{whole(-2, 1), whole(-2, 1), whole(-2, 1)} * kChunkEdge;
+  const IVec3 size = IVec3{whole(1, 2), whole(1, 2), whole(1, 2)} * kChunkEdge;
+  const unsigned one_in = GetParam() % 2 == 0 ? 2 : 40;
+  grid.edit({corner, corner + size}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random_() % one_in == 0); });
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  int hits = 0;
+  for (int i = 0; i < 3'000; ++i) {
+    RayPacket rays = bunch();
+    const DVec3 first = rays.ray(0).origin;
+    const DVec3 end = DVec3(corner) + DVec3(size) * DVec3(whole(0, 2), whole(0, 2), whole(0, 2)) * 0.5;
+    for (std::size_t lane = 0; lane < RayPacket::kSize; ++lane) {
+      rays.origin_x[lane] += std::floor(end.x - first.x) + whole(-7, 7);
+      rays.origin_y[lane] += std::floor(end.y - first.y) + whole(-7, 7);
+      rays.origin_z[lane] += std::floor(end.z - first.z) + whole(-7, 7);
+    }
+    hits += hits_if_all_agree(tree, rays);
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 1'000);
 }
 
 // Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.

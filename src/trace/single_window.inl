@@ -5,7 +5,8 @@
 // The crossings of the x planes are in the first lanes, then those of y, then z. Where a lane stands is the sum of the
 // steps of all crossings that come before it or are its own.
 
-// Voxels along |x| + |y| + |z| that a ray may reach: with one crossing more on each axis they are at most fifteen.
+// Voxels along |x| + |y| + |z| that a ray may reach: with one crossing more on each axis they are at most fourteen, and
+// the last lane is left for where it starts.
 constexpr float kWindowReach = 11.0F;
 // How far from the tables' ends it starts, in voxels, so that it does not come to them.
 constexpr std::int32_t kWindowMargin = 12;
@@ -47,7 +48,7 @@ inline F of_axis(F4 numbers, I axis) {
 }
 
 // A short ray that stays within the tables.
-struct ShortRay {
+struct WindowRay {
   F4 origin;
   F4 inverse;  // 1 where it is still
   F4 sign;
@@ -59,7 +60,7 @@ struct ShortRay {
 };
 
 // False where another way is to be taken.
-inline bool set_up_short(const TreeView& tree, const Ray& ray, double max_t, ShortRay& out) {
+inline bool set_up_in_window(const TreeView& tree, const Ray& ray, double max_t, WindowRay& out) {
   D4 p;
   D4 direction64;
   D4 corner;
@@ -99,7 +100,7 @@ struct CrossingWindow {
 };
 
 // All crossings of a ray.
-inline CrossingWindow all_crossings(const ShortRay& ray) {
+inline CrossingWindow all_crossings(const WindowRay& ray) {
   const F4 first = __builtin_convertvector(ray.own - ray.forward, F4);
   const int x = ray.crossed[0];
   const int xy = x + ray.crossed[1];
@@ -116,7 +117,7 @@ inline CrossingWindow all_crossings(const ShortRay& ray) {
   const Mask is_start = ~(lane < all(kStartLane));
   window.t = select(is_crossing, t + all(0.0F), select(is_start, all(-1.0F), all(kAfterAll)));
   // More than rounding can move a crossing.
-  const F doubt = of_axis(0.01F * max4(ray.inverse, -ray.inverse), window.axis);
+  const F doubt = of_axis(kDoubt * max4(ray.inverse, -ray.inverse), window.axis);
   window.valid = (is_crossing & (window.t <= all(ray.max_t) + doubt)) | is_start;
   window.sure = (is_crossing & (window.t < all(ray.max_t) - doubt)) | is_start;
   return window;
@@ -158,7 +159,7 @@ struct Blocked {
   bool is_doubtful;
 };
 
-inline Blocked any_in_window(const TreeView& tree, const ShortRay& ray) {
+inline Blocked any_in_window(const TreeView& tree, const WindowRay& ray) {
   const CrossingWindow window = all_crossings(ray);
   const I4 at = ray.own + ray.base;
   const I4 brick = (ray.forward ? at : at - 15) >> 4;
@@ -176,8 +177,8 @@ inline Blocked any_in_window(const TreeView& tree, const ShortRay& ray) {
 }
 
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
-  ShortRay single;
-  if (!set_up_short(tree, ray, max_t, single)) return any_single(tree, ray, max_t, unfinished);
+  WindowRay single;
+  if (!set_up_in_window(tree, ray, max_t, single)) return any_single(tree, ray, max_t, unfinished);
   const Blocked blocked = any_in_window(tree, single);
   unfinished = false;
   return blocked.is_doubtful ? any_single(tree, ray, max_t, unfinished) : blocked.is_sure;

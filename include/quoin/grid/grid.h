@@ -51,8 +51,8 @@ class Grid {
   /// A negative or NaN radius or centre changes nothing.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
   /// Asks `pick(voxel, current type)` for the new type of every voxel of the box, x fastest, then y, then z within a
-  /// chunk, chunks likewise. Answers how many changed. Requires: `pick` changes nothing in the grid. It may read it,
-  /// and finds what was picked for earlier rows, of 64 voxels along x, but not yet for its own.
+  /// chunk, chunks likewise. Answers how many changed. Requires: `pick` changes nothing in the grid. It may read it by
+  /// `get`, not by a GridReader, and finds what was picked for earlier rows, of 64 voxels along x, but not its own.
   std::int64_t edit(const IBox& box, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, Chunk voxels);
