@@ -73,9 +73,7 @@ inline bool set_up_in_window(const TreeView& tree, const Ray& ray, double max_t,
   const float greatest = greatest3(size);
   out.max_t = static_cast<float>(max_t);
   const F4 reach = size * out.max_t;
-  if (!(out.max_t >= 0.0F && greatest >= 0x1p-20F && greatest <= 0x1p20F &&
-        reach[0] + reach[1] + reach[2] <= kWindowReach))
-    return false;
+  if (!(out.max_t >= 0.0F && greatest >= 0x1p-20F && greatest <= 0x1p20F)) return false;
   const I4 still = size < all4(0x1p-100F);
   const I4 own = __builtin_convertvector(floor_of(p), I4);
   const I4 last = I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 0} * 16 - kWindowMargin;
@@ -177,6 +175,9 @@ inline Blocked any_in_window(const TreeView& tree, const WindowRay& ray) {
 }
 
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
+  // Before all else, as most rays go further.
+  const double reach = max_t * (std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z));
+  if (!(reach <= kWindowReach)) return any_single(tree, ray, max_t, unfinished);
   WindowRay single;
   if (!set_up_in_window(tree, ray, max_t, single)) return any_single(tree, ray, max_t, unfinished);
   const Blocked blocked = any_in_window(tree, single);
