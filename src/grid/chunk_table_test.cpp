@@ -72,6 +72,7 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
 TEST(ChunkTable, ChunksSideBySideAllStandInTheWindowInWhateverOrderTheyCome) {
   std::mt19937 random(3);
   std::vector<IVec3> places;
+  places.reserve(12 * 3 * 12);
   for (int i = 0; i < 12 * 3 * 12; ++i) places.push_back(IVec3{i % 12, i / 12 % 3, i / 36} - IVec3{5, 1, 700});
   for (int order = 0; order < 4; ++order) {
     ChunkTable table;
