@@ -54,7 +54,8 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
     }
   }
   if (enter_axis < 0) return true;
-  if (!(enter_t <= ray.max_t)) return false;
+  // Not to the bit: the distance of the face decides in the end, and rounds otherwise.
+  if (!(enter_t <= ray.max_t * 1.000001)) return false;
   for (int axis = 0; axis < 3; ++axis) {
     const double plane = direction[axis] > 0.0 ? tree.box.min[axis] : tree.box.max[axis];
     const double p = axis == enter_axis ? plane : ray.position[axis] + enter_t * direction[axis];
@@ -62,7 +63,7 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
     if (!(p >= tree.box.min[axis] - 1e-3 && p <= tree.box.max[axis] + 1e-3)) return false;
     ray.position[axis] = p;
   }
-  ray.max_t -= enter_t;
+  ray.max_t = std::max(ray.max_t - enter_t, 0.0);
   ray.entered = enter_axis;
   return true;
 }

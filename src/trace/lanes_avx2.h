@@ -27,6 +27,9 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   whole.v = _mm256_set_m128(w[1], w[0]);
 }
 
+inline I as_bits(F a) {
+  return {_mm256_castps_si256(a.v)};
+}
 inline F just_below(F a) {
   const __m256 less = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a.v), _mm256_set1_epi32(1)));
   const __m256 is_positive = _mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ);

@@ -164,6 +164,9 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
 }
 
+inline I as_bits(F a) {
+  return {half::as_bits(a.low), half::as_bits(a.high)};
+}
 inline F just_below(F a) {
   return {half::just_below(a.low), half::just_below(a.high)};
 }

@@ -78,7 +78,9 @@ inline bool set_up_short(const TreeView& tree, const Rays& rays, Mask wanted, co
   Lanes& lanes = out.lanes;
   out.max_t = narrow(rays.max_t);
   out.code = all(0);
-  const Mask usual = (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
+  // A limit just below zero may have become one.
+  const Mask is_negative = test(as_bits(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
+  const Mask usual = ~is_negative & (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
   const Mask fits = start_in_window<0>(out, lanes.x, out.planes.x, rays.origins[0], tree.origin.x, dx, origin.x) &
                     start_in_window<2>(out, lanes.y, out.planes.y, rays.origins[1], tree.origin.y, dy, origin.y) &
                     start_in_window<4>(out, lanes.z, out.planes.z, rays.origins[2], tree.origin.z, dz, origin.z);

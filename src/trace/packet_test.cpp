@@ -155,10 +155,28 @@ int hits_if_all_agree(const OccupancyTree& tree, const RayPacket& rays) {
   return hits;
 }
 
+// Each ray to where it meets something, exactly, and to the numbers next to that.
+void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, std::mt19937& random) {
+  for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+    const auto hit = first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
+    if (!hit) continue;
+    const double towards[] = {-1.0, hit->t, kInfinity};
+    const double limit = std::nextafter(hit->t, towards[random() % 3]);
+    rays.max_t[static_cast<std::size_t>(lane)] = limit;
+    for (const InstructionSet set : kSets) {
+      ASSERT_EQ(first_hit(tree, rays.ray(lane), limit, set).has_value(), hit->t <= limit);
+      ASSERT_EQ(any_hit(tree, rays.ray(lane), limit, set), hit->t <= limit);
+    }
+  }
+}
+
 TEST_P(Packets, AnswerTheSameWithEveryInstructionSetAndOneByOne) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
-    hits += hits_if_all_agree(tree_, packet());
+    RayPacket rays = packet();
+    hits += hits_if_all_agree(tree_, rays);
+    limit_to_hits(tree_, rays, random_);
+    hits_if_all_agree(tree_, rays);
     ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 500);
@@ -171,16 +189,6 @@ TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
     ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
   }
   EXPECT_GT(hits, 1'000);
-}
-
-// Each ray to where it meets something, exactly, and to the numbers next to that.
-void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, std::mt19937& random) {
-  for (int lane = 0; lane < RayPacket::kSize; ++lane) {
-    const auto hit = first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
-    if (!hit) continue;
-    const double towards[] = {0.0, hit->t, kInfinity};
-    rays.max_t[static_cast<std::size_t>(lane)] = std::nextafter(hit->t, towards[random() % 3]);
-  }
 }
 
 TEST_P(Packets, OfShortRaysFromAboutOnePlaceAnswerTheSame) {

@@ -190,6 +190,26 @@ TEST(Ray, BlockerThatStraddlesTheEndIsHit) {
   EXPECT_FALSE(any_hit(tree, {{0.5, 0.5, 0.5}, {1, 0, 0}}, 9.4999));
 }
 
+// Rays that start far away are moved to the bounds first, of which a flat floor is a face.
+TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
+  Grid grid;
+  grid.fill_box({-200, -5, -200}, {200, 0, 200}, 1);
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-190.0, 190.0);
+  for (int i = 0; i < 20'000; ++i) {
+    const DVec3 from = glm::floor(DVec3{uniform(random), 200.0 + uniform(random) / 2, uniform(random)} * 10.0) / 10.0;
+    const Ray ray{from, DVec3{uniform(random), 0.0, uniform(random)} - from};
+    const auto hit = first_hit(tree, ray);
+    ASSERT_TRUE(hit);
+    for (const InstructionSet set : {InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Plain}) {
+      ASSERT_TRUE(first_hit(tree, ray, hit->t, set));
+      ASSERT_TRUE(any_hit(tree, ray, hit->t, set));
+      ASSERT_FALSE(any_hit(tree, ray, std::nextafter(hit->t, 0.0), set));
+    }
+  }
+}
+
 TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
   const VoxelRegistry types = oracle::mixed_types();
   Grid grid = oracle::random_world(3, {IVec3{-70}, IVec3{70}}, 5, 0.001);

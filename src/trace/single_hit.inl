@@ -25,5 +25,5 @@ inline bool any_single(const TreeView& tree, const Ray& ray, double max_t, bool&
   }
   const SingleHit found = trace_one<Ask::Where>(tree, ray, max_t);
   unfinished = found.is_unfinished;
-  return found.is_hit && (found.axis < 0 || distance_of(tree, ray, found) <= max_t);
+  return found.is_hit && (found.axis < 0 ? 0.0 : distance_of(tree, ray, found)) <= max_t;
 }

@@ -177,7 +177,7 @@ inline Blocked any_in_window(const TreeView& tree, const WindowRay& ray) {
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
   // Before all else, as most rays go further.
   const double reach = max_t * (std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z));
-  if (!(reach <= kWindowReach)) return any_single(tree, ray, max_t, unfinished);
+  if (!(reach <= kWindowReach && max_t >= 0.0)) return any_single(tree, ray, max_t, unfinished);
   WindowRay single;
   if (!set_up_in_window(tree, ray, max_t, single)) return any_single(tree, ray, max_t, unfinished);
   const Blocked blocked = any_in_window(tree, single);
