@@ -103,7 +103,7 @@ class ChunkTable {
   [[nodiscard]] VoxelType voxel(int x, int y, int z) const;
 
   /// To be called before a change during which the chunk may be read: it is then read through its entry.
-  void voxels_change(const IVec3& chunk) {
+  void voxels_will_change(const IVec3& chunk) {
     const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
     if (cell != ChunkWindow::kOutside) window_.forget_voxels(cell);
   }

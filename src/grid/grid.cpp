@@ -77,7 +77,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   std::int64_t changed = 0;
   const auto edit_chunk = [&](IVec3 chunk, ChunkEntry& entry) {
     Reach reach;
-    entries.voxels_change(chunk);
+    entries.voxels_will_change(chunk);
     try {
       change(chunk, entry.chunk, part_of(box, chunk), reach);
     } catch (...) {

@@ -4,7 +4,6 @@
 #include <cstring>
 #include <map>
 
-#include <quoin/io/file.h>
 #include <quoin/io/ply.h>
 #include <quoin/mesh/occlusion.h>
 
@@ -157,24 +156,17 @@ Result<std::uint64_t> write_checked(const Scene& scene, const SceneMeshes& meshe
   if (auto sound = check_placements(scene, meshes.hidden); !sound) return tl::unexpected<Error>(sound.error());
   const std::vector<BlockyPart> parts = parts_of(scene, meshes);
   if (auto sound = check_parts(scene, parts); !sound) return tl::unexpected<Error>(sound.error());
-  const PlyCounts counts = count(parts);
-  if (auto possible = check_counts(counts); !possible) return tl::unexpected<Error>(possible.error());
-  auto file = AtomicFile::create(path);
-  if (!file) return tl::unexpected<Error>(file.error());
-  BlockWriter out(*file, progress, ply_bytes(counts));
-  out.put_text(ply_header(counts));
   const std::vector<Srgb> colours = colours_of(scene.types);
-  for_each_surface(scene, parts, [&](const BlockyTriangles& triangles, const VertexTransform& transform) {
-    write_vertices(triangles, transform, colours, meshes.occlusion, out);
+  return write_ply_file(path, count(parts), progress, [&](BlockWriter& out) {
+    for_each_surface(scene, parts, [&](const BlockyTriangles& triangles, const VertexTransform& transform) {
+      write_vertices(triangles, transform, colours, meshes.occlusion, out);
+    });
+    std::uint64_t first = 0;
+    for_each_surface(scene, parts, [&](const BlockyTriangles& triangles, const VertexTransform& transform) {
+      write_faces(triangles, transform.mirrors(), first, out);
+      first += triangles.positions.size();
+    });
   });
-  std::uint64_t first = 0;
-  for_each_surface(scene, parts, [&](const BlockyTriangles& triangles, const VertexTransform& transform) {
-    write_faces(triangles, transform.mirrors(), first, out);
-    first += triangles.positions.size();
-  });
-  if (auto written = out.finish(); !written) return tl::unexpected<Error>(written.error());
-  if (auto done = file->commit(); !done) return tl::unexpected<Error>(done.error());
-  return out.bytes();
 }
 
 }  // namespace

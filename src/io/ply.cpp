@@ -1,7 +1,6 @@
 #include <cstdint>
 #include <string>
 
-#include <quoin/io/file.h>
 #include <quoin/io/smooth_files.h>
 
 #include "io/block_writer.h"
@@ -51,23 +50,16 @@ void write_faces(const SmoothMesh& mesh, bool turned, std::uint64_t first, Block
 
 Result<std::uint64_t> write_checked(std::span<const SmoothPart> parts, const std::filesystem::path& path,
                                     bool occlusion, const Progress& progress) {
-  const PlyCounts counts = count(parts);
-  if (auto possible = check_counts(counts); !possible) return tl::unexpected<Error>(possible.error());
-  auto file = AtomicFile::create(path);
-  if (!file) return tl::unexpected<Error>(file.error());
-  BlockWriter out(*file, progress, ply_bytes(counts));
-  out.put_text(ply_header(counts));
-  for_each_placement(parts, out, [&](const SmoothMesh& mesh, const VertexTransform& transform) {
-    write_vertices(mesh, transform, occlusion, out);
+  return write_ply_file(path, count(parts), progress, [&](BlockWriter& out) {
+    for_each_placement(parts, out, [&](const SmoothMesh& mesh, const VertexTransform& transform) {
+      write_vertices(mesh, transform, occlusion, out);
+    });
+    std::uint64_t first = 0;
+    for_each_placement(parts, out, [&](const SmoothMesh& mesh, const VertexTransform& transform) {
+      write_faces(mesh, transform.mirrors(), first, out);
+      first += mesh.positions.size();
+    });
   });
-  std::uint64_t first = 0;
-  for_each_placement(parts, out, [&](const SmoothMesh& mesh, const VertexTransform& transform) {
-    write_faces(mesh, transform.mirrors(), first, out);
-    first += mesh.positions.size();
-  });
-  if (auto written = out.finish(); !written) return tl::unexpected<Error>(written.error());
-  if (auto done = file->commit(); !done) return tl::unexpected<Error>(done.error());
-  return out.bytes();
 }
 
 }  // namespace

@@ -1,8 +1,13 @@
 #include "io/ply_layout.h"
 
 #include <bit>
+#include <string>
+
+#include <quoin/io/file.h>
 
 namespace quoin {
+
+namespace {
 
 static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
 
@@ -25,6 +30,21 @@ std::string ply_header(const PlyCounts& counts) {
 
 std::uint64_t ply_bytes(const PlyCounts& counts) {
   return ply_header(counts).size() + counts.vertices * kPlyVertexBytes + counts.faces * kPlyFaceBytes;
+}
+
+}  // namespace
+
+Result<std::uint64_t> write_ply_file(const std::filesystem::path& path, const PlyCounts& counts,
+                                     const Progress& progress, const std::function<void(BlockWriter&)>& write) {
+  if (auto possible = check_counts(counts); !possible) return tl::unexpected<Error>(possible.error());
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  BlockWriter out(*file, progress, ply_bytes(counts));
+  out.put_text(ply_header(counts));
+  write(out);
+  if (auto written = out.finish(); !written) return tl::unexpected<Error>(written.error());
+  if (auto done = file->commit(); !done) return tl::unexpected<Error>(done.error());
+  return out.bytes();
 }
 
 }  // namespace quoin

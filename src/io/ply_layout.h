@@ -1,9 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <string>
+#include <filesystem>
+#include <functional>
 
 #include <quoin/core/result.h>
+
+#include "io/block_writer.h"
 
 namespace quoin {
 
@@ -18,12 +22,10 @@ struct PlyCounts {
 inline constexpr std::size_t kPlyVertexBytes = 6 * 4 + 3;
 inline constexpr std::size_t kPlyFaceBytes = 1 + 3 * 4;
 
-/// Errors: LimitExceeded where an int cannot count them.
-[[nodiscard]] Status check_counts(const PlyCounts& counts);
-
-[[nodiscard]] std::string ply_header(const PlyCounts& counts);
-
-/// The size of the whole file.
-[[nodiscard]] std::uint64_t ply_bytes(const PlyCounts& counts);
+/// Writes a whole file, whose vertices and then faces `write` puts; answers its bytes.
+/// Errors: LimitExceeded where an int cannot count them; those of AtomicFile.
+[[nodiscard]] Result<std::uint64_t> write_ply_file(const std::filesystem::path& path, const PlyCounts& counts,
+                                                   const Progress& progress,
+                                                   const std::function<void(BlockWriter&)>& write);
 
 }  // namespace quoin

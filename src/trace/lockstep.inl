@@ -63,7 +63,7 @@ struct CellWalk {
 inline F first_cell(const Axis& axis, F t, Mask entered, Mask ties_before, Mask ties_after) {
   const F low = floor(axis.low * all(0.25F));
   const F high = floor((axis.high - all(1.0F)) * all(0.25F));
-  const F at = coordinate_after<4>(axis, t, low, high, ties_before, ties_after);
+  const F at = coordinate_after(axis, t, low, high, ties_before, ties_after);
   return select(entered, select(axis.forward, low, high), at);
 }
 

@@ -114,13 +114,12 @@ inline F to_bound(int bound, I base) {
   return to_float(all(bound) - base);
 }
 
-// The coordinate, in units of `kSize` voxels, just after the crossing at `t`: a guess by position, corrected by
+// The coordinate, in cells, just after the crossing at `t`: a guess by position, corrected by
 // comparing crossings, since rounding can put a position on the wrong side of a plane. `ties_before`: lanes whose
 // crossing was of a later axis, so that planes of this one at the same t were crossed before; `ties_after`: of an
 // earlier axis.
-template <int kSize>
 inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before, Mask ties_after) {
-  constexpr auto kEdge = static_cast<float>(kSize);
+  constexpr float kEdge = 4.0F;
   const F position = axis.origin + t * axis.direction;
   F at = max(min(floor(position * all(1.0F / kEdge)), high), low);
   const F lower = at * all(kEdge);
