@@ -1,0 +1,37 @@
+#pragma once
+
+#include <source_location>
+
+namespace quoin {
+
+/// A programmer's mistake: a `Requires:` of the documentation that did not hold.
+struct AssertFailure {
+  const char* condition;  ///< as it stands in the source
+  const char* message;    ///< what was required, or an empty string
+  std::source_location location;
+};
+
+/// Called for every mistake that is found. When it returns, the process is aborted; it may throw or exit instead.
+using AssertHandler = void (*)(const AssertFailure& failure);
+
+/// Replaces the handler, for the whole process; null restores the default, which writes one line to standard error.
+/// Returns the handler that was there. Threads: any; the handler is called on the thread that made the mistake.
+AssertHandler set_assert_handler(AssertHandler handler);
+
+/// Calls the handler, then aborts.
+[[noreturn]] void fail_assert(const AssertFailure& failure);
+
+}  // namespace quoin
+
+/// Checks a `Requires:` in debug builds and wherever QUOIN_CHECKED is defined (CMake: -DQUOIN_CHECKED=ON); elsewhere
+/// the condition is compiled but never evaluated. Usage: QUOIN_ASSERT(i < size(), "the type must be registered").
+#if defined(QUOIN_CHECKED) || !defined(NDEBUG)
+#define QUOIN_ASSERT_ENABLED 1
+#define QUOIN_ASSERT(condition, ...) \
+  (static_cast<bool>(condition)      \
+       ? static_cast<void>(0)        \
+       : ::quoin::fail_assert({#condition, "" __VA_ARGS__, ::std::source_location::current()}))
+#else
+#define QUOIN_ASSERT_ENABLED 0
+#define QUOIN_ASSERT(condition, ...) static_cast<void>(sizeof(static_cast<bool>(condition)))
+#endif
