@@ -20,7 +20,7 @@ int main() {
 
   quoin::BlockyMesher mesher;
   quoin::QuadBuffer quads;
-  for (const quoin::IVec3 chunk : grid.take_dirty()) {
+  for (const quoin::IVec3 chunk : grid.chunks()) {
     mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
     std::printf("chunk %d %d %d: %lld faces in %zu quads\n", chunk.x, chunk.y, chunk.z,
                 static_cast<long long>(quoin::face_count(quads)), quads.size());

@@ -46,14 +46,14 @@ int main() {
   if (!stone || !camera) return 1;
   quoin::Grid grid;
   grid.fill_sphere({0, 0, 0}, 20.0, *stone);
-  static_cast<void>(grid.take_dirty());
+  quoin::ChangeCursor followed = grid.cursor();
   auto tree = quoin::OccupancyTree::build(grid, types);
 
   const auto before = look(tree, *camera);
   if (!before) return 1;
   grid.set(before->voxel, quoin::kAir);
   // The same list says which meshes to make anew.
-  tree.update(grid, types, grid.take_dirty());
+  tree.update(grid, types, quoin::chunks_to_mesh(grid, grid.changes_since(followed)));
   const auto after = look(tree, *camera);
   std::printf("%d of 16 rays hit\n", count_hits(tree, *camera));
   return after && after->t > before->t ? 0 : 1;

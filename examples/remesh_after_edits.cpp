@@ -14,9 +14,11 @@ using ChunkKey = std::tuple<int, int, int>;
 // Meshes kept by their owner, keyed by chunk.
 class MeshCache {
  public:
-  int update(quoin::Grid& grid, const quoin::VoxelRegistry& types) {
+  int update(const quoin::Grid& grid, const quoin::VoxelRegistry& types) {
+    const quoin::GridChanges changes = grid.changes_since(followed_);
+    if (changes.all) quads_.clear();
     int meshed = 0;
-    for (const quoin::IVec3 chunk : grid.take_dirty()) {
+    for (const quoin::IVec3 chunk : quoin::chunks_to_mesh(grid, changes)) {
       const ChunkKey key{chunk.x, chunk.y, chunk.z};
       if (grid.find_chunk(chunk) == nullptr) {
         quads_.erase(key);
@@ -30,6 +32,7 @@ class MeshCache {
 
  private:
   quoin::BlockyMesher mesher_;
+  quoin::ChangeCursor followed_;  // how far this has read the grid's journal
   std::map<ChunkKey, quoin::QuadBuffer> quads_;
 };
 

@@ -10,6 +10,8 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
+#include "grid/change_follower.h"
+
 namespace quoin {
 namespace {
 
@@ -90,12 +92,12 @@ TEST(DensityEdits, NoMeshChangesUntold) {
     DensityGrid grid;
     grid.add_box({-90, -90, -90}, {90, 3, 90}, 1);
     std::map<Place, std::string> before = meshes.all(grid);
-    grid.take_dirty(0);
+    ChangeFollower follower(grid);
     int changed = 0;
     for (int round = 0; round < 8; ++round) {
       edit_somewhere(grid, random);
       std::set<Place> told;
-      for (const IVec3 at : grid.take_dirty(reach_of(options.occlusion))) told.emplace(at.x, at.y, at.z);
+      for (const IVec3 at : follower.take(grid, reach_of(options.occlusion))) told.emplace(at.x, at.y, at.z);
       std::map<Place, std::string> after = meshes.all(grid);
       for (const auto& [at, bytes] : after) before.try_emplace(at);
       for (const auto& [at, bytes] : before) {

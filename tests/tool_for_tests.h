@@ -66,7 +66,7 @@ inline std::string vox_with_hidden(int hidden) {
   second.position.x += 10;
   scene.add_instance(second);
   for (const InstanceHandle handle : scene.instances().handles()) {
-    if (hidden-- > 0) scene.instances()[handle].visible = false;
+    if (hidden-- > 0) scene.edit(handle).visible = false;
   }
   std::vector<std::string> warnings;
   const auto bytes = write_vox(scene, warnings).value();

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 namespace quoin::viewer {
 

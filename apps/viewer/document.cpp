@@ -85,7 +85,7 @@ bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
 }
 
 std::int64_t Document::touch(IVec3 voxel) {
-  Grid& grid = loaded_.scene.grids()[stroke_->grid].grid;
+  Grid& grid = loaded_.scene.edit(stroke_->grid).grid;
   history_.touch(stroke_->grid, grid, reach_of(stroke_->brush, voxel));
   return apply(stroke_->brush, voxel, grid);
 }

@@ -196,7 +196,7 @@ TEST(EditHistory, ForgetsTheOldestBeyondItsLimit) {
   std::mt19937 random(3);
   for (int edit = 0; edit < 60; ++edit) {
     history.begin("edit");
-    Grid& grid = scene.grids()[handle].grid;
+    Grid& grid = scene.edit(handle).grid;
     const IVec3 centre{static_cast<int>(random() % 60), 8, static_cast<int>(random() % 40)};
     const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
     history.touch(handle, grid, reach_of(brush, centre));

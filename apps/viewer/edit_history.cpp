@@ -1,8 +1,9 @@
 #include "edit_history.h"
 
 #include <algorithm>
-#include <cassert>
 #include <utility>
+
+#include <quoin/core/assert.h>
 
 namespace quoin::viewer {
 
@@ -16,13 +17,13 @@ Chunk copy_of(const Grid& grid, IVec3 place) {
 }  // namespace
 
 void EditHistory::begin(std::string name) {
-  assert(!open_ && "the step before has no end");
+  QUOIN_ASSERT(!open_, "the step before has ended");
   open_.emplace();
   open_->name = std::move(name);
 }
 
 void EditHistory::touch(GridHandle handle, const Grid& grid, const IBox& box) {
-  assert(open_);
+  QUOIN_ASSERT(open_, "a step is under way");
   if (box.empty()) return;
   const IVec3 first = chunk_of(box.min);
   const IVec3 last = chunk_of(box.max - 1);
@@ -34,7 +35,7 @@ void EditHistory::touch(GridHandle handle, const Grid& grid, const IBox& box) {
           return chunk.grid == handle && chunk.place == place;
         });
         if (is_known) continue;
-        open_->chunks.push_back({handle, place, grid.version(place), copy_of(grid, place), Chunk(kAir)});
+        open_->chunks.push_back({handle, place, copy_of(grid, place), Chunk(kAir)});
       }
     }
   }
@@ -46,7 +47,7 @@ void EditHistory::end(const Scene& scene) {
   open_.reset();
   std::erase_if(step.chunks, [&](const ChangedChunk& chunk) {
     const SceneGrid* grid = scene.grids().find(chunk.grid);
-    return grid == nullptr || grid->grid.version(chunk.place) == chunk.version;
+    return grid == nullptr || chunk.before == copy_of(grid->grid, chunk.place);
   });
   if (step.chunks.empty()) return;
   for (ChangedChunk& chunk : step.chunks) {
@@ -81,7 +82,7 @@ std::string EditHistory::redo_name() const {
 }
 
 bool EditHistory::undo(Scene& scene) {
-  assert(!open_);
+  QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_undo()) return false;
   --done_;
   for (const ChangedChunk& chunk : steps_[done_].chunks) {
@@ -91,7 +92,7 @@ bool EditHistory::undo(Scene& scene) {
 }
 
 bool EditHistory::redo(Scene& scene) {
-  assert(!open_);
+  QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_redo()) return false;
   for (const ChangedChunk& chunk : steps_[done_].chunks) {
     if (SceneGrid* grid = scene.grids().find(chunk.grid)) grid->grid.put_chunk(chunk.place, chunk.after);

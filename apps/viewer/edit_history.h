@@ -44,7 +44,6 @@ class EditHistory {
   struct ChangedChunk {
     GridHandle grid;
     IVec3 place{0};
-    std::uint64_t version = 0;
     Chunk before{kAir};
     Chunk after{kAir};
   };

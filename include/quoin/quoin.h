@@ -51,7 +51,7 @@
 #include <quoin/render_vk/vulkan_window.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cstring>
 #include <optional>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
+#include "grid/content_hash.h"
 #include "grid/packed_row.h"
 
 namespace quoin {
@@ -95,14 +97,8 @@ std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
 
 }  // namespace
 
-Chunk::Chunk(VoxelType uniform) : uniform_(uniform) {}
-
-Chunk::Chunk(const Chunk& other)
-    : uniform_(other.uniform_), mixed_(other.mixed_ ? std::make_unique<Mixed>(*other.mixed_) : nullptr) {}
-
-Chunk& Chunk::operator=(const Chunk& other) {
-  if (this != &other) *this = Chunk(other);
-  return *this;
+void Chunk::copy_storage() {
+  mixed_.make_own();
 }
 
 void Chunk::fill(VoxelType type) {
@@ -137,6 +133,7 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   if (mixed_ == nullptr) make_mixed();
+  own();
   const std::uint32_t index = index_for(type);
   Mixed& m = *mixed_;
   std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
@@ -172,7 +169,7 @@ std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
 }
 
 bool Chunk::set(int x, int y, int z, VoxelType type) {
-  assert((x | y | z) >= 0 && (x | y | z) < kChunkEdge);
+  QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
   if (mixed_ == nullptr) return type != uniform_ && set_anywhere(x, y, z, type);
   Mixed& m = *mixed_;
   const std::uint32_t slot = m.slabs[slab_index(y, z)];
@@ -181,6 +178,8 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
   std::uint64_t& word = m.row(slot, row_in_slab(y, z))[bit >> 6];
   const std::uint32_t old = static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << m.bits) - 1U);
   if (old == m.recent) return false;
+  if (mixed_.is_shared()) [[unlikely]]
+    return set_anywhere(x, y, z, type);
   word ^= std::uint64_t{old ^ m.recent} << (bit & 63U);
   m.move_counts(old, m.recent, 1);
   if (type == kAir) {
@@ -197,6 +196,7 @@ bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = get(x, y, z);
   if (old == type) return false;
   if (mixed_ == nullptr) make_mixed();
+  own();
   const std::uint32_t index = index_for(type);
   Mixed& m = *mixed_;
   std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
@@ -253,7 +253,7 @@ void Chunk::read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const {
 }
 
 void Chunk::fill_box(const IBox& box, VoxelType type,
-                     const std::function<void(int y, int z, std::uint64_t changed)>& on_change) {
+                     FunctionRef<void(int y, int z, std::uint64_t changed)> on_change) {
   const IBox inside = intersect(box, {IVec3{0}, IVec3{kChunkEdge}});
   if (inside.empty()) return;
   const int width = inside.max.x - inside.min.x;
@@ -276,7 +276,7 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
 Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   Chunk chunk(types[0]);
   if (is_one_type(types)) return chunk;
-  chunk.mixed_ = std::make_unique<Mixed>();
+  chunk.mixed_ = make_ref<Mixed>();
   Mixed& m = *chunk.mixed_;
   constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
   std::vector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
@@ -382,6 +382,40 @@ IBox Chunk::bounds() const {
     box.max[axis] = static_cast<int>(counts.rend() - std::find_if(counts.rbegin(), counts.rend(), is_filled));
   }
   return box;
+}
+
+bool Chunk::operator==(const Chunk& other) const {
+  if (shares_storage_with(other)) return true;
+  if (non_air_count() != other.non_air_count()) return false;
+  std::array<VoxelType, kChunkEdge> row{};
+  std::array<VoxelType, kChunkEdge> other_row{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      read_row(y, z, row);
+      other.read_row(y, z, other_row);
+      if (row != other_row) return false;
+    }
+  }
+  return true;
+}
+
+std::uint64_t Chunk::content_hash() const {
+  std::uint64_t hash = kHashSeed;
+  std::array<VoxelType, kChunkEdge> row{};
+  std::optional<VoxelType> hashed;  // the one type of the row that was hashed last
+  std::uint64_t row_hash = 0;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const std::optional<VoxelType> one = one_type_of_row(*this, y, z);
+      if (!one.has_value() || one != hashed) {
+        read_row(y, z, row);
+        row_hash = hash_of_row(row);
+        hashed = one;
+      }
+      hash = mixed_with(hash, row_hash);
+    }
+  }
+  return hash;
 }
 
 }  // namespace quoin

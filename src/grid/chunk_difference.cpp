@@ -20,36 +20,50 @@ bool is_stored_alike(const Chunk::Mixed& a, const Chunk::Mixed& b, int y, int z)
   return std::memcmp(a.row(in_a, row), b.row(in_b, row), static_cast<std::size_t>(a.bits) * sizeof(std::uint64_t)) == 0;
 }
 
-void compare_row(const Chunk& before, const Chunk& after, int y, int z, ChunkDifference& found) {
+// Calls `compare(y, z, old row, new row)` for the rows that may differ.
+template <class Compare>
+void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, Compare&& compare) {
+  if (before.shares_storage_with(after)) return;
+  const bool share = share_palette(before.mixed(), after.mixed());
   std::array<VoxelType, kChunkEdge> old_row;
   std::array<VoxelType, kChunkEdge> new_row;
-  before.read_row(y, z, old_row);
-  after.read_row(y, z, new_row);
-  std::uint64_t types = 0;
-  std::uint64_t solid = 0;
-  for (std::size_t x = 0; x < kChunkEdge; ++x) {
-    types |= std::uint64_t{old_row[x] != new_row[x]} << x;
-    solid |= std::uint64_t{(old_row[x] == kAir) != (new_row[x] == kAir)} << x;
+  for (int z = within.min.z; z < within.max.z; ++z) {
+    for (int y = within.min.y; y < within.max.y; ++y) {
+      if (share && is_stored_alike(*before.mixed(), *after.mixed(), y, z)) continue;
+      before.read_row(y, z, old_row);
+      after.read_row(y, z, new_row);
+      compare(y, z, old_row, new_row);
+    }
   }
-  found.types.add(y, z, types);
-  found.solid.add(y, z, solid);
+}
+
+std::uint64_t other_types(const std::array<VoxelType, kChunkEdge>& a, const std::array<VoxelType, kChunkEdge>& b) {
+  std::uint64_t types = 0;
+  for (std::size_t x = 0; x < kChunkEdge; ++x) types |= std::uint64_t{a[x] != b[x]} << x;
+  return types;
 }
 
 }  // namespace
 
-ChunkDifference difference(const Chunk* before, const Chunk* after) {
+void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit) {
+  for_each_other_row(before, after, kWholeChunk, [&](int y, int z, const auto& old_row, const auto& new_row) {
+    edit.add(y, z, other_types(old_row, new_row));
+  });
+}
+
+ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
   static const Chunk kAllAir;
   const Chunk& a = before == nullptr ? kAllAir : *before;
   const Chunk& b = after == nullptr ? kAllAir : *after;
   ChunkDifference found;
-  if (a.uniform().has_value() && a.uniform() == b.uniform()) return found;
-  const bool share = share_palette(a.mixed(), b.mixed());
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      if (share && is_stored_alike(*a.mixed(), *b.mixed(), y, z)) continue;
-      compare_row(a, b, y, z, found);
+  for_each_other_row(a, b, within, [&](int y, int z, const auto& old_row, const auto& new_row) {
+    std::uint64_t solid = 0;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      solid |= std::uint64_t{(old_row[x] == kAir) != (new_row[x] == kAir)} << x;
     }
-  }
+    found.types.add(y, z, other_types(old_row, new_row));
+    found.solid.add(y, z, solid);
+  });
   return found;
 }
 

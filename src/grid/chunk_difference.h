@@ -2,7 +2,7 @@
 
 #include <quoin/grid/chunk.h>
 
-#include "grid/change_reach.h"
+#include "grid/change_records.h"
 
 namespace quoin {
 
@@ -12,7 +12,11 @@ struct ChunkDifference {
   ChangeReach types;  ///< voxels of another type, those too
 };
 
-/// Cost: O(rows of 64 voxels); about 20 microseconds where the storage of both is alike, as after a few edits.
-[[nodiscard]] ChunkDifference difference(const Chunk* before, const Chunk* after);
+/// Of types alone: books in `edit` which voxels of a chunk are to change.
+void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit);
+
+/// They differ nowhere but within the box. Cost: O(rows of 64 voxels of the box); about 20 microseconds for a chunk where
+/// the storage of both is alike, as after a few edits.
+[[nodiscard]] ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within = kWholeChunk);
 
 }  // namespace quoin

@@ -113,7 +113,7 @@ void renumber_row(const std::uint64_t* from, int from_bits, const std::vector<st
 }  // namespace
 
 void Chunk::make_mixed() {
-  mixed_ = std::make_unique<Mixed>();
+  mixed_ = make_ref<Mixed>();
   Mixed& m = *mixed_;
   m.palette.push_back(uniform_);
   m.counts.push_back(kChunkVoxels);
@@ -279,6 +279,8 @@ std::size_t Chunk::bytes() const {
 void Chunk::compact() {
   if (mixed_ == nullptr) return;
   if (is_one_entry()) return fill(get(0, 0, 0));
+  // What others share they would keep all the same.
+  if (mixed_.is_shared()) return;
   repack(bits_for(used_types()));
   mixed_->palette.shrink_to_fit();
   mixed_->counts.shrink_to_fit();

@@ -38,16 +38,19 @@ ChunkWindow::Box ChunkWindow::Box::grown_to(IVec3 chunk) const {
 // Air outlives every window, as it is there before the first.
 ChunkWindow::ChunkWindow() : air_(&all_air()) {}
 
-void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry) {
+void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch) {
   entries_[cell] = entry;
+  epochs_[cell] = epoch;
   voxels_[cell] = entry == nullptr ? air_ : entry->chunk.mixed();
 }
 
 void ChunkWindow::move_to(const Box& box) {
   const std::size_t cells = std::size_t{1} << box.log_cells();
   std::vector<ChunkEntry*> entries(cells, nullptr);
+  std::vector<std::uint32_t> epochs(cells, 0);
   voxels_ = std::vector<const Chunk::Mixed*>(cells, air_);
   entries_ = std::move(entries);
+  epochs_ = std::move(epochs);
   box_ = box;
   first_x_ = static_cast<std::uint32_t>(box.first.x);
   first_y_ = static_cast<std::uint32_t>(box.first.y);
@@ -62,25 +65,41 @@ void ChunkWindow::move_to(const Box& box) {
 void ChunkWindow::close() {
   voxels_ = {};
   entries_ = {};
+  epochs_ = {};
   box_ = {};
   size_x_ = size_y_ = size_z_ = 0;
 }
 
-// The table shrinks again where few of many chunks are left.
-ChunkTable::ChunkTable() {
-  entries_.min_load_factor(0.1F);
+// Of its own epochs none is known in which its nodes were not shared.
+ChunkTable::ChunkTable(const ChunkTable& other)
+    : trie_(other.trie_), outside_(other.size()), is_planned_(false), epoch_(2) {
+  other.epoch_.fetch_add(1, std::memory_order_relaxed);
 }
 
-ChunkEntry* ChunkTable::find_by_hash(int x, int y, int z) const {
-  const auto it = entries_.find(IVec3{x, y, z});
-  return it == entries_.end() ? nullptr : it->second.get();
+// The entries of a leaf lie elsewhere than before.
+void ChunkTable::put_leaf(Leaf& leaf) {
+  ChunkTrie<ChunkEntry>::for_each_of(leaf, [&](IVec3 at, ChunkEntry& entry) {
+    const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
+    if (cell != ChunkWindow::kOutside) window_.put(cell, &entry, epoch());
+  });
 }
 
-ChunkEntry& ChunkTable::find_or_create(const IVec3& chunk) {
-  if (ChunkEntry* entry = find(chunk)) return *entry;
-  ChunkEntry& made = *entries_.emplace(chunk, std::make_unique<ChunkEntry>()).first->second;
+ChunkTable::Slot ChunkTable::find_shared_to_edit(const IVec3& chunk, std::uint32_t cell) {
+  if (!is_planned_) {
+    is_planned_ = true;
+    plan();
+    cell = window_.cell(chunk.x, chunk.y, chunk.z);
+  }
+  ChunkEntry* entry = trie_.find_to_edit(chunk, [this](Leaf& leaf) { put_leaf(leaf); });
+  if (cell != ChunkWindow::kOutside) window_.put(cell, entry, epoch());
+  return {entry, cell};
+}
+
+ChunkTable::Slot ChunkTable::find_or_create(const IVec3& chunk) {
+  if (const Slot slot = find_to_edit(chunk); slot.entry != nullptr) return slot;
+  ChunkEntry& made = trie_.find_or_create(chunk, [this](Leaf& leaf) { put_leaf(leaf); });
   place(chunk, made);
-  return made;
+  return {&made, window_.cell(chunk.x, chunk.y, chunk.z)};
 }
 
 VoxelType ChunkTable::voxel(int x, int y, int z) const {
@@ -90,7 +109,7 @@ VoxelType ChunkTable::voxel(int x, int y, int z) const {
   const std::uint32_t cell = window_.cell(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
   if (cell == ChunkWindow::kOutside) [[unlikely]] {
     if (outside_ == 0) return kAir;
-    const ChunkEntry* entry = find_by_hash(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
+    const ChunkEntry* entry = trie_.find(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
     return entry == nullptr ? kAir : entry->chunk.get(local_x, local_y, local_z);
   }
   if (const Chunk::Mixed* voxels = window_.voxels(cell)) [[likely]]
@@ -100,10 +119,10 @@ VoxelType ChunkTable::voxel(int x, int y, int z) const {
 
 void ChunkTable::erase(const IVec3& chunk) {
   const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
-  const std::size_t erased = entries_.erase(chunk);
+  const bool was_there = trie_.erase(chunk, [this](Leaf& leaf) { put_leaf(leaf); });
   if (cell != ChunkWindow::kOutside) {
-    window_.put(cell, nullptr);
-  } else if (erased != 0) {
+    window_.put(cell, nullptr, 0);
+  } else if (was_there) {
     --outside_;
     outside_changed();
   }
@@ -111,18 +130,14 @@ void ChunkTable::erase(const IVec3& chunk) {
 }
 
 void ChunkTable::clear() {
-  entries_.clear();
+  trie_.clear();
   window_.close();
   outside_ = 0;
   outside_since_plan_ = 0;
 }
 
-std::size_t ChunkTable::bytes() const {
-  return entries_.bucket_count() * sizeof(void*) * 4 + window_.bytes();
-}
-
 std::size_t ChunkTable::most_cells() const {
-  return std::max(kFewCells, kCellsPerChunk * entries_.size());
+  return std::max(kFewCells, kCellsPerChunk * size());
 }
 
 bool ChunkTable::fits(const ChunkWindow::Box& box) const {
@@ -133,7 +148,7 @@ bool ChunkTable::fits(const ChunkWindow::Box& box) const {
 // where all of them lie.
 void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
   const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
-  if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry);
+  if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry, epoch());
   ++outside_;
   if (window_.cells() != 0) {
     const ChunkWindow::Box grown = window_.box().grown_to(chunk);
@@ -148,15 +163,16 @@ void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
 // Looks where the chunks are now and then, so that all of it costs no more than a few visits a change.
 void ChunkTable::outside_changed() {
   ++outside_since_plan_;
-  if (4 * outside_since_plan_ >= entries_.size()) plan();
+  if (4 * outside_since_plan_ >= size()) plan();
 }
 
 // Around all chunks but so many at either end of each axis.
 ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
-  std::vector<int> along(entries_.size());
+  std::vector<int> along(size());
   ChunkWindow::Box box;
   for (int axis = 0; axis < 3; ++axis) {
-    std::transform(entries_.begin(), entries_.end(), along.begin(), [axis](const auto& e) { return e.first[axis]; });
+    auto next = along.begin();
+    trie_.for_each([&](IVec3 at, const ChunkEntry&) { *next++ = at[axis]; });
     const auto low = along.begin() + static_cast<std::ptrdiff_t>(left_out);
     const auto high = along.end() - 1 - static_cast<std::ptrdiff_t>(left_out);
     std::nth_element(along.begin(), low, along.end());
@@ -168,7 +184,7 @@ ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
   return box;
 }
 
-// Where there is no memory for another window the one there is stays: chunks outside are found by their hashes.
+// Where there is no memory for another window the one there is stays: chunks outside are found in the tree.
 void ChunkTable::plan() {
   try {
     try_to_plan();
@@ -179,27 +195,30 @@ void ChunkTable::plan() {
 // Moves the window to where all chunks are, or most; where they lie too far from each other it stays if most are in it.
 void ChunkTable::try_to_plan() {
   outside_since_plan_ = 0;
-  if (entries_.empty()) return window_.close();
-  for (const std::size_t left_out : {std::size_t{0}, entries_.size() / 16}) {
+  if (empty()) return window_.close();
+  for (const std::size_t left_out : {std::size_t{0}, size() / 16}) {
     const ChunkWindow::Box box = box_of_most(left_out);
     if (fits(box)) return move_to(box);
   }
-  if (window_.cells() <= kSlack * most_cells() && 2 * outside_ <= entries_.size()) return;
+  if (window_.cells() <= kSlack * most_cells() && 2 * outside_ <= size()) return;
   window_.close();
-  outside_ = entries_.size();
+  outside_ = size();
 }
 
 void ChunkTable::move_to(const ChunkWindow::Box& box) {
   window_.move_to(box);
   outside_ = 0;
-  for (const auto& [at, entry] : entries_) {
+  // Where nothing was ever shared nothing need be looked at again.
+  const std::uint32_t known = epoch() == 1 ? 1 : 0;
+  trie_.for_each([&](IVec3 at, const ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
     if (cell != ChunkWindow::kOutside) {
-      window_.put(cell, entry.get());
+      // An entry that may be shared is not changed before its way was looked at, its epoch says.
+      window_.put(cell, const_cast<ChunkEntry*>(&entry), known);
     } else {
       ++outside_;
     }
-  }
+  });
 }
 
 }  // namespace quoin

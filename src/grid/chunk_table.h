@@ -1,23 +1,21 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
-#include <tsl/robin_map.h>
-
 #include <quoin/grid/chunk.h>
+
+#include "grid/chunk_trie.h"
 
 namespace quoin {
 
 /// A chunk, and what a grid keeps beside it.
 struct ChunkEntry {
   Chunk chunk;
-  std::uint64_t version = 0;
-  std::uint64_t neighbourhood_version = 0;
-  bool is_dirty = false;  ///< its coordinates stand in the grid's list of dirty chunks
+  std::uint64_t serial = 0;  ///< of its last record in the grid's journal
 };
 
 /// A box of chunks in which one is found by its place: a pointer for every chunk of the box, there or not.
@@ -48,15 +46,17 @@ class ChunkWindow {
   }
   /// Null where there is no chunk.
   [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const { return entries_[cell]; }
+  /// The epoch in which the entry was last known to be shared with no snapshot.
+  [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const { return epochs_[cell]; }
   /// The voxels of a chunk; those of a chunk of air where there is none; null where the chunk is uniform.
   [[nodiscard]] const Chunk::Mixed* voxels(std::uint32_t cell) const { return voxels_[cell]; }
 
   [[nodiscard]] std::size_t cells() const { return entries_.size(); }
   [[nodiscard]] const Box& box() const { return box_; }
-  [[nodiscard]] std::size_t bytes() const { return cells() * (sizeof(ChunkEntry*) + sizeof(Chunk::Mixed*)); }
+  [[nodiscard]] std::size_t bytes() const { return cells() * (sizeof(ChunkEntry*) + sizeof(Chunk::Mixed*) + sizeof(std::uint32_t)); }
 
   /// A chunk that came or went, or whose storage may have moved.
-  void put(std::uint32_t cell, ChunkEntry* entry);
+  void put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch);
   /// Of a chunk that is there; until it is put again its voxels are found through its entry.
   void forget_voxels(std::uint32_t cell) { voxels_[cell] = nullptr; }
   /// Another box, in which no chunk stands yet. When it throws, all is as it was.
@@ -76,73 +76,89 @@ class ChunkWindow {
   int shift_z_ = 0;
   std::vector<const Chunk::Mixed*> voxels_;
   std::vector<ChunkEntry*> entries_;
+  std::vector<std::uint32_t> epochs_;
   Box box_;
 };
 
-/// The chunks of a grid by their coordinates: in a hash table, and those that lie close together in a window besides.
+/// The chunks of a grid by their coordinates: in a tree, and those that lie close together in a window besides.
 ///
 /// The window grows with the chunks and goes where they go, without the outermost eighth along each axis where these
 /// lie too far out, and never has more than 8 places a chunk (or 64), 32 where chunks were dropped. What lies outside
-/// it is found by its hash.
-/// Threads: any number may read; a change needs it to itself.
+/// it is found in the tree.
+/// A copy shares the tree's nodes and has no window until it is changed. Entries are changed by way of `find_to_edit` or
+/// `find_or_create`, which copy what is shared; they lie elsewhere then, so that no pointer to an entry outlives the next
+/// of these calls.
+/// Threads: any number may read and copy at once; a change needs it to itself.
 class ChunkTable {
  public:
-  ChunkTable();
-  ChunkTable(const ChunkTable&) = delete;
+  /// An entry that is about to be changed; `entry` is null where there is none.
+  struct Slot {
+    ChunkEntry* entry = nullptr;
+    std::uint32_t cell = ChunkWindow::kOutside;
+  };
+
+  ChunkTable() = default;
+  ChunkTable(const ChunkTable& other);
   ChunkTable& operator=(const ChunkTable&) = delete;
 
-  [[nodiscard]] ChunkEntry* find(int x, int y, int z) const {
+  [[nodiscard]] const ChunkEntry* find(int x, int y, int z) const {
     const std::uint32_t cell = window_.cell(x, y, z);
     if (cell != ChunkWindow::kOutside) [[likely]]
       return window_.entry(cell);
-    return outside_ == 0 ? nullptr : find_by_hash(x, y, z);
+    return outside_ == 0 ? nullptr : trie_.find(x, y, z);
   }
-  [[nodiscard]] ChunkEntry* find(const IVec3& chunk) const { return find(chunk.x, chunk.y, chunk.z); }
-  [[nodiscard]] ChunkEntry& find_or_create(const IVec3& chunk);
+  [[nodiscard]] const ChunkEntry* find(const IVec3& chunk) const { return find(chunk.x, chunk.y, chunk.z); }
+  [[nodiscard]] Slot find_to_edit(const IVec3& chunk) {
+    const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
+    if (cell != ChunkWindow::kOutside) [[likely]] {
+      ChunkEntry* entry = window_.entry(cell);
+      if (entry == nullptr || window_.epoch(cell) == epoch()) [[likely]]
+        return {entry, cell};
+    }
+    return find_shared_to_edit(chunk, cell);
+  }
+  [[nodiscard]] Slot find_or_create(const IVec3& chunk);
   /// Of one voxel, by its own coordinates.
   [[nodiscard]] VoxelType voxel(int x, int y, int z) const;
 
   /// To be called before a change during which the chunk may be read: it is then read through its entry.
-  void voxels_will_change(const IVec3& chunk) {
-    const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
-    if (cell != ChunkWindow::kOutside) window_.forget_voxels(cell);
+  void voxels_will_change(const Slot& slot) {
+    if (slot.cell != ChunkWindow::kOutside) window_.forget_voxels(slot.cell);
   }
   /// To be called after every change of a chunk's voxels.
-  void voxels_changed(const IVec3& chunk, ChunkEntry& entry) {
-    const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
-    if (cell != ChunkWindow::kOutside && window_.voxels(cell) != entry.chunk.mixed()) window_.put(cell, &entry);
+  void voxels_changed(const Slot& slot) {
+    if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != slot.entry->chunk.mixed()) {
+      window_.put(slot.cell, slot.entry, epoch());
+    }
   }
   void erase(const IVec3& chunk);
   void clear();
 
-  [[nodiscard]] std::size_t size() const { return entries_.size(); }
-  [[nodiscard]] bool empty() const { return entries_.empty(); }
-  /// Bytes held, those of the entries excluded.
-  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] std::size_t size() const { return trie_.size(); }
+  [[nodiscard]] bool empty() const { return trie_.size() == 0; }
+  /// Bytes held, the chunks' voxels excluded.
+  [[nodiscard]] std::size_t bytes() const { return trie_.bytes() + window_.bytes(); }
   /// Places of the window.
   [[nodiscard]] std::size_t window_cells() const { return window_.cells(); }
   /// Chunks that do not stand in the window.
   [[nodiscard]] std::size_t outside() const { return outside_; }
 
-  /// Calls `visit(chunk, entry)` for each, in no order that means anything.
+  /// Calls `visit(chunk, entry)` for each, in an order that depends on nothing but the coordinates.
   template <class Visit>
   void for_each(Visit&& visit) const {
-    for (const auto& [at, entry] : entries_) visit(at, *entry);
+    trie_.for_each(visit);
+  }
+  template <class Visit>
+  void for_each_in(const IBox& chunks, Visit&& visit) const {
+    trie_.for_each_in(chunks, visit);
   }
 
  private:
-  // Spreads chunks over the table. The three products do not wait for each other, and a voxel that is looked up because
-  // of the one before waits for all of this.
-  struct Hash {
-    std::size_t operator()(IVec3 c) const {
-      const auto times = [](int i, std::uint64_t factor) { return static_cast<std::uint32_t>(i) * factor; };
-      const std::uint64_t sum =
-          times(c.x, 0x9E37'79B9'7F4A'7C15U) + times(c.y, 0xC2B2'AE3D'27D4'EB4FU) + times(c.z, 0x1656'67B1'9E37'79F9U);
-      return static_cast<std::size_t>(sum >> 32);
-    }
-  };
+  using Leaf = ChunkTrie<ChunkEntry>::Leaf;
 
-  [[nodiscard]] ChunkEntry* find_by_hash(int x, int y, int z) const;
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_.load(std::memory_order_relaxed); }
+  Slot find_shared_to_edit(const IVec3& chunk, std::uint32_t cell);
+  void put_leaf(Leaf& leaf);
   [[nodiscard]] std::size_t most_cells() const;
   [[nodiscard]] bool fits(const ChunkWindow::Box& box) const;
   [[nodiscard]] ChunkWindow::Box box_of_most(std::size_t left_out) const;
@@ -152,10 +168,13 @@ class ChunkTable {
   void try_to_plan();
   void move_to(const ChunkWindow::Box& box);
 
-  tsl::robin_map<IVec3, std::unique_ptr<ChunkEntry>, Hash> entries_;
+  ChunkTrie<ChunkEntry> trie_;
   ChunkWindow window_;
   std::size_t outside_ = 0;
   std::size_t outside_since_plan_ = 0;
+  bool is_planned_ = true;  // false: a copy that was not changed yet
+  // Raised by every copy: an entry that is known not to be shared since is of this epoch. 0 is of none.
+  mutable std::atomic<std::uint32_t> epoch_{1};
 };
 
 }  // namespace quoin

@@ -18,10 +18,10 @@ Key key_of(IVec3 at) {
 }
 
 ChunkEntry& add(ChunkTable& table, IVec3 at, VoxelType type) {
-  ChunkEntry& entry = table.find_or_create(at);
-  entry.chunk.set(1, 2, 3, type);
-  table.voxels_changed(at, entry);
-  return entry;
+  const ChunkTable::Slot slot = table.find_or_create(at);
+  slot.entry->chunk.set(1, 2, 3, type);
+  table.voxels_changed(slot);
+  return *slot.entry;
 }
 
 // A crowd that moves away bit by bit, and a few far from it and from each other.
@@ -121,15 +121,16 @@ TEST(ChunkTable, FarFromEachOtherChunksTakeNoWindow) {
 TEST(ChunkTable, VoxelsAreThoseOfTheStorageThatAnEditMoved) {
   ChunkTable table;
   const IVec3 at{-3, 4, 5};
-  ChunkEntry& entry = add(table, at, 2);
+  add(table, at, 2);
+  const ChunkTable::Slot slot = table.find_to_edit(at);
   const auto voxel = [&] { return table.voxel(-3 * 64 + 1, 4 * 64 + 2, 5 * 64 + 3); };
   EXPECT_EQ(voxel(), 2);
-  entry.chunk.fill(9);
-  table.voxels_changed(at, entry);
+  slot.entry->chunk.fill(9);
+  table.voxels_changed(slot);
   EXPECT_EQ(voxel(), 9);
-  entry.chunk = Chunk(4);
-  entry.chunk.set(0, 0, 0, 5);
-  table.voxels_changed(at, entry);
+  slot.entry->chunk = Chunk(4);
+  slot.entry->chunk.set(0, 0, 0, 5);
+  table.voxels_changed(slot);
   EXPECT_EQ(voxel(), 4);
   table.erase(at);
   EXPECT_EQ(voxel(), kAir);

@@ -1,10 +1,12 @@
 #include <quoin/grid/density_chunk.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstring>
 
+#include <quoin/core/assert.h>
+
+#include "grid/content_hash.h"
 #include "grid/stored_density.h"
 
 namespace quoin {
@@ -28,21 +30,11 @@ std::uint64_t solid_bits(const Half* row) {
 }  // namespace
 
 Half stored_density(float density, float band) {
-  assert(band > 0.0F);
+  QUOIN_ASSERT(band > 0.0F, "a positive band");
   return stored_within(density, largest_within(band));
 }
 
 DensityChunk::DensityChunk(Half density, VoxelType material) : uniform_(density), materials_(material) {}
-
-DensityChunk::DensityChunk(const DensityChunk& other)
-    : uniform_(other.uniform_),
-      materials_(other.materials_),
-      mixed_(other.mixed_ ? std::make_unique<Mixed>(*other.mixed_) : nullptr) {}
-
-DensityChunk& DensityChunk::operator=(const DensityChunk& other) {
-  if (this != &other) *this = DensityChunk(other);
-  return *this;
-}
 
 void DensityChunk::fill(Half density) {
   mixed_.reset();
@@ -59,7 +51,7 @@ void DensityChunk::read_row(int y, int z, std::span<Half, kChunkEdge> out) const
 }
 
 void DensityChunk::make_mixed() {
-  mixed_ = std::make_unique<Mixed>();
+  mixed_ = make_ref<Mixed>();
   mixed_->slabs.fill(kUniformSlab | uniform_);
   mixed_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
 }
@@ -92,6 +84,7 @@ std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunk
   if (std::memcmp(old, densities.data(), sizeof(Half) * kChunkEdge) == 0) return 0;
   const std::uint64_t changed = differences(old, densities.data());
   if (mixed_ == nullptr) make_mixed();
+  mixed_.make_own();
   const std::uint32_t slot = slot_for_writing(Chunk::slab_index(y, z));
   const std::size_t first = (std::size_t{slot} * kSlabRows + static_cast<std::size_t>(Chunk::row_in_slab(y, z)));
   std::memcpy(mixed_->values.data() + first * kChunkEdge, densities.data(), sizeof(Half) * kChunkEdge);
@@ -101,25 +94,29 @@ std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunk
 
 void DensityChunk::unite_slabs() {
   if (mixed_ == nullptr) return;
-  Mixed& m = *mixed_;
-  for (std::uint32_t& slab : m.slabs) {
+  for (std::size_t i = 0; i < mixed_->slabs.size(); ++i) {
+    const std::uint32_t slab = mixed_->slabs[i];
     if ((slab & kUniformSlab) != 0) continue;
-    const Half* values = m.row(slab, 0);
+    const Half* values = mixed_->row(slab, 0);
     // All are equal when each equals the next.
     if (std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) != 0) continue;
-    m.free_slots.push_back(slab);
-    slab = kUniformSlab | *values;
+    const Half value = *values;
+    mixed_.make_own();
+    mixed_->free_slots.push_back(slab);
+    mixed_->slabs[i] = kUniformSlab | value;
   }
-  const std::uint32_t first = m.slabs[0];
+  const std::uint32_t first = mixed_->slabs[0];
   if ((first & kUniformSlab) == 0) return;
-  const bool is_uniform = std::all_of(m.slabs.begin(), m.slabs.end(), [&](std::uint32_t s) { return s == first; });
+  const bool is_uniform =
+      std::all_of(mixed_->slabs.begin(), mixed_->slabs.end(), [&](std::uint32_t s) { return s == first; });
   if (is_uniform) fill(static_cast<Half>(first));
 }
 
 void DensityChunk::compact() {
   unite_slabs();
   materials_.compact();
-  if (mixed_ == nullptr) return;
+  // What others share they would keep all the same.
+  if (mixed_ == nullptr || mixed_.is_shared()) return;
   std::vector<Half> values;
   Mixed& m = *mixed_;
   values.reserve(m.values.size() - m.free_slots.size() * kSlabValues);
@@ -131,6 +128,23 @@ void DensityChunk::compact() {
   }
   m.values = std::move(values);
   m.free_slots = {};
+}
+
+bool DensityChunk::is_full() const {
+  if (mixed_ == nullptr) return is_solid(uniform_);
+  return std::all_of(mixed_->solid.begin(), mixed_->solid.end(), [](std::uint64_t row) { return ~row == 0; });
+}
+
+std::uint64_t DensityChunk::content_hash() const {
+  std::uint64_t hash = materials_.content_hash();
+  std::array<Half, kChunkEdge> row{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      read_row(y, z, row);
+      hash = mixed_with(hash, hash_of_row(row));
+    }
+  }
+  return hash;
 }
 
 std::size_t DensityChunk::bytes() const {

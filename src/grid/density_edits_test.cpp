@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
 #include "grid/density_oracle.h"
 
 namespace quoin {
@@ -165,22 +166,18 @@ TEST(DensityEdits, AgreeWithAPlainFieldAndTellOfEveryChunkThatTheyReach) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     DensityGrid grid(kBand);
+    ChangeFollower follower(grid);
     PlainField plain({IVec3(-54), IVec3(70)}, kBand);
     for (int round = 0; round < 12; ++round) {
       SCOPED_TRACE(round);
-      const std::uint64_t version = grid.version();
       const RandomEdit edit(random);
       const std::vector<IVec3> changed = edit.apply(plain);
       EXPECT_EQ(edit.apply(grid), static_cast<std::int64_t>(changed.size()));
       ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
-      EXPECT_EQ(grid.version() != version, !changed.empty());
-      const std::vector<IVec3> raised = chunks_reached(changed, 0);
-      for (const IVec3 chunk : grid.chunks()) {
-        EXPECT_EQ(grid.version(chunk) > version, std::find(raised.begin(), raised.end(), chunk) != raised.end());
-      }
+      EXPECT_EQ(follower.is_behind(grid), !changed.empty());
       const int reach = std::array{0, 1, 5, 12, 33, 64}[random() % 6];
-      EXPECT_EQ(grid.take_dirty(reach), chunks_reached(changed, reach)) << "reach " << reach;
-      EXPECT_TRUE(grid.take_dirty(64).empty());
+      EXPECT_EQ(follower.take(grid, reach), chunks_reached(changed, reach)) << "reach " << reach;
+      EXPECT_TRUE(follower.take(grid, 64).empty());
     }
   }
 }
@@ -212,13 +209,14 @@ TEST(DensityEdits, RemovedRockKeepsItsMaterialWhileItIsNearTheSurface) {
 
 TEST(DensityEdits, WhatIsRemovedAltogetherLeavesNothing) {
   DensityGrid grid;
+  ChangeFollower follower(grid);
   grid.add_box({-70, 3, 3}, {80, 90, 40}, 3, 4.0);
   EXPECT_GT(grid.chunk_count(), 3U);
   grid.remove_sphere({0, 40, 20}, 400.0);
   EXPECT_EQ(grid.chunk_count(), 0U);
   EXPECT_EQ(grid.solid_count(), 0);
   EXPECT_TRUE(grid.solid_bounds().empty());
-  EXPECT_FALSE(grid.take_dirty(0).empty());
+  EXPECT_FALSE(follower.take(grid, 0).empty());
 }
 
 TEST(DensityEdits, ABlendIntoEmptyAirAddsNothingButTheShape) {
@@ -242,8 +240,7 @@ TEST(DensityEdits, ABlendFillsTheCrease) {
 TEST(DensityEdits, SizesThatAreNoneChangeNothing) {
   DensityGrid grid;
   grid.add_sphere({0, 0, 0}, 5.0, 1);
-  grid.take_dirty(0);
-  const std::uint64_t version = grid.version();
+  ChangeFollower follower(grid);
   for (const double bad : {-1.0, kNan, kInfinity, -kInfinity}) {
     EXPECT_EQ(grid.add_sphere({0, 0, 0}, bad, 2), 0);
     EXPECT_EQ(grid.add_sphere({0, 0, 0}, 9.0, 2, bad), 0);
@@ -265,12 +262,13 @@ TEST(DensityEdits, SizesThatAreNoneChangeNothing) {
     EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, 1, 0}, {0, 1, 0}, bad, 1), 0);
   }
   EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, 1, 0}, {0, 0, 0}, 0.5, 1), 0);
-  EXPECT_EQ(grid.version(), version);
-  EXPECT_TRUE(grid.take_dirty(64).empty());
+  EXPECT_FALSE(follower.is_behind(grid));
+  EXPECT_TRUE(follower.take(grid, 64).empty());
 }
 
 TEST(DensityEdits, FarPlacesAndHugeRemovalsCostOnlyWhatIsThere) {
   DensityGrid grid;
+  ChangeFollower follower(grid);
   EXPECT_EQ(grid.add_sphere({1e300, 0, 0}, 5.0, 1), 0);
   EXPECT_EQ(grid.add_box({1e300, 1e300, 1e300}, {1.7e308, 1.7e308, 1.7e308}, 1), 0);
   EXPECT_GT(grid.add_sphere({1e9, -1e9, 1e9}, 5.0, 1), 0);
@@ -283,7 +281,7 @@ TEST(DensityEdits, FarPlacesAndHugeRemovalsCostOnlyWhatIsThere) {
   EXPECT_GT(grid.add_sphere({edge - 64.0, 0, 0}, 20.0, 1), 0);
   EXPECT_LT(grid.solid_bounds().max.x, std::numeric_limits<int>::max() - 62);
   EXPECT_GT(grid.add_sphere({-edge + 64.0, 0, 0}, 20.0, 1), 0);
-  EXPECT_FALSE(grid.take_dirty(64).empty());
+  EXPECT_FALSE(follower.take(grid, 64).empty());
 }
 
 TEST(DensityEdits, TheInsideOfALargeSolidIsUniformChunks) {

@@ -5,6 +5,7 @@
 namespace quoin {
 
 struct DensityGrid::Impl {
+  explicit Impl(float band) : store(band) {}
   DensityStore store;
 };
 

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
 #include "grid/density_oracle.h"
 
 namespace quoin {
@@ -88,12 +89,13 @@ TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
   SCOPED_TRACE(kSeed);
   std::mt19937 random(kSeed);
   DensityGrid grid;
+  ChangeFollower follower(grid);
   PlainField plain({IVec3(-64), IVec3(64)}, 8.0F);
   for (int round = 0; round < 24; ++round) {
     SCOPED_TRACE(round);
     const std::vector<IVec3> changed = change_both(random, round, grid, plain);
     const int reach = static_cast<int>(random() % 65);
-    EXPECT_EQ(grid.take_dirty(reach), chunks_reached(changed, reach));
+    EXPECT_EQ(follower.take(grid, reach), chunks_reached(changed, reach));
     if (round == 11) grid.compact();
     ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
   }
@@ -102,16 +104,15 @@ TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
 TEST(DensityGrid, TheSameStoredValueIsNoChange) {
   DensityGrid grid;
   EXPECT_TRUE(grid.set({1, 2, 3}, {-0.5F, 2}));
-  grid.take_dirty(0);
-  const std::uint64_t version = grid.version();
+  ChangeFollower follower(grid);
   EXPECT_FALSE(grid.set({1, 2, 3}, {-0.50001F, 2}));
   EXPECT_FALSE(grid.set({1, 2, 4}, {std::nanf(""), 7}));
   EXPECT_FALSE(grid.set({1, 2, 4}, {900.0F, 7}));
   EXPECT_EQ(grid.material({1, 2, 4}), kAir);
-  EXPECT_EQ(grid.version(), version);
-  EXPECT_TRUE(grid.take_dirty(9).empty());
+  EXPECT_FALSE(follower.is_behind(grid));
+  EXPECT_TRUE(follower.take(grid, 9).empty());
   EXPECT_TRUE(grid.set({1, 2, 3}, {-0.5F, 4}));
-  EXPECT_EQ(grid.take_dirty(1).size(), 1U);
+  EXPECT_EQ(follower.take(grid, 1).size(), 1U);
 }
 
 TEST(DensityGrid, FarAirGivenAMaterialForgetsIt) {
@@ -128,12 +129,11 @@ TEST(DensityGrid, FarAirGivenAMaterialForgetsIt) {
 TEST(DensityGrid, ADroppedChunkIsStillTakenWithItsNeighbours) {
   DensityGrid grid;
   grid.set({63, 10, 0}, {-1.0F, 1});
-  grid.take_dirty(0);
+  ChangeFollower follower(grid);
   grid.set({63, 10, 0}, {8.0F, 1});
   EXPECT_EQ(grid.chunk_count(), 0U);
-  EXPECT_EQ(grid.version({0, 0, 0}), 0U);
-  EXPECT_EQ(grid.take_dirty(1), std::vector<IVec3>({{0, 0, -1}, {1, 0, -1}, {0, 0, 0}, {1, 0, 0}}));
-  EXPECT_TRUE(grid.take_dirty(1).empty());
+  EXPECT_EQ(follower.take(grid, 1), std::vector<IVec3>({{0, 0, -1}, {1, 0, -1}, {0, 0, 0}, {1, 0, 0}}));
+  EXPECT_TRUE(follower.take(grid, 1).empty());
 }
 
 TEST(DensityGrid, ChangesThatNobodyTakesDoNotPileUp) {
@@ -149,29 +149,29 @@ TEST(DensityGrid, ClearTellsOfAllThatWasThere) {
   grid.add_sphere({0, 0, 0}, 70.0, 3);
   grid.set({300, 0, 0}, {1.0F, 0});
   std::vector<IVec3> chunks = grid.chunks();
-  grid.take_dirty(0);
+  ChangeFollower follower(grid);
   grid.clear();
   EXPECT_EQ(grid.chunk_count(), 0U);
-  EXPECT_EQ(grid.take_dirty(0), chunks);
-  const std::uint64_t version = grid.version();
+  EXPECT_EQ(follower.take(grid, 0), chunks);
   grid.clear();
-  EXPECT_EQ(grid.version(), version);
+  EXPECT_FALSE(follower.is_behind(grid));
 }
 
-TEST(DensityGrid, ACloneHasSamplesVersionsAndChanges) {
+TEST(DensityGrid, ASnapshotStaysAsItWas) {
   DensityGrid grid(5.0F);
   grid.add_sphere({10, 10, 10}, 12.0, 2);
-  DensityGrid copy = grid.clone();
+  DensityGrid copy = grid.snapshot();
   grid.remove_sphere({10, 10, 10}, 40.0);
   EXPECT_EQ(copy.band(), 5.0F);
   EXPECT_LT(copy.density({10, 10, 10}), 0.0F);
   EXPECT_EQ(copy.material({10, 10, 10}), 2);
-  EXPECT_GT(copy.version({0, 0, 0}), 0U);
-  EXPECT_FALSE(copy.take_dirty(0).empty());
+  EXPECT_GT(copy.solid_count(), 0);
+  EXPECT_EQ(grid.solid_count(), 0);
 }
 
 TEST(DensityGrid, TheEndsOfTheWorldStayAir) {
   DensityGrid grid;
+  ChangeFollower follower(grid);
   for (const int edge : {kLowest, kHighest}) {
     EXPECT_FALSE(grid.set({edge, 0, 0}, {-1.0F, 1}));
     EXPECT_FALSE(grid.set({0, 0, edge}, {-1.0F, 1}));
@@ -180,20 +180,20 @@ TEST(DensityGrid, TheEndsOfTheWorldStayAir) {
   grid.put_chunk(chunk_of({kLowest, 0, 0}), chunk_of_plane(5.0, 1));
   EXPECT_EQ(grid.chunk_count(), 0U);
   EXPECT_TRUE(grid.set({kLowest + 64, 0, 0}, {-1.0F, 1}));
-  EXPECT_EQ(grid.take_dirty(1).size(), 8U);
+  EXPECT_EQ(follower.take(grid, 1).size(), 8U);
   EXPECT_EQ(grid.neighbourhood(chunk_of({kLowest, 0, 0})).get({64, 0, 0}), stored_density(-1.0F, 8.0F));
 }
 
 TEST(DensityGrid, WhatAnEditDidBeforeItThrewStaysBooked) {
   DensityGrid grid;
+  ChangeFollower follower(grid);
   const auto pick = [](IVec3 p, DensitySample) -> DensitySample {
     if (p.y == 7) throw std::runtime_error("stop");
     return {-1.0F, 1};
   };
   EXPECT_THROW(grid.edit({{0, 0, 0}, {9, 9, 9}}, pick), std::runtime_error);
   EXPECT_EQ(grid.density({0, 0, 0}), -1.0F);
-  EXPECT_GT(grid.version({0, 0, 0}), 0U);
-  EXPECT_EQ(grid.take_dirty(0), std::vector<IVec3>({{0, 0, 0}}));
+  EXPECT_EQ(follower.take(grid, 0), std::vector<IVec3>({{0, 0, 0}}));
 }
 
 TEST(DensityGrid, EditVisitsEverySampleOnceInOrder) {

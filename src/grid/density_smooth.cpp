@@ -108,13 +108,12 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
   std::vector<IVec3> chunks;
   const IBox wanted = chunks_of(box);
   const IBox near{wanted.min - 1, wanted.max + 1};
-  for (const auto& [at, entry] : store.entries()) {
-    if (!near.contains(at)) continue;
+  store.entries().for_each_in(near, [&](IVec3 at, const DensityStore::Entry&) {
     for (int i = 0; i < 27; ++i) {
       const IVec3 chunk = at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
       if (wanted.contains(chunk)) chunks.push_back(chunk);
     }
-  }
+  });
   sort_and_unite(chunks);
   std::vector<ChunkPart> parts;
   parts.reserve(chunks.size());
@@ -127,6 +126,7 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
 std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   const Brush brush(centre, radius, strength);
   if (!brush.is_sound()) return 0;
+  notice_.give();
   DensityStore& store = impl_->store;
   const LongBox box = clipped(box_around(brush.sphere().min(), brush.sphere().max()));
   if (is_empty(box)) return 0;

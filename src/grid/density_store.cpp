@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
+
+#include <quoin/core/assert.h>
 
 #include "grid/stored_density.h"
 
@@ -38,13 +39,7 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
 }  // namespace
 
 DensityStore::DensityStore(float band) : far_(largest_within(band)) {
-  assert(band > 0.0F && band <= kLargestHalf);
-}
-
-DensityStore::DensityStore(const DensityStore& other)
-    : far_(other.far_), changes_(other.changes_), version_(other.version_) {
-  entries_.reserve(other.entries_.size());
-  for (const auto& [at, entry] : other.entries_) entries_.emplace(at, std::make_unique<Entry>(*entry));
+  QUOIN_ASSERT(band > 0.0F && band <= kLargestHalf, "0 < band <= 65,504");
 }
 
 VoxelType DensityStore::material(IVec3 sample) const {
@@ -110,18 +105,19 @@ ChangeReach DensityStore::differences(const DensityChunk* before, const DensityC
 }
 
 DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
-  const auto it = entries_.find(chunk);
-  if (it != entries_.end()) return *it->second;
-  return *entries_.emplace(chunk, std::make_unique<Entry>(Entry{DensityChunk(far_)})).first->second;
+  const auto stay = [](auto&) {};
+  if (Entry* entry = entries_.find_to_edit(chunk, stay)) return *entry;
+  Entry& made = entries_.find_or_create(chunk, stay);
+  made.samples = DensityChunk(far_);
+  return made;
 }
 
 void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row) {
   if (changes.samples != 0) {
-    entry.version = version_;
-    changes_[chunk].add(changes);
+    journal_.note(entry.serial, {chunk, changes}, entries_.size());
     if (has_even_row) entry.samples.unite_slabs();
   }
-  if (entry.samples.uniform() == far_) entries_.erase(chunk);
+  if (entry.samples.uniform() == far_) entries_.erase(chunk, [](auto&) {});
 }
 
 std::int64_t DensityStore::make_solid(IVec3 chunk, VoxelType material) {
@@ -137,57 +133,41 @@ void DensityStore::put(IVec3 chunk, DensityChunk samples) {
   if (!is_inside_world(chunk)) return;
   samples.unite_slabs();
   const Entry* present = find(chunk);
+  if (present != nullptr && present->samples.shares_storage_with(samples)) return;
   const ChangeReach changes = differences(present == nullptr ? nullptr : &present->samples, &samples);
   if (present == nullptr && changes.samples == 0) return;
-  if (changes.samples != 0) ++version_;
+  journal_.begin_change();
   Entry& entry = find_or_create(chunk);
   entry.samples = std::move(samples);
   finish_edit(chunk, entry, changes, false);
 }
 
 void DensityStore::clear() {
-  if (entries_.empty()) return;
-  ++version_;
-  for (const auto& [at, entry] : entries_) changes_[at].add(differences(&entry->samples, nullptr));
+  if (entries_.size() == 0) return;
+  journal_.begin_change();
+  entries_.for_each([this](IVec3 at, const Entry& entry) {
+    std::uint64_t serial = entry.serial;
+    journal_.note(serial, {at, differences(&entry.samples, nullptr)}, entries_.size());
+  });
   entries_.clear();
-}
-
-std::vector<IVec3> DensityStore::take_dirty(int reach) {
-  assert(reach >= 0 && reach <= kChunkEdge);
-  std::vector<IVec3> taken;
-  for (const auto& [at, changes] : changes_) {
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          if (changes.is_within(reach, dx, dy, dz)) taken.push_back(at + IVec3{dx, dy, dz});
-        }
-      }
-    }
-  }
-  changes_.clear();
-  sort_and_unite(taken);
-  return taken;
 }
 
 std::vector<IVec3> DensityStore::chunks() const {
   std::vector<IVec3> all;
   all.reserve(entries_.size());
-  for (const auto& [at, entry] : entries_) all.push_back(at);
+  entries_.for_each([&](IVec3 at, const Entry&) { all.push_back(at); });
   std::sort(all.begin(), all.end(), by_zyx);
   return all;
 }
 
 std::size_t DensityStore::bytes() const {
-  std::size_t total = sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bucket_count() * sizeof(void*) * 4 +
-                      changes_.bucket_count() * (sizeof(IVec3) + sizeof(ChangeReach) + sizeof(void*));
-  for (const auto& [at, entry] : entries_) {
-    total += sizeof(Entry) - sizeof(DensityChunk) + entry->samples.bytes();
-  }
+  std::size_t total = sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + journal_.bytes();
+  entries_.for_each([&](IVec3, const Entry& entry) { total += entry.samples.bytes() - sizeof(DensityChunk); });
   return total;
 }
 
 void DensityStore::compact() {
-  for (auto it = entries_.begin(); it != entries_.end(); ++it) it.value()->samples.compact();
+  for (const IVec3 at : chunks()) find_or_create(at).samples.compact();
 }
 
 }  // namespace quoin

@@ -3,17 +3,15 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <memory>
 #include <utility>
 #include <vector>
 
-#include <tsl/robin_map.h>
-
 #include <quoin/grid/density_grid.h>
 
-#include "grid/change_reach.h"
+#include "core/change_journal.h"
+#include "grid/change_records.h"
 #include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
+#include "grid/chunk_trie.h"
 #include "grid/long_box.h"
 
 namespace quoin {
@@ -41,22 +39,17 @@ struct ChunkPart {
 class DensityStore {
  public:
   struct Entry {
-    DensityChunk samples;
-    std::uint64_t version = 0;
+    DensityChunk samples{Half{0}};
+    std::uint64_t serial = 0;  ///< of its last record in the journal
   };
 
   explicit DensityStore(float band);
-  DensityStore(const DensityStore& other);
-  DensityStore& operator=(const DensityStore&) = delete;
 
   [[nodiscard]] Half far() const { return far_; }
   [[nodiscard]] float band() const { return float_from_half(far_); }
-  [[nodiscard]] std::uint64_t version() const { return version_; }
-  [[nodiscard]] const auto& entries() const { return entries_; }
-  [[nodiscard]] const Entry* find(IVec3 chunk) const {
-    const auto it = entries_.find(chunk);
-    return it == entries_.end() ? nullptr : it->second.get();
-  }
+  [[nodiscard]] const ChunkTrie<Entry>& entries() const { return entries_; }
+  [[nodiscard]] const ChangeJournal<DensityRecord>& journal() const { return journal_; }
+  [[nodiscard]] const Entry* find(IVec3 chunk) const { return entries_.find(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] Half get(IVec3 sample) const {
     const Entry* entry = find(chunk_of(sample));
     if (entry == nullptr) return far_;
@@ -66,12 +59,12 @@ class DensityStore {
   /// Air where the density is far air, whatever is stored there.
   [[nodiscard]] VoxelType material(IVec3 sample) const;
 
-  /// Edits the samples of a box, clipped to the world, chunk by chunk in the order of z, y, x. Answers how many
+  /// Edits the samples of a box, clipped to the world, chunk by chunk in the order of z, y, x. Returns how many
   /// changed.
   ///
   /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
   /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
-  /// `change(sample, first, end, row)` changes part of a row, and answers false when it did not; `sample` is the row's
+  /// `change(sample, first, end, row)` changes part of a row, and returns false when it did not; `sample` is the row's
   /// first (local x = 0).
   template <class ChooseChunk, class ChangeRow>
   std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change);
@@ -82,7 +75,6 @@ class DensityStore {
 
   void put(IVec3 chunk, DensityChunk samples);
   void clear();
-  std::vector<IVec3> take_dirty(int reach);
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t bytes() const;
   void compact();
@@ -93,7 +85,7 @@ class DensityStore {
   static bool is_even(const Half* row) {
     return row != nullptr && std::memcmp(row, row + 1, sizeof(Half) * (kChunkEdge - 1)) == 0;
   }
-  // Answers which samples changed.
+  // Returns which samples changed.
   std::uint64_t write_row(DensityChunk& samples, int y, int z, int first, int end, const SampleRow& row) const;
   [[nodiscard]] ChangeReach differences(const DensityChunk* before, const DensityChunk* after) const;
   Entry& find_or_create(IVec3 chunk);
@@ -105,9 +97,8 @@ class DensityStore {
   std::int64_t make_solid(IVec3 chunk, VoxelType material);
 
   Half far_;
-  tsl::robin_map<IVec3, std::unique_ptr<Entry>, CoordinateHash> entries_;
-  tsl::robin_map<IVec3, ChangeReach, CoordinateHash> changes_;  // since they were last taken
-  std::uint64_t version_ = 0;
+  ChunkTrie<Entry> entries_;
+  ChangeJournal<DensityRecord> journal_;
 };
 
 template <class ChangeRow>
@@ -136,10 +127,9 @@ std::int64_t DensityStore::edit_rows(IVec3 chunk, const IBox& part, ChangeRow& c
 
 template <class ChangeRow>
 std::int64_t DensityStore::edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change) {
-  ++version_;
+  journal_.begin_change();
   std::int64_t changed = 0;
   for (const ChunkPart& part : parts) changed += edit_rows(part.chunk, part.box, change);
-  if (changed == 0) --version_;
   return changed;
 }
 
@@ -149,7 +139,7 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
-  ++version_;
+  journal_.begin_change();
   std::int64_t changed = 0;
   const auto visit = [&](IVec3 chunk) {
     const ChunkEdit wish = chunk_edit(chunk);
@@ -168,13 +158,10 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
     }
   } else {
     std::vector<IVec3> present;
-    for (const auto& [at, entry] : entries_) {
-      if (chunks.contains(at)) present.push_back(at);
-    }
+    entries_.for_each_in(chunks, [&](IVec3 at, const Entry&) { present.push_back(at); });
     std::sort(present.begin(), present.end(), by_zyx);
     for (const IVec3 at : present) visit(at);
   }
-  if (changed == 0) --version_;
   return changed;
 }
 

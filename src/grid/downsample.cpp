@@ -1,7 +1,6 @@
 #include <quoin/grid/downsample.h>
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -23,30 +22,24 @@ void remake(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec
   for (std::size_t i = 0; i < chunks.size(); ++i) coarse.put_chunk(chunks[i], std::move(made[i]));
 }
 
-// What is kept of a level: which versions of the finer grid's chunks it was made of.
+// What is kept of a level: how far it has followed the finer grid.
 struct Level {
   Grid grid;
-  std::vector<std::pair<IVec3, std::uint64_t>> made_of;
+  ChangeCursor followed;
 
   void update(const Grid& finer, const VoxelRegistry& types, Threads threads);
 };
 
-bool same_chunk_before(const std::pair<IVec3, std::uint64_t>& a, const std::pair<IVec3, std::uint64_t>& b) {
-  return by_zyx(a.first, b.first);
-}
-
 void Level::update(const Grid& finer, const VoxelRegistry& types, Threads threads) {
-  std::vector<std::pair<IVec3, std::uint64_t>> now;
-  for (const IVec3 chunk : finer.chunks()) now.emplace_back(chunk, finer.version(chunk));
-  std::vector<std::pair<IVec3, std::uint64_t>> changed;
-  const auto order = [](const auto& a, const auto& b) {
-    return a.first != b.first ? same_chunk_before(a, b) : a.second < b.second;
-  };
-  std::set_symmetric_difference(now.begin(), now.end(), made_of.begin(), made_of.end(), std::back_inserter(changed),
-                                order);
+  ChangeCursor now = followed;
+  const GridChanges changes = finer.changes_since(now);
   std::vector<IVec3> dirty;
-  for (const auto& [chunk, version] : changed) {
-    for (int i = 0; i < 27; ++i) dirty.push_back(halved_coordinates(chunk + IVec3{i % 3, i / 3 % 3, i / 9} - 1));
+  if (changes.all) {
+    dirty = grid.chunks();
+    for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
+  }
+  for (const ChunkChange& change : changes.items) {
+    for (int i = 0; i < 27; ++i) dirty.push_back(halved_coordinates(change.chunk + IVec3{i % 3, i / 3 % 3, i / 9} - 1));
   }
   sort_and_unite(dirty);
   std::erase_if(dirty, [&](IVec3 chunk) {
@@ -56,7 +49,7 @@ void Level::update(const Grid& finer, const VoxelRegistry& types, Threads thread
     return grid.find_chunk(chunk) == nullptr;
   });
   remake(finer, types, dirty, threads, grid);
-  made_of = std::move(now);
+  followed = now;
 }
 
 }  // namespace

@@ -2,125 +2,131 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
+#include <mutex>
 #include <set>
+#include <utility>
 
+#include "core/change_journal.h"
+#include "grid/change_records.h"
+#include "grid/chunk_difference.h"
 #include "grid/chunk_order.h"
 #include "grid/chunk_table.h"
 #include "grid/long_box.h"
-#include "grid/reach.h"
 
 namespace quoin {
 namespace {
 
-std::uint64_t next_identity() {
-  static std::atomic<std::uint64_t> count{0};
-  return count.fetch_add(1, std::memory_order_relaxed) + 1;
-}
+// The bounds as they were last asked for. What changed within them since, without touching their sides, leaves them as
+// they were.
+class KeptBounds {
+ public:
+  KeptBounds() = default;
+  KeptBounds(const KeptBounds& other) {
+    const std::lock_guard lock(other.mutex_);
+    cursor_ = other.cursor_;
+    box_ = other.box_;
+  }
+
+  template <class Measure>
+  IBox update(const ChangeJournal<VoxelRecord>& journal, Measure&& measure) {
+    const std::lock_guard lock(mutex_);
+    bool is_same = true;
+    is_same &= journal.visit_since(cursor_, [&](const VoxelRecord& record) { is_same &= is_within(record); });
+    if (!is_same) box_ = measure();
+    return box_;
+  }
+
+ private:
+  [[nodiscard]] bool is_within(const VoxelRecord& record) const {
+    if (box_.empty()) return false;
+    const IBox changed = record.box.box();
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t first = std::int64_t{record.chunk[axis]} * kChunkEdge;
+      if (first + changed.min[axis] <= box_.min[axis] || first + changed.max[axis] >= box_.max[axis]) return false;
+    }
+    return true;
+  }
+
+  mutable std::mutex mutex_;
+  ChangeCursor cursor_;
+  IBox box_;
+};
 
 }  // namespace
 
 struct Grid::Impl {
   ChunkTable entries;
-  std::vector<IVec3> dirty;  // a chunk that was dropped and came again may stand in it more than once
-  std::uint64_t version = 0;
-  std::uint64_t identity = next_identity();
+  ChangeJournal<VoxelRecord> journal;
+  KeptBounds bounds;
 
-  // Books that the mesh of a chunk may have changed.
-  void touch(const IVec3& chunk, ChunkEntry& entry) {
-    entry.neighbourhood_version = version;
-    if (entry.is_dirty) return;
-    if (dirty.size() == dirty.capacity()) make_room_in_dirty();
-    dirty.push_back(chunk);
-    entry.is_dirty = true;
-  }
-
-  // Chunks that come and go would let the list grow for ever where nobody takes it.
-  void make_room_in_dirty() {
-    sort_and_unite(dirty);
-    dirty.reserve(std::max<std::size_t>(16, 2 * dirty.size()));
-  }
-
-  // Books an edit of one chunk: versions, dirty neighbours, and the chunk dropped where nothing is left in it.
-  void finish_edit(const IVec3& chunk, ChunkEntry& entry, const Reach& reach) {
+  // Books an edit of one chunk, and drops the chunk where nothing is left in it.
+  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit) {
     // Before anything that may throw: the storage that was known may be gone.
-    entries.voxels_changed(chunk, entry);
-    if (reach.voxels != 0) {
-      entry.version = version;
-      touch(chunk, entry);
-      if (reach.mask != Reach::kCentreOnly) touch_neighbours(chunk, reach.mask);
+    entries.voxels_changed(slot);
+    if (edit.voxels != 0) {
+      edit.record.chunk = chunk;
+      journal.note(slot.entry->serial, edit.record, entries.size());
     }
-    if (entry.chunk.non_air_count() == 0) entries.erase(chunk);
+    if (slot.entry->chunk.non_air_count() == 0) entries.erase(chunk);
   }
 
-  void touch_neighbours(const IVec3& chunk, std::uint32_t mask) {
-    for (std::uint32_t left = mask & ~Reach::kCentreOnly; left != 0; left &= left - 1) {
-      const int i = std::countr_zero(left);
-      const IVec3 at = chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-      if (ChunkEntry* neighbour = entries.find(at)) touch(at, *neighbour);
-    }
-  }
-
-  // Calls `change(chunk, entry, part of the box in chunk coordinates, reach)` for every chunk of a box. Chunks that are
+  // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
   std::int64_t edit_box(const LongBox& wanted, bool create, Change&& change);
+  template <class Change>
+  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, Change& change);
 };
+
+template <class Change>
+std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, Change& change) {
+  VoxelEdit edit;
+  entries.voxels_will_change(slot);
+  try {
+    change(chunk, slot.entry->chunk, part, edit);
+  } catch (...) {
+    edit.add_all();
+    finish_edit(chunk, slot, edit);
+    throw;
+  }
+  finish_edit(chunk, slot, edit);
+  return edit.voxels;
+}
 
 template <class Change>
 std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& change) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
-  ++version;
+  journal.begin_change();
   std::int64_t changed = 0;
-  const auto edit_chunk = [&](IVec3 chunk, ChunkEntry& entry) {
-    Reach reach;
-    entries.voxels_will_change(chunk);
-    try {
-      change(chunk, entry.chunk, part_of(box, chunk), reach);
-    } catch (...) {
-      reach.add_all();
-      finish_edit(chunk, entry, reach);
-      throw;
-    }
-    changed += reach.voxels;
-    finish_edit(chunk, entry, reach);
-  };
   if (create) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
-        for (int x = chunks.min.x; x < chunks.max.x; ++x) edit_chunk({x, y, z}, entries.find_or_create({x, y, z}));
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const IVec3 at{x, y, z};
+          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), change);
+        }
       }
     }
-  } else {
-    std::vector<IVec3> present;
-    entries.for_each([&](IVec3 at, const ChunkEntry&) {
-      if (chunks.contains(at)) present.push_back(at);
-    });
-    std::sort(present.begin(), present.end(), by_zyx);
-    for (const IVec3 at : present) edit_chunk(at, *entries.find(at));
+    return changed;
   }
-  if (changed == 0) --version;
+  std::vector<IVec3> present;
+  entries.for_each_in(chunks, [&](IVec3 at, const ChunkEntry&) { present.push_back(at); });
+  std::sort(present.begin(), present.end(), by_zyx);
+  for (const IVec3 at : present) changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), change);
   return changed;
 }
 
 Grid::Grid() : impl_(std::make_unique<Impl>()) {}
+Grid::Grid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Grid::Grid(Grid&&) noexcept = default;
 Grid& Grid::operator=(Grid&&) noexcept = default;
 Grid::~Grid() = default;
 
-Grid Grid::clone() const {
-  Grid copy;
-  copy.impl_->version = impl_->version;
-  copy.impl_->dirty = impl_->dirty;
-  impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
-    ChunkEntry& made = copy.impl_->entries.find_or_create(at);
-    made = entry;
-    copy.impl_->entries.voxels_changed(at, made);
-  });
-  return copy;
+Grid Grid::snapshot() const {
+  return Grid(std::make_unique<Impl>(*impl_));
 }
 
 VoxelType Grid::get(int x, int y, int z) const {
@@ -130,26 +136,29 @@ VoxelType Grid::get(int x, int y, int z) const {
 bool Grid::set(int x, int y, int z, VoxelType type) {
   const IVec3 at{x >> kChunkShift, y >> kChunkShift, z >> kChunkShift};
   const IVec3 local{x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1)};
-  ChunkEntry* entry = impl_->entries.find(at);
-  if (entry == nullptr) {
+  impl_->journal.begin_change();
+  ChunkTable::Slot slot = impl_->entries.find_to_edit(at);
+  if (slot.entry == nullptr) {
     if (type == kAir || !is_inside_world(at)) return false;
-    entry = &impl_->entries.find_or_create(at);
+    slot = impl_->entries.find_or_create(at);
   }
-  Reach reach;
+  VoxelEdit edit;
   try {
-    if (!entry->chunk.set(local, type)) return false;
+    if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
-    impl_->finish_edit(at, *entry, reach);
+    impl_->finish_edit(at, slot, edit);
     throw;
   }
-  ++impl_->version;
+  edit.voxels = 1;
   const auto is_inner = [](int i) { return i != 0 && i != kChunkEdge - 1; };
   if (is_inner(local.x) && is_inner(local.y) && is_inner(local.z)) {
-    impl_->finish_edit(at, *entry, {.voxels = 1, .mask = Reach::kCentreOnly});
-    return true;
+    edit.record.neighbours = VoxelRecord::kCentreOnly;
+    edit.record.box = PackedBox::of(local.x, local.y, local.z);
+  } else {
+    edit.record.add(local.y, local.z, std::uint64_t{1} << local.x);
   }
-  reach.add(local.y, local.z, std::uint64_t{1} << local.x);
-  impl_->finish_edit(at, *entry, reach);
+  impl_->finish_edit(at, slot, edit);
+  notice_.give();
   return true;
 }
 
@@ -157,32 +166,34 @@ std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelT
   const IVec3 at = chunk_of(row);
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
-  ChunkEntry& entry = impl_->entries.find_or_create(at);
-  ++impl_->version;
-  Reach reach;
+  impl_->journal.begin_change();
+  const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
+  VoxelEdit edit;
+  notice_.give();
   try {
-    reach.add(local.y, local.z, entry.chunk.write_row(local.y, local.z, mask, types));
+    edit.add(local.y, local.z, slot.entry->chunk.write_row(local.y, local.z, mask, types));
   } catch (...) {
-    reach.add_all();
-    impl_->finish_edit(at, entry, reach);
+    edit.add_all();
+    impl_->finish_edit(at, slot, edit);
     throw;
   }
-  if (reach.voxels == 0) --impl_->version;
-  impl_->finish_edit(at, entry, reach);
-  return reach.voxels;
+  impl_->finish_edit(at, slot, edit);
+  return edit.voxels;
 }
 
 std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
   const LongBox box = box_from(glm::min(first, last), glm::max(first, last));
-  return impl_->edit_box(box, type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, Reach& reach) {
-    chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { reach.add(y, z, changed); });
+  notice_.give();
+  return impl_->edit_box(box, type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+    chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   });
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
   if (!(radius >= 0.0) || !is_finite(centre)) return 0;
   const LongBox box = box_around(centre - radius, centre + radius);
-  return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
+  notice_.give();
+  return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     const DVec3 local_centre = centre - DVec3(at) * double{kChunkEdge} - 0.5;
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
@@ -194,24 +205,23 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
           mask |= std::uint64_t{dx * dx + dy * dy + dz * dz <= radius * radius} << x;
         }
         const std::uint64_t changed = chunk.set_row(y, z, mask, type);
-        if (changed != 0) reach.add(y, z, changed);
+        edit.add(y, z, changed);
       }
     }
   });
 }
 
-std::int64_t Grid::edit(const IBox& wanted, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick) {
-  return impl_->edit_box(box_from(wanted), true, [&](IVec3 at, Chunk& chunk, const IBox& part, Reach& reach) {
+std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change) {
+  notice_.give();
+  return impl_->edit_box(box_from(wanted), true, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     std::array<VoxelType, kChunkEdge> row{};
+    const auto first = static_cast<std::size_t>(part.min.x);
+    const auto count = static_cast<std::size_t>(part.max.x - part.min.x);
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
         chunk.read_row(y, z, row);
-        for (int x = part.min.x; x < part.max.x; ++x) {
-          VoxelType& type = row[static_cast<std::size_t>(x)];
-          type = pick(at * kChunkEdge + IVec3{x, y, z}, type);
-        }
-        const std::uint64_t changed = chunk.write_row(y, z, row);
-        if (changed != 0) reach.add(y, z, changed);
+        change(at * kChunkEdge + IVec3{part.min.x, y, z}, std::span(row).subspan(first, count));
+        edit.add(y, z, chunk.write_row(y, z, row));
       }
     }
   });
@@ -219,35 +229,32 @@ std::int64_t Grid::edit(const IBox& wanted, const std::function<VoxelType(IVec3 
 
 void Grid::put_chunk(IVec3 at, Chunk voxels) {
   if (!is_inside_world(at)) return;
-  ChunkEntry* present = impl_->entries.find(at);
+  const ChunkEntry* present = impl_->entries.find(at);
   if (present == nullptr && voxels.non_air_count() == 0) return;
-  ChunkEntry& entry = present != nullptr ? *present : impl_->entries.find_or_create(at);
-  Reach reach;
-  std::array<VoxelType, kChunkEdge> old_row{};
-  std::array<VoxelType, kChunkEdge> new_row{};
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      if (present == nullptr) {
-        reach.add(y, z, ~voxels.row_mask(y, z, kAir));
-        continue;
-      }
-      entry.chunk.read_row(y, z, old_row);
-      voxels.read_row(y, z, new_row);
-      std::uint64_t changed = 0;
-      for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{old_row[x] != new_row[x]} << x;
-      if (changed != 0) reach.add(y, z, changed);
-    }
-  }
-  entry.chunk = std::move(voxels);
-  if (reach.voxels != 0) ++impl_->version;
-  impl_->finish_edit(at, entry, reach);
+  if (present != nullptr && present->chunk.shares_storage_with(voxels)) return;
+  impl_->journal.begin_change();
+  const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
+  VoxelEdit edit;
+  difference_of_types(slot.entry->chunk, voxels, edit);
+  slot.entry->chunk = std::move(voxels);
+  impl_->finish_edit(at, slot, edit);
+  notice_.give();
 }
 
 void Grid::clear() {
   if (impl_->entries.empty()) return;
-  ++impl_->version;
-  impl_->entries.for_each([&](IVec3 at, ChunkEntry& entry) { impl_->touch(at, entry); });
+  impl_->journal.begin_change();
+  impl_->entries.for_each([this](IVec3 at, const ChunkEntry& entry) {
+    const IBox box = entry.chunk.bounds();
+    VoxelRecord record{at};
+    record.add_all();
+    record.box = PackedBox::of(box.min.x, box.min.y, box.min.z);
+    record.box.unite(PackedBox::of(box.max.x - 1, box.max.y - 1, box.max.z - 1));
+    std::uint64_t serial = entry.serial;
+    impl_->journal.note(serial, record, impl_->entries.size());
+  });
   impl_->entries.clear();
+  notice_.give();
 }
 
 const Chunk* Grid::find_chunk(int x, int y, int z) const {
@@ -279,41 +286,49 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
   return result;
 }
 
-std::uint64_t Grid::version(IVec3 chunk) const {
-  const ChunkEntry* entry = impl_->entries.find(chunk);
-  return entry == nullptr ? 0 : entry->version;
+GridChanges Grid::changes_since(ChangeCursor& cursor) const {
+  GridChanges changes;
+  changes.all = !impl_->journal.visit_since(
+      cursor, [&](const VoxelRecord& record) { changes.items.push_back(record.change()); });
+  unite_changes(changes.items, by_chunk, [](ChunkChange& into, const ChunkChange& other) {
+    into.box = unite(into.box, other.box);
+    into.neighbours |= other.neighbours;
+  });
+  return changes;
 }
 
-std::uint64_t Grid::neighbourhood_version(IVec3 chunk) const {
-  const ChunkEntry* entry = impl_->entries.find(chunk);
-  return entry == nullptr ? 0 : entry->neighbourhood_version;
+bool Grid::has_changed_since(const ChangeCursor& cursor) const {
+  return impl_->journal.has_changed_since(cursor);
 }
 
-std::uint64_t Grid::version() const {
-  return impl_->version;
+ChangeCursor Grid::cursor() const {
+  return impl_->journal.present();
 }
 
-std::uint64_t Grid::identity() const {
-  return impl_->identity;
-}
-
-std::vector<IVec3> Grid::take_dirty() {
-  std::vector<IVec3> taken = std::move(impl_->dirty);
-  impl_->dirty.clear();
-  for (const IVec3 at : taken) {
-    if (ChunkEntry* entry = impl_->entries.find(at)) entry->is_dirty = false;
+std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) {
+  if (changes.all) return grid.chunks();
+  std::vector<IVec3> chunks;
+  for (const ChunkChange& change : changes.items) {
+    chunks.push_back(change.chunk);
+    for (std::uint32_t left = change.neighbours & ~VoxelRecord::kCentreOnly; left != 0; left &= left - 1) {
+      const int i = std::countr_zero(left);
+      const IVec3 at = change.chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      if (grid.find_chunk(at) != nullptr) chunks.push_back(at);
+    }
   }
-  sort_and_unite(taken);
-  return taken;
+  sort_and_unite(chunks);
+  return chunks;
 }
 
 IBox Grid::bounds() const {
-  IBox box;
-  impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
-    const IBox inside = entry.chunk.bounds();
-    box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
+  return impl_->bounds.update(impl_->journal, [this] {
+    IBox box;
+    impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
+      const IBox inside = entry.chunk.bounds();
+      box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
+    });
+    return box;
   });
-  return box;
 }
 
 std::int64_t Grid::voxel_count() const {
@@ -332,35 +347,34 @@ std::vector<VoxelType> Grid::types() const {
   return {all.begin(), all.end()};
 }
 
-void Grid::for_each(const std::function<void(IVec3 voxel, VoxelType type)>& visit) const {
+void Grid::for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType> types)> visit) const {
   std::array<VoxelType, kChunkEdge> row{};
   for (const IVec3 at : chunks()) {
     const Chunk& chunk = *find_chunk(at);
     const IBox box = chunk.bounds();
+    const auto first = static_cast<std::size_t>(box.min.x);
+    const auto count = static_cast<std::size_t>(box.max.x - box.min.x);
     for (int z = box.min.z; z < box.max.z; ++z) {
       for (int y = box.min.y; y < box.max.y; ++y) {
         chunk.read_row(y, z, row);
-        for (int x = box.min.x; x < box.max.x; ++x) {
-          const VoxelType type = row[static_cast<std::size_t>(x)];
-          if (type != kAir) visit(at * kChunkEdge + IVec3{x, y, z}, type);
-        }
+        visit(at * kChunkEdge + IVec3{box.min.x, y, z}, std::span<const VoxelType>(row).subspan(first, count));
       }
     }
   }
 }
 
 std::size_t Grid::bytes() const {
-  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->dirty.capacity() * sizeof(IVec3);
-  impl_->entries.for_each(
-      [&](IVec3, const ChunkEntry& entry) { total += sizeof(ChunkEntry) - sizeof(Chunk) + entry.chunk.bytes(); });
+  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->journal.bytes();
+  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
   return total;
 }
 
 void Grid::compact() {
-  impl_->entries.for_each([&](IVec3 at, ChunkEntry& entry) {
-    entry.chunk.compact();
-    impl_->entries.voxels_changed(at, entry);
-  });
+  for (const IVec3 at : chunks()) {
+    const ChunkTable::Slot slot = impl_->entries.find_to_edit(at);
+    slot.entry->chunk.compact();
+    impl_->entries.voxels_changed(slot);
+  }
 }
 
 }  // namespace quoin

@@ -136,7 +136,7 @@ BENCHMARK(set_alone)->Name("grid/set_alone")->Unit(benchmark::kMillisecond);
 // one takes.
 void edits_undone(benchmark::State& state, std::uint32_t types) {
   constexpr int kEdits = 1'000'000;
-  Grid grid = world().clone();
+  Grid grid = world().snapshot();
   std::vector<std::pair<IVec3, VoxelType>> undo(kEdits);
   std::uint64_t s = 42;
   for (auto _ : state) {

@@ -12,6 +12,8 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
+
 namespace quoin {
 namespace {
 
@@ -106,7 +108,7 @@ TEST(Grid, AgreesWithAMapUnderRandomEdits) {
     EXPECT_EQ((plain[{v.x, v.y, v.z}]), type);
   });
   EXPECT_EQ(visited, count);
-  const Grid copy = grid.clone();
+  const Grid copy = grid.snapshot();
   EXPECT_EQ(copy.voxel_count(), count);
 }
 
@@ -117,19 +119,15 @@ TEST(Grid, EditOfACornerDirtiesSevenNeighboursThatExist) {
       for (int x = -1; x <= 1; ++x) grid.set(IVec3{x, y, z} * 64 + 32, 1);
     }
   }
-  grid.take_dirty();
-  const std::uint64_t before = grid.neighbourhood_version({1, 1, 1});
+  ChangeFollower follower(grid);
   grid.set({32, 32, 33}, 2);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}}));
-  EXPECT_EQ(grid.neighbourhood_version({1, 1, 1}), before);
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}}));
   grid.set({63, 63, 63}, 2);
-  EXPECT_EQ(grid.take_dirty().size(), 8U);
-  EXPECT_GT(grid.neighbourhood_version({1, 1, 1}), before);
-  EXPECT_EQ(grid.version({1, 1, 1}), before);
+  EXPECT_EQ(follower.take(grid).size(), 8U);
   grid.set({0, 63, 32}, 2);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{-1, 0, 0}, {0, 0, 0}, {-1, 1, 0}, {0, 1, 0}}));
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{-1, 0, 0}, {0, 0, 0}, {-1, 1, 0}, {0, 1, 0}}));
   grid.set({0, 63, 32}, 2);
-  EXPECT_TRUE(grid.take_dirty().empty());
+  EXPECT_TRUE(follower.take(grid).empty());
 }
 
 TEST(Grid, SphereThatTouchesTwoSidesButNotTheirEdgeSparesTheDiagonalNeighbour) {
@@ -137,9 +135,9 @@ TEST(Grid, SphereThatTouchesTwoSidesButNotTheirEdgeSparesTheDiagonalNeighbour) {
   for (int y = 0; y <= 1; ++y) {
     for (int x = 0; x <= 1; ++x) grid.set(IVec3{x * 64 + 32, y * 64 + 32, 5}, 1);
   }
-  grid.take_dirty();
+  ChangeFollower follower(grid);
   grid.fill_sphere({54.0, 54.0, 32.0}, 10.0, 2);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
 }
 
 TEST(Grid, HugeFillsOfAirCostOnlyWhatIsThere) {
@@ -174,14 +172,13 @@ TEST(Grid, PuttingAChunkBooksOnlyWhatDiffers) {
   Chunk first;
   first.set(0, 0, 0, 1);
   grid.put_chunk({2, 0, 0}, first);
-  const std::uint64_t version = grid.version({2, 0, 0});
-  grid.take_dirty();
+  ChangeFollower follower(grid);
   grid.put_chunk({2, 0, 0}, first);
-  EXPECT_EQ(grid.version({2, 0, 0}), version);
-  EXPECT_TRUE(grid.take_dirty().empty());
+  EXPECT_FALSE(follower.is_behind(grid));
+  EXPECT_TRUE(follower.take(grid).empty());
   grid.put_chunk({2, 0, 0}, Chunk());
   EXPECT_EQ(grid.chunk_count(), 0U);
-  EXPECT_EQ(grid.take_dirty().size(), 1U);
+  EXPECT_EQ(follower.take(grid).size(), 1U);
 }
 
 TEST(Grid, PuttingANewChunkDirtiesOnlyWhatItsVoxelsReach) {
@@ -193,20 +190,20 @@ TEST(Grid, PuttingANewChunkDirtiesOnlyWhatItsVoxelsReach) {
       }
     }
   }
-  grid.take_dirty();
+  ChangeFollower follower(grid);
   Chunk inner;
   inner.set(30, 30, 30, 1);
   grid.put_chunk({0, 0, 0}, inner);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}}));
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}}));
   Chunk with_side = inner;
   with_side.set(63, 20, 20, 1);
   grid.put_chunk({0, 0, 0}, with_side);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
 /// The chunks that hold one of the 26 neighbours of a voxel of the box that is not what it was.
 std::vector<IVec3> reached_chunks(const Grid& before, const Grid& after, const IBox& box) {
-  std::set<std::tuple<int, int, int>> found;  // z, y, x: the order of take_dirty
+  std::set<std::tuple<int, int, int>> found;  // z, y, x: the order of chunks_to_mesh
   for (int z = box.min.z; z < box.max.z; ++z) {
     for (int y = box.min.y; y < box.max.y; ++y) {
       for (int x = box.min.x; x < box.max.x; ++x) {
@@ -227,10 +224,10 @@ TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
   std::mt19937 random(3);
   Grid grid;
   grid.fill_box({-100, -100, -100}, {100, 100, 100}, 1);
-  grid.take_dirty();
+  ChangeFollower follower(grid);
   const auto near = [&] { return static_cast<int>(random() % 5) * 32 - 66 + static_cast<int>(random() % 5); };
   for (int round = 0; round < 60; ++round) {
-    const Grid before = grid.clone();
+    const Grid before = grid.snapshot();
     const IVec3 a{near(), near(), near()};
     const auto type = static_cast<VoxelType>(random() % 3);
     const int extent = static_cast<int>(random() % 6);
@@ -250,7 +247,7 @@ TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
         grid.put_chunk(chunk_of(a), std::move(copy));
       }
     }
-    EXPECT_EQ(grid.take_dirty(), reached_chunks(before, grid, {a - 7, a + 8})) << "round " << round;
+    EXPECT_EQ(follower.take(grid), reached_chunks(before, grid, {a - 7, a + 8})) << "round " << round;
   }
 }
 
@@ -258,16 +255,14 @@ TEST(Grid, AnEditThatThrowsIsBooked) {
   Grid grid;
   grid.set({1, 1, 1}, 1);
   grid.set({64, 1, 1}, 1);
-  grid.take_dirty();
-  const std::uint64_t before = grid.version({0, 0, 0});
+  ChangeFollower follower(grid);
   const auto pick = [](IVec3 v, VoxelType) {
     if (v.y == 5) throw std::bad_alloc();
     return VoxelType{2};
   };
   EXPECT_THROW(grid.edit({{0, 0, 0}, {64, 64, 64}}, pick), std::bad_alloc);
   EXPECT_EQ(grid.get({63, 4, 0}), 2);
-  EXPECT_GT(grid.version({0, 0, 0}), before);
-  EXPECT_EQ(grid.take_dirty(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
 // The storage of a chunk comes and goes while it is edited.
@@ -286,11 +281,16 @@ TEST(Grid, AnEditMayReadWhatItChanges) {
   }
 }
 
-TEST(Grid, ChunksThatComeAndGoDoNotFillTheDirtyListForEver) {
+TEST(Grid, ChunksThatComeAndGoDoNotFillTheJournalForEver) {
   Grid grid;
   for (int i = 0; i < 100'000; ++i) grid.set({i % 3 * 64, 0, 0}, static_cast<VoxelType>(i / 3 % 2));
-  EXPECT_LT(grid.bytes(), 32'768U);
-  EXPECT_EQ(grid.take_dirty().size(), 3U);
+  EXPECT_LT(grid.bytes(), 32'768U) << "nobody follows";
+  ChangeCursor late = grid.cursor();
+  for (int i = 0; i < 100'000; ++i) grid.set({i % 3 * 64, 0, 0}, static_cast<VoxelType>(i / 3 % 2));
+  EXPECT_LT(grid.bytes(), 500'000U);
+  EXPECT_TRUE(grid.changes_since(late).all) << "so far behind";
+  grid.set({0, 0, 0}, 5);
+  EXPECT_EQ(grid.changes_since(late).items.size(), 1U);
 }
 
 TEST(Grid, CornersOfTheWorldCanBeEdited) {
@@ -311,17 +311,15 @@ TEST(Grid, CornersOfTheWorldCanBeEdited) {
   }
 }
 
-TEST(Grid, ItsIdentityGoesWithTheVoxelsAndIsNoOthers) {
+TEST(Grid, ItsJournalGoesWithTheVoxelsAndIsNoOthers) {
   Grid grid;
-  const std::uint64_t identity = grid.identity();
+  ChangeCursor cursor = grid.cursor();
   grid.set({1, 2, 3}, 1);
-  EXPECT_EQ(grid.identity(), identity) << "an edit raises the version alone";
-  EXPECT_NE(grid.clone().identity(), identity);
-  EXPECT_NE(Grid().identity(), identity);
   Grid other = std::move(grid);
-  EXPECT_EQ(other.identity(), identity);
+  EXPECT_EQ(other.changes_since(cursor).items.size(), 1U);
+  EXPECT_TRUE(other.changes_since(cursor).empty());
   other = Grid();
-  EXPECT_NE(other.identity(), identity);
+  EXPECT_TRUE(other.changes_since(cursor).all);
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
 #include <quoin/grid/voxel_registry.h>
 
-#include <cassert>
+#include <algorithm>
 #include <functional>
+#include <utility>
+
+#include "core/change_journal.h"
 
 namespace quoin {
 namespace {
@@ -14,55 +17,112 @@ std::uint64_t hash_of(const VoxelProperties& p) {
          static_cast<std::uint64_t>(p.visibility);
 }
 
+template <class T>
+void make_room(std::vector<T>& all) {
+  if (all.size() == all.capacity()) all.reserve(2 * all.size() + 1);
+}
+
 }  // namespace
 
-VoxelRegistry::VoxelRegistry() {
+struct TypeRecord : TypeChange {
+  void merge(const TypeRecord& other) {
+    visibility |= other.visibility;
+    colour |= other.colour;
+  }
+};
+
+struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
+
+VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::make_unique<Journal>()) {
   VoxelProperties air;
   air.name = "air";
   air.colour = {0, 0, 0, 0};
   air.visibility = Visibility::Air;
   air.collides = false;
-  properties_.push_back(std::move(air));
-  visibility_.push_back(Visibility::Air);
+  content_->properties.push_back(std::move(air));
+  content_->visibility.push_back(Visibility::Air);
+  content_->serials.push_back(0);
+}
+
+VoxelRegistry::VoxelRegistry(const VoxelRegistry& other)
+    : content_(other.content_), journal_(std::make_unique<Journal>(*other.journal_)) {}
+VoxelRegistry::VoxelRegistry(VoxelRegistry&&) noexcept = default;
+VoxelRegistry& VoxelRegistry::operator=(const VoxelRegistry& other) {
+  if (this != &other) *this = VoxelRegistry(other);
+  return *this;
+}
+VoxelRegistry& VoxelRegistry::operator=(VoxelRegistry&&) noexcept = default;
+VoxelRegistry::~VoxelRegistry() = default;
+
+void VoxelRegistry::note(TypeChange change) {
+  journal_->note(content_->serials[change.type], {change}, size());
 }
 
 Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (properties.visibility == Visibility::Air) {
     return fail(ErrorCode::InvalidArgument, "type 0 is the only air");
   }
-  if (properties_.size() > kMaxVoxelTypes) {
+  if (size() > kMaxVoxelTypes) {
     return fail(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
-  const auto type = static_cast<VoxelType>(properties_.size());
-  if (properties.visibility == Visibility::Transparent) ++transparent_count_;
-  by_hash_.emplace(hash_of(properties), type);
-  visibility_.push_back(properties.visibility);
-  properties_.push_back(std::move(properties));
+  journal_->begin_change();
+  content_.make_own();
+  Content& c = *content_;
+  const auto type = static_cast<VoxelType>(size());
+  const Visibility visibility = properties.visibility;
+  // Room first, so that nothing is half done when there is none.
+  make_room(c.serials);
+  make_room(c.visibility);
+  make_room(c.properties);
+  c.by_hash.emplace(hash_of(properties), type);
+  c.serials.push_back(0);
+  c.visibility.push_back(visibility);
+  c.properties.push_back(std::move(properties));
+  if (visibility == Visibility::Transparent) ++c.transparent_count;
+  note({type, visibility != Visibility::Opaque, true});
   return type;
 }
 
 Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) {
-  const auto [first, last] = by_hash_.equal_range(hash_of(properties));
+  const auto [first, last] = std::as_const(content_->by_hash).equal_range(hash_of(properties));
   for (auto it = first; it != last; ++it) {
-    if (properties_[it->second] == properties) return it->second;
+    if ((*this)[it->second] == properties) return it->second;
   }
   return add(properties);
 }
 
 void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
-  assert(type != kAir && type < properties_.size() && properties.visibility != Visibility::Air);
-  const auto [first, last] = by_hash_.equal_range(hash_of(properties_[type]));
-  for (auto it = first; it != last; ++it) {
-    if (it->second == type) {
-      by_hash_.erase(it);
-      break;
-    }
-  }
-  by_hash_.emplace(hash_of(properties), type);
-  if (visibility_[type] == Visibility::Transparent) --transparent_count_;
-  if (properties.visibility == Visibility::Transparent) ++transparent_count_;
-  visibility_[type] = properties.visibility;
-  properties_[type] = std::move(properties);
+  QUOIN_ASSERT(type != kAir && type < size(), "a registered type, not air");
+  QUOIN_ASSERT(properties.visibility != Visibility::Air, "type 0 is the only air");
+  journal_->begin_change();
+  content_.make_own();
+  Content& c = *content_;
+  const auto [first, last] = c.by_hash.equal_range(hash_of(c.properties[type]));
+  const auto old = std::find_if(first, last, [type](const auto& each) { return each.second == type; });
+  c.by_hash.emplace(hash_of(properties), type);
+  if (old != last) c.by_hash.erase(old);
+  const Visibility was = std::exchange(c.visibility[type], properties.visibility);
+  if (was == Visibility::Transparent) --c.transparent_count;
+  if (properties.visibility == Visibility::Transparent) ++c.transparent_count;
+  const TypeChange change{type, was != properties.visibility, !(c.properties[type].colour == properties.colour)};
+  c.properties[type] = std::move(properties);
+  note(change);
+}
+
+ChangeCursor VoxelRegistry::cursor() const {
+  return journal_->present();
+}
+
+TypeChanges VoxelRegistry::changes_since(ChangeCursor& cursor) const {
+  TypeChanges changes;
+  changes.all = !journal_->visit_since(cursor, [&](const TypeRecord& record) { changes.items.push_back(record); });
+  unite_changes(
+      changes.items, [](const TypeChange& a, const TypeChange& b) { return a.type < b.type; },
+      [](TypeChange& into, const TypeChange& later) {
+        into.visibility |= later.visibility;
+        into.colour |= later.colour;
+      });
+  return changes;
 }
 
 }  // namespace quoin

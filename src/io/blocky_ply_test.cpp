@@ -16,11 +16,11 @@ TEST(BlockyPly, every_face_stands_in_the_world_with_its_colour) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
   const InstanceHandle mirrored = place(scene, grid, {10, 20, 30});
-  scene.instances()[mirrored].mirrored = true;
-  scene.instances()[mirrored].voxel_size = 2.0;
-  scene.instances()[mirrored].rotation = DQuat(0.5, 0.5, 0.5, 0.5);
+  scene.edit(mirrored).mirrored = true;
+  scene.edit(mirrored).voxel_size = 2.0;
+  scene.edit(mirrored).rotation = DQuat(0.5, 0.5, 0.5, 0.5);
   place(scene, grid, {-40, 0, 0});
-  scene.instances()[place(scene, grid, {90, 0, 0})].visible = false;
+  scene.edit(place(scene, grid, {90, 0, 0})).visible = false;
   const auto meshes = mesh_scene(scene, {.merge = false});
   ASSERT_TRUE(meshes);
   const TestFolder folder("blocky_ply");
@@ -50,7 +50,7 @@ TEST(BlockyPly, failures_leave_no_file) {
   const InstanceHandle placed = place(scene, add_asymmetric_grid(scene, "L"), {});
   const TestFolder folder("blocky_ply_failures");
   const auto meshes = mesh_scene(scene, {});
-  scene.instances()[placed].voxel_size = -1.0;
+  scene.edit(placed).voxel_size = -1.0;
   const auto refused = write_ply(scene, meshes.value(), folder.file("out.ply"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);

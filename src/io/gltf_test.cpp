@@ -81,8 +81,8 @@ TEST_F(Gltf, instances_of_one_grid_share_its_mesh_and_keep_names_and_transforms)
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0}, "first");
   const InstanceHandle second = place(scene_, grid, {10.5, -3, 1e6}, "second");
-  scene_.instances()[second].rotation = glm::angleAxis(glm::radians(90.0), DVec3(0, 1, 0));
-  scene_.instances()[second].voxel_size = 0.25;
+  scene_.edit(second).rotation = glm::angleAxis(glm::radians(90.0), DVec3(0, 1, 0));
+  scene_.edit(second).voxel_size = 0.25;
   const ParsedGlb glb = write();
   ASSERT_EQ(glb.document["meshes"].size(), 1U);
   ASSERT_EQ(glb.document["nodes"].size(), 2U);
@@ -105,7 +105,7 @@ TEST_F(Gltf, every_instance_lies_where_the_scene_has_it_mirrored_ones_too) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-20.0, 20.0);
   for (int i = 0; i < 6; ++i) {
-    Instance& instance = scene_.instances()[place(scene_, grid, {number(random), number(random), number(random)})];
+    Instance& instance = scene_.edit(place(scene_, grid, {number(random), number(random), number(random)}));
     instance.rotation = glm::normalize(DQuat(number(random), number(random), number(random), number(random)));
     instance.voxel_size = i < 2 ? 1.0 : 0.5 * i;
     instance.mirrored = i % 2 == 1;
@@ -132,7 +132,7 @@ TEST_F(Gltf, every_instance_lies_where_the_scene_has_it_mirrored_ones_too) {
 TEST_F(Gltf, an_asymmetric_model_is_pinned) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0});
-  Instance& mirrored = scene_.instances()[place(scene_, grid, {0, 0, 0})];
+  Instance& mirrored = scene_.edit(place(scene_, grid, {0, 0, 0}));
   mirrored.mirrored = true;
   const ParsedGlb glb = write();
   // The red tip fills (3..4, 1..2, 0..1); the pivot is at (2, 2.5, 0.5).
@@ -221,7 +221,7 @@ TEST_F(Gltf, hidden_instances_are_left_out_unless_asked_for) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   const GridHandle other = add_asymmetric_grid(scene_, "ghost");
   place(scene_, grid, {0, 0, 0}, "seen");
-  scene_.instances()[place(scene_, other, {0, 0, 0}, "unseen")].visible = false;
+  scene_.edit(place(scene_, other, {0, 0, 0}, "unseen")).visible = false;
   EXPECT_EQ(write().document["nodes"].size(), 1U);
   const auto all = mesh_scene(scene_, {}, true);
   ASSERT_TRUE(all);
@@ -250,7 +250,7 @@ TEST_F(Gltf, the_same_bytes_at_any_thread_count) {
   std::mt19937 random(11);
   for (int g = 0; g < 5; ++g) {
     const GridHandle handle = add_asymmetric_grid(scene_, "grid " + std::to_string(g));
-    Grid& grid = scene_.grids()[handle].grid;
+    Grid& grid = scene_.edit(handle).grid;
     for (int i = 0; i < 2000; ++i) {
       grid.set({static_cast<int>(random() % 100), static_cast<int>(random() % 100), static_cast<int>(random() % 300)},
                1);

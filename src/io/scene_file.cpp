@@ -48,7 +48,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   }
   std::map<GridHandle, GridHandle> new_grid_of;
   for (const GridHandle handle : from.grids().handles()) {
-    SceneGrid grid = std::move(from.grids()[handle]);
+    SceneGrid grid = std::move(from.edit(handle));
     grid.grid = with_types(std::move(grid.grid), new_type_of);
     new_grid_of[handle] = into.add_grid(std::move(grid));
   }

@@ -66,7 +66,7 @@ TEST(SceneMeshes, types_that_are_not_registered_are_refused) {
       Scene scene;
       const GridHandle grid = add_grid(scene, 1);
       place(scene, grid);
-      scene.grids()[grid].grid.set({1, 0, 0}, type);
+      scene.edit(grid).grid.set({1, 0, 0}, type);
       const auto meshes = mesh_scene(scene, {.merge = true, .occlusion = true, .watertight = watertight});
       ASSERT_FALSE(meshes) << type;
       EXPECT_EQ(meshes.error().code, ErrorCode::InvalidArgument);
@@ -78,7 +78,7 @@ TEST(SceneMeshes, types_that_are_not_registered_do_no_harm_where_no_face_shows_t
   Scene scene;
   const GridHandle grid = add_grid(scene, 3);
   place(scene, grid);
-  Grid& voxels = scene.grids()[grid].grid;
+  Grid& voxels = scene.edit(grid).grid;
   voxels.fill_box({0, 0, 0}, {2, 2, 2}, 1);
   voxels.set({1, 1, 1}, 65535);
   EXPECT_TRUE(mesh_scene(scene, {}));

@@ -58,11 +58,11 @@ void add_instances(const vox::Placements& placements, const std::vector<GridHand
   for (const vox::Placement& placement : placements.all) {
     const GridHandle grid = grids[placement.model];
     scene.add_instance(instance_of(placement, grid, options));
-    std::string& name = scene.grids()[grid].name;
+    std::string& name = scene.edit(grid).name;
     if (name.empty()) name = printable(placement.shape_name);
   }
   for (const vox::Placement& placement : placements.all) {
-    std::string& name = scene.grids()[grids[placement.model]].name;
+    std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.name);
   }
 }

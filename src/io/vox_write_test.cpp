@@ -87,7 +87,7 @@ Scene random_scene(std::uint32_t seed) {
     instance.mirrored = turn.mirrored;
     instance.visible = random.between(0, 3) != 0;
     scene.add_instance(instance);
-    SceneGrid& grid = scene.grids()[instance.grid];
+    SceneGrid& grid = scene.edit(instance.grid);
     if (grid.name.empty() && random.between(0, 2) == 0) grid.name = "grid";
   }
   // Names that the file does not hold come from the first instance that has one.
@@ -256,17 +256,17 @@ TEST(VoxWrite, WhatVoxCannotSayIsRefused) {
     return bytes ? std::optional<ErrorCode>{} : bytes.error().code;
   };
   EXPECT_EQ(code(), std::nullopt);
-  scene.instances()[instance].voxel_size = 2.0;
+  scene.edit(instance).voxel_size = 2.0;
   EXPECT_EQ(code(), ErrorCode::Unsupported);
-  scene.instances()[instance].voxel_size = 1.0;
-  scene.instances()[instance].rotation = glm::angleAxis(0.5, DVec3(0, 1, 0));
+  scene.edit(instance).voxel_size = 1.0;
+  scene.edit(instance).rotation = glm::angleAxis(0.5, DVec3(0, 1, 0));
   EXPECT_EQ(code(), ErrorCode::Unsupported);
-  scene.instances()[instance].rotation = {1, 0, 0, 0};
-  scene.instances()[instance].position = {1e12, 0, 0};
+  scene.edit(instance).rotation = {1, 0, 0, 0};
+  scene.edit(instance).position = {1e12, 0, 0};
   EXPECT_EQ(code(), ErrorCode::LimitExceeded);
-  scene.instances()[instance].position = {0, std::nan(""), 0};
+  scene.edit(instance).position = {0, std::nan(""), 0};
   EXPECT_EQ(code(), ErrorCode::LimitExceeded);
-  scene.instances()[instance].position = {0, 0.25, 0};
+  scene.edit(instance).position = {0, 0.25, 0};
   EXPECT_EQ(code(), std::nullopt);
   EXPECT_EQ(warnings, std::vector<std::string>{"instances between voxels moved to the nearest: 1"});
 }

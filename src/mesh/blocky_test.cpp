@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
 #include "bench/workloads.h"
 #include "mesh/mesh_oracle.h"
 
@@ -296,7 +297,7 @@ TEST(GreedyQuads, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
     return all;
   };
   auto before = mesh_all();
-  grid.take_dirty();
+  ChangeFollower follower(grid);
   int dirty_count = 0;
   for (int i = 0; i < 40; ++i) {
     const auto border = [&] { return static_cast<int>(random() % 2) * 64 - static_cast<int>(random() % 3); };
@@ -309,7 +310,7 @@ TEST(GreedyQuads, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
     }
     auto after = mesh_all();
     std::set<std::tuple<int, int, int>> dirty;
-    for (const IVec3 c : grid.take_dirty()) dirty.insert({c.x, c.y, c.z});
+    for (const IVec3 c : follower.take(grid)) dirty.insert({c.x, c.y, c.z});
     dirty_count += static_cast<int>(dirty.size());
     for (const auto& [key, quads] : after) {
       if (quads != before[key]) {

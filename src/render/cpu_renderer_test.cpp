@@ -284,7 +284,7 @@ TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   const GridHandle grid = scene.grids().handles()[0];
   scene.instances()[first].position += DVec3(3, 1, 0);
   renderer.expect_as_new("moved");
-  scene.grids()[grid].grid.fill_sphere({4, 3, 4}, 6.0, 1);
+  scene.edit(grid).grid.fill_sphere({4, 3, 4}, 6.0, 1);
   renderer.expect_as_new("edited");
   VoxelProperties stone = scene.types[1];
   stone.colour = {20, 200, 30, 255};
@@ -295,12 +295,12 @@ TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   scene.types.replace(1, stone);
   renderer.expect_as_new("transparent");
   scene.types.replace(1, {});
-  scene.grids()[grid].grid = scene.grids()[grid].grid.clone();
-  place(scene, scene.grids()[grid].grid.clone(), {-10, 4, 6});
+  scene.edit(grid).grid = scene.grids()[grid].grid.snapshot();
+  place(scene, scene.grids()[grid].grid.snapshot(), {-10, 4, 6});
   renderer.expect_as_new("more");
   scene.remove_instance(first);
   renderer.expect_as_new("fewer");
-  scene.grids()[grid].grid.clear();
+  scene.edit(grid).grid.clear();
   renderer.expect_as_new("emptied");
 }
 

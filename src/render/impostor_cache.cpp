@@ -13,10 +13,8 @@ namespace {
 
 // Which voxels an impostor was made of.
 struct Origin {
-  std::uint64_t identity = 0;  // of the grid
-  std::uint64_t version = 0;
+  ChangeCursor grid;
   std::uint64_t types = 0;  // how often the transparency of types had changed
-  bool operator==(const Origin&) const = default;
 };
 
 struct Entry {
@@ -35,9 +33,9 @@ struct ImpostorCache::Impl {
   std::deque<GridHandle> waiting;
   ImpostorCacheStatistics statistics;
   std::uint64_t built_bytes = 0;
-  std::vector<VoxelType> transparent;  // when types were looked at; all others are opaque, unregistered ones too
-  std::uint64_t types_changed = 0;     // how often
-  std::uint64_t round = 0;             // of build_some
+  ChangeCursor followed_types;
+  std::uint64_t types_changed = 0;  // how often, in whether they are transparent
+  std::uint64_t round = 0;          // of build_some
 
   std::optional<GridHandle> take_waiting() {
     const std::lock_guard lock(mutex);
@@ -93,17 +91,17 @@ struct ImpostorCache::Impl {
   }
 
   // Requires: the lock.
-  [[nodiscard]] Origin origin_of(const Grid& grid) const { return {grid.identity(), grid.version(), types_changed}; }
+  [[nodiscard]] Origin origin_of(const Grid& grid) const { return {grid.cursor(), types_changed}; }
+  [[nodiscard]] bool is_current(const Entry& entry, const Grid& grid) const {
+    return entry.origin.types == types_changed && !grid.has_changed_since(entry.origin.grid);
+  }
 
   void look_at(const VoxelRegistry& types) {
-    std::vector<VoxelType> now;
-    for (std::size_t type = 0; type < types.size(); ++type) {
-      if (types.is_transparent(static_cast<VoxelType>(type))) now.push_back(static_cast<VoxelType>(type));
-    }
     const std::lock_guard lock(mutex);
-    if (now == transparent) return;
-    ++types_changed;
-    transparent = std::move(now);
+    const TypeChanges changes = types.changes_since(followed_types);
+    const bool are_others =
+        std::any_of(changes.items.begin(), changes.items.end(), [](const TypeChange& each) { return each.visibility; });
+    if (changes.all || are_others) ++types_changed;
   }
 
   void put(GridHandle grid, const Origin& origin, std::shared_ptr<const Impostor> made) {
@@ -158,7 +156,7 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
   const std::lock_guard lock(impl_->mutex);
   Entry& entry = impl_->entries[grid];
   entry.last_use = impl_->round;
-  if ((entry.impostor == nullptr || entry.origin != impl_->origin_of(named->grid)) && !entry.is_waiting) {
+  if ((entry.impostor == nullptr || !impl_->is_current(entry, named->grid)) && !entry.is_waiting) {
     entry.is_waiting = true;
     impl_->waiting.push_back(grid);
   }

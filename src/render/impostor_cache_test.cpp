@@ -53,7 +53,7 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   const auto old = cache.find(world.scene, world.grids[0]);
   ASSERT_NE(old, nullptr);
-  world.scene.grids()[world.grids[0]].grid.fill_box({0, 0, 0}, {5, 5, 5}, 2);
+  world.scene.edit(world.grids[0]).grid.fill_box({0, 0, 0}, {5, 5, 5}, 2);
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), old);
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   const auto renewed = cache.find(world.scene, world.grids[0]);
@@ -77,7 +77,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   EXPECT_EQ(ready(), first) << "nothing has changed";
   Grid other;
   other.fill_box({0, 0, 0}, {0, 2, 3}, 3);
-  world.scene.grids()[world.grids[0]].grid = std::move(other);
+  world.scene.edit(world.grids[0]).grid = std::move(other);
   const auto second = ready();
   EXPECT_TRUE(shows(*second, 3)) << "of the same version as the one before";
   VoxelProperties glass = world.scene.types[3];
@@ -90,7 +90,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
 TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
   World world(1);
   const auto type = static_cast<VoxelType>(world.scene.types.size());
-  world.scene.grids()[world.grids[0]].grid.fill_box({0, 0, 0}, {0, 2, 3}, type);
+  world.scene.edit(world.grids[0]).grid.fill_box({0, 0, 0}, {0, 2, 3}, type);
   ImpostorCache cache;
   const auto is_empty = [&] {
     cache.look_at_types(world.scene.types);

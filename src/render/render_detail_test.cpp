@@ -31,9 +31,9 @@ struct Model {
 
   void place_turned(Grid grid) {
     instance = place(scene, std::move(grid));
-    SceneGrid& placed = scene.grids()[scene.instances()[instance].grid];
+    SceneGrid& placed = scene.edit(scene.instances()[instance].grid);
     placed.pivot = content_sphere(placed.grid).centre;
-    scene.instances()[instance].rotation = glm::angleAxis(0.7, glm::normalize(DVec3(0.3, 1.0, 0.1)));
+    scene.edit(instance).rotation = glm::angleAxis(0.7, glm::normalize(DVec3(0.3, 1.0, 0.1)));
   }
   [[nodiscard]] double radius() const {
     return content_sphere(scene.grids()[scene.instances()[instance].grid].grid).radius;
@@ -239,7 +239,7 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
 TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
   VoxelType glass = kAir;
   Model model = blobs(&glass);
-  Grid& voxels = model.scene.grids()[model.scene.instances()[model.instance].grid].grid;
+  Grid& voxels = model.scene.edit(model.scene.instances()[model.instance].grid).grid;
   voxels.edit(voxels.bounds(), [&](IVec3, VoxelType type) { return type == glass ? VoxelType{1} : type; });
   Scene coarse;
   for (VoxelType type = 1; type < model.scene.types.size(); ++type) {

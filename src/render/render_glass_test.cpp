@@ -105,7 +105,7 @@ TEST(RenderGlass, LengthsAreInVoxelsWhateverTheirSize) {
   Grid grid;
   grid.fill_box({0, 0, 0}, {0, 0, 3}, s.glass);
   const InstanceHandle instance = place(s.scene, std::move(grid), {0, 0, 10});
-  s.scene.instances()[instance].voxel_size = 0.5;
+  s.scene.edit(instance).voxel_size = 0.5;
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, {0.25, 0.25, 0});
   std::vector<GlassBody> bodies;

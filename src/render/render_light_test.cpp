@@ -107,7 +107,7 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   Grid grid = floor_of(type);
   grid.fill_box({-9, 10, -9}, {8, 10, 8}, type);
   const InstanceHandle instance = place(scene, std::move(grid));
-  scene.instances()[instance].voxel_size = 0.25;
+  scene.edit(instance).voxel_size = 0.25;
   RenderOptions options = sized(1, 1);
   options.light.occlusion = OcclusionMode::Off;
   options.light.sun = {0, 0.001, 0};  // of any length

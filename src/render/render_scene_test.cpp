@@ -67,7 +67,7 @@ TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
     Grid turned;
     voxels.for_each(
         [&](IVec3 voxel, VoxelType type) { turned.set(IVec3(glm::floor(all[i] * (DVec3(voxel) + 0.5))), type); });
-    Instance& instance = placed.scene.instances()[place(placed.scene, std::move(voxels))];
+    Instance& instance = placed.scene.edit(place(placed.scene, std::move(voxels)));
     instance.mirrored = glm::determinant(all[i]) < 0.0;
     glm::dmat3 rotation = all[i];
     if (instance.mirrored) rotation[0] = -rotation[0];
@@ -186,7 +186,7 @@ TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
   World large;
   World small;
   place(large.scene, blobs(large, 7));
-  small.scene.instances()[place(small.scene, blobs(small, 7))].voxel_size = 0.125;
+  small.scene.edit(place(small.scene, blobs(small, 7))).voxel_size = 0.125;
   Camera camera = kCamera;
   camera.position *= 0.125;
   const Picture a = taken(large.scene, kCamera, sized(64, 64));

@@ -33,13 +33,10 @@ void DeviceDetail::clear() {
 }
 
 void DeviceDetail::look_at(const Scene& scene) {
-  if (takes_other_visibility(visibility_, scene.types)) clear();
-  std::map<GridHandle, std::uint64_t> now;
-  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) { now[handle] = grid.grid.identity(); });
-  const auto is_gone = [&](GridHandle handle) {
-    const auto found = now.find(handle);
-    return found == now.end() || found->second != identities_[handle];
-  };
+  if (has_other_visibility(scene.types, followed_types_)) clear();
+  const SceneChanges changes = scene.changes_since(followed_scene_);
+  const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
+  if (!changes.all && std::none_of(changes.grids.begin(), changes.grids.end(), is_gone)) return;
   coarse_.forget(is_gone);
   impostors_.forget(is_gone);
   for (auto level = levels_.begin(); level != levels_.end();) {
@@ -48,7 +45,6 @@ void DeviceDetail::look_at(const Scene& scene) {
     each->second.voxels.release(*memory_);
     levels_.erase(each);
   }
-  identities_ = std::move(now);
 }
 
 Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,

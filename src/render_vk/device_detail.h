@@ -67,8 +67,8 @@ class DeviceDetail {
   DeviceImpostors impostors_;
   CoarseGrids coarse_;
   std::map<Key, Level> levels_;
-  std::map<GridHandle, std::uint64_t> identities_;  // of grids that the last scene had
-  std::vector<Visibility> visibility_;
+  ChangeCursor followed_scene_;
+  ChangeCursor followed_types_;
   std::uint64_t picture_ = 0;
   Place table_place_;
   std::vector<ShaderGrid> table_;

@@ -37,27 +37,23 @@ std::uint64_t DeviceGrid::bytes() const {
 
 Status DeviceGrid::update(DeviceMemory& memory, const Grid& grid, const OccupancyTree& opaque,
                           const OccupancyTree* transparent) {
-  if (identity_ == grid.identity() && version_ == grid.version()) return {};
-  if (identity_ != grid.identity()) release(memory);
-  const std::vector<IVec3> present = grid.chunks();
-  std::vector<IVec3> changed;
-  for (const IVec3 at : present) {
-    const auto found = chunks_.find(at);
-    if (found == chunks_.end() || found->second.version != grid.version(at)) changed.push_back(at);
+  ChangeCursor now = followed_;
+  const GridChanges changes = grid.changes_since(now);
+  if (changes.empty()) return {};
+  if (changes.all) {
+    release(memory);
+    for (const IVec3 at : grid.chunks()) {
+      if (Status done = put_chunk(memory, grid, opaque, transparent, at); !done) return done;
+    }
   }
-  for (auto& [at, chunk] : chunks_) {
-    if (grid.find_chunk(at) == nullptr) changed.push_back(at);
+  for (const ChunkChange& change : changes.items) {
+    if (Status done = put_chunk(memory, grid, opaque, transparent, change.chunk); !done) return done;
   }
-  for (const IVec3 at : changed) {
-    if (Status done = put_chunk(memory, grid, opaque, transparent, at); !done) return done;
-  }
-  origin_ = present.front();
-  for (const IVec3 at : present) origin_ = glm::min(origin_, at);
+  origin_ = chunk_of(grid.bounds().min);
   if (Status done = put_top(memory, opaque_, &DeviceChunk::opaque); !done) return done;
   if (Status done = put_top(memory, transparent_, &DeviceChunk::transparent); !done) return done;
   shader_grid_ = {shader_tree(opaque_.top, &opaque, origin()), shader_tree(transparent_.top, transparent, origin())};
-  identity_ = grid.identity();
-  version_ = grid.version();
+  followed_ = now;
   return {};
 }
 
@@ -66,6 +62,7 @@ Status DeviceGrid::put_chunk(DeviceMemory& memory, const Grid& grid, const Occup
   const Chunk* voxels = grid.find_chunk(chunk);
   if (voxels == nullptr) {
     const auto old = chunks_.find(chunk);
+    if (old == chunks_.end()) return {};
     memory.release(old->second.place);
     chunks_.erase(old);
     return {};
@@ -77,7 +74,6 @@ Status DeviceGrid::put_chunk(DeviceMemory& memory, const Grid& grid, const Occup
   if (!place) return tl::unexpected(place.error());
   entry.place = *place;
   record.move_to(place->address);
-  entry.version = grid.version(chunk);
   entry.opaque = record.opaque;
   entry.transparent = record.transparent;
   return memory.write(entry.place, std::as_bytes(std::span(record.words)));

@@ -14,8 +14,7 @@ namespace quoin::vulkan {
 /// One grid's voxels in device memory.
 class DeviceGrid {
  public:
-  /// Takes over what was edited since the last time, told by the versions of chunks, and everything of another grid;
-  /// shaders may read it once the memory is flushed. After an error it is to be released.
+  /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the memory is flushed. After an error it is to be released.
   ///
   /// `transparent` may be null. Requires: both are the grid's trees as it is; it is not empty; the types' visibility is
   /// that of the last time.
@@ -35,7 +34,6 @@ class DeviceGrid {
     bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
   };
   struct DeviceChunk {
-    std::uint64_t version = 0;
     Place place;
     Node opaque;
     Node transparent;
@@ -48,8 +46,7 @@ class DeviceGrid {
                    const OccupancyTree* transparent, IVec3 chunk);
   Status put_top(DeviceMemory& memory, DeviceTree& tree, Node DeviceChunk::*node);
 
-  std::uint64_t identity_ = 0;  // of the grid; 0: none
-  std::uint64_t version_ = 0;
+  ChangeCursor followed_;
   std::map<IVec3, DeviceChunk, ByPlace> chunks_;
   IVec3 origin_{0};  // in chunks
   DeviceTree opaque_;

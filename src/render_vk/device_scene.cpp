@@ -31,6 +31,12 @@ bool can_be_traced(const Instance& instance, const SceneGrid* grid, bool hidden)
          !grid->grid.bounds().empty();
 }
 
+bool has_other_pivot(const Placement& placement, const SceneGrid& grid, const Scene& scene, GridHandle handle) {
+  return std::any_of(placement.placed.begin(), placement.placed.end(), [&](const DevicePlaced& each) {
+    return scene.instances()[each.placed.instance].grid == handle && each.placed.pivot != grid.pivot;
+  });
+}
+
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
   PlacedGrid placed;
   placed.instance = handle;
@@ -44,10 +50,15 @@ PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHa
 }  // namespace
 
 Status DeviceScene::update(const Scene& scene, bool hidden, Threads threads) {
-  Status done = try_update(scene, hidden, threads);
-  if (done) done = memory_->flush();
-  if (!done) clear();
-  return done;
+  try {
+    Status done = try_update(scene, hidden, threads);
+    if (done) done = memory_->flush();
+    if (!done) clear();
+    return done;
+  } catch (...) {
+    clear();
+    throw;
+  }
 }
 
 void DeviceScene::clear() {
@@ -59,24 +70,14 @@ void DeviceScene::clear() {
   surface_table_.clear();
   memory_->release(grids_place_);
   memory_->release(surfaces_place_);
+  surface_table_.clear();
+  followed_types_ = followed_visibility_ = followed_scene_ = {};
 }
 
-bool takes_other_visibility(std::vector<Visibility>& known, const VoxelRegistry& types) {
-  bool is_other = false;
-  known.resize(std::max(known.size(), types.size()), Visibility::Opaque);
-  for (std::size_t i = 1; i < known.size(); ++i) {
-    const Visibility now = types.visibility(static_cast<VoxelType>(i));
-    is_other |= known[i] != now;
-    known[i] = now;
-  }
-  return is_other;
-}
-
-// Grids are packed by what their types are.
-void DeviceScene::forget_old_types(const VoxelRegistry& types) {
-  if (!takes_other_visibility(visibility_, types)) return;
-  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
-  grids_.clear();
+bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed) {
+  const TypeChanges changes = types.changes_since(followed);
+  return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
+                                    [](const TypeChange& change) { return change.visibility; });
 }
 
 // Lists the instances and keeps, of the known grids, those that are among them.
@@ -87,61 +88,87 @@ void DeviceScene::place(const Scene& scene, bool hidden) {
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(instance, grid, hidden)) return;
-    const auto known = grids_.find(instance.grid);
-    if (known != grids_.end() && known->second.identity == grid->grid.identity()) {
-      kept.insert(grids_.extract(known));
-    } else if (const auto [added, is_new] = kept.try_emplace(instance.grid); is_new) {
-      added->second.identity = grid->grid.identity();
-    }
+    if (const auto known = grids_.find(instance.grid); known != grids_.end()) kept.insert(grids_.extract(known));
+    const IBox bounds = grid->grid.bounds();
+    kept[instance.grid].bounds = bounds;
     placement_.placed.push_back({placed_as(instance, *grid, handle)});
-    boxes.push_back(bounds_in_world(placement_.placed.back().placed, grid->grid.bounds()));
+    boxes.push_back(bounds_in_world(placement_.placed.back().placed, bounds));
   });
   for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
   grids_ = std::move(kept);
+  std::int32_t index = 0;
+  for (auto& [handle, known] : grids_) known.index = index++;
   placement_.instances = InstanceTree(std::move(boxes));
 }
 
-void DeviceScene::update_trees(const Scene& scene, Threads threads) {
-  std::vector<std::pair<KeptTrees*, const Grid*>> all;
-  for (auto& [handle, known] : grids_) all.emplace_back(&known.trees, &scene.grids()[handle].grid);
-  parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->update(*all[i].second, scene.types); });
+// The placed grids that may be other than before; `places` where instances are to be placed anew.
+std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, bool hidden, bool& places) {
+  const SceneChanges changes = scene.changes_since(followed_scene_);
+  places = changes.all || hidden != hidden_ || !changes.instances.empty();
+  hidden_ = hidden;
+  std::vector<GridHandle> changed;
+  for (const GridHandle handle : changes.grids) {
+    const auto known = grids_.find(handle);
+    const SceneGrid* grid = scene.grids().find(handle);
+    // One that was empty may now be placed, and whose pivot moved is placed elsewhere.
+    places |= known == grids_.end() || grid == nullptr || !(grid->grid.bounds() == known->second.bounds);
+    places |= known != grids_.end() && grid != nullptr && has_other_pivot(placement_, *grid, scene, handle);
+    if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
+  }
+  if (!places) return changed;
+  place(scene, hidden);
+  changed.clear();
+  for (const auto& [handle, known] : grids_) changed.push_back(handle);
+  return changed;
 }
 
 // What depends on the grids as they are by now.
 void DeviceScene::finish_placed(const Scene& scene) {
   for (DevicePlaced& each : placement_.placed) {
-    const GridHandle handle = scene.instances()[each.placed.instance].grid;
-    const KnownGrid& known = grids_.find(handle)->second;
-    const IBox bounds = scene.grids()[handle].grid.bounds();
+    const KnownGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
     each.grid = known.index;
     each.origin = known.voxels.origin();
-    each.low = DVec3(bounds.min - each.origin);
-    each.high = DVec3(bounds.max - each.origin);
+    each.low = DVec3(known.bounds.min - each.origin);
+    each.high = DVec3(known.bounds.max - each.origin);
   }
 }
 
+Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads) {
+  std::vector<std::pair<KnownGrid*, const Grid*>> all;
+  for (const GridHandle handle : changed) {
+    KnownGrid& known = grids_.find(handle)->second;
+    if (is_too_wide(known.bounds)) return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
+    all.emplace_back(&known, &scene.grids()[handle].grid);
+  }
+  parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->trees.update(*all[i].second, scene.types); });
+  for (const auto& [known, grid] : all) {
+    Status done = known->voxels.update(*memory_, *grid, known->trees.opaque(), known->trees.transparent());
+    if (!done) return done;
+  }
+  return {};
+}
+
 Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
-  forget_old_types(scene.types);
-  place(scene, hidden);
+  // Grids are packed by what their types are.
+  if (has_other_visibility(scene.types, followed_visibility_)) {
+    for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
+    grids_.clear();
+    followed_scene_ = {};
+  }
+  bool places = false;
+  const std::vector<GridHandle> changed = changed_grids(scene, hidden, places);
   if (placement_.placed.size() > kMostInstances) {
     return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
   }
-  for (const auto& [handle, known] : grids_) {
-    if (!is_too_wide(scene.grids()[handle].grid.bounds())) continue;
-    return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
+  if (Status done = update_grids(scene, changed, threads); !done) return done;
+  if (places) finish_placed(scene);
+  if (places || !changed.empty()) {
+    placement_.has_transparent = std::any_of(grids_.begin(), grids_.end(),
+                                             [](const auto& grid) { return grid.second.voxels.has_transparent(); });
   }
-  update_trees(scene, threads);
-  std::int32_t index = 0;
-  placement_.has_transparent = false;
-  for (auto& [handle, known] : grids_) {
-    known.index = index++;
-    const Grid& grid = scene.grids()[handle].grid;
-    Status done = known.voxels.update(*memory_, grid, known.trees.opaque(), known.trees.transparent());
-    if (!done) return done;
-    placement_.has_transparent |= known.voxels.has_transparent();
+  if (!scene.types.changes_since(followed_types_).empty()) {
+    if (Status done = put_surfaces(scene.types); !done) return done;
   }
-  finish_placed(scene);
-  if (Status done = put_surfaces(scene.types); !done) return done;
   return put_grids();
 }
 

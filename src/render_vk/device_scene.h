@@ -42,9 +42,8 @@ struct Placement {
   std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
 };
 
-/// Whether any type is transparent or opaque that `known` says otherwise of, which then says it too; new types count as
-/// opaque before they are registered.
-[[nodiscard]] bool takes_other_visibility(std::vector<Visibility>& known, const VoxelRegistry& types);
+/// Whether any type became transparent or opaque, or may have; moves the cursor to the present.
+[[nodiscard]] bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed);
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
@@ -64,16 +63,16 @@ class DeviceScene {
 
  private:
   struct KnownGrid {
-    std::uint64_t identity = 0;
+    IBox bounds;
     KeptTrees trees;
     DeviceGrid voxels;
     std::int32_t index = 0;
   };
 
   void clear();
-  void forget_old_types(const VoxelRegistry& types);
   void place(const Scene& scene, bool hidden);
-  void update_trees(const Scene& scene, Threads threads);
+  [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, bool hidden, bool& places);
+  Status update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads);
   void finish_placed(const Scene& scene);
   Status try_update(const Scene& scene, bool hidden, Threads threads);
   Status put_surfaces(const VoxelRegistry& types);
@@ -81,7 +80,10 @@ class DeviceScene {
 
   DeviceMemory* memory_;
   std::map<GridHandle, KnownGrid> grids_;
-  std::vector<Visibility> visibility_;
+  ChangeCursor followed_types_;
+  ChangeCursor followed_visibility_;
+  ChangeCursor followed_scene_;
+  bool hidden_ = false;
   Placement placement_;
   Place grids_place_;
   std::vector<ShaderGrid> grid_table_;

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include "render_vk/memory.h"
 

@@ -44,7 +44,7 @@ void update(benchmark::State& state) {
   auto renderer = VulkanRenderer::create();
   if (!renderer) return state.SkipWithError(renderer.error().message.c_str());
   fail_unless(renderer->update(scene).has_value(), "the update's success", 0);
-  Grid& grid = scene.grids()[scene.grids().handles().front()].grid;
+  Grid& grid = scene.edit(scene.grids().handles().front()).grid;
   VoxelType type = kAir;
   for (auto _ : state) {
     type = type == kAir ? 1 : kAir;

@@ -96,7 +96,7 @@ TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
   const InstanceHandle instance = place(scene, std::move(grid));
   EXPECT_GT(taken(scene, camera, options).pixels_hit, 0);
-  Grid& voxels = scene.grids()[scene.instances()[instance].grid].grid;
+  Grid& voxels = scene.edit(scene.instances()[instance].grid).grid;
   voxels.set({-1'000'000'000, 0, 0}, stone);
   ASSERT_FALSE(renderer_->update(scene)) << "too wide";
   EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);

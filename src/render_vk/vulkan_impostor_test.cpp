@@ -102,11 +102,11 @@ TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
 TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {
   const GridHandle grid = add_blobs(scene_, 31);
   // Without glass: that would begin where the other's opaque voxels do, but for rounding.
-  Grid& voxels = scene_.grids()[grid].grid;
+  Grid& voxels = scene_.edit(grid).grid;
   voxels.edit(voxels.bounds(), [](IVec3, VoxelType type) { return type == 3 ? VoxelType{1} : type; });
   SceneGrid other;
   other.pivot = scene_.grids()[grid].pivot;
-  other.grid = voxels.clone();
+  other.grid = voxels.snapshot();
   other.grid.edit(voxels.bounds(), [](IVec3, VoxelType type) { return type == kAir ? kAir : VoxelType{4}; });
   add_crowd(scene_, {grid}, 3, 400.0);
   const GridHandle glowing = scene_.add_grid(std::move(other));
@@ -125,7 +125,7 @@ TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
   const RenderOptions options = in_detail(256, 192, 128);
   compare(camera, options, "far_before");
   const std::uint64_t both = impostor_bytes();
-  scene_.grids()[grids[0]].grid.fill_box({-40, -40, -40}, {80, 60, 70}, 2);
+  scene_.edit(grids[0]).grid.fill_box({-40, -40, -40}, {80, 60, 70}, 2);
   compare(camera, options, "far_edited");
   for (const InstanceHandle handle : scene_.instances().handles()) {
     if (scene_.instances()[handle].grid == grids[0]) scene_.remove_instance(handle);
@@ -146,7 +146,7 @@ TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
 TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   const std::vector<InstanceHandle> handles = scene_.instances().handles();
-  for (std::size_t i = 0; i < handles.size(); i += 2) scene_.instances()[handles[i]].visible = false;
+  for (std::size_t i = 0; i < handles.size(); i += 2) scene_.edit(handles[i]).visible = false;
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
   const RenderOptions options = in_detail(128, 96, 128);
   compare(camera, options, "far_without_hidden");

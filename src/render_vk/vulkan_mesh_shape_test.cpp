@@ -96,7 +96,7 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   options.shading = MeshShading::Normals;
   const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
   for (const bool mirrored : {false, true}) {
-    scene.instances()[placed].mirrored = mirrored;
+    scene.edit(placed).mirrored = mirrored;
     put(scene, smooth_surfaces(handle, field, scene.types));
     const Image image = drawn(camera, options);
     int inside = 0;

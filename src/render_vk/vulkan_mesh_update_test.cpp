@@ -52,7 +52,7 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   EXPECT_EQ(meshes_->facts().triangles, 24);
   EXPECT_EQ(meshes_->facts().bytes, 2U * 64U) << "six quads of 8 bytes, in places of multiples of 32";
   SurfaceUpdate update = blocky_surfaces(scene)[0];
-  Grid& grid = scene.grids()[update.grid].grid;
+  Grid& grid = scene.edit(update.grid).grid;
   const auto expect_current = [&](const std::string& name) {
     vulkan_test::VulkanMeshTest::expect_like(drawn(before_boxes(), mesh_options(options)),
                                              render_test::taken(scene, before_boxes(), options), name);
@@ -98,13 +98,13 @@ TEST_F(VulkanMeshUpdate, InstancesFollowTheScene) {
     expect_like(drawn(before_boxes(), mesh_options(options)), render_test::taken(scene, before_boxes(), options), name);
   };
   expect_current("two_instances");
-  scene.instances()[handle].position = {0, -40, 0};
+  scene.edit(handle).position = {0, -40, 0};
   expect_current("moved");
   VoxelProperties green = scene.types[1];
   green.colour = {30, 160, 50, 255};
   scene.types.replace(1, green);
   expect_current("recoloured");
-  scene.instances()[handle].visible = false;
+  scene.edit(handle).visible = false;
   const Image hidden = (expect_current("hidden"), drawn(before_boxes(), mesh_options(options)));
   ASSERT_TRUE(meshes_->update(scene, true));
   EXPECT_NE(drawn(before_boxes(), mesh_options(options)).rgb, hidden.rgb);

@@ -77,7 +77,7 @@ Scene village(DVec3 centre, bool has_glass) {
   }
   SceneGrid ground;
   ground.grid.fill_box({-60, -13, -60}, {60, -10, 60}, types.wall);
-  place(scene, ground.grid.clone(), centre);
+  place(scene, ground.grid.snapshot(), centre);
   return scene;
 }
 

@@ -48,7 +48,7 @@ TEST_F(VulkanUpdate, AnEditSendsWhatItChangedAndNoMore) {
   const VoxelType stone = add_type(scene, {140, 140, 150});
   const VoxelType glass = add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
   const InstanceHandle instance = place(scene, hills(ground, stone, 512));
-  Grid& grid = scene.grids()[scene.instances()[instance].grid].grid;
+  Grid& grid = scene.edit(scene.instances()[instance].grid).grid;
   const Camera camera = towards({150, 70, 210}, {70, 20, 70});
   ASSERT_TRUE(renderer_->update(scene));
   const std::uint64_t all = renderer_->uploaded_bytes();
@@ -77,28 +77,28 @@ TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
   place(scene, std::move(floor));
   Grid tower;
   tower.fill_box({0, 0, 0}, {7, 23, 7}, brick);
-  const InstanceHandle first = place(scene, tower.clone(), {12, 2, 12});
+  const InstanceHandle first = place(scene, tower.snapshot(), {12, 2, 12});
   const Camera camera = towards({90, 60, 100}, {30, 8, 30});
   const auto then = [&](const char* name) {
     ASSERT_TRUE(renderer_->update(scene)) << name;
     expect_current(scene, camera, name);
   };
   then("two");
-  const InstanceHandle second = place(scene, tower.clone(), {40, 2, 30});
+  const InstanceHandle second = place(scene, tower.snapshot(), {40, 2, 30});
   then("three");
   scene.instances()[first].position.x += 20.25;
   then("moved");
   EXPECT_TRUE(scene.remove_grid(scene.instances()[second].grid));
   then("removed");
-  scene.instances()[first].visible = false;
+  scene.edit(first).visible = false;
   then("hidden");
-  scene.instances()[first].visible = true;
+  scene.edit(first).visible = true;
   VoxelProperties glass = scene.types[brick];
   glass.visibility = Visibility::Transparent;
   glass.colour = {90, 200, 120, 60};
   scene.types.replace(brick, glass);
   then("glass_now");
-  scene.grids()[scene.instances()[first].grid].grid = tower.clone();
+  scene.edit(scene.instances()[first].grid).grid = tower.snapshot();
   then("assigned");
 }
 
@@ -145,10 +145,10 @@ TEST_F(VulkanUpdate, IslandsFarApart) {
   const Camera far = towards({-3e6 + 60, 4e6 + 50, -5e6 + 70}, {-3e6, 4e6, -5e6});
   expect_equal(taken_as_is(far, options), render_test::taken(scene, far, options), "far_island");
   // Further than single precision counts voxels: rays end all the same.
-  scene.grids()[scene.instances()[instance].grid].grid.set({400'000'000, 21, 43}, stone);
+  scene.edit(scene.instances()[instance].grid).grid.set({400'000'000, 21, 43}, stone);
   const Camera across = towards({150.3, 24.7, 20.1}, {400'000'000, 21, 43}, 1.5);
   expect_equal(taken(scene, across, options), render_test::taken(scene, across, options), "across");
-  Grid& wide = scene.grids()[scene.instances()[instance].grid].grid;
+  Grid& wide = scene.edit(scene.instances()[instance].grid).grid;
   wide.set({-1'000'000'000, 0, 0}, stone);
   const Status refused = renderer_->update(scene);
   ASSERT_FALSE(refused);

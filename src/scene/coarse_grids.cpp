@@ -30,10 +30,15 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
 }
 
 void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
-  if (identity != grid.identity()) *this = {};
-  if (identity != 0 && version != grid.version()) renew(grid, types, threads);
-  identity = grid.identity();
-  version = grid.version();
+  ChangeCursor now = followed;
+  const GridChanges changes = grid.changes_since(now);
+  followed = {};  // stays so when memory runs out
+  if (changes.all) {
+    *this = {};
+  } else if (!changes.empty()) {
+    renew(grid, types, threads);
+  }
+  followed = now;
   for (int level = static_cast<int>(levels.size()) + 1; level <= halvings && !is_coarsest; ++level) {
     pyramid.update(grid, types, level, threads);
     is_coarsest = !take_level(grid, types, level);

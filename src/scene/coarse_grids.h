@@ -35,8 +35,7 @@ struct CoarseLevel {
 /// bridge's deck, becomes twice as thick, and shows. Threads: any number may call.
 class CoarseGrids {
   struct Entry {
-    std::uint64_t identity = 0;  // of the grid; 0: none
-    std::uint64_t version = 0;
+    ChangeCursor followed;
     GridPyramid pyramid;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
     bool is_coarsest = false;                          // there are no more levels that are like the grid

@@ -3,65 +3,46 @@
 #include <algorithm>
 #include <utility>
 
-#include "grid/chunk_order.h"
-
 namespace quoin {
 namespace {
 
-bool has_transparent_types(const Chunk& chunk, const VoxelRegistry& types) {
-  if (!types.has_transparent()) return false;
-  const std::vector<VoxelType> all = chunk.types();
+bool has_transparent_types(const Chunk* chunk, const VoxelRegistry& types) {
+  if (chunk == nullptr || !types.has_transparent()) return false;
+  const std::vector<VoxelType> all = chunk->types();
   return std::any_of(all.begin(), all.end(), [&](VoxelType type) { return types.is_transparent(type); });
 }
 
 }  // namespace
 
-// What the trees are to be made of, and the chunks in which that differs from what they are made of.
-std::vector<KeptTrees::MadeOf> KeptTrees::look_at(const Grid& grid, const VoxelRegistry& types,
-                                                  std::vector<IVec3>& changed) const {
-  std::vector<MadeOf> now;
-  now.reserve(made_of_.size());
-  auto last = made_of_.begin();
-  for (const IVec3 chunk : grid.chunks()) {
-    for (; last != made_of_.end() && by_zyx(last->chunk, chunk); ++last) changed.push_back(last->chunk);
-    const std::uint64_t version = grid.version(chunk);
-    const bool was_there = last != made_of_.end() && last->chunk == chunk;
-    if (was_there && last->version == version) {
-      now.push_back(*last);
-    } else {
-      changed.push_back(chunk);
-      now.push_back({chunk, version, has_transparent_types(*grid.find_chunk(chunk), types)});
-    }
-    if (was_there) ++last;
-  }
-  for (; last != made_of_.end(); ++last) changed.push_back(last->chunk);
-  return now;
-}
-
 bool KeptTrees::update(const Grid& grid, const VoxelRegistry& types) {
-  if (identity_ == grid.identity() && version_ == grid.version()) return false;
-  const bool is_new = identity_ != grid.identity();
-  if (is_new) forget();
+  ChangeCursor now = followed_;
+  const GridChanges changes = grid.changes_since(now);
+  if (changes.empty()) return false;
+  followed_ = {};  // stays so when memory runs out
   std::vector<IVec3> changed;
-  std::vector<MadeOf> now = look_at(grid, types, changed);
-  const bool has_transparent =
-      std::any_of(now.begin(), now.end(), [](const MadeOf& each) { return each.is_transparent; });
-  if (is_new) {
+  if (changes.all) {
     opaque_ = OccupancyTree::build(grid, types, Occupancy::Opaque);
+    transparent_.reset();
+    changed = grid.chunks();
   } else {
+    for (const ChunkChange& change : changes.items) changed.push_back(change.chunk);
     opaque_.update(grid, types, changed);
   }
-  if (!has_transparent) {
-    transparent_.reset();
-  } else if (transparent_) {
-    transparent_->update(grid, types, changed);
-  } else {
-    transparent_.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
-  }
-  made_of_ = std::move(now);
-  identity_ = grid.identity();
-  version_ = grid.version();
+  update_transparent(grid, types, changed);
+  followed_ = now;
   return true;
+}
+
+void KeptTrees::update_transparent(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& changed) {
+  if (transparent_) {
+    transparent_->update(grid, types, changed);
+    if (transparent_->bounds().empty()) transparent_.reset();
+    return;
+  }
+  const bool has_transparent = std::any_of(changed.begin(), changed.end(), [&](IVec3 chunk) {
+    return has_transparent_types(grid.find_chunk(chunk), types);
+  });
+  if (has_transparent) transparent_.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
 }
 
 }  // namespace quoin

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -11,35 +9,26 @@
 
 namespace quoin {
 
-/// What rays that make light need of one grid, and of which versions of its chunks it was made.
+/// What rays that make light need of one grid, and how far it has followed the grid's changes.
 class KeptTrees {
  public:
-  /// Makes the trees, or takes over what was edited since the last time: of that grid, found by the versions of its
-  /// chunks, so that whoever takes the grid's dirty chunks misses none; everything when it is another grid. Answers
+  /// Makes the trees, or takes over what was edited since the last time; everything when it is another grid. Returns
   /// whether there was anything to do.
   ///
   /// Requires: the types' visibility is that of the last time; otherwise `forget` first.
-  /// Cost:     that of OccupancyTree::update for the chunks that changed, and a look at every chunk's version; nothing
-  ///           when the grid's version is the last one.
+  /// Cost:     that of OccupancyTree::update for the chunks that changed.
   bool update(const Grid& grid, const VoxelRegistry& types);
   void forget() { *this = {}; }
+  [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
 
   [[nodiscard]] const OccupancyTree& opaque() const { return opaque_; }
   /// Null when the grid has no transparent voxel.
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
 
  private:
-  struct MadeOf {
-    IVec3 chunk{0};
-    std::uint64_t version = 0;
-    bool is_transparent = false;  ///< in part
-  };
-  [[nodiscard]] std::vector<MadeOf> look_at(const Grid& grid, const VoxelRegistry& types,
-                                            std::vector<IVec3>& changed) const;
+  void update_transparent(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& changed);
 
-  std::uint64_t identity_ = 0;  // of the grid; 0: none
-  std::uint64_t version_ = 0;
-  std::vector<MadeOf> made_of_;
+  ChangeCursor followed_;
   OccupancyTree opaque_;
   std::optional<OccupancyTree> transparent_;
 };

@@ -103,8 +103,6 @@ struct DetailSelector::Impl {
   struct Content {
     std::uint32_t generation = 0;  // of the grid's handle
     bool is_there = false;         // now
-    std::uint64_t identity = 0;    // of the grid; 0: none
-    std::uint64_t version = 0;
     ContentSphere sphere;
     DVec3 from_pivot{0.0};  // the sphere's centre, in voxels
   };
@@ -120,26 +118,40 @@ struct DetailSelector::Impl {
   };
   std::vector<Seen> seen;  // room for every instance
 
+  ChangeCursor followed;  // of the scene
+
   void look_at_grids(const Scene& scene);
+  void look_at_grid(GridHandle handle, const SceneGrid& grid);
   std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum, bool hidden);
   Choice choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
                 const DetailPolicy& policy);
 };
 
 void DetailSelector::Impl::look_at_grids(const Scene& scene) {
-  for (Content& content : contents) content.is_there = false;
-  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
-    if (handle.index >= contents.size()) contents.resize(handle.index + std::size_t{1});
-    Content& content = contents[handle.index];
-    const std::uint64_t identity = grid.grid.identity();
-    const std::uint64_t version = grid.grid.version();
-    if (content.identity != identity || content.version != version) content.sphere = content_sphere(grid.grid);
-    content.identity = identity;
-    content.version = version;
-    content.generation = handle.generation;
-    content.is_there = content.sphere.radius > 0.0;
-    content.from_pivot = content.sphere.centre - grid.pivot;
-  });
+  ChangeCursor now = followed;
+  const SceneChanges changes = scene.changes_since(now);
+  if (changes.all) {
+    for (Content& content : contents) content.is_there = false;
+    scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) { look_at_grid(handle, grid); });
+  }
+  for (const GridHandle handle : changes.grids) {
+    const SceneGrid* grid = scene.grids().find(handle);
+    if (grid != nullptr) {
+      look_at_grid(handle, *grid);
+    } else if (handle.index < contents.size() && contents[handle.index].generation == handle.generation) {
+      contents[handle.index].is_there = false;
+    }
+  }
+  followed = now;
+}
+
+void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid) {
+  if (handle.index >= contents.size()) contents.resize(handle.index + std::size_t{1});
+  Content& content = contents[handle.index];
+  content.sphere = content_sphere(grid.grid);
+  content.generation = handle.generation;
+  content.is_there = content.sphere.radius > 0.0;
+  content.from_pivot = content.sphere.centre - grid.pivot;
 }
 
 // Instances are written before it is known whether they are seen: no processor guesses that (a tenth of the time).

@@ -101,11 +101,11 @@ TEST(LevelOfDetail, ContentIsWhatIsThereNotTheOriginNorTheChunk) {
 
 TEST(LevelOfDetail, DistancesCountFromTheContentAndInTheInstancesSize) {
   Scene scene = cubes(1, 20);
-  Instance& instance = scene.instances()[scene.instances().handles()[0]];
+  Instance& instance = scene.edit(scene.instances().handles()[0]);
   instance.position = {5, -3, 2};
   instance.voxel_size = 0.5;
   instance.rotation = glm::angleAxis(1.0, glm::normalize(DVec3(1, 2, 3)));
-  scene.grids()[instance.grid].pivot = {40, 0, 0};
+  scene.edit(instance.grid).pivot = {40, 0, 0};
   DetailPolicy policy;
   policy.rule = DetailPolicy::Rule::ByRadius;
   std::vector<SelectedInstance> selected;
@@ -243,7 +243,7 @@ TEST(LevelOfDetail, EditsAreSeen) {
   std::vector<SelectedInstance> selected;
   selector.select(scene, looking_at_origin(1000.0), 800, 600, {}, selected);
   ASSERT_EQ(selected.at(0).detail, Detail::Far);
-  scene.grids()[scene.grids().handles()[0]].grid.fill_box({0, 0, 0}, {399, 399, 399}, 1);
+  scene.edit(scene.grids().handles()[0]).grid.fill_box({0, 0, 0}, {399, 399, 399}, 1);
   selector.select(scene, looking_at_origin(1000.0), 800, 600, {}, selected);
   EXPECT_NE(selected.at(0).detail, Detail::Far);
 }
@@ -251,11 +251,11 @@ TEST(LevelOfDetail, EditsAreSeen) {
 TEST(LevelOfDetail, LeavesOutHiddenEmptyAndImpossibleInstances) {
   Scene scene = cubes(7);
   const std::vector<InstanceHandle> all = scene.instances().handles();
-  scene.instances()[all[1]].visible = false;
-  scene.instances()[all[2]].voxel_size = 0.0;
-  scene.instances()[all[3]].voxel_size = kNan;
+  scene.edit(all[1]).visible = false;
+  scene.edit(all[2]).voxel_size = 0.0;
+  scene.edit(all[3]).voxel_size = kNan;
   scene.instances()[all[4]].position.x = kInfinity;
-  scene.instances()[all[5]].grid = scene.add_grid({});
+  scene.edit(all[5]).grid = scene.add_grid({});
   std::vector<SelectedInstance> selected(3);
   DetailPolicy policy;
   DetailSelector().select(scene, looking_at_origin(100), 80, 60, policy, selected);

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
+#include "core/change_journal.h"
+#include "core/edit_notices.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -44,12 +47,147 @@ bool has_place(const Instance& instance) {
          std::isfinite(instance.voxel_size) && instance.voxel_size > 0.0;
 }
 
+namespace {
+
+enum class Kind : std::uint8_t { Grid, Instance };
+
+struct SceneRecord {
+  Kind kind = Kind::Grid;
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;
+  void merge(const SceneRecord&) {}
+};
+
+template <class T>
+void sort_and_unite(std::vector<Handle<T>>& handles) {
+  std::sort(handles.begin(), handles.end());
+  handles.erase(std::unique(handles.begin(), handles.end()), handles.end());
+}
+
+}  // namespace
+
+// What a scene knows of its changes. Edits of grids come as notices and are booked when somebody asks.
+struct Scene::Book {
+  Book() = default;
+  Book(const Book& other) : journal(other.journal), grid_serials(other.grid_serials), serials(other.serials) {}
+
+  std::mutex mutex;  // of those who ask at once
+  ChangeJournal<SceneRecord> journal;
+  std::vector<std::uint64_t> grid_serials;  // by slot, of the last records in the journal
+  std::vector<std::uint64_t> serials;       // likewise of instances
+  EditNotices notices;
+  std::vector<std::uint32_t> noticed;
+
+  void note(GridHandle handle, std::size_t keys) {
+    journal.note(grid_serials[handle.index], {Kind::Grid, handle.index, handle.generation}, keys);
+  }
+  void note(InstanceHandle handle, std::size_t keys) {
+    journal.note(serials[handle.index], {Kind::Instance, handle.index, handle.generation}, keys);
+  }
+  void collect(const SlotMap<SceneGrid>& grids) {
+    notices.take(noticed);
+    for (const std::uint32_t index : noticed) {
+      const auto handle = grids.handle_at(index);
+      if (!handle.has_value()) continue;
+      journal.begin_change();
+      note(*handle, grids.size());
+      notices.follow(grids[*handle].grid.notice_, index);
+    }
+    noticed.clear();
+  }
+};
+
+Scene::Scene() : book_(std::make_unique<Book>()) {}
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
+Scene::~Scene() = default;
+
+Scene Scene::snapshot() const {
+  Scene copy;
+  const std::lock_guard lock(book_->mutex);
+  book_->collect(grids_);
+  copy.types = types;
+  copy.grids_ = grids_.copied([](const SceneGrid& grid) {
+    return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas};
+  });
+  copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
+  copy.book_ = std::make_unique<Book>(*book_);
+  copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) {
+    copy.book_->notices.follow(grid.grid.notice_, handle.index);
+  });
+  return copy;
+}
+
+GridHandle Scene::add_grid(SceneGrid grid) {
+  const GridHandle handle = grids_.insert(std::move(grid));
+  book_->journal.begin_change();
+  if (handle.index >= book_->grid_serials.size()) book_->grid_serials.resize(handle.index + std::size_t{1});
+  book_->grid_serials[handle.index] = 0;  // records of another grid in this slot stay as they are
+  book_->note(handle, grids_.size());
+  book_->notices.follow(grids_[handle].grid.notice_, handle.index);
+  return handle;
+}
+
+InstanceHandle Scene::add_instance(Instance instance) {
+  const InstanceHandle handle = instances_.insert(std::move(instance));
+  book_->journal.begin_change();
+  if (handle.index >= book_->serials.size()) book_->serials.resize(handle.index + std::size_t{1});
+  book_->serials[handle.index] = 0;
+  book_->note(handle, instances_.size());
+  return handle;
+}
+
 bool Scene::remove_grid(GridHandle handle) {
   if (!grids_.remove(handle)) return false;
+  book_->journal.begin_change();
+  book_->note(handle, grids_.size());
   for (const InstanceHandle instance : instances_.handles()) {
-    if (instances_[instance].grid == handle) instances_.remove(instance);
+    if (instances_[instance].grid == handle) remove_instance(instance);
   }
   return true;
+}
+
+bool Scene::remove_instance(InstanceHandle handle) {
+  if (!instances_.remove(handle)) return false;
+  book_->journal.begin_change();
+  book_->note(handle, instances_.size());
+  return true;
+}
+
+SceneGrid& Scene::edit(GridHandle handle) {
+  SceneGrid& grid = grids_[handle];
+  book_->journal.begin_change();
+  book_->note(handle, grids_.size());
+  return grid;
+}
+
+Instance& Scene::edit(InstanceHandle handle) {
+  Instance& instance = instances_[handle];
+  book_->journal.begin_change();
+  book_->note(handle, instances_.size());
+  return instance;
+}
+
+SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
+  SceneChanges changes;
+  const std::lock_guard lock(book_->mutex);
+  book_->collect(grids_);
+  changes.all = !book_->journal.visit_since(cursor, [&](const SceneRecord& record) {
+    if (record.kind == Kind::Grid) {
+      changes.grids.push_back({record.index, record.generation});
+    } else {
+      changes.instances.push_back({record.index, record.generation});
+    }
+  });
+  sort_and_unite(changes.grids);
+  sort_and_unite(changes.instances);
+  return changes;
+}
+
+ChangeCursor Scene::cursor() const {
+  ChangeCursor cursor;
+  (void)changes_since(cursor);
+  return cursor;
 }
 
 std::int64_t Scene::voxel_count() const {

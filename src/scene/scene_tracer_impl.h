@@ -16,8 +16,6 @@ namespace quoin {
 struct TracedGrid {
   GridHandle handle;
   const SceneGrid* grid = nullptr;
-  std::uint64_t identity = 0;
-  std::uint64_t version = 0;
   DVec3 pivot{0.0};
   IBox tight;
   bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
@@ -48,7 +46,8 @@ struct SceneTracer::Impl {
 
   const Scene* scene = nullptr;
   bool hidden = false;
-  std::vector<bool> is_transparent;                // by type
+  ChangeCursor followed_types;
+  ChangeCursor followed_scene;
   std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null where none was seen
   std::vector<PlacedGrid> placed;
   std::vector<Source> sources;  // of `placed`
@@ -62,14 +61,16 @@ struct SceneTracer::Impl {
   std::uint64_t shapes = 0;      // that were given out
   bool has_other_trees = false;  // than those that `placed` names
 
-  void look_at_types();
-  void look_at_grids();
-  void look_at(GridHandle handle, const SceneGrid& grid);
+  void look_at_types(const TypeChanges& changes);
+  [[nodiscard]] bool look_at_grids(const SceneChanges& changes);
+  [[nodiscard]] bool look_at(GridHandle handle);
+  [[nodiscard]] bool move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved);
+  [[nodiscard]] bool move_instances(const SceneChanges& changes);
   [[nodiscard]] TracedGrid* grid_to_place(const Instance& instance) const;
   void place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid);
-  [[nodiscard]] bool move_instances();
+  [[nodiscard]] bool move_all_instances();
   void place_instances();
-  void update_trees(Threads threads);
+  void update_trees(const SceneChanges& changes, Threads threads);
 };
 
 }  // namespace quoin

@@ -10,6 +10,10 @@
 namespace quoin {
 namespace {
 
+bool is_seen_through_otherwise(const TypeChange& change) {
+  return change.visibility;
+}
+
 bool has_type_of(const Grid& grid, const std::vector<VoxelType>& ascending) {
   const std::vector<VoxelType> types = grid.types();
   return std::any_of(types.begin(), types.end(),
@@ -33,70 +37,90 @@ DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight) {
 }
 
 bool SceneTracer::Impl::update(Threads threads) {
-  look_at_types();
-  look_at_grids();
-  if (!move_instances()) place_instances();
-  update_trees(threads);
+  ChangeCursor types_now = followed_types;
+  ChangeCursor scene_now = followed_scene;
+  const TypeChanges types = scene->types.changes_since(types_now);
+  SceneChanges changes = scene->changes_since(scene_now);
+  followed_types = followed_scene = {};  // stay so when memory runs out
+  look_at_types(types);
+  // Trees that were forgotten are made again wherever they are.
+  changes.all |= types.all || std::any_of(types.items.begin(), types.items.end(), is_seen_through_otherwise);
+  const bool are_shapes_same = look_at_grids(changes);
+  const bool are_placed = changes.all || !are_shapes_same ? move_all_instances() : move_instances(changes);
+  if (!are_placed) {
+    place_instances();
+    changes.all = true;
+  }
+  update_trees(changes, threads);
+  followed_types = types_now;
+  followed_scene = scene_now;
   return std::exchange(has_other_trees, false);
 }
 
 // Forgets what was made of types that were not seen through and now are, or the other way around.
-void SceneTracer::Impl::look_at_types() {
-  std::vector<bool> now(scene->types.size());
-  for (std::size_t type = 0; type < now.size(); ++type) {
-    now[type] = scene->types.is_transparent(static_cast<VoxelType>(type));
-  }
-  if (now == is_transparent) return;
+void SceneTracer::Impl::look_at_types(const TypeChanges& changes) {
   std::vector<VoxelType> changed;
-  for (std::size_t type = 0; type < std::max(now.size(), is_transparent.size()); ++type) {
-    const bool was = type < is_transparent.size() && is_transparent[type];
-    const bool is = type < now.size() && now[type];
-    if (was != is) changed.push_back(static_cast<VoxelType>(type));
+  for (const TypeChange& change : changes.items) {
+    if (is_seen_through_otherwise(change)) changed.push_back(change.type);
   }
-  is_transparent = std::move(now);
-  if (changed.empty()) return;
+  if (!changes.all && changed.empty()) return;
   for (const auto& each : grids) {
     if (each == nullptr) continue;
     // Edited meanwhile, it may have lost the last voxel of such a type.
     const SceneGrid* grid = scene->grids().find(each->handle);
-    if (grid == nullptr || grid->grid.version() != each->version || has_type_of(grid->grid, changed)) {
+    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) || has_type_of(grid->grid, changed)) {
       each->trees.forget();
     }
   }
   coarse.forget([](GridHandle) { return true; });
 }
 
-void SceneTracer::Impl::look_at_grids() {
+// False when a grid has other bounds or another pivot than before, came or went.
+bool SceneTracer::Impl::look_at_grids(const SceneChanges& changes) {
   const auto is_gone = [&](GridHandle handle) { return scene->grids().find(handle) == nullptr; };
-  for (auto& each : grids) {
-    if (each == nullptr) continue;
-    each->is_placed = false;
-    if (is_gone(each->handle)) each.reset();
+  if (changes.all) {
+    for (auto& each : grids) {
+      if (each != nullptr && is_gone(each->handle)) each.reset();
+    }
+    coarse.forget(is_gone);
+    scene->grids().for_each([&](GridHandle handle, const SceneGrid&) { (void)look_at(handle); });
+    return false;
   }
-  coarse.forget(is_gone);
-  scene->grids().for_each([&](GridHandle handle, const SceneGrid& grid) { look_at(handle, grid); });
+  bool is_same = true;
+  bool has_gone = false;
+  for (const GridHandle handle : changes.grids) {
+    if (!is_gone(handle)) {
+      is_same &= look_at(handle);
+      continue;
+    }
+    has_gone = true;
+    is_same = false;
+    if (handle.index >= grids.size() || grids[handle.index] == nullptr) continue;
+    if (grids[handle.index]->handle == handle) grids[handle.index].reset();
+  }
+  if (has_gone) coarse.forget(is_gone);
+  return is_same;
 }
 
-void SceneTracer::Impl::look_at(GridHandle handle, const SceneGrid& grid) {
+// False when it is placed otherwise than before.
+bool SceneTracer::Impl::look_at(GridHandle handle) {
+  const SceneGrid& grid = scene->grids()[handle];
   if (handle.index >= grids.size()) grids.resize(handle.index + std::size_t{1});
   auto& known = grids[handle.index];
-  if (known == nullptr) {
+  if (known == nullptr || known->handle != handle) {
     known = std::make_unique<TracedGrid>();
     known->handle = handle;
   }
   has_other_trees |= known->grid != &grid;
-  known->grid = &grid;
-  const std::uint64_t identity = grid.grid.identity();
-  const std::uint64_t version = grid.grid.version();
-  // What is not a number differs from itself, and is looked at each time.
-  if (known->identity == identity && known->version == version && known->pivot == grid.pivot) return;
+  const bool is_new = std::exchange(known->grid, &grid) == nullptr;
   const IBox tight = grid.grid.bounds();
-  if (!(tight == known->tight) || known->pivot != grid.pivot) known->shape = ++shapes;
-  known->identity = identity;
-  known->version = version;
+  // What is not a number differs from itself, and is another each time.
+  if (!is_new && tight == known->tight && known->pivot == grid.pivot) return true;
+  known->shape = ++shapes;
   known->pivot = grid.pivot;
   known->tight = tight;
   known->can_be_placed = !tight.empty() && is_finite(grid.pivot);
+  return false;
 }
 
 // The grid of an instance that is to be traced where it has a place; null for any other.
@@ -121,8 +145,38 @@ void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instan
                 instance.mirrored};
 }
 
-// Places anew what was moved; false, with some of it done, when other instances are to be traced than were.
-bool SceneTracer::Impl::move_instances() {
+// Places an instance anew if it was moved; false when it is to be traced and was not, or the other way round.
+bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved) {
+  const auto found = std::lower_bound(sources.begin(), sources.end(), handle,
+                                      [](const Source& each, InstanceHandle key) { return each.instance < key; });
+  const bool was_placed = found != sources.end() && found->instance == handle;
+  const Instance* instance = scene->instances().find(handle);
+  TracedGrid* grid = instance == nullptr ? nullptr : grid_to_place(*instance);
+  const bool is_placed = grid != nullptr && has_place(*instance);
+  if (is_placed != was_placed) return false;
+  if (!is_placed || found->is_of(*instance, *grid)) return true;
+  // Of another grid: that grid's trees may not be there.
+  if (found->grid != grid) return false;
+  const auto i = static_cast<std::size_t>(found - sources.begin());
+  place(i, handle, *instance, *grid);
+  moved.push_back({i, bounds_in_world(placed[i], grid->tight)});
+  return true;
+}
+
+bool SceneTracer::Impl::move_instances(const SceneChanges& changes) {
+  std::vector<InstanceTree::Change> moved;
+  for (const InstanceHandle handle : changes.instances) {
+    if (!move_instance(handle, moved)) return false;
+  }
+  instances.change(moved);
+  return true;
+}
+
+// Likewise all; false, with some of it done, when other instances are to be traced than were.
+bool SceneTracer::Impl::move_all_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
   std::vector<InstanceTree::Change> moved;
   std::size_t next = 0;
   bool is_same = true;
@@ -149,6 +203,9 @@ bool SceneTracer::Impl::move_instances() {
 
 // Places all that is to be traced.
 void SceneTracer::Impl::place_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
   std::vector<DBox> boxes;
   placed.clear();
   sources.clear();
@@ -164,18 +221,26 @@ void SceneTracer::Impl::place_instances() {
   instances = InstanceTree(std::move(boxes));
 }
 
-void SceneTracer::Impl::update_trees(Threads threads) {
+void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads threads) {
   std::vector<TracedGrid*> used;
-  for (const auto& each : grids) {
-    if (each != nullptr && each->is_placed) used.push_back(each.get());
+  const auto use = [&](TracedGrid* grid) {
+    if (grid != nullptr && grid->is_placed) used.push_back(grid);
+  };
+  if (changes.all) {
+    for (const auto& each : grids) use(each.get());
+  }
+  for (const GridHandle handle : changes.grids) {
+    if (!changes.all && handle.index < grids.size()) use(grids[handle.index].get());
   }
   std::vector<std::uint8_t> is_other(used.size());
   parallel_for(used.size(), threads, [&](std::size_t i) {
     is_other[i] = static_cast<std::uint8_t>(used[i]->trees.update(used[i]->grid->grid, scene->types));
   });
   has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
-  has_transparent = std::any_of(used.begin(), used.end(),
-                                [](const TracedGrid* grid) { return grid->trees.transparent() != nullptr; });
+  if (!changes.all && !has_other_trees) return;
+  has_transparent = std::any_of(grids.begin(), grids.end(), [](const auto& grid) {
+    return grid != nullptr && grid->is_placed && grid->trees.transparent() != nullptr;
+  });
   if (!has_other_trees) return;
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const TracedGrid& grid = *sources[i].grid;

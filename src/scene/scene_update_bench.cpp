@@ -44,7 +44,7 @@ void tenth_moved(benchmark::State& state, double step) {
   for (auto _ : state) {
     state.PauseTiming();
     for (std::size_t i = round++ % 10; i < handles.size(); i += 10) {
-      Instance& instance = scene.instances()[handles[i]];
+      Instance& instance = scene.edit(handles[i]);
       instance.position += DVec3(by(random), by(random), by(random));
       for (int axis = 0; axis < 3; ++axis) instance.position[axis] = std::remainder(instance.position[axis], 12'000.0);
     }
@@ -66,7 +66,7 @@ void one_voxel(benchmark::State& state) {
   Scene scene = mixed_scene(kInstances);
   SceneTracer tracer(scene, false, {1});
   // The largest: 512 chunks.
-  Grid& grid = scene.grids()[scene.grids().handles().back()].grid;
+  Grid& grid = scene.edit(scene.grids().handles().back()).grid;
   bool is_solid = true;
   for (auto _ : state) {
     state.PauseTiming();

@@ -10,6 +10,8 @@
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
 
+#include "grid/change_follower.h"
+
 namespace quoin {
 namespace {
 
@@ -42,7 +44,7 @@ class ChangingScene {
         if (SceneGrid* grid = any_grid()) grid->pivot = vector() * 20.0;
         return;
       case 7:
-        if (SceneGrid* grid = any_grid()) (void)grid->grid.take_dirty();
+        if (SceneGrid* grid = any_grid()) (void)grid->grid.cursor();
         return;
       case 8:
         if (SceneGrid* grid = any_grid()) empty(grid->grid);
@@ -74,11 +76,11 @@ class ChangingScene {
 
   SceneGrid* any_grid() {
     const auto handles = scene.grids().handles();
-    return handles.empty() ? nullptr : &scene.grids()[handles[random_() % handles.size()]];
+    return handles.empty() ? nullptr : &scene.edit(handles[random_() % handles.size()]);
   }
   Instance* any_instance() {
     const auto handles = scene.instances().handles();
-    return handles.empty() ? nullptr : &scene.instances()[handles[random_() % handles.size()]];
+    return handles.empty() ? nullptr : &scene.edit(handles[random_() % handles.size()]);
   }
 
   void edit(Grid& grid) {
@@ -94,19 +96,16 @@ class ChangingScene {
     if (below(2) == 0) grid.clear();
     if (!grid.bounds().empty()) grid.fill_box(grid.bounds().min, grid.bounds().max, kAir);
   }
-  // Another in its place; often of the same version.
+  // Another in its place.
   void replace_grid() {
     SceneGrid* grid = any_grid();
     if (grid == nullptr) return;
     if (below(2) == 0) {
-      grid->grid = grid->grid.clone();
+      grid->grid = grid->grid.snapshot();
       return;
     }
-    const std::uint64_t version = grid->grid.version();
     grid->grid = Grid();
-    for (std::uint64_t i = 0; i < std::min<std::uint64_t>(version, 20); ++i) {
-      grid->grid.set({static_cast<int>(i), below(5), below(5)}, type());
-    }
+    for (int i = below(20); i > 0; --i) grid->grid.set({i, below(5), below(5)}, type());
   }
   void change_types() {
     if (below(3) == 0 && scene.types.size() < 6) {
@@ -285,29 +284,29 @@ TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
   const OccupancyTree* first = tracer.placed()[0].opaque;
   const OccupancyTree* second = tracer.placed()[1].opaque;
   EXPECT_FALSE(tracer.update());
-  world.scene.instances()[world.near].position = {1, 2, 3};
+  world.scene.edit(world.near).position = {1, 2, 3};
   EXPECT_FALSE(tracer.update());
-  world.scene.instances()[world.near].visible = false;
+  world.scene.edit(world.near).visible = false;
   EXPECT_FALSE(tracer.update());
-  world.scene.instances()[world.near].visible = true;
+  world.scene.edit(world.near).visible = true;
   EXPECT_FALSE(tracer.update()) << "trees outlive their instances";
-  world.scene.grids()[world.grid].grid.set({70, 20, 0}, 1);
+  world.scene.edit(world.grid).grid.set({70, 20, 0}, 1);
   EXPECT_TRUE(tracer.update());
   EXPECT_EQ(tracer.placed()[0].opaque, first);
   EXPECT_EQ(tracer.placed()[1].opaque, second);
   EXPECT_TRUE(first->is_occupied({70, 20, 0}));
 }
 
-TEST(SceneUpdate, TakesNoDirtFromOthers) {
+TEST(SceneUpdate, OthersWhoFollowTheGridMissNothing) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
-  Grid& grid = world.scene.grids()[world.grid].grid;
-  (void)grid.take_dirty();
+  Grid& grid = world.scene.edit(world.grid).grid;
+  ChangeFollower follower(grid);
   grid.set({5, 5, 5}, kAir);
   tracer.update();
-  EXPECT_EQ(grid.take_dirty(), (std::vector<IVec3>{{0, 0, 0}}));
+  EXPECT_EQ(follower.take(grid), (std::vector<IVec3>{{0, 0, 0}}));
   grid.set({6, 5, 5}, kAir);
-  (void)grid.take_dirty();
+  (void)follower.take(grid);
   tracer.update();
   EXPECT_FALSE(tracer.placed()[0].opaque->is_occupied({6, 5, 5}));
 }

@@ -172,7 +172,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
   Random random(17);
   for (int turn = 0; turn < 4; ++turn) {
     const DQuat rotation = turn == 0 ? DQuat(1, 0, 0, 0) : random.rotation();
-    const Scene scene = scene_of(room.clone(), rotation);
+    const Scene scene = scene_of(room.snapshot(), rotation);
     const SceneTracer tracer(scene);
     const OrientedBox box{rotation * DVec3(10.3, 10.1, 10.2), DVec3(0.6), rotation};
     // Over the floor: what goes down is dropped, the rest kept, across the borders of its voxels.

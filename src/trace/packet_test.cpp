@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
 
@@ -257,7 +258,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
   Grid grid;
   grid.fill_box({-70, -70, -70}, {70, -20, 70}, 1);
   OccupancyTree tree = OccupancyTree::build(grid, types);
-  static_cast<void>(grid.take_dirty());
+  ChangeFollower follower(grid);
   std::mt19937 random(3);
   const auto near = [&](int reach) { return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach; };
   for (int round = 0; round < 24; ++round) {
@@ -269,7 +270,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
     } else {
       grid.set({near(reach), near(reach), near(reach)}, type);
     }
-    tree.update(grid, types, grid.take_dirty());
+    tree.update(grid, types, follower.take(grid));
     const OccupancyTree fresh = OccupancyTree::build(grid, types);
     ASSERT_EQ(tree.bounds(), fresh.bounds());
     for (int i = 0; i < 200; ++i) {

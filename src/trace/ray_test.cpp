@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/change_follower.h"
 #include "bench/workloads.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
@@ -217,6 +218,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
   for (int which = 0; which < 3; ++which) {
     trees[static_cast<std::size_t>(which)] = OccupancyTree::build(grid, types, static_cast<Occupancy>(which));
   }
+  ChangeFollower follower(grid);
   std::mt19937 random(9);
   const auto near = [&] { return static_cast<int>(random() % 150) - 75; };
   for (int round = 0; round < 12; ++round) {
@@ -225,7 +227,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     } else {
       grid.set({near(), near(), near()}, static_cast<VoxelType>(random() % 6));
     }
-    const std::vector<IVec3> dirty = grid.take_dirty();
+    const std::vector<IVec3> dirty = follower.take(grid);
     for (OccupancyTree& tree : trees) {
       tree.update(grid, types, dirty);
     }
@@ -239,7 +241,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     EXPECT_EQ(trees[0].bounds(), grid.bounds());
   }
   grid.clear();
-  trees[0].update(grid, types, grid.take_dirty());
+  trees[0].update(grid, types, follower.take(grid));
   EXPECT_TRUE(trees[0].bounds().empty());
 }
 

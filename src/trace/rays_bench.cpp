@@ -134,7 +134,7 @@ BENCHMARK(build)->Name("rays/build")->Unit(benchmark::kMillisecond);
 // Following an edit of a cube of this edge, the edit itself not counted.
 void update(benchmark::State& state) {
   Grid grid = workloads::terrain_grid(256, 256);
-  static_cast<void>(grid.take_dirty());
+  ChangeCursor cursor = grid.cursor();
   OccupancyTree tree = OccupancyTree::build(grid, ray_workload().types);
   const IVec3 corner{100, 20, 100};
   const IVec3 size{static_cast<int>(state.range(0))};
@@ -143,7 +143,7 @@ void update(benchmark::State& state) {
     state.PauseTiming();
     grid.fill_box(corner, corner + size, is_solid ? VoxelType{1} : kAir);
     is_solid = !is_solid;
-    const std::vector<IVec3> dirty = grid.take_dirty();
+    const std::vector<IVec3> dirty = chunks_to_mesh(grid, grid.changes_since(cursor));
     state.ResumeTiming();
     tree.update(grid, ray_workload().types, dirty);
   }

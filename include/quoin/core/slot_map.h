@@ -1,10 +1,14 @@
 #pragma once
 
-#include <cassert>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
+
+#include <quoin/core/assert.h>
 
 namespace quoin {
 
@@ -21,37 +25,45 @@ struct Handle {
   }
 };
 
-/// Values by generational handle: O(1) insert, remove and find; iteration in slot order.
+/// Values by generational handle: O(1) insert, remove and find; iteration in slot order. An element stays at its address
+/// until it is removed, whatever else is inserted, and when the map is moved.
 template <class T>
 class SlotMap {
  public:
+  SlotMap() = default;
+  SlotMap(SlotMap&&) noexcept = default;
+  SlotMap& operator=(SlotMap&&) noexcept = default;
+
   Handle<T> insert(T value) {
-    ++size_;
+    std::uint32_t index = count_;
     if (!free_.empty()) {
-      const std::uint32_t index = free_.back();
+      index = free_.back();
       free_.pop_back();
-      slots_[index].value = std::move(value);
-      return {index, slots_[index].generation};
+    } else {
+      if (count_ % kPage == 0) pages_.push_back(std::make_unique<Page>());
+      ++count_;
     }
-    slots_.push_back({std::move(value), 0});
-    return {static_cast<std::uint32_t>(slots_.size() - 1), 0};
+    Slot& slot = slot_at(index);
+    slot.value.emplace(std::move(value));
+    ++size_;
+    return {index, slot.generation};
   }
 
-  /// False when the handle names nothing.
+  /// Returns false when the handle names nothing.
   bool remove(Handle<T> handle) {
     if (find(handle) == nullptr) return false;
-    Slot& slot = slots_[handle.index];
+    free_.push_back(handle.index);
+    Slot& slot = slot_at(handle.index);
     slot.value.reset();
     ++slot.generation;
-    free_.push_back(handle.index);
     --size_;
     return true;
   }
 
   /// Null when the handle names nothing (never inserted, or removed since).
   [[nodiscard]] const T* find(Handle<T> handle) const {
-    if (handle.index >= slots_.size()) return nullptr;
-    const Slot& slot = slots_[handle.index];
+    if (handle.index >= count_) return nullptr;
+    const Slot& slot = slot_at(handle.index);
     return slot.value.has_value() && slot.generation == handle.generation ? &*slot.value : nullptr;
   }
   [[nodiscard]] T* find(Handle<T> handle) { return const_cast<T*>(std::as_const(*this).find(handle)); }
@@ -59,7 +71,7 @@ class SlotMap {
   /// Requires: the handle names an element.
   [[nodiscard]] const T& operator[](Handle<T> handle) const {
     const T* found = find(handle);
-    assert(found != nullptr);
+    QUOIN_ASSERT(found != nullptr, "the handle names an element");
     return *found;
   }
   [[nodiscard]] T& operator[](Handle<T> handle) { return const_cast<T&>(std::as_const(*this)[handle]); }
@@ -71,18 +83,43 @@ class SlotMap {
   [[nodiscard]] std::vector<Handle<T>> handles() const {
     std::vector<Handle<T>> all;
     all.reserve(size_);
-    for (std::uint32_t i = 0; i < slots_.size(); ++i) {
-      if (slots_[i].value.has_value()) all.push_back({i, slots_[i].generation});
-    }
+    for_each([&](Handle<T> handle, const T&) { all.push_back(handle); });
     return all;
+  }
+  /// The handle of the element in a slot, if any.
+  [[nodiscard]] std::optional<Handle<T>> handle_at(std::uint32_t index) const {
+    if (index >= count_ || !slot_at(index).value.has_value()) return std::nullopt;
+    return Handle<T>{index, slot_at(index).generation};
   }
 
   /// Calls `visit(handle, value)` for every element, in slot order. Requires: `visit` neither inserts nor removes.
   template <class Visit>
   void for_each(Visit&& visit) const {
-    for (std::uint32_t i = 0; i < slots_.size(); ++i) {
-      if (slots_[i].value.has_value()) visit(Handle<T>{i, slots_[i].generation}, *slots_[i].value);
+    std::uint32_t index = 0;
+    for (const std::unique_ptr<Page>& page : pages_) {
+      for (const Slot& slot : *page) {
+        if (slot.value.has_value()) visit(Handle<T>{index, slot.generation}, *slot.value);
+        ++index;
+      }
     }
+  }
+
+  /// A map with the same handles, of `copy(value)`.
+  template <class Copy>
+  [[nodiscard]] SlotMap copied(Copy&& copy) const {
+    SlotMap made;
+    made.pages_.reserve(pages_.size());
+    for (const std::unique_ptr<Page>& page : pages_) {
+      Page& to = *made.pages_.emplace_back(std::make_unique<Page>());
+      for (std::size_t i = 0; i < kPage; ++i) {
+        to[i].generation = (*page)[i].generation;
+        if ((*page)[i].value.has_value()) to[i].value.emplace(copy(*(*page)[i].value));
+      }
+    }
+    made.free_ = free_;
+    made.count_ = count_;
+    made.size_ = size_;
+    return made;
   }
 
  private:
@@ -90,8 +127,15 @@ class SlotMap {
     std::optional<T> value;
     std::uint32_t generation = 0;
   };
-  std::vector<Slot> slots_;
+  static constexpr std::size_t kPage = 32;
+  using Page = std::array<Slot, kPage>;
+
+  [[nodiscard]] const Slot& slot_at(std::uint32_t index) const { return (*pages_[index / kPage])[index % kPage]; }
+  [[nodiscard]] Slot& slot_at(std::uint32_t index) { return (*pages_[index / kPage])[index % kPage]; }
+
+  std::vector<std::unique_ptr<Page>> pages_;
   std::vector<std::uint32_t> free_;
+  std::uint32_t count_ = 0;  // slots that were ever used
   std::size_t size_ = 0;
 };
 

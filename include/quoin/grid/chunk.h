@@ -4,13 +4,13 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
+#include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -30,6 +30,9 @@ inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
   return {voxel.x & (kChunkEdge - 1), voxel.y & (kChunkEdge - 1), voxel.z & (kChunkEdge - 1)};
 }
 
+/// All of a chunk, in its own coordinates.
+inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
+
 /// 64^3 voxels, compressed by a palette to 1, 2, 4, 8 or 16 bits each.
 ///
 /// Voxels lie in rows of 64 along x, so one bit plane of a row is one word. 4x4 rows (64x4x4 voxels) are a slab, the
@@ -38,14 +41,11 @@ inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
 /// leave about the memory that a new chunk takes; `compact` gives back the rest.
 /// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and
 /// tight bounds cost nothing to ask.
+/// Copies share their storage until one of them is written, so that a copy costs no more than a pointer; a write to what
+/// is shared copies it first. Threads: copies may be read, written and destroyed on several threads, each copy by itself.
 class Chunk {
  public:
-  explicit Chunk(VoxelType uniform = kAir);
-  Chunk(Chunk&&) noexcept = default;
-  Chunk& operator=(Chunk&&) noexcept = default;
-  Chunk(const Chunk& other);
-  Chunk& operator=(const Chunk& other);
-  ~Chunk() = default;
+  explicit Chunk(VoxelType uniform = kAir) : uniform_(uniform) {}
 
   /// From 64^3 types, x fastest, then y, then z. The smallest storage that holds them.
   static Chunk from_dense(std::span<const VoxelType, kChunkVoxels> types);
@@ -72,7 +72,7 @@ class Chunk {
   void fill(VoxelType type);
   /// Sets the voxels of a box (clipped to the chunk); calls `on_change` for every row in which some had another type.
   void fill_box(const IBox& box, VoxelType type,
-                const std::function<void(int y, int z, std::uint64_t changed)>& on_change);
+                FunctionRef<void(int y, int z, std::uint64_t changed)> on_change);
 
   /// Which of a row's voxels have this type.
   [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;
@@ -85,6 +85,17 @@ class Chunk {
     if (mixed_ != nullptr) return mixed_->non_air;
     return uniform_ == kAir ? 0 : static_cast<int>(kChunkVoxels);
   }
+  /// Whether no voxel is air.
+  [[nodiscard]] bool is_full() const { return non_air_count() == static_cast<int>(kChunkVoxels); }
+  /// Whether a copy of the other has not been written since, nor this: equal without a look. False says nothing.
+  [[nodiscard]] bool shares_storage_with(const Chunk& other) const {
+    return mixed_ == other.mixed_ && (mixed_ != nullptr || uniform_ == other.uniform_);
+  }
+  /// The same types everywhere, however they are stored. Cost: none where storage is shared; O(voxels) otherwise.
+  [[nodiscard]] bool operator==(const Chunk& other) const;
+  /// A number that says what the voxels are, whatever edits led to them and however they are stored: equal for equal
+  /// chunks, on every machine. Not for those who mean harm. Cost: up to 0.1 ms; it is not kept.
+  [[nodiscard]] std::uint64_t content_hash() const;
   /// How many voxels have this type. Cost: O(palette), or O(voxels) at 16 bits a voxel.
   [[nodiscard]] int count(VoxelType type) const;
   /// The types that occur, ascending. Cost: as `count`.
@@ -97,7 +108,7 @@ class Chunk {
   void compact();
 
   /// The storage itself, for code that turns voxels into masks (meshing, tracing).
-  struct Mixed {
+  struct Mixed : RefCounted {
     static constexpr std::uint32_t kNoSlot = 0xFFFF'FFFFU;
     /// Of types at 16 bits: so few that a chunk can keep their counts, so many that 256 types or fewer show.
     static constexpr std::uint32_t kRemainders = 1'024;
@@ -167,6 +178,13 @@ class Chunk {
   [[nodiscard]] const Mixed* mixed() const { return mixed_.get(); }
 
  private:
+  // What is about to be written: of this chunk alone.
+  Mixed& own() {
+    if (mixed_.is_shared()) [[unlikely]]
+      copy_storage();
+    return *mixed_;
+  }
+  void copy_storage();
   void make_mixed();
   std::uint32_t index_for(VoxelType type);
   std::uint32_t find_or_add(VoxelType type);
@@ -184,7 +202,7 @@ class Chunk {
   [[nodiscard]] bool is_one_entry() const;
 
   VoxelType uniform_;
-  std::unique_ptr<Mixed> mixed_;
+  Ref<Mixed> mixed_;
 };
 
 }  // namespace quoin

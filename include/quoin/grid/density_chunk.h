@@ -3,12 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include <quoin/core/half.h>
+#include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 
@@ -24,16 +24,11 @@ namespace quoin {
 ///
 /// Samples lie in rows of 64 along x; 4x4 rows are a slab, the unit of uniformity, as in Chunk: what is far from the
 /// surface is clamped to one value by the grid, and a slab of one value holds no samples. The signs of a row are also
-/// kept as one word, so that finding the surface reads 1/16 of the bytes.
+/// kept as one word, so that finding the surface reads 1/16 of the bytes. Copies share their storage as those of Chunk do.
 class DensityChunk {
  public:
   /// All samples of one density and material.
   explicit DensityChunk(Half density, VoxelType material = kAir);
-  DensityChunk(DensityChunk&&) noexcept = default;
-  DensityChunk& operator=(DensityChunk&&) noexcept = default;
-  DensityChunk(const DensityChunk& other);
-  DensityChunk& operator=(const DensityChunk& other);
-  ~DensityChunk() = default;
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] Half get(int x, int y, int z) const {
@@ -69,6 +64,16 @@ class DensityChunk {
   /// `unite_slabs`, and gives back the memory that this and the materials no longer need.
   void compact();
 
+  /// Whether every sample is solid. Cost: O(4096).
+  [[nodiscard]] bool is_full() const;
+  /// Whether a copy of the other has not been written since, nor this: equal without a look. False says nothing.
+  [[nodiscard]] bool shares_storage_with(const DensityChunk& other) const {
+    return mixed_ == other.mixed_ && (mixed_ != nullptr || uniform_ == other.uniform_) &&
+           materials_.shares_storage_with(other.materials_);
+  }
+  /// As Chunk::content_hash, of densities and materials. Cost: up to 0.2 ms.
+  [[nodiscard]] std::uint64_t content_hash() const;
+
   [[nodiscard]] const Chunk& materials() const { return materials_; }
   [[nodiscard]] Chunk& materials() { return materials_; }
   /// Bytes held, this object and its materials included.
@@ -77,7 +82,7 @@ class DensityChunk {
   [[nodiscard]] static constexpr bool is_solid(Half density) { return (density & 0x8000U) != 0; }
 
   /// The storage itself, for meshing.
-  struct Mixed {
+  struct Mixed : RefCounted {
     std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | half, or a slot in `values`
     std::vector<Half> values;                ///< [slot][z % 4][y % 4][x]
     std::vector<std::uint32_t> free_slots;
@@ -97,7 +102,7 @@ class DensityChunk {
 
   Half uniform_;
   Chunk materials_;
-  std::unique_ptr<Mixed> mixed_;
+  Ref<Mixed> mixed_;
 };
 
 /// A density chunk and its 26 neighbours: all that meshing a chunk may read.

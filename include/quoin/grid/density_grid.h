@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/density_chunk.h>
 
 namespace quoin {
@@ -25,11 +27,9 @@ struct DensitySample {
 ///            Values are distances in samples wherever occlusion is to mean what it says. The sign that is given is
 ///            kept, however small the value; NaN counts as far air, infinities as +-band.
 /// Materials: that of an air sample has no effect on any mesh. Far air has none: it reads as kAir.
-/// Edits:     an edit raises the version of every chunk in which a density or a material changed, and remembers where,
-///            so that `take_dirty` can tell which meshes it reaches. A chunk that is all far air is dropped. When an
-///            edit throws (bad_alloc, or what a callback threw), what it did until then stays done and booked.
-/// Threads:   any number may read at once; an edit needs the grid to itself.
-/// Moving:    a grid that was moved from may only be assigned to or destroyed.
+/// Edits:     a chunk that is all far air is dropped. When an edit throws (bad_alloc, or what a callback threw), what it
+///            did until then stays done and booked. `changes_since` tells any number of consumers what edits changed.
+/// Sharing, threads and moving: as Grid.
 class DensityGrid {
  public:
   /// Requires: 0 < band <= 65,504. A band that is no half counts as the next lesser one.
@@ -37,7 +37,8 @@ class DensityGrid {
   DensityGrid(DensityGrid&&) noexcept;
   DensityGrid& operator=(DensityGrid&&) noexcept;
   ~DensityGrid();
-  [[nodiscard]] DensityGrid clone() const;
+  /// As Grid::snapshot.
+  [[nodiscard]] DensityGrid snapshot() const;
 
   [[nodiscard]] float band() const;
   [[nodiscard]] float density(IVec3 sample) const;
@@ -59,7 +60,7 @@ class DensityGrid {
   /// Blend:   `blend` >= 0 is the width k, in samples, over which the two surfaces flow together (0: a sharp crease):
   ///          min(a, b) - max(k - |a - b|, 0)^2 / (4 k). Since densities end at the band, k is at most
   ///          band - max(a, b).
-  /// Answers: how many samples changed.
+  /// Returns: how many samples changed.
   /// Errors:  a negative, infinite or NaN size or place, or a box whose `max` is less than its `min`, changes nothing.
   /// Cost:    adding: O(chunks of the shape's box), and O(samples) in those that its surface comes near or that exist;
   ///          each chunk inside becomes a uniform one of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
@@ -78,10 +79,24 @@ class DensityGrid {
   /// length but 0), `strength` as in `smooth`. Samples that become solid take `material`.
   /// Cost: as adding a sphere.
   std::int64_t flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength, VoxelType material);
-  /// Asks `pick(sample, current)` for the new value of every sample of the box, x fastest, then y, then z within a
-  /// chunk, chunks likewise. Requires: `pick` leaves the grid alone.
-  /// Cost: O(samples of the box), far air too.
-  std::int64_t edit(const IBox& box, const std::function<DensitySample(IVec3 sample, DensitySample current)>& pick);
+  /// Asks `pick(IVec3 sample, DensitySample current)` for the new value of every sample of the box (half open: `max`
+  /// excluded), x fastest, then y, then z within a chunk, chunks likewise. Returns how many samples changed.
+  /// Requires: `pick` leaves the grid alone. Cost: O(samples of the box), far air too.
+  template <class Pick>
+  std::int64_t edit(const IBox& box, Pick&& pick) {
+    return edit_rows(box, [&pick](IVec3 first, std::span<float> densities, std::span<VoxelType> materials) {
+      for (std::size_t i = 0; i < densities.size(); ++i, ++first.x) {
+        const DensitySample picked = pick(first, DensitySample{densities[i], materials[i]});
+        densities[i] = picked.density;
+        materials[i] = picked.material;
+      }
+    });
+  }
+  /// Likewise a row at a time: `change(first, densities, materials)` gets the samples of the box along x in one chunk,
+  /// from `first` on, and changes them in place.
+  std::int64_t edit_rows(
+      const IBox& box,
+      FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Requires: its densities are `stored_density`
   /// of this band. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, DensityChunk samples);
@@ -97,17 +112,12 @@ class DensityGrid {
   [[nodiscard]] IBox solid_bounds() const;
   [[nodiscard]] std::int64_t solid_count() const;
 
-  /// Raised by every edit that changed a sample of this chunk; 0 for a chunk that is not there.
-  [[nodiscard]] std::uint64_t version(IVec3 chunk) const;
-  /// Raised by every edit that changed anything.
-  [[nodiscard]] std::uint64_t version() const;
-  /// The chunks whose mesh may have changed since the last call: those that read a changed sample at most `reach`
-  /// samples away from a sample of theirs. `reach` is what the mesher says (`reach_of`, quoin/mesh/smooth.h). Sorted as
-  /// `chunks`, neighbours that do not exist (all far air) included, since a surface can end in them.
-  /// Exact: a chunk is told of if, and only if, a sample changed within its 64^3 samples grown by `reach` on each side.
-  /// Memory: that of 27 bytes for each chunk that changed, until they are taken.
-  /// Requires: 0 <= reach <= 64.
-  std::vector<IVec3> take_dirty(int reach);
+  /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
+  /// Cost: O(chunks that changed), whatever the size of the grid. See ChangeCursor.
+  [[nodiscard]] DensityChanges changes_since(ChangeCursor& cursor) const;
+  /// As those of Grid.
+  [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
+  [[nodiscard]] ChangeCursor cursor() const;
 
   /// Bytes held.
   [[nodiscard]] std::size_t bytes() const;
@@ -116,7 +126,10 @@ class DensityGrid {
 
  private:
   struct Impl;
+  explicit DensityGrid(std::unique_ptr<Impl> impl);
+
   std::unique_ptr<Impl> impl_;
+  EditNotice notice_;
 };
 
 }  // namespace quoin

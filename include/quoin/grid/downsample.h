@@ -38,11 +38,11 @@ class GridPyramid {
   GridPyramid& operator=(GridPyramid&&) noexcept;
   ~GridPyramid();
 
-  /// Halves `grid` up to `levels` times, fewer where nothing would be left. Chunks whose voxels are of the versions of
-  /// the last update are not made again.
+  /// Halves `grid` up to `levels` times, fewer where nothing would be left. Only chunks that edits since the last update
+  /// can have changed are made again; all of another grid.
   ///
-  /// Requires: always the same grid, and the same visibility of its types.
-  /// Cost:     O(chunks) for looking; `halved_chunk` for each chunk that an edit can have changed.
+  /// Requires: the visibility of the types is that of the last update.
+  /// Cost:     `halved_chunk` for each chunk that an edit can have changed.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});
 
   /// How many there are; none before the first update.

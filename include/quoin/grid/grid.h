@@ -2,13 +2,14 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
 
@@ -18,47 +19,66 @@ namespace quoin {
 ///
 /// Space:    voxel (i, j, k) fills the unit cube from (i, j, k) to (i + 1, j + 1, k + 1). Any int32 coordinates, except
 ///           the outermost chunk on each side, which stays air.
-/// Edits:    an edit raises the version of every chunk in which a voxel changed, and the neighbourhood version of
-///           every existing chunk whose mesh it can change: those that hold one of the 26 neighbours of a changed
-///           voxel. Setting a voxel to what it is changes nothing. A chunk that is all air is dropped.
-///           When an edit throws (bad_alloc, or what a callback threw), what it did until then stays done and booked.
-/// Threads:  any number may read at once; an edit needs the grid to itself.
+/// Edits:    setting a voxel to what it is changes nothing. A chunk that is all air is dropped. When an edit throws
+///           (bad_alloc, or what a callback threw), what it did until then stays done and booked. `changes_since` tells
+///           any number of consumers what edits changed.
+/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a chunk
+///           at a time.
+/// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
+///           its own: it may be read and destroyed on another thread while this one is edited.
 /// Moving:   a grid that was moved from may only be assigned to or destroyed.
 class Grid {
  public:
   Grid();
+  /// Takes the other's voxels and its journal of changes along.
   Grid(Grid&&) noexcept;
   Grid& operator=(Grid&&) noexcept;
   ~Grid();
-  /// A copy of voxels and versions; copying is explicit because it is dear.
-  [[nodiscard]] Grid clone() const;
+  /// The voxels as they are now; later edits of either do not reach the other. A cursor that read this grid's changes
+  /// reads on in the snapshot, and the other way round, until the snapshot is edited itself.
+  /// Cost: a fraction of a microsecond. The first edit of each chunk afterwards copies that chunk, as long as a snapshot
+  /// shares it.
+  [[nodiscard]] Grid snapshot() const;
 
   // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
   [[nodiscard]] VoxelType get(IVec3 voxel) const { return get(voxel.x, voxel.y, voxel.z); }
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
 
-  /// True when the voxel had another type before.
+  /// Returns true when the voxel had another type before.
   bool set(IVec3 voxel, VoxelType type) { return set(voxel.x, voxel.y, voxel.z, type); }
   bool set(int x, int y, int z, VoxelType type);
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
-  /// one edit. Answers how many changed.
+  /// one edit. Returns how many changed.
   std::int64_t set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
-  /// Sets all voxels from `first` to `last`, both included, in any order of corners. Answers how many changed.
+  /// Sets all voxels from `first` to `last`, both included, in any order of corners. Returns how many changed.
   /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel. It cannot be
   /// cancelled: a box of millions of chunks is better filled piece by piece.
   std::int64_t fill_box(IVec3 first, IVec3 last, VoxelType type);
-  /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Answers how many changed.
+  /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
   /// A negative or NaN radius or centre changes nothing.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
-  /// Asks `pick(voxel, current type)` for the new type of every voxel of the box, x fastest, then y, then z within a
-  /// chunk, chunks likewise. Answers how many changed. Requires: `pick` changes nothing in the grid. It may read it by
-  /// `get`, not by a GridReader, and finds what was picked for earlier rows, of 64 voxels along x, but not its own.
-  std::int64_t edit(const IBox& box, const std::function<VoxelType(IVec3 voxel, VoxelType current)>& pick);
+  /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max` excluded),
+  /// x fastest, then y, then z within a chunk, chunks likewise. Returns how many changed. Requires: `pick` changes
+  /// nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was picked for earlier rows, of 64
+  /// voxels along x, but not its own.
+  template <class Pick>
+  std::int64_t edit(const IBox& box, Pick&& pick) {
+    return edit_rows(box, [&pick](IVec3 first, std::span<VoxelType> row) {
+      for (VoxelType& type : row) {
+        type = pick(first, type);
+        ++first.x;
+      }
+    });
+  }
+  /// Likewise a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the box
+  /// along x in one chunk, from `first` on, and changes them in place.
+  std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, Chunk voxels);
   void clear();
 
-  /// Null where all is air.
+  /// Null where all is air. The pointer is good until the grid is edited; a copy of the chunk for as long as you like,
+  /// and costs no more.
   [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const { return find_chunk(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] const Chunk* find_chunk(int x, int y, int z) const;
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
@@ -66,40 +86,51 @@ class Grid {
   [[nodiscard]] std::size_t chunk_count() const;
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
 
-  /// Raised by every edit that changed a voxel of this chunk; 0 for a chunk that is not there.
-  [[nodiscard]] std::uint64_t version(IVec3 chunk) const;
-  /// Raised by every edit within one voxel of this chunk: what a mesh of it depends on. 0 for a chunk that is not
-  /// there.
-  [[nodiscard]] std::uint64_t neighbourhood_version(IVec3 chunk) const;
-  /// Raised by every edit that changed anything.
-  [[nodiscard]] std::uint64_t version() const;
-  /// Tells this field of voxels from every other of the process, also from one whose place it has taken: it moves along
-  /// with the voxels, and a clone has its own. Together with the versions it says whether anything has changed.
-  [[nodiscard]] std::uint64_t identity() const;
-  /// The chunks whose mesh may have changed since the last call, sorted as `chunks`; dropped ones are among them.
-  std::vector<IVec3> take_dirty();
+  /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
+  /// Cost: O(chunks that changed), whatever the size of the grid. See ChangeCursor.
+  [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
+  /// Whether that would tell of anything. Cost: O(1).
+  [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
+  /// A cursor at the present: it will be told what changes from now on.
+  [[nodiscard]] ChangeCursor cursor() const;
 
-  /// The smallest box around all non-air voxels; empty when there are none. Cost: O(chunks).
+  /// The smallest box around all non-air voxels; empty when there are none. Cost: O(chunks) the first time, and after
+  /// edits at its sides; otherwise O(chunks that changed).
   [[nodiscard]] IBox bounds() const;
+  /// Cost: O(chunks).
   [[nodiscard]] std::int64_t voxel_count() const;
-  /// Types that occur, ascending.
+  /// Types that occur, ascending. Cost: O(chunks).
   [[nodiscard]] std::vector<VoxelType> types() const;
-  /// Calls `visit(voxel, type)` for every non-air voxel: chunks as in `chunks`, then z, y, x.
-  void for_each(const std::function<void(IVec3 voxel, VoxelType type)>& visit) const;
-  /// Bytes held.
+  /// Calls `visit(IVec3 voxel, VoxelType type)` for every non-air voxel: chunks as in `chunks`, then z, y, x.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for_each_row([&visit](IVec3 first, std::span<const VoxelType> row) {
+      for (const VoxelType type : row) {
+        if (type != kAir) visit(first, type);
+        ++first.x;
+      }
+    });
+  }
+  /// Likewise a row of a chunk at a time, from its first non-air voxels on; rows of air are left out.
+  void for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType> types)> visit) const;
+  /// Bytes held, also those that snapshots share.
   [[nodiscard]] std::size_t bytes() const;
-  /// Gives back memory that edits left unused.
+  /// Gives back memory that edits left unused, but for what snapshots share.
   void compact();
 
  private:
+  friend class Scene;
   struct Impl;
+  explicit Grid(std::unique_ptr<Impl> impl);
+
   std::unique_ptr<Impl> impl_;
+  mutable EditNotice notice_;  // a scene that follows it is no part of it
 };
 
 /// Reads many voxels that lie near each other: remembers the chunk of the last one, and unpacks a row that is
 /// read along x.
 ///
-/// Requires: the grid is not edited meanwhile.
+/// Requires: the grid outlives the reader and is not edited meanwhile.
 class GridReader {
  public:
   explicit GridReader(const Grid& grid) : grid_(&grid) {}

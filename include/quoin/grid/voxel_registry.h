@@ -2,9 +2,13 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include <quoin/core/assert.h>
+#include <quoin/core/changes.h>
+#include <quoin/core/ref.h>
 #include <quoin/core/result.h>
 
 namespace quoin {
@@ -43,13 +47,28 @@ struct VoxelProperties {
   bool operator==(const VoxelProperties&) const = default;
 };
 
+/// A type that was added or replaced.
+struct TypeChange {
+  VoxelType type = kAir;
+  bool visibility = false;  ///< is another; what is not registered counts as opaque
+  bool colour = false;      ///< is another; added ones always
+};
+using TypeChanges = Changes<TypeChange>;
+
 /// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.
 ///
+/// Copies share what they hold until one of them is changed, as a Grid's snapshots do; a cursor that read one reads on in
+/// the other until then. Threads and moving: as Grid.
 /// Cost: `visibility` is one array look-up.
 class VoxelRegistry {
  public:
   /// Holds air only.
   VoxelRegistry();
+  VoxelRegistry(const VoxelRegistry& other);
+  VoxelRegistry(VoxelRegistry&&) noexcept;
+  VoxelRegistry& operator=(const VoxelRegistry& other);
+  VoxelRegistry& operator=(VoxelRegistry&&) noexcept;
+  ~VoxelRegistry();
 
   /// Adds a type and returns its id: ids count up from 1.
   ///
@@ -59,31 +78,49 @@ class VoxelRegistry {
   /// The id of a type that equals `properties` in everything, or a new one. Errors: as `add`. Cost: O(log types).
   [[nodiscard]] Result<VoxelType> find_or_add(const VoxelProperties& properties);
 
-  /// Replaces the properties of `type`. Meshes and pictures made before know nothing of it.
+  /// Replaces the properties of `type`. Meshes and pictures made before know nothing of it; `changes_since` tells.
   ///
   /// Requires: type is not air and is registered; visibility is not Air.
   void replace(VoxelType type, VoxelProperties properties);
 
   /// Requires: `type < size()`.
-  [[nodiscard]] const VoxelProperties& operator[](VoxelType type) const { return properties_[type]; }
+  [[nodiscard]] const VoxelProperties& operator[](VoxelType type) const {
+    QUOIN_ASSERT(type < size(), "a registered type");
+    return content_->properties[type];
+  }
 
   /// Number of ids in use, air included; every id below it is valid.
-  [[nodiscard]] std::size_t size() const { return properties_.size(); }
+  [[nodiscard]] std::size_t size() const { return content_->properties.size(); }
 
   /// An unregistered id counts as opaque, so that a wrong id shows instead of vanishing.
   [[nodiscard]] Visibility visibility(VoxelType type) const {
-    return type < visibility_.size() ? visibility_[type] : Visibility::Opaque;
+    const std::vector<Visibility>& all = content_->visibility;
+    return type < all.size() ? all[type] : Visibility::Opaque;
   }
   [[nodiscard]] bool is_opaque(VoxelType type) const { return visibility(type) == Visibility::Opaque; }
   [[nodiscard]] bool is_transparent(VoxelType type) const { return visibility(type) == Visibility::Transparent; }
   /// Whether any registered type is transparent.
-  [[nodiscard]] bool has_transparent() const { return transparent_count_ > 0; }
+  [[nodiscard]] bool has_transparent() const { return content_->transparent_count > 0; }
+
+  /// The types that were added or replaced since the cursor's last time, in the order of their ids; moves the cursor to
+  /// the present. Cost: O(types that changed). See ChangeCursor.
+  [[nodiscard]] TypeChanges changes_since(ChangeCursor& cursor) const;
+  /// A cursor at the present: it will be told what changes from now on.
+  [[nodiscard]] ChangeCursor cursor() const;
 
  private:
-  std::vector<VoxelProperties> properties_;
-  std::vector<Visibility> visibility_;
-  std::multimap<std::uint64_t, VoxelType> by_hash_;
-  std::size_t transparent_count_ = 0;
+  struct Content : RefCounted {
+    std::vector<VoxelProperties> properties;
+    std::vector<Visibility> visibility;
+    std::vector<std::uint64_t> serials;  // of the types' last records in the journal
+    std::multimap<std::uint64_t, VoxelType> by_hash;
+    std::size_t transparent_count = 0;
+  };
+  struct Journal;
+  void note(TypeChange change);
+
+  Ref<Content> content_;
+  std::unique_ptr<Journal> journal_;
 };
 
 }  // namespace quoin

@@ -11,9 +11,6 @@
 
 namespace quoin {
 
-/// All of a chunk: the default region to mesh.
-inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
-
 /// Whether the face of a voxel of type `a` towards a voxel of type `b` shows: `a` is not air, and `b` is air, or
 /// transparent and of another type.
 [[nodiscard]] inline bool face_is_visible(const VoxelRegistry& types, VoxelType a, VoxelType b) {

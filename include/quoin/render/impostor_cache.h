@@ -51,7 +51,7 @@ class ImpostorCache {
   std::size_t build_some(const Scene& scene, double budget_seconds, Threads threads = {1});
 
   /// Has impostors built anew when types became transparent or opaque since they were; `build_some` does it as well.
-  /// Cost: O(types).
+  /// Cost: O(types that changed).
   void look_at_types(const VoxelRegistry& types);
 
   [[nodiscard]] ImpostorCacheStatistics statistics() const;

@@ -9,7 +9,7 @@
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

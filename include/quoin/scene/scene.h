@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
@@ -41,23 +43,57 @@ struct Instance {
 
 using InstanceHandle = Handle<Instance>;
 
+/// What changed in a scene; in the order of the handles, each once. Those that were removed are among them: they name
+/// nothing.
+struct SceneChanges {
+  bool all = false;                       ///< anything may have changed; the lists are empty
+  std::vector<GridHandle> grids;          ///< added, removed, edited, or with another name, pivot or canvas
+  std::vector<InstanceHandle> instances;  ///< added, removed, or changed
+
+  [[nodiscard]] bool empty() const { return !all && grids.empty() && instances.empty(); }
+};
+
 /// Many grids, placed any number of times each, that share one registry.
 ///
-/// Axes: right-handed, +Y up, one world unit a voxel unless an instance says otherwise.
+/// Axes:      right-handed, +Y up, one world unit a voxel unless an instance says otherwise.
+/// Addresses: a grid stays where it is until it is removed, also when the scene is moved: a reference to it may be kept.
+/// Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, but for edits of
+///            different grids, which may happen at once. A snapshot is a scene of its own.
+/// Moving:    a scene that was moved from may only be assigned to or destroyed.
 class Scene {
  public:
   VoxelRegistry types;
 
-  GridHandle add_grid(SceneGrid grid) { return grids_.insert(std::move(grid)); }
-  InstanceHandle add_instance(Instance instance) { return instances_.insert(std::move(instance)); }
+  Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+  ~Scene();
+  /// The scene as it is now; later changes of either do not reach the other. Cursors that read this one's changes read
+  /// on in the snapshot, and the other way round, until the snapshot is changed itself.
+  /// Cost: a pointer a grid and a copy of each instance, well below a microsecond each, whatever the grids hold.
+  [[nodiscard]] Scene snapshot() const;
+
+  GridHandle add_grid(SceneGrid grid);
+  InstanceHandle add_instance(Instance instance);
   /// Removes the grid and every instance of it.
   bool remove_grid(GridHandle handle);
-  bool remove_instance(InstanceHandle handle) { return instances_.remove(handle); }
+  bool remove_instance(InstanceHandle handle);
 
   [[nodiscard]] const SlotMap<SceneGrid>& grids() const { return grids_; }
-  [[nodiscard]] SlotMap<SceneGrid>& grids() { return grids_; }
   [[nodiscard]] const SlotMap<Instance>& instances() const { return instances_; }
-  [[nodiscard]] SlotMap<Instance>& instances() { return instances_; }
+  /// A grid, to be edited, now or later: the scene learns of every edit of its voxels. Name, pivot and canvas are to be
+  /// changed before the next `changes_since`, since this call is what books that. Requires: the handle names a grid.
+  [[nodiscard]] SceneGrid& edit(GridHandle handle);
+  /// An instance, to be changed before the next `changes_since`: this call is what books the change.
+  /// Requires: the handle names an instance.
+  [[nodiscard]] Instance& edit(InstanceHandle handle);
+
+  /// What changed since the cursor's last time; moves the cursor to the present. Which of a grid's chunks changed its
+  /// own `changes_since` tells, which types those of `types`.
+  /// Cost: O(grids and instances that changed), whatever the size of the scene. See ChangeCursor.
+  [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
+  /// A cursor at the present: it will be told what changes from now on.
+  [[nodiscard]] ChangeCursor cursor() const;
 
   /// Non-air voxels of all grids; a grid that is placed several times counts once.
   [[nodiscard]] std::int64_t voxel_count() const;
@@ -67,8 +103,10 @@ class Scene {
   [[nodiscard]] DBox bounds(bool hidden_too) const;
 
  private:
+  struct Book;
   SlotMap<SceneGrid> grids_;
   SlotMap<Instance> instances_;
+  std::unique_ptr<Book> book_;
 };
 
 /// A point of the instance's grid (voxels) in the world.

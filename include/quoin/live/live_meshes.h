@@ -52,9 +52,9 @@ struct LiveMeshOptions {
 
 /// The meshes of a scene's chunks, kept up to date by worker threads while the scene is edited.
 ///
-/// Only `update` reads the scene: it copies the chunks that meshing needs, so edits never wait for workers. A chunk is
-/// meshed again only when an edit could have changed its mesh; of several edits before its turn the last counts, and
-/// results of what was removed meanwhile are dropped.
+/// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only when
+/// an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was removed
+/// meanwhile are dropped.
 /// Threads: all calls come from one thread.
 class LiveMeshes {
  public:
@@ -67,11 +67,10 @@ class LiveMeshes {
 
   /// Takes over whatever was changed: voxels, grids, types whose visibility changed (smooth: whose colour did),
   /// instances that first show a grid or last showed it. Chunks nearest to `eye` (world) come first. Call it after
-  /// edits and once a frame while `pending` is not 0: no more chunks are copied ahead than keep the workers busy.
+  /// edits and once a frame while `pending` is not 0: no more chunks are handed out than keep the workers busy.
   ///
-  /// Cost:   O(instances + types + chunks of grids whose version changed), and for each chunk that is to be meshed the
-  ///         copies of at most 27 chunks (smooth: of those around each of its 27 densities that must be made anew),
-  ///         each once.
+  /// Cost:   O(what changed), whatever the size of the world; O(instances) when some of them came, went or changed, and
+  ///         while chunks wait for workers, besides O(chunks that wait).
   /// Errors: bad_alloc; the next call begins anew with all chunks.
   void update(const Scene& scene, DVec3 eye);
 
@@ -90,7 +89,6 @@ class LiveMeshes {
     std::int64_t chunks_meshed = 0;     ///< in all
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
     double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
-    std::size_t copied_bytes = 0;       ///< of chunks that wait for workers
     std::int64_t out_of_memory = 0;     ///< times a worker's memory ran out; the chunk stays pending, to be tried again
   };
   [[nodiscard]] Facts facts() const;

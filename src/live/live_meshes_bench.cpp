@@ -1,7 +1,7 @@
 // live: from an edit to the new meshes of all chunks that it reaches, and from nothing to all meshes; terrain of
 // 256x128x256 voxels, as many workers as `LiveMeshOptions` makes them by itself.
 
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include <chrono>
 #include <cstdio>
@@ -64,7 +64,7 @@ void load(benchmark::State& state, SurfaceStyle style) {
 // A voxel comes and goes; `x` and `z` say how many chunks that reaches.
 void edit(benchmark::State& state, SurfaceStyle style, int x, int z) {
   Land land;
-  Grid& grid = land.scene.grids()[land.grid].grid;
+  Grid& grid = land.scene.edit(land.grid).grid;
   const IVec3 at = land.above(x, z);
   const DVec3 eye(at);
   LiveMeshes meshes(options_of(style));

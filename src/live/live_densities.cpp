@@ -1,4 +1,4 @@
-#include "scene/live_densities.h"
+#include "live/live_densities.h"
 
 #include <algorithm>
 #include <utility>
@@ -53,10 +53,9 @@ const Chunk* materials_of(const DensityChunk* chunk) {
 
 }  // namespace
 
-LiveDensity::LiveDensity(CopiedNeighbourhood voxels, std::uint64_t version, std::shared_ptr<const LiveDensity> base,
-                         bool only_types)
+LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, bool only_types)
     : stamp_(next_stamp()),
-      version_(version),
+      chunk_(chunk),
       voxels_(std::move(voxels)),
       base_(std::move(base)),
       only_types_(only_types) {}
@@ -74,7 +73,7 @@ void LiveDensity::make() {
 }
 
 void LiveDensity::make_locked() {
-  const Neighbourhood voxels = voxels_.view();
+  const Neighbourhood voxels = voxels_->neighbourhood(chunk_);
   std::unique_ptr<DensityChunk> made;
   if (only_types_ && base_ != nullptr && base_->densities() != nullptr && voxels.centre() != nullptr) {
     made = std::make_unique<DensityChunk>(*base_->densities());
@@ -85,13 +84,13 @@ void LiveDensity::make_locked() {
   }
   if (base_ != nullptr) {
     changed_densities_ = density_difference(base_->densities(), made.get());
-    changed_types_ = difference(materials_of(base_->densities()), materials_of(made.get())).types;
+    changed_types_ = difference(materials_of(base_->densities()), materials_of(made.get()), kWholeChunk).types;
     base_stamp_ = base_->stamp();
     has_base_ = true;
   }
   densities_ = std::move(made);
   is_made_.store(true, std::memory_order_release);
-  voxels_ = {};
+  voxels_.reset();
   base_.reset();
 }
 
@@ -103,39 +102,30 @@ bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
          !changed_types_.is_within(1, offset.x, offset.y, offset.z);
 }
 
-// The chunks that came, went or were edited, sorted; `seen_` is brought up to date.
-std::vector<IVec3> DensityBook::changed_chunks(const Grid& grid) {
-  ++scans_;
-  std::vector<IVec3> changed;
-  for (const IVec3 chunk : grid.chunks()) {
-    Seen& seen = seen_[chunk];
-    const std::uint64_t version = grid.version(chunk);
-    seen.scan = scans_;
-    if (seen.version == version) continue;
-    seen.last_version = std::exchange(seen.version, version);
-    changed.push_back(chunk);
+// Where the chunks of the edits differ from what they were, as far as that is looked into.
+std::vector<DensityBook::Change> DensityBook::changes_of(const Grid& grid, const GridChanges& edits) const {
+  std::vector<Change> changes;
+  if (edits.all) {
+    for (const IVec3 chunk : grid.chunks()) changes.push_back({chunk, everything()});
   }
-  for (auto& [chunk, seen] : seen_) {
-    if (seen.scan == scans_) continue;
-    seen.last_version = std::exchange(seen.version, 0);
-    changed.push_back(chunk);
+  for (const ChunkChange& edit : edits.items) {
+    if (changes.size() >= kMostCompared) {
+      changes.push_back({edit.chunk, everything()});
+    } else {
+      changes.push_back({edit.chunk, difference(seen_->find_chunk(edit.chunk), grid.find_chunk(edit.chunk), edit.box)});
+    }
   }
-  std::sort(changed.begin(), changed.end(), by_zyx);
-  return changed;
+  return changes;
 }
 
-void DensityBook::follow(const Grid& grid, const ChunkCopies& copies, std::vector<IVec3>& changed,
+void DensityBook::follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed,
                          std::vector<IVec3>& reached) {
-  const bool is_first = slots_.empty();
-  changed = changed_chunks(grid);
-  // All are compared before any densities are given up: they tell what was there.
-  std::vector<Change> changes;
-  changes.reserve(changed.size());
-  for (const IVec3 chunk : changed) {
-    const bool compares = !is_first && changes.size() < kMostCompared;
-    changes.push_back({chunk, compares ? change_of(chunk, seen_[chunk].last_version, grid, copies) : everything()});
+  const std::vector<Change> changes = changes_of(*grid, edits);
+  seen_ = std::move(grid);
+  for (const Change& change : changes) {
+    changed.push_back(change.chunk);
+    reach_from(change, reached);
   }
-  for (const Change& change : changes) reach_from(change, reached);
   sort_and_unite(reached);
   drop_what_is_gone(changed);
 }
@@ -159,29 +149,12 @@ void DensityBook::reach_from(const Change& change, std::vector<IVec3>& reached) 
 }
 
 void DensityBook::drop_what_is_gone(const std::vector<IVec3>& changed) {
-  std::erase_if(seen_, [](const auto& each) { return each.second.version == 0; });
   for (const IVec3 chunk : changed) {
-    if (seen_.contains(chunk)) continue;
+    if (seen_->find_chunk(chunk) != nullptr) continue;
     for (int i = 0; i < 27; ++i) {
       if (!has_voxels_near(neighbour_of(chunk, i))) slots_.erase(neighbour_of(chunk, i));
     }
   }
-}
-
-// Where a chunk differs from what it was at `last_version`, as far as that is still known.
-ChunkDifference DensityBook::change_of(IVec3 chunk, std::uint64_t last_version, const Grid& grid,
-                                       const ChunkCopies& copies) const {
-  const Chunk* now = grid.find_chunk(chunk);
-  if (last_version == 0) return difference(nullptr, now);
-  if (const auto copy = copies.find(chunk, last_version)) return difference(&copy->chunk(), now);
-  const auto found = slots_.find(chunk);
-  if (found == slots_.end()) return everything();
-  const std::shared_ptr<LiveDensity> under_way = found->second.under_way.lock();
-  for (const std::shared_ptr<LiveDensity>& each : {found->second.kept, under_way}) {
-    const bool tells = each != nullptr && each->version() == last_version && each->is_made();
-    if (tells) return difference(materials_of(each->densities()), now);
-  }
-  return everything();
 }
 
 void DensityBook::invalidate(IVec3 chunk, bool solid) {
@@ -192,25 +165,25 @@ void DensityBook::invalidate(IVec3 chunk, bool solid) {
 
 bool DensityBook::has_voxels_near(IVec3 chunk) const {
   for (int i = 0; i < 27; ++i) {
-    if (seen_.contains(neighbour_of(chunk, i))) return true;
+    if (seen_->find_chunk(neighbour_of(chunk, i)) != nullptr) return true;
   }
   return false;
 }
 
-LiveDensities DensityBook::around(const Grid& grid, IVec3 chunk, ChunkCopies& copies) {
+LiveDensities DensityBook::around(IVec3 chunk) {
   LiveDensities all;
-  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(grid, neighbour_of(chunk, i), copies);
+  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(neighbour_of(chunk, i));
   return all;
 }
 
-std::shared_ptr<LiveDensity> DensityBook::density(const Grid& grid, IVec3 chunk, ChunkCopies& copies) {
+std::shared_ptr<LiveDensity> DensityBook::density(IVec3 chunk) {
   // As in a DensityGrid, the outermost chunks stay air.
   if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
   if (std::shared_ptr<LiveDensity> under_way = slot.under_way.lock()) return under_way;
   const bool only_types = slot.kept != nullptr && !slot.is_solid_stale;
-  auto made = std::make_shared<LiveDensity>(copies.around(grid, chunk), grid.version(chunk), slot.kept, only_types);
+  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, only_types);
   slot.under_way = made;
   return made;
 }

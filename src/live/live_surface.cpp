@@ -1,7 +1,6 @@
 #include <algorithm>
-#include <cassert>
 
-#include "scene/live_queue.h"
+#include "live/live_queue.h"
 
 namespace quoin {
 namespace {
@@ -17,7 +16,7 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   QuadOptions wanted;
   wanted.merge = options.merge;
   const VoxelRegistry& types = *job.types;
-  workspace.blocky->mesh(job.voxels.view(), types, wanted, workspace.quads);
+  workspace.blocky->mesh(job.voxels->neighbourhood(job.chunk), types, wanted, workspace.quads);
   if (workspace.quads.empty()) return;
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Blocky;

@@ -12,26 +12,29 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/grid.h>
 
-#include "grid/change_reach.h"
 #include "grid/chunk_difference.h"
 #include "grid/coordinate_hash.h"
-#include "scene/copied_chunk.h"
 
 namespace quoin {
+
+/// A grid as it was at one moment, for whoever needs it on other threads.
+using GridSnapshot = std::shared_ptr<const Grid>;
+
+/// The chunk beside another, `i` as in Neighbourhood.
+[[nodiscard]] inline IVec3 neighbour_of(IVec3 chunk, int i) {
+  return chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+}
 
 /// The densities of one chunk of voxels in one state, made by the first who needs them.
 ///
 /// Threads: any; the voxels are let go once the densities are made.
 class LiveDensity {
  public:
-  /// `version` is that of the chunk's own voxels. `base` are the densities of an earlier state, or null; with
-  /// `only_types`, the two differ in types alone.
-  LiveDensity(CopiedNeighbourhood voxels, std::uint64_t version, std::shared_ptr<const LiveDensity> base,
-              bool only_types);
+  /// `base` are the densities of an earlier state, or null; with `only_types`, the two differ in types alone.
+  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, bool only_types);
 
   /// Tells this state of this chunk from every other; 0 stands for far air, of which there is no object.
   [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
-  [[nodiscard]] std::uint64_t version() const { return version_; }
   [[nodiscard]] bool is_made() const { return is_made_.load(std::memory_order_acquire); }
   /// Makes them unless another thread is about it. When that throws, nothing has happened.
   void try_to_make();
@@ -48,9 +51,9 @@ class LiveDensity {
   void make_locked();
 
   const std::uint64_t stamp_;
-  const std::uint64_t version_;
+  const IVec3 chunk_;
   std::mutex mutex_;
-  CopiedNeighbourhood voxels_;               // until made, as `base_`
+  GridSnapshot voxels_;                      // until made, as `base_`
   std::shared_ptr<const LiveDensity> base_;  // made
   const bool only_types_;
   std::unique_ptr<const DensityChunk> densities_;
@@ -74,12 +77,12 @@ class DensityBook {
   explicit DensityBook(int reach) : reach_(reach) {}
 
   void clear() { *this = DensityBook(reach_); }
-  /// Takes over what was edited since the last time: of all chunks, if any, in which the surface may have changed
-  /// (`reached`, sorted), and of those that came or went and all that changed (`changed`, sorted). The first time that
-  /// is everything.
-  void follow(const Grid& grid, const ChunkCopies& copies, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
-  /// Requires: `grid` is as `follow` saw it.
-  [[nodiscard]] LiveDensities around(const Grid& grid, IVec3 chunk, ChunkCopies& copies);
+  /// Takes over what was edited since the last time, as `edits` say: the chunks that changed, came or went (`changed`),
+  /// and those in which the surface may have changed (`reached`), both sorted. When all has changed, what was there
+  /// before is to be cleared first.
+  void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
+  /// Of the grid as `follow` saw it last.
+  [[nodiscard]] LiveDensities around(IVec3 chunk);
   /// Keeps what workers made, as far as it holds still. Answers a bit for each that is new.
   std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
 
@@ -95,23 +98,15 @@ class DensityBook {
     IVec3 chunk{0};
     ChunkDifference difference;
   };
-  [[nodiscard]] std::vector<IVec3> changed_chunks(const Grid& grid);
-  [[nodiscard]] ChunkDifference change_of(IVec3 chunk, std::uint64_t last_version, const Grid& grid,
-                                          const ChunkCopies& copies) const;
+  [[nodiscard]] std::vector<Change> changes_of(const Grid& grid, const GridChanges& edits) const;
   void reach_from(const Change& change, std::vector<IVec3>& reached);
   void drop_what_is_gone(const std::vector<IVec3>& changed);
   void invalidate(IVec3 chunk, bool solid);
   [[nodiscard]] bool has_voxels_near(IVec3 chunk) const;
-  [[nodiscard]] std::shared_ptr<LiveDensity> density(const Grid& grid, IVec3 chunk, ChunkCopies& copies);
+  [[nodiscard]] std::shared_ptr<LiveDensity> density(IVec3 chunk);
 
   int reach_;
-  std::uint64_t scans_ = 0;
-  struct Seen {
-    std::uint64_t version = 0;
-    std::uint64_t last_version = 0;
-    std::uint64_t scan = 0;
-  };
-  std::unordered_map<IVec3, Seen, CoordinateHash> seen_;  // the chunks of the grid
+  GridSnapshot seen_;  // the grid as it was followed last
   std::unordered_map<IVec3, Slot, CoordinateHash> slots_;
 };
 

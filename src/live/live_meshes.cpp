@@ -1,6 +1,6 @@
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
-#include "scene/live_book.h"
+#include "live/live_book.h"
 
 namespace quoin {
 

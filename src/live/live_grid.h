@@ -9,20 +9,17 @@
 #include <utility>
 #include <vector>
 
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
 #include "grid/coordinate_hash.h"
-#include "scene/copied_chunk.h"
-#include "scene/live_densities.h"
-#include "scene/live_queue.h"
+#include "live/live_densities.h"
+#include "live/live_queue.h"
 
 namespace quoin {
 
 /// What is known of the surface of one chunk.
 struct LiveChunk {
-  std::uint64_t version = 0;    ///< blocky: the neighbourhood's, as last seen
-  std::uint64_t scan = 0;       ///< in which it was last found in the grid
   std::uint64_t serial = 0;     ///< of the newest job
   std::uint64_t oldest = 0;     ///< results of jobs before this one are of something else
   std::uint64_t collected = 0;  ///< the newest job that is done
@@ -59,14 +56,14 @@ struct LiveTypes {
 /// Follows one grid of a scene: which of its chunks are to be meshed, and what became of them.
 class LiveGrid {
  public:
-  LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals, const CopiedBytes& copied);
+  LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals);
 
-  /// Takes over what was edited. Costs nothing when the grid is as it was.
+  /// Takes over what was edited, at a cost in proportion to that.
   void follow(const Grid& grid, LiveClock::time_point now);
   /// Nothing of the grid is drawn any more.
   void leave();
   /// Makes the next `follow` begin anew.
-  void forget() { identity_ = 0; }
+  void forget() { followed_ = {}; }
   /// Chunks that show one of the types are to be meshed again.
   void mark_types(const Grid& grid, const std::vector<bool>& changed, LiveClock::time_point now);
 
@@ -75,7 +72,7 @@ class LiveGrid {
   [[nodiscard]] const IBox& box() const { return box_; }
   [[nodiscard]] bool has_chunks() const { return !chunks_.empty(); }
   /// Requires: the chunk waits; `grid` is as `follow` saw it.
-  [[nodiscard]] std::unique_ptr<LiveJob> make_job(const Grid& grid, IVec3 chunk, const LiveTypes& types);
+  [[nodiscard]] std::unique_ptr<LiveJob> make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types);
   /// The job is with the workers.
   void hand_over(IVec3 chunk, std::uint64_t serial);
   /// Whether the job is of the chunk's present state.
@@ -86,15 +83,15 @@ class LiveGrid {
   void collect(LiveJob& job);
   /// Appends the surface if there is one to be taken.
   void take(IVec3 chunk, std::vector<SurfaceUpdate>& out);
-  void tidy() { copies_.tidy(); }
 
  private:
   class Change;
   using Chunks = std::unordered_map<IVec3, LiveChunk, CoordinateHash>;
 
   void begin_anew();
-  void follow_blocky(const Grid& grid, LiveClock::time_point now);
-  void follow_smooth(const Grid& grid, LiveClock::time_point now);
+  void follow_blocky(const Grid& grid, const GridChanges& changes, LiveClock::time_point now);
+  void follow_smooth(const Grid& grid, const GridChanges& changes, LiveClock::time_point now);
+  void remove_if_there(IVec3 chunk);
   void see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time_point now);
   void mark_if_there(IVec3 chunk, LiveClock::time_point now);
   void mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now);
@@ -107,13 +104,10 @@ class LiveGrid {
   GridHandle handle_;
   const LiveMeshOptions& options_;
   LiveTotals& totals_;
-  std::uint64_t identity_ = 0;  // of the grid; 0: none
-  std::uint64_t version_ = 0;
-  std::uint64_t scan_ = 0;
+  ChangeCursor followed_;
   Chunks chunks_;
   std::unordered_set<IVec3, CoordinateHash> waiting_;
   IBox box_;  // of all chunks that there were
-  ChunkCopies copies_;
   DensityBook densities_;  // smooth
 };
 

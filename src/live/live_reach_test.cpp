@@ -1,13 +1,12 @@
 // Which chunks are meshed again after an edit.
 
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include "scene/copied_chunk.h"
-#include "scene/live_test_support.h"
+#include "live/live_test_support.h"
 
 namespace quoin {
 namespace {
@@ -64,14 +63,15 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
 
 // Those of which a density field says that a sample changed within reach.
 ChunkSet chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
-  DensityGrid edited = before.clone();
-  edited.take_dirty(reach);
+  DensityGrid edited = before.snapshot();
+  ChangeCursor cursor;
+  (void)edited.changes_since(cursor);
   for (const IVec3 chunk : before.chunks()) {
     if (after.find_chunk(chunk) == nullptr) edited.put_chunk(chunk, DensityChunk(DensityNeighbourhood{}.outside));
   }
   for (const IVec3 chunk : after.chunks()) edited.put_chunk(chunk, *after.find_chunk(chunk));
   ChunkSet all;
-  for (const IVec3 chunk : edited.take_dirty(reach)) all.insert(key(chunk));
+  for (const IVec3 chunk : chunks_to_mesh(edited, edited.changes_since(cursor), reach)) all.insert(key(chunk));
   return all;
 }
 

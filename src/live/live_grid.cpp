@@ -1,4 +1,4 @@
-#include "scene/live_grid.h"
+#include "live/live_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -42,31 +42,30 @@ class LiveGrid::Change {
   const LiveChunk& state_;
 };
 
-LiveGrid::LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals, const CopiedBytes& copied)
-    : handle_(handle), options_(options), totals_(totals), copies_(copied), densities_(reach_of(options.occlusion)) {}
+LiveGrid::LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals)
+    : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion)) {}
 
 void LiveGrid::follow(const Grid& grid, LiveClock::time_point now) {
-  if (identity_ == grid.identity() && version_ == grid.version()) return;
-  if (identity_ != grid.identity()) begin_anew();
-  identity_ = 0;  // stays so when memory runs out
+  ChangeCursor end = followed_;
+  const GridChanges changes = grid.changes_since(end);
+  if (changes.empty()) return;
+  followed_ = {};  // stays so when memory runs out
+  if (changes.all) begin_anew();
   if (options_.style == SurfaceStyle::Blocky) {
-    follow_blocky(grid, now);
+    follow_blocky(grid, changes, now);
   } else {
-    follow_smooth(grid, now);
+    follow_smooth(grid, changes, now);
   }
-  identity_ = grid.identity();
-  version_ = grid.version();
+  followed_ = end;
 }
 
 // What was made so far, or is being made, is of another grid.
 void LiveGrid::begin_anew() {
-  copies_.clear();
   densities_.clear();
   for (auto& [chunk, state] : chunks_) {
     if (state.is_gone) continue;
     waiting_.insert(chunk);
     const Change change(totals_, state);
-    state.version = 0;
     state.oldest = totals_.serial + 1;
     state.last_stamps.reset();
     state.surface.reset();
@@ -82,31 +81,33 @@ void LiveGrid::leave() {
     if (!state.is_gone) all.push_back(chunk);
   }
   for (const IVec3 chunk : all) remove(chunk);
-  identity_ = 0;
-  copies_.clear();
+  followed_ = {};
   densities_.clear();
 }
 
-void LiveGrid::follow_blocky(const Grid& grid, LiveClock::time_point now) {
-  ++scan_;
-  for (const IVec3 chunk : grid.chunks()) {
-    LiveChunk& state = chunks_[chunk];
-    const std::uint64_t version = grid.neighbourhood_version(chunk);
-    if (state.version != version || state.is_gone) mark(chunk, state, now);
-    state.version = version;
-    state.scan = scan_;
+void LiveGrid::follow_blocky(const Grid& grid, const GridChanges& changes, LiveClock::time_point now) {
+  std::vector<IVec3> seen = chunks_to_mesh(grid, changes);
+  if (changes.all) {
+    for (const auto& [chunk, state] : chunks_) seen.push_back(chunk);
   }
-  std::vector<IVec3> gone;
-  for (const auto& [chunk, state] : chunks_) {
-    if (state.scan != scan_ && !state.is_gone) gone.push_back(chunk);
+  for (const IVec3 chunk : seen) {
+    if (grid.find_chunk(chunk) != nullptr) {
+      mark(chunk, chunks_[chunk], now);
+    } else {
+      remove_if_there(chunk);
+    }
   }
-  for (const IVec3 chunk : gone) remove(chunk);
 }
 
-void LiveGrid::follow_smooth(const Grid& grid, LiveClock::time_point now) {
+void LiveGrid::remove_if_there(IVec3 chunk) {
+  const auto found = chunks_.find(chunk);
+  if (found != chunks_.end() && !found->second.is_gone) remove(chunk);
+}
+
+void LiveGrid::follow_smooth(const Grid& grid, const GridChanges& changes, LiveClock::time_point now) {
   std::vector<IVec3> changed;
   std::vector<IVec3> reached;
-  densities_.follow(grid, copies_, changed, reached);
+  densities_.follow(std::make_shared<const Grid>(grid.snapshot()), changes, changed, reached);
   std::vector<IVec3> asked;
   for (const IVec3 chunk : changed) {
     for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
@@ -163,7 +164,6 @@ void LiveGrid::remove(IVec3 chunk) {
   waiting_.erase(chunk);
   {
     const Change change(totals_, state);
-    state.version = 0;
     state.oldest = totals_.serial + 1;
     state.is_waiting = state.is_working = false;
     state.is_ready = false;
@@ -182,7 +182,7 @@ void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
   state.is_listed = true;
 }
 
-std::unique_ptr<LiveJob> LiveGrid::make_job(const Grid& grid, IVec3 chunk, const LiveTypes& types) {
+std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types) {
   const LiveChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<LiveJob>();
   job->grid = handle_;
@@ -190,11 +190,11 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(const Grid& grid, IVec3 chunk, const
   job->serial = ++totals_.serial;
   job->seen = state.seen;
   if (options_.style == SurfaceStyle::Blocky) {
-    job->voxels = copies_.around(grid, chunk);
+    job->voxels = grid;
     job->types = types.registry;
     return job;
   }
-  job->densities = densities_.around(grid, chunk, copies_);
+  job->densities = densities_.around(chunk);
   job->materials = types.materials;
   job->type_generation = types.generation;
   job->last_collected = state.collected;

@@ -1,6 +1,7 @@
-#include "scene/live_book.h"
+#include "live/live_book.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <new>
 #include <utility>
@@ -21,13 +22,6 @@ std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {
   return style == SurfaceStyle::Blocky ? kBlocky : std::clamp<std::size_t>(4 * std::size_t{workers}, 8, kBlocky);
 }
 
-std::uint32_t look_of(const VoxelRegistry& types, VoxelType type, SurfaceStyle style) {
-  if (style == SurfaceStyle::Blocky) return static_cast<std::uint32_t>(types.visibility(type));
-  // Types that are not registered are opaque white.
-  const Rgba8 colour = type < types.size() ? types[type].colour : Rgba8{255, 255, 255, 255};
-  return colour.r | colour.g << 8U | colour.b << 16U | static_cast<std::uint32_t>(colour.a) << 24U;
-}
-
 bool is_drawn(const Instance& instance, const Scene& scene, bool hidden_too) {
   return (instance.visible || hidden_too) && has_place(instance) && scene.grids().find(instance.grid) != nullptr;
 }
@@ -46,7 +40,6 @@ LiveBook::LiveBook(const LiveMeshOptions& options, LiveQueue::Work work)
     : options_(options),
       workers_(worker_count(options.threads)),
       most_ahead_(jobs_ahead(options.style, workers_)),
-      copied_(std::make_shared<std::atomic<std::size_t>>(0)),
       queue_(workers_, std::move(work), options.on_ready) {}
 
 void LiveBook::update(const Scene& scene, DVec3 eye) {
@@ -61,50 +54,70 @@ void LiveBook::update(const Scene& scene, DVec3 eye) {
 // Memory ran out in the middle: whatever was lost is found by beginning anew.
 void LiveBook::forget() {
   for (auto& [handle, grid] : grids_) grid.forget();
+  followed_scene_ = {};
 }
 
 void LiveBook::update_or_throw(const Scene& scene, DVec3 eye) {
   const LiveClock::time_point now = LiveClock::now();
   collect();
   const std::vector<bool> changed_types = follow_types(scene.types);
-  const std::vector<GridHandle> drawn = drawn_grids(scene);
-  for (auto& [handle, grid] : grids_) {
-    if (!std::binary_search(drawn.begin(), drawn.end(), handle)) grid.leave();
+  for (const GridHandle handle : follow_scene(scene)) {
+    LiveGrid& live = grids_.try_emplace(handle, handle, options_, totals_).first->second;
+    live.follow(scene.grids()[handle].grid, now);
   }
-  for (const GridHandle handle : drawn) {
-    const Grid& grid = scene.grids()[handle].grid;
-    LiveGrid& live = grids_.try_emplace(handle, handle, options_, totals_, copied_).first->second;
-    live.follow(grid, now);
-    if (!changed_types.empty()) live.mark_types(grid, changed_types, now);
+  if (!changed_types.empty()) {
+    for (const GridHandle handle : drawn_) find(handle)->mark_types(scene.grids()[handle].grid, changed_types, now);
   }
   withdraw([&](const LiveJob& job) {
     const LiveGrid* live = find(job.grid);
     return live == nullptr || !live->is_current(job);
   });
   if (totals_.unfinished != 0) hand_over(scene, eye);
-  for (auto& [handle, grid] : grids_) grid.tidy();
+}
+
+// The drawn grids that may have changed.
+std::vector<GridHandle> LiveBook::follow_scene(const Scene& scene) {
+  ChangeCursor now = followed_scene_;
+  const SceneChanges changes = scene.changes_since(now);
+  followed_scene_ = now;
+  const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
+  const bool may_draw_others =
+      changes.all || !changes.instances.empty() || std::any_of(changes.grids.begin(), changes.grids.end(), is_gone);
+  if (!may_draw_others) {
+    std::vector<GridHandle> changed;
+    std::set_intersection(changes.grids.begin(), changes.grids.end(), drawn_.begin(), drawn_.end(),
+                          std::back_inserter(changed));
+    return changed;
+  }
+  drawn_ = drawn_grids(scene);
+  for (auto& [handle, grid] : grids_) {
+    if (!std::binary_search(drawn_.begin(), drawn_.end(), handle)) grid.leave();
+  }
   std::erase_if(grids_, [&](const auto& each) {
-    return !each.second.has_chunks() && !std::binary_search(drawn.begin(), drawn.end(), each.first);
+    return !each.second.has_chunks() && !std::binary_search(drawn_.begin(), drawn_.end(), each.first);
   });
+  return drawn_;
 }
 
 // Which types look otherwise than before, by type; empty when none does.
 std::vector<bool> LiveBook::follow_types(const VoxelRegistry& types) {
-  std::vector<std::uint32_t> looks(types.size());
-  for (std::size_t i = 0; i < looks.size(); ++i) looks[i] = look_of(types, static_cast<VoxelType>(i), options_.style);
-  if (types_.generation != 0 && looks == type_looks_) return {};
-  const std::uint32_t unregistered = look_of(VoxelRegistry(), 1, options_.style);
-  std::vector<bool> changed(std::max(looks.size(), type_looks_.size()));
-  for (std::size_t i = 1; i < changed.size(); ++i) {
-    const auto look = [&](const std::vector<std::uint32_t>& all) { return i < all.size() ? all[i] : unregistered; };
-    changed[i] = look(looks) != look(type_looks_);
+  ChangeCursor now = followed_types_;
+  const TypeChanges changes = types.changes_since(now);
+  const bool is_blocky = options_.style == SurfaceStyle::Blocky;
+  const auto matters = [&](const TypeChange& change) { return is_blocky ? change.visibility : change.colour; };
+  if (!changes.all && std::none_of(changes.items.begin(), changes.items.end(), matters)) {
+    followed_types_ = now;
+    return {};
   }
+  // Of another registry all types look otherwise, those that it does not have included.
+  std::vector<bool> changed(changes.all ? kMaxVoxelTypes + 1 : types.size(), changes.all);
+  for (const TypeChange& change : changes.items) changed[change.type] = matters(change);
   if (options_.style == SurfaceStyle::Blocky) {
     types_.registry = std::make_shared<const VoxelRegistry>(types);
   } else {
     types_.materials = std::make_shared<const SurfaceMaterials>(types);
   }
-  type_looks_ = std::move(looks);
+  followed_types_ = now;
   ++types_.generation;
   return changed;
 }
@@ -180,6 +193,7 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene, eye);
+  std::map<GridHandle, GridSnapshot> snapshots;
   std::vector<double> queued = queue_.measure([&](const LiveJob& job) { return distances.at(job.grid).to(job.chunk); });
   double farthest = kNone;  // of those that came and have to go
   for (const Candidate& each : candidates(distances)) {
@@ -188,7 +202,9 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
       farthest = queued.back();
       queued.pop_back();
     }
-    std::unique_ptr<LiveJob> job = each.live->make_job(scene.grids()[each.handle].grid, each.chunk, types_);
+    GridSnapshot& snapshot = snapshots[each.handle];
+    if (snapshot == nullptr) snapshot = std::make_shared<const Grid>(scene.grids()[each.handle].grid.snapshot());
+    std::unique_ptr<LiveJob> job = each.live->make_job(snapshot, each.chunk, types_);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;
     queue_.push(std::move(job));
@@ -229,9 +245,7 @@ void LiveBook::finish(const Scene& scene, DVec3 eye) {
 }
 
 LiveMeshes::Facts LiveBook::facts() const {
-  LiveMeshes::Facts facts = queue_.facts();
-  facts.copied_bytes = copied_->load(std::memory_order_relaxed);
-  return facts;
+  return queue_.facts();
 }
 
 }  // namespace quoin

@@ -13,11 +13,10 @@
 
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include "mesh/smooth_material.h"
-#include "scene/copied_chunk.h"
-#include "scene/live_densities.h"
+#include "live/live_densities.h"
 
 namespace quoin {
 
@@ -31,7 +30,7 @@ struct LiveJob {
   double distance = 0.0;       ///< from the eye; the least comes first
   LiveClock::time_point seen;  ///< when the edit was
 
-  CopiedNeighbourhood voxels;                         ///< blocky
+  GridSnapshot voxels;                                ///< blocky
   std::shared_ptr<const VoxelRegistry> types;         ///< blocky
   LiveDensities densities;                            ///< smooth
   std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth
@@ -77,7 +76,6 @@ class LiveQueue {
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once none is left at all.
   void wait(std::size_t waiting);
-  /// All but `copied_bytes`.
   [[nodiscard]] LiveMeshes::Facts facts() const;
 
  private:

@@ -6,13 +6,12 @@
 #include <memory>
 #include <vector>
 
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "scene/copied_chunk.h"
-#include "scene/live_distance.h"
-#include "scene/live_grid.h"
-#include "scene/live_queue.h"
+#include "live/live_distance.h"
+#include "live/live_grid.h"
+#include "live/live_queue.h"
 
 namespace quoin {
 
@@ -34,6 +33,7 @@ class LiveBook {
   void update_or_throw(const Scene& scene, DVec3 eye);
   [[nodiscard]] std::vector<bool> follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
+  [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
   void forget();
   void collect();
   void hand_over(const Scene& scene, DVec3 eye);
@@ -47,10 +47,10 @@ class LiveBook {
   const unsigned workers_;
   const std::size_t most_ahead_;  // jobs that wait for workers
   LiveTotals totals_;
-  CopiedBytes copied_;
   LiveTypes types_;
-  // Of each registered type what surfaces depend on: its visibility, or the linear colour that it gives.
-  std::vector<std::uint32_t> type_looks_;
+  ChangeCursor followed_types_;
+  ChangeCursor followed_scene_;
+  std::vector<GridHandle> drawn_;  // sorted
   std::map<GridHandle, LiveGrid> grids_;
   LiveQueue queue_;  // last: its threads end first
 };

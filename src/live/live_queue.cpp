@@ -1,4 +1,4 @@
-#include "scene/live_queue.h"
+#include "live/live_queue.h"
 
 #include <algorithm>
 #include <new>

@@ -1,4 +1,4 @@
-#include "scene/live_book.h"
+#include "live/live_book.h"
 
 #include <condition_variable>
 #include <mutex>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/live_test_support.h"
+#include "live/live_test_support.h"
 
 namespace quoin {
 namespace {
@@ -79,7 +79,7 @@ std::size_t faces_of(const SurfaceUpdate& update) {
 TEST(LiveBook, TheNearestChunksComeFirst) {
   OneGrid one;
   fill_row(one.grid(), 200);
-  Instance& instance = one.scene.instances()[one.placed];
+  Instance& instance = one.scene.edit(one.placed);
   instance.voxel_size = 0.5;
   instance.mirrored = true;
   GatedWork gated(blocky(1));

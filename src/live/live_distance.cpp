@@ -1,4 +1,4 @@
-#include "scene/live_distance.h"
+#include "live/live_distance.h"
 
 #include <algorithm>
 #include <limits>

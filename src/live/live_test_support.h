@@ -16,7 +16,7 @@
 #include <quoin/grid/voxel_field.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include "grid/chunk_order.h"
 
@@ -228,7 +228,7 @@ class SceneEditor {
       case 4:
         return change_types();
       case 5:
-        scene.grids()[any(scene.grids().handles())].grid.clear();
+        scene.edit(any(scene.grids().handles())).grid.clear();
         return;
       default:
         return edit_voxels(scene.grids()[any(scene.grids().handles())].grid, which);
@@ -273,16 +273,16 @@ class SceneEditor {
     } else if (below(4) == 0) {
       scene.remove_instance(any(all));
     } else {
-      Instance& instance = scene.instances()[any(all)];
+      Instance& instance = scene.edit(any(all));
       instance.visible = !instance.visible;
     }
   }
 
   void replace_grid() {
-    Grid& grid = scene.grids()[any(scene.grids().handles())].grid;
+    Grid& grid = scene.edit(any(scene.grids().handles())).grid;
     switch (below(3)) {
       case 0:
-        grid = grid.clone();
+        grid = grid.snapshot();
         return;
       case 1:
         grid = small_grid();

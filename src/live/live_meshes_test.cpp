@@ -1,4 +1,4 @@
-#include <quoin/scene/live_meshes.h>
+#include <quoin/live/live_meshes.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/live_test_support.h"
+#include "live/live_test_support.h"
 
 namespace quoin {
 namespace {
@@ -100,7 +100,7 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
   EXPECT_FALSE(all_of(meshes, one.scene).empty());
   const std::int64_t before = meshes.facts().chunks_meshed;
   one.grid().set({60, 60, 60}, 1);  // what it is
-  one.scene.instances()[one.placed].position = {5, 5, 5};
+  one.scene.edit(one.placed).position = {5, 5, 5};
   Instance second = one.instance;
   second.position = {500, 0, 0};
   one.scene.add_instance(second);
@@ -124,9 +124,9 @@ TEST_P(LiveMeshesOf, WhatIsNotDrawnGoesAndComesBack) {
     ASSERT_EQ(back.size(), 1U);
     EXPECT_NE(back[0].surface, nullptr);
   };
-  expect_gone_and_back([&](bool shown) { one.scene.instances()[one.placed].visible = shown; });
+  expect_gone_and_back([&](bool shown) { one.scene.edit(one.placed).visible = shown; });
   expect_gone_and_back([&](bool shown) {
-    one.scene.instances()[one.placed].voxel_size = shown ? 1.0 : std::numeric_limits<double>::quiet_NaN();
+    one.scene.edit(one.placed).voxel_size = shown ? 1.0 : std::numeric_limits<double>::quiet_NaN();
   });
   expect_gone_and_back([&](bool shown) {
     if (!shown) one.scene.remove_instance(one.placed);

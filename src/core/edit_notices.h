@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include <quoin/core/changes.h>
+
+namespace quoin {
+
+/// The notices of what one container holds: which of it was edited since they were last taken.
+///
+/// Threads: notices may be given on several threads at once, for different things.
+class EditNotices {
+ public:
+  EditNotices() = default;
+  EditNotices(const EditNotices&) = delete;
+  EditNotices& operator=(const EditNotices&) = delete;
+
+  /// From now on the notice is given to this, under a number. Requires: this outlives it.
+  void follow(EditNotice& notice, std::uint32_t index) {
+    const std::lock_guard lock(mutex_);
+    if (index >= given_.capacity()) given_.reserve(std::size_t{2} * index + 1);
+    notice.to_ = this;
+    notice.index_ = index;
+    notice.is_given_ = false;
+  }
+  /// Appends the numbers of those that were given. Each is given again only once it has been followed anew.
+  void take(std::vector<std::uint32_t>& taken) {
+    const std::lock_guard lock(mutex_);
+    taken.insert(taken.end(), given_.begin(), given_.end());
+    given_.clear();
+  }
+
+ private:
+  friend class EditNotice;
+  void give(std::uint32_t index) {
+    const std::lock_guard lock(mutex_);
+    given_.push_back(index);
+  }
+
+  std::mutex mutex_;
+  std::vector<std::uint32_t> given_;  // with room for every number
+};
+
+}  // namespace quoin

@@ -1,0 +1,169 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include <quoin/grid/changes.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/neighbourhood.h>
+
+namespace quoin {
+
+/// A box of voxels of one chunk in eight bytes, so that it grows by one comparison of all: the least x, y, z, and 255
+/// less the greatest.
+class PackedBox {
+ public:
+  static PackedBox of(int x, int y, int z) {
+    const auto low = static_cast<std::uint32_t>(x | y << 8 | z << 16);
+    return PackedBox(low | std::uint64_t{~low} << 32);
+  }
+  static PackedBox of_row(int y, int z, std::uint64_t voxels) {
+    PackedBox box = of(std::countr_zero(voxels), y, z);
+    box.unite(of(63 - std::countl_zero(voxels), y, z));
+    return box;
+  }
+  static PackedBox of_chunk() {
+    PackedBox box = of(0, 0, 0);
+    box.unite(of(63, 63, 63));
+    return box;
+  }
+
+  /// Of nothing.
+  PackedBox() = default;
+
+  void unite(const PackedBox& other) {
+    const auto a = std::bit_cast<Bytes>(bytes_);
+    const auto b = std::bit_cast<Bytes>(other.bytes_);
+    bytes_ = std::bit_cast<std::uint64_t>(a < b ? a : b);
+  }
+  [[nodiscard]] IBox box() const {
+    const auto byte = [&](int i) { return static_cast<int>(bytes_ >> (8 * i) & 255U); };
+    return {{byte(0), byte(1), byte(2)}, {256 - byte(4), 256 - byte(5), 256 - byte(6)}};
+  }
+
+ private:
+  using Bytes = std::uint8_t __attribute__((vector_size(8)));
+  explicit PackedBox(std::uint64_t bytes) : bytes_(bytes) {}
+
+  std::uint64_t bytes_ = ~std::uint64_t{0};
+};
+
+/// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets, as
+/// in Neighbourhood; and where those voxels are.
+struct VoxelRecord {
+  static constexpr std::uint32_t kCentreOnly = std::uint32_t{1} << 13;
+
+  IVec3 chunk{0};
+  std::uint32_t neighbours = 0;
+  PackedBox box;
+
+  /// Counts voxels of a row that changed.
+  void add(int y, int z, std::uint64_t changed) {
+    const unsigned x_sides = 0b010U | static_cast<unsigned>(changed & 1) | static_cast<unsigned>(changed >> 63) << 2;
+    const unsigned y_sides = sides(y);
+    const unsigned z_sides = sides(z);
+    for (unsigned dz = 0; dz < 3; ++dz) {
+      for (unsigned dy = 0; dy < 3; ++dy) {
+        if (((z_sides >> dz) & (y_sides >> dy) & 1U) != 0) neighbours |= x_sides << (dz * 9 + dy * 3);
+      }
+    }
+    box.unite(PackedBox::of_row(y, z, changed));
+  }
+  /// For an edit that was broken off: anything may have changed.
+  void add_all() {
+    neighbours = (std::uint32_t{1} << 27) - 1;
+    box = PackedBox::of_chunk();
+  }
+  void merge(const VoxelRecord& other) {
+    neighbours |= other.neighbours;
+    box.unite(other.box);
+  }
+  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours}; }
+
+ private:
+  static unsigned sides(int local) {
+    return 0b010U | static_cast<unsigned>(local == 0) | static_cast<unsigned>(local == kChunkEdge - 1) << 2;
+  }
+};
+
+/// What an edit did to one chunk of voxels.
+struct VoxelEdit {
+  std::int64_t voxels = 0;
+  VoxelRecord record;
+
+  void add(int y, int z, std::uint64_t changed) {
+    if (changed == 0) return;
+    voxels += std::popcount(changed);
+    record.add(y, z, changed);
+  }
+  void add_all() {
+    voxels = kChunkVoxels;
+    record.add_all();
+  }
+};
+
+/// How near the changed samples of a chunk come to each of its neighbours, so that it can be asked later, and exactly,
+/// whether a neighbour that reads `reach` samples beyond its own reads one of them.
+class ChangeReach {
+ public:
+  ChangeReach() { least_.fill(kNever); }
+
+  /// Counts samples of a row that changed.
+  void add(int y, int z, std::uint64_t changed) {
+    if (changed == 0) return;
+    samples += std::popcount(changed);
+    const std::array<std::uint8_t, 3> x_steps = {static_cast<std::uint8_t>(std::countr_zero(changed) + 1), 0,
+                                                 static_cast<std::uint8_t>(std::countl_zero(changed) + 1)};
+    const std::array<std::uint8_t, 3> y_steps = steps(y);
+    const std::array<std::uint8_t, 3> z_steps = steps(z);
+    for (std::size_t i = 0; i < least_.size(); ++i) {
+      const std::uint8_t farthest = std::max({x_steps[i % 3], y_steps[i / 3 % 3], z_steps[i / 9]});
+      least_[i] = std::min(least_[i], farthest);
+    }
+    box_.unite(PackedBox::of_row(y, z, changed));
+  }
+
+  /// For an edit that was broken off: anything may have changed.
+  void add_all() {
+    samples = kChunkVoxels;
+    for (std::size_t i = 0; i < least_.size(); ++i) least_[i] = i == 13 ? 0 : 1;
+    box_ = PackedBox::of_chunk();
+  }
+
+  void add(const ChangeReach& other) {
+    samples += other.samples;
+    for (std::size_t i = 0; i < least_.size(); ++i) least_[i] = std::min(least_[i], other.least_[i]);
+    box_.unite(other.box_);
+  }
+
+  [[nodiscard]] bool is_within(int reach, int dx, int dy, int dz) const {
+    return least_[static_cast<std::size_t>(Neighbourhood::index(dx, dy, dz))] <= reach;
+  }
+  [[nodiscard]] DensityChange change(IVec3 chunk) const { return {chunk, box_.box(), least_}; }
+
+  std::int64_t samples = 0;
+
+ private:
+  static constexpr std::uint8_t kNever = 255;
+
+  // From the previous chunk, this one and the next: how many samples beyond its own a chunk must read.
+  static std::array<std::uint8_t, 3> steps(int local) {
+    return {static_cast<std::uint8_t>(local + 1), 0, static_cast<std::uint8_t>(kChunkEdge - local)};
+  }
+
+  std::array<std::uint8_t, 27> least_{};  ///< [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]
+  PackedBox box_;
+};
+
+/// In a grid's journal.
+struct DensityRecord {
+  IVec3 chunk{0};
+  ChangeReach reach;
+
+  void merge(const DensityRecord& other) { reach.add(other.reach); }
+  [[nodiscard]] DensityChange change() const { return reach.change(chunk); }
+};
+
+}  // namespace quoin

@@ -1,0 +1,225 @@
+#include <quoin/grid/changes.h>
+
+#include <array>
+#include <map>
+#include <random>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+namespace {
+
+using Key = std::tuple<int, int, int>;  // z, y, x: the order in which chunks are listed
+
+Key key_of(IVec3 at) {
+  return {at.z, at.y, at.x};
+}
+
+// What one consumer should be told.
+struct Expected {
+  std::map<Key, IBox> boxes;  // by chunk, in grid coordinates
+  std::set<Key> reached;      // chunks that hold one of the 26 neighbours of a changed voxel
+
+  void add(IVec3 voxel) {
+    IBox& box = boxes[key_of(chunk_of(voxel))];
+    box = unite(box, {voxel, voxel + 1});
+    for (int i = 0; i < 27; ++i) reached.insert(key_of(chunk_of(voxel + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1})));
+  }
+};
+
+struct Consumer {
+  ChangeCursor cursor;
+  Expected expected;
+};
+
+void expect_told(Consumer& consumer, const Grid& grid) {
+  const GridChanges changes = grid.changes_since(consumer.cursor);
+  ASSERT_FALSE(changes.all);
+  ASSERT_EQ(changes.items.size(), consumer.expected.boxes.size());
+  std::set<Key> meshes;
+  for (const ChunkChange& change : changes.items) {
+    const auto found = consumer.expected.boxes.find(key_of(change.chunk));
+    ASSERT_NE(found, consumer.expected.boxes.end());
+    const IVec3 origin = change.chunk * kChunkEdge;
+    EXPECT_EQ((IBox{change.box.min + origin, change.box.max + origin}), found->second);
+    meshes.insert(found->first);
+  }
+  for (const Key& key : consumer.expected.reached) {
+    if (grid.find_chunk({std::get<2>(key), std::get<1>(key), std::get<0>(key)}) != nullptr) meshes.insert(key);
+  }
+  std::vector<IVec3> wanted;
+  for (const auto& [z, y, x] : meshes) wanted.emplace_back(x, y, z);
+  EXPECT_EQ(chunks_to_mesh(grid, changes), wanted);
+  EXPECT_TRUE(grid.changes_since(consumer.cursor).empty());
+  EXPECT_FALSE(grid.has_changed_since(consumer.cursor));
+  consumer.expected = {};
+}
+
+// The least and the greatest voxels of a chunk, and some between.
+int random_place(std::mt19937& random) {
+  return static_cast<int>(random() % 3) * 64 - 64 + std::array{0, 1, 17, 40, 62, 63}[random() % 6];
+}
+
+// An edit of some kind, and all voxels that it changed.
+std::vector<IVec3> random_edit(std::mt19937& random, Grid& grid) {
+  const IVec3 at{random_place(random), random_place(random), random_place(random)};
+  const IVec3 size{static_cast<int>(random() % 5), static_cast<int>(random() % 4), static_cast<int>(random() % 5)};
+  const auto type = static_cast<VoxelType>(random() % 3);
+  const IBox touched{at - 6, at + 7};
+  std::map<Key, VoxelType> before;
+  const auto for_each_touched = [&](auto&& visit) {
+    for (int z = touched.min.z; z < touched.max.z; ++z) {
+      for (int y = touched.min.y; y < touched.max.y; ++y) {
+        for (int x = touched.min.x; x < touched.max.x; ++x) visit(IVec3{x, y, z});
+      }
+    }
+  };
+  for_each_touched([&](IVec3 v) { before[key_of(v)] = grid.get(v); });
+  switch (random() % 6) {
+    case 0:
+      grid.fill_box(at, at + size, type);
+      break;
+    case 1:
+      grid.fill_sphere(DVec3(at), 0.5 * size.x, type);
+      break;
+    case 2:
+      grid.edit({at, at + size + 1}, [&](IVec3 v, VoxelType t) { return (v.x ^ v.y) % 2 == 0 ? type : t; });
+      break;
+    case 3: {
+      const Chunk* present = grid.find_chunk(chunk_of(at));
+      Chunk copy = present == nullptr ? Chunk() : *present;
+      copy.set(local_of(at), type);
+      grid.put_chunk(chunk_of(at), std::move(copy));
+      break;
+    }
+    default:
+      grid.set(at, type);
+  }
+  std::vector<IVec3> changed;
+  for_each_touched([&](IVec3 v) {
+    if (grid.get(v) != before[key_of(v)]) changed.push_back(v);
+  });
+  return changed;
+}
+
+TEST(Changes, EveryConsumerIsToldExactlyWhatChangedSinceItsOwnLastTime) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    Grid grid;
+    grid.fill_box({-60, -60, -60}, {120, 120, 120}, 1);
+    std::array<Consumer, 5> consumers;
+    for (Consumer& each : consumers) {
+      EXPECT_TRUE(grid.changes_since(each.cursor).all) << "the first time";
+    }
+    for (int round = 0; round < 400; ++round) {
+      for (const IVec3 voxel : random_edit(random, grid)) {
+        for (Consumer& each : consumers) each.expected.add(voxel);
+      }
+      for (std::size_t i = 0; i < consumers.size(); ++i) {
+        // Each in its own rhythm, and some by way of a snapshot.
+        if (random() % (1U << (2 * i)) != 0) continue;
+        if (random() % 3 == 0) {
+          ASSERT_NO_FATAL_FAILURE(expect_told(consumers[i], grid.snapshot()));
+        } else {
+          ASSERT_NO_FATAL_FAILURE(expect_told(consumers[i], grid));
+        }
+      }
+    }
+  }
+}
+
+TEST(Changes, WhoReadsOnlySnapshotsMissesNothing) {
+  Grid grid;
+  ChangeCursor cursor;
+  EXPECT_TRUE(grid.snapshot().changes_since(cursor).all);
+  grid.set({1, 2, 3}, 4);
+  const Grid second = grid.snapshot();
+  grid.set({70, 2, 3}, 4);
+  ChangeCursor other = cursor;
+  EXPECT_EQ(second.changes_since(cursor).items.size(), 1U) << "what came after it is not its own";
+  EXPECT_EQ(grid.changes_since(cursor).items.size(), 1U);
+  EXPECT_EQ(grid.changes_since(other).items.size(), 2U);
+  EXPECT_TRUE(second.changes_since(other).all) << "back in time";
+}
+
+TEST(Changes, ASnapshotThatIsEditedIsAnotherGrid) {
+  Grid grid;
+  grid.set({1, 2, 3}, 4);
+  ChangeCursor cursor = grid.cursor();
+  Grid copy = grid.snapshot();
+  EXPECT_TRUE(copy.changes_since(cursor).empty());
+  copy.set({1, 2, 3}, 5);
+  EXPECT_TRUE(copy.changes_since(cursor).all);
+  copy.set({1, 2, 3}, 6);
+  EXPECT_EQ(copy.changes_since(cursor).items.size(), 1U);
+  EXPECT_TRUE(grid.changes_since(cursor).all);
+  EXPECT_EQ(grid.get({1, 2, 3}), 4);
+}
+
+TEST(Changes, ManyEditsOfOneChunkAreOneChange) {
+  Grid grid;
+  grid.set({0, 0, 0}, 1);
+  ChangeCursor cursor = grid.cursor();
+  const std::size_t bytes = grid.bytes();
+  for (int i = 0; i < 200'000; ++i) grid.set({1 + i % 5, 7, 9}, static_cast<VoxelType>(1 + i % 3));
+  EXPECT_LT(grid.bytes(), bytes + 32'768U);
+  const GridChanges changes = grid.changes_since(cursor);
+  ASSERT_EQ(changes.items.size(), 1U);
+  EXPECT_EQ(changes.items[0].box, (IBox{{1, 7, 9}, {6, 8, 10}}));
+  EXPECT_EQ(changes.items[0].neighbours, 1U << 13U);
+}
+
+TEST(Changes, WhoLagsTooFarIsToldAll) {
+  Grid grid;
+  ChangeCursor late = grid.cursor();
+  ChangeCursor early = late;
+  for (int i = 0; i < 40'000; ++i) {
+    grid.set({i % 2, 0, 0}, static_cast<VoxelType>(1 + i / 2 % 2));
+    ASSERT_EQ(grid.changes_since(early).items.size(), 1U);
+  }
+  EXPECT_TRUE(grid.changes_since(late).all);
+  EXPECT_TRUE(grid.changes_since(late).empty());
+  EXPECT_LT(grid.bytes(), 2'000'000U);
+}
+
+TEST(Changes, OfTypesAreToldWithWhatLooksOtherwise) {
+  VoxelRegistry types;
+  ChangeCursor cursor = types.cursor();
+  VoxelProperties properties;
+  const VoxelType stone = types.add(properties).value();
+  properties.name = "glass";
+  properties.visibility = Visibility::Transparent;
+  const VoxelType glass = types.add(properties).value();
+  TypeChanges changes = types.changes_since(cursor);
+  ASSERT_EQ(changes.items.size(), 2U);
+  EXPECT_EQ(changes.items[0].type, stone);
+  EXPECT_FALSE(changes.items[0].visibility) << "unregistered types were opaque";
+  EXPECT_TRUE(changes.items[0].colour);
+  EXPECT_EQ(changes.items[1].type, glass);
+  EXPECT_TRUE(changes.items[1].visibility);
+  properties.roughness = 0.25F;
+  types.replace(glass, properties);
+  changes = types.changes_since(cursor);
+  ASSERT_EQ(changes.items.size(), 1U);
+  EXPECT_FALSE(changes.items[0].visibility || changes.items[0].colour);
+  VoxelRegistry copy = types;
+  EXPECT_TRUE(copy.changes_since(cursor).empty());
+  properties.colour = {1, 2, 3, 4};
+  copy.replace(glass, properties);
+  EXPECT_NE(types[glass].colour, properties.colour) << "each is by itself";
+  EXPECT_TRUE(copy.changes_since(cursor).all);
+  EXPECT_EQ(copy.find_or_add(properties).value(), glass);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,258 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
+
+#include <quoin/core/ref.h>
+#include <quoin/core/vec.h>
+
+#include "grid/long_box.h"
+
+namespace quoin {
+
+/// The chunks of a grid by their coordinates, in a tree that its copies share.
+///
+///                root                     A node of level n stands for a cube of 4^(n+1) chunks along each edge and has
+///           2: [ . . x . x . ]            64 places. A node of level 0 holds the entries themselves. Levels at which
+///                  |     |                there is but one child are left out, so chunks far apart cost a node each.
+///           0: [ e . e ] |                A node's `prefix` are the coordinates of its cube in cubes of its size.
+///                     1: [ x . x ]
+///                          |   |
+///                       0: [e] [e e]
+///
+/// A copy shares all nodes. A change copies those between the root and its entry that are shared, 64 places each: time
+/// in proportion to the levels, whatever the number of chunks.
+/// Threads: as Ref; a trie may be changed while copies of it are read and destroyed on other threads.
+template <class Entry>
+class ChunkTrie {
+ public:
+  /// The entries of 4^3 neighbouring chunks.
+  struct Leaf;
+
+  [[nodiscard]] const Entry* find(int x, int y, int z) const {
+    const Place at = place_of(x, y, z);
+    for (const Node* node = root_.get(); node != nullptr;) {
+      if (!covers(*node, at)) return nullptr;
+      const unsigned slot = slot_of(at, node->level);
+      if ((node->present >> slot & 1U) == 0) return nullptr;
+      if (node->level == 0) return &static_cast<const Leaf*>(node)->entries[slot];
+      node = static_cast<const Inner*>(node)->children[slot].get();
+    }
+    return nullptr;
+  }
+
+  /// The entry, which no copy shares then; null where there is none. Calls `on_copy(leaf)` when the entries around it
+  /// had to be copied and now lie elsewhere.
+  template <class OnCopy>
+  Entry* find_to_edit(IVec3 chunk, OnCopy&& on_copy) {
+    return find(chunk.x, chunk.y, chunk.z) == nullptr ? nullptr : &find_or_create(chunk, on_copy);
+  }
+
+  /// Likewise, made where it was missing. Requires: is_inside_world(chunk).
+  template <class OnCopy>
+  Entry& find_or_create(IVec3 chunk, OnCopy&& on_copy) {
+    const Place at = place_of(chunk.x, chunk.y, chunk.z);
+    if (root_ == nullptr) root_ = Ref<Node>(new Leaf(at));
+    Ref<Node>* here = &root_;
+    for (;;) {
+      const bool was_shared = here->is_shared();
+      if (was_shared) *here = copy_of(**here);
+      Node& node = **here;
+      if (was_shared && node.level == 0) on_copy(static_cast<Leaf&>(node));
+      if (!covers(node, at)) {
+        insert_above(*here, at);
+        continue;
+      }
+      const unsigned slot = slot_of(at, node.level);
+      const std::uint64_t bit = std::uint64_t{1} << slot;
+      if (node.level == 0) {
+        size_ += static_cast<std::size_t>((node.present & bit) == 0);
+        node.present |= bit;
+        return static_cast<Leaf&>(node).entries[slot];
+      }
+      here = &static_cast<Inner&>(node).children[slot];
+      if (*here == nullptr) *here = Ref<Node>(new Leaf(at));
+      node.present |= bit;
+    }
+  }
+
+  /// False where there is none.
+  template <class OnCopy>
+  bool erase(IVec3 chunk, OnCopy&& on_copy) {
+    if (find_to_edit(chunk, on_copy) == nullptr) return false;
+    erase_below(root_, place_of(chunk.x, chunk.y, chunk.z));
+    --size_;
+    return true;
+  }
+  void clear() {
+    root_.reset();
+    size_ = 0;
+  }
+
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+  /// Calls `visit(chunk, entry)` for each within the box of chunks, in an order that depends on nothing but the
+  /// coordinates.
+  template <class Visit>
+  void for_each_in(const IBox& chunks, Visit&& visit) const {
+    if (root_ != nullptr) walk(*root_, &chunks, visit);
+  }
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    if (root_ != nullptr) walk(*root_, nullptr, visit);
+  }
+  /// Of one leaf.
+  template <class Visit>
+  static void for_each_of(Leaf& leaf, Visit&& visit) {
+    for (std::uint64_t left = leaf.present; left != 0; left &= left - 1) {
+      const auto slot = static_cast<unsigned>(std::countr_zero(left));
+      visit(chunk_at(leaf, slot), leaf.entries[slot]);
+    }
+  }
+
+  /// Of all nodes, entries included, also of those that copies share.
+  [[nodiscard]] std::size_t bytes() const { return root_ == nullptr ? 0 : bytes_of(*root_); }
+
+ private:
+  static constexpr int kLog = 2;  // places along an edge
+  static constexpr unsigned kEdge = 1U << kLog;
+  static constexpr std::uint32_t kOrigin = std::uint32_t{1} << 25;  // so that chunks of the world count from 0
+
+  using Place = std::array<std::uint32_t, 3>;
+
+  struct Node : RefCounted {
+    Node(int node_level, Place node_prefix) : level(node_level), prefix(node_prefix) {}
+    void operator delete(Node* node, std::destroying_delete_t) {
+      if (node->level == 0) {
+        static_cast<Leaf*>(node)->~Leaf();
+        ::operator delete(node, sizeof(Leaf));
+      } else {
+        static_cast<Inner*>(node)->~Inner();
+        ::operator delete(node, sizeof(Inner));
+      }
+    }
+    int level;
+    Place prefix;
+    std::uint64_t present = 0;
+  };
+
+ public:
+  struct Leaf : Node {
+    explicit Leaf(const Place& at) : Node(0, prefix_of(at, 0)) {}
+    std::array<Entry, 64> entries;
+  };
+
+ private:
+  struct Inner : Node {
+    Inner(int node_level, const Place& at) : Node(node_level, prefix_of(at, node_level)) {}
+    std::array<Ref<Node>, 64> children;
+  };
+
+  static Place place_of(int x, int y, int z) {
+    return {static_cast<std::uint32_t>(x) + kOrigin, static_cast<std::uint32_t>(y) + kOrigin,
+            static_cast<std::uint32_t>(z) + kOrigin};
+  }
+  static Place prefix_of(const Place& at, int level) {
+    const int shift = kLog * (level + 1);
+    return {at[0] >> shift, at[1] >> shift, at[2] >> shift};
+  }
+  static bool covers(const Node& node, const Place& at) { return prefix_of(at, node.level) == node.prefix; }
+  static unsigned slot_of(const Place& at, int level) {
+    const int shift = kLog * level;
+    return (at[0] >> shift & (kEdge - 1)) | (at[1] >> shift & (kEdge - 1)) << kLog |
+           (at[2] >> shift & (kEdge - 1)) << (2 * kLog);
+  }
+  // The first chunk below a place of a node.
+  static IVec3 chunk_at(const Node& node, unsigned slot) {
+    const int shift = kLog * node.level;
+    const auto along = [&](std::size_t axis, unsigned digit) {
+      return static_cast<int>(((node.prefix[axis] << kLog | digit) << shift) - kOrigin);
+    };
+    return {along(0, slot & (kEdge - 1)), along(1, slot >> kLog & (kEdge - 1)), along(2, slot >> (2 * kLog))};
+  }
+
+  static Ref<Node> copy_of(const Node& node) {
+    if (node.level == 0) return Ref<Node>(new Leaf(static_cast<const Leaf&>(node)));
+    return Ref<Node>(new Inner(static_cast<const Inner&>(node)));
+  }
+
+  // Puts a node in place of another that does not cover a chunk: the smallest that covers both, with the other below.
+  static void insert_above(Ref<Node>& here, const Place& at) {
+    int level = here->level;
+    Place other = here->prefix;
+    do {
+      ++level;
+      for (std::uint32_t& coordinate : other) coordinate >>= kLog;
+    } while (prefix_of(at, level) != other);
+    const int down = kLog * (level - 1 - here->level);
+    unsigned slot = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      slot |= (here->prefix[axis] >> down & (kEdge - 1)) << (kLog * static_cast<int>(axis));
+    }
+    auto inner = std::make_unique<Inner>(level, at);
+    inner->children[slot] = std::move(here);
+    inner->present = std::uint64_t{1} << slot;
+    here = Ref<Node>(inner.release());
+  }
+
+  // Requires: the entry is there, and nothing on the way to it is shared.
+  static void erase_below(Ref<Node>& here, const Place& at) {
+    Node& node = *here;
+    const unsigned slot = slot_of(at, node.level);
+    const std::uint64_t bit = std::uint64_t{1} << slot;
+    if (node.level == 0) {
+      static_cast<Leaf&>(node).entries[slot] = Entry();
+      node.present &= ~bit;
+    } else {
+      auto& children = static_cast<Inner&>(node).children;
+      erase_below(children[slot], at);
+      if (children[slot] == nullptr) node.present &= ~bit;
+      if (std::has_single_bit(node.present)) {
+        Ref<Node> only = std::move(children[static_cast<std::size_t>(std::countr_zero(node.present))]);
+        here = std::move(only);
+        return;
+      }
+    }
+    if (node.present == 0) here.reset();
+  }
+
+  template <class Visit>
+  static void walk(const Node& node, const IBox* box, Visit&& visit) {
+    for (std::uint64_t left = node.present; left != 0; left &= left - 1) {
+      const auto slot = static_cast<unsigned>(std::countr_zero(left));
+      const IVec3 first = chunk_at(node, slot);
+      if (box != nullptr && !meets(*box, first, kLog * node.level)) continue;
+      if (node.level == 0) {
+        visit(first, static_cast<const Leaf&>(node).entries[slot]);
+      } else {
+        walk(*static_cast<const Inner&>(node).children[slot], box, visit);
+      }
+    }
+  }
+
+  static bool meets(const IBox& box, IVec3 first, int log_size) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t end = std::int64_t{first[axis]} + (std::int64_t{1} << log_size);
+      if (box.max[axis] <= first[axis] || box.min[axis] >= end) return false;
+    }
+    return true;
+  }
+
+  static std::size_t bytes_of(const Node& node) {
+    if (node.level == 0) return sizeof(Leaf);
+    std::size_t sum = sizeof(Inner);
+    for (const Ref<Node>& child : static_cast<const Inner&>(node).children) {
+      if (child != nullptr) sum += bytes_of(*child);
+    }
+    return sum;
+  }
+
+  Ref<Node> root_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace quoin
