@@ -81,12 +81,16 @@ std::string EditHistory::redo_name() const {
   return can_redo() ? steps_[done_].name : "";
 }
 
+void EditHistory::put(Scene& scene, const ChangedChunk& changed, const Chunk& voxels) {
+  if (scene.grids().find(changed.grid) != nullptr) scene.edit(changed.grid).grid.put_chunk(changed.place, voxels);
+}
+
 bool EditHistory::undo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_undo()) return false;
   --done_;
   for (const ChangedChunk& chunk : steps_[done_].chunks) {
-    if (SceneGrid* grid = scene.grids().find(chunk.grid)) grid->grid.put_chunk(chunk.place, chunk.before);
+    put(scene, chunk, chunk.before);
   }
   return true;
 }
@@ -95,7 +99,7 @@ bool EditHistory::redo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_redo()) return false;
   for (const ChangedChunk& chunk : steps_[done_].chunks) {
-    if (SceneGrid* grid = scene.grids().find(chunk.grid)) grid->grid.put_chunk(chunk.place, chunk.after);
+    put(scene, chunk, chunk.after);
   }
   ++done_;
   return true;

@@ -55,6 +55,7 @@ class EditHistory {
   };
 
   void keep(Step step);
+  static void put(Scene& scene, const ChangedChunk& changed, const Chunk& voxels);
 
   std::size_t most_bytes_;
   std::deque<Step> steps_;

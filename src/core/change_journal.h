@@ -148,8 +148,9 @@ class ChangeJournal {
   bool is_copy_ = false;
   std::uint64_t first_ = 1;
   std::uint64_t end_ = 1;
-  mutable std::atomic<std::uint64_t> seen_{kNobody};  // the last serial that a cursor may have read; kNobody: none asked
-  std::vector<std::shared_ptr<Block>> blocks_;        // [serial / kBlock - first_ / kBlock]
+  mutable std::atomic<std::uint64_t> seen_{
+      kNobody};                                 // the last serial that a cursor may have read; kNobody: none asked
+  std::vector<std::shared_ptr<Block>> blocks_;  // [serial / kBlock - first_ / kBlock]
 };
 
 /// Sorts changes and merges those that are of the same: `less(a, b)`, `merge(into, later)`.

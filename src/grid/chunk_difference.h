@@ -15,8 +15,8 @@ struct ChunkDifference {
 /// Of types alone: books in `edit` which voxels of a chunk are to change.
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit);
 
-/// They differ nowhere but within the box. Cost: O(rows of 64 voxels of the box); about 20 microseconds for a chunk where
-/// the storage of both is alike, as after a few edits.
+/// They differ nowhere but within the box. Cost: O(rows of 64 voxels of the box); about 20 microseconds for a chunk
+/// where the storage of both is alike, as after a few edits.
 [[nodiscard]] ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within = kWholeChunk);
 
 }  // namespace quoin

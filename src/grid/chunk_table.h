@@ -53,7 +53,9 @@ class ChunkWindow {
 
   [[nodiscard]] std::size_t cells() const { return entries_.size(); }
   [[nodiscard]] const Box& box() const { return box_; }
-  [[nodiscard]] std::size_t bytes() const { return cells() * (sizeof(ChunkEntry*) + sizeof(Chunk::Mixed*) + sizeof(std::uint32_t)); }
+  [[nodiscard]] std::size_t bytes() const {
+    return cells() * (sizeof(ChunkEntry*) + sizeof(Chunk::Mixed*) + sizeof(std::uint32_t));
+  }
 
   /// A chunk that came or went, or whose storage may have moved.
   void put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch);
@@ -85,10 +87,9 @@ class ChunkWindow {
 /// The window grows with the chunks and goes where they go, without the outermost eighth along each axis where these
 /// lie too far out, and never has more than 8 places a chunk (or 64), 32 where chunks were dropped. What lies outside
 /// it is found in the tree.
-/// A copy shares the tree's nodes and has no window until it is changed. Entries are changed by way of `find_to_edit` or
-/// `find_or_create`, which copy what is shared; they lie elsewhere then, so that no pointer to an entry outlives the next
-/// of these calls.
-/// Threads: any number may read and copy at once; a change needs it to itself.
+/// A copy shares the tree's nodes and has no window until it is changed. Entries are changed by way of `find_to_edit`
+/// or `find_or_create`, which copy what is shared; they lie elsewhere then, so that no pointer to an entry outlives the
+/// next of these calls. Threads: any number may read and copy at once; a change needs it to itself.
 class ChunkTable {
  public:
   /// An entry that is about to be changed; `entry` is null where there is none.

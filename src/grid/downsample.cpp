@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "grid/chunk_halver.h"
 #include "grid/chunk_order.h"
 
@@ -86,16 +88,20 @@ void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int level
     kept[i]->update(*finer, types, threads);
     finer = &kept[i]->grid;
     if (finer->chunk_count() != 0) continue;
-    kept.resize(i);
+    // It stays, though it counts as none, so that the next edit does not make it anew.
+    kept.resize(i + 1);
     return;
   }
 }
 
 int GridPyramid::levels() const {
-  return static_cast<int>(impl_->levels.size());
+  const auto& kept = impl_->levels;
+  const bool is_last_empty = !kept.empty() && kept.back()->grid.chunk_count() == 0;
+  return static_cast<int>(kept.size()) - static_cast<int>(is_last_empty);
 }
 
 const Grid& GridPyramid::level(int level) const {
+  QUOIN_ASSERT(level >= 1 && level <= levels(), "1 <= level <= levels()");
   return impl_->levels[static_cast<std::size_t>(level) - 1]->grid;
 }
 

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <utility>
 
 #include "core/change_journal.h"
 #include "grid/change_records.h"
+#include "grid/chunk_boxes.h"
 #include "grid/chunk_difference.h"
 #include "grid/chunk_order.h"
 #include "grid/chunk_table.h"
@@ -17,27 +19,54 @@
 namespace quoin {
 namespace {
 
-// The bounds as they were last asked for. What changed within them since, without touching their sides, leaves them as
-// they were.
+// The bounds as they were last asked for. What changed since within them, without touching their sides, leaves them as
+// they were; where something else changed, the boxes of all chunks are kept from then on.
 class KeptBounds {
  public:
   KeptBounds() = default;
+  // Copies keep no boxes until they need them.
   KeptBounds(const KeptBounds& other) {
     const std::lock_guard lock(other.mutex_);
     cursor_ = other.cursor_;
     box_ = other.box_;
   }
 
-  template <class Measure>
-  IBox update(const ChangeJournal<VoxelRecord>& journal, Measure&& measure) {
+  IBox update(const ChangeJournal<VoxelRecord>& journal, const ChunkTable& entries) {
     const std::lock_guard lock(mutex_);
-    bool is_same = true;
-    is_same &= journal.visit_since(cursor_, [&](const VoxelRecord& record) { is_same &= is_within(record); });
-    if (!is_same) box_ = measure();
+    bool is_within_all = true;
+    ChangeCursor now = cursor_;
+    const bool is_known = journal.visit_since(now, [&](const VoxelRecord& record) {
+      is_within_all &= is_within(record);
+      if (boxes_ != nullptr) put(record.chunk, entries);
+    });
+    if (!is_known) {
+      boxes_.reset();
+      box_ = {};
+      entries.for_each([&](IVec3 at, const ChunkEntry& entry) { box_ = unite(box_, box_of(at, entry)); });
+    } else if (!is_within_all) {
+      if (boxes_ == nullptr) {
+        boxes_ = std::make_unique<ChunkBoxes>();
+        entries.for_each([&](IVec3 at, const ChunkEntry& entry) { boxes_->put(at, box_of(at, entry)); });
+      }
+      box_ = boxes_->bounds();
+    }
+    cursor_ = now;
     return box_;
+  }
+  [[nodiscard]] std::size_t bytes() const {
+    const std::lock_guard lock(mutex_);
+    return boxes_ == nullptr ? 0 : boxes_->bytes();
   }
 
  private:
+  static IBox box_of(IVec3 at, const ChunkEntry& entry) {
+    const IBox inside = entry.chunk.bounds();
+    return {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge};
+  }
+  void put(IVec3 chunk, const ChunkTable& entries) {
+    const ChunkEntry* entry = entries.find(chunk);
+    boxes_->put(chunk, entry == nullptr ? IBox{} : box_of(chunk, *entry));
+  }
   [[nodiscard]] bool is_within(const VoxelRecord& record) const {
     if (box_.empty()) return false;
     const IBox changed = record.box.box();
@@ -51,6 +80,7 @@ class KeptBounds {
   mutable std::mutex mutex_;
   ChangeCursor cursor_;
   IBox box_;
+  std::unique_ptr<ChunkBoxes> boxes_;
 };
 
 }  // namespace
@@ -246,7 +276,8 @@ void Grid::clear() {
   impl_->journal.begin_change();
   impl_->entries.for_each([this](IVec3 at, const ChunkEntry& entry) {
     const IBox box = entry.chunk.bounds();
-    VoxelRecord record{at};
+    VoxelRecord record;
+    record.chunk = at;
     record.add_all();
     record.box = PackedBox::of(box.min.x, box.min.y, box.min.z);
     record.box.unite(PackedBox::of(box.max.x - 1, box.max.y - 1, box.max.z - 1));
@@ -288,8 +319,8 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
   GridChanges changes;
-  changes.all = !impl_->journal.visit_since(
-      cursor, [&](const VoxelRecord& record) { changes.items.push_back(record.change()); });
+  changes.all =
+      !impl_->journal.visit_since(cursor, [&](const VoxelRecord& record) { changes.items.push_back(record.change()); });
   unite_changes(changes.items, by_chunk, [](ChunkChange& into, const ChunkChange& other) {
     into.box = unite(into.box, other.box);
     into.neighbours |= other.neighbours;
@@ -321,14 +352,7 @@ std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) 
 }
 
 IBox Grid::bounds() const {
-  return impl_->bounds.update(impl_->journal, [this] {
-    IBox box;
-    impl_->entries.for_each([&](IVec3 at, const ChunkEntry& entry) {
-      const IBox inside = entry.chunk.bounds();
-      box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
-    });
-    return box;
-  });
+  return impl_->bounds.update(impl_->journal, impl_->entries);
 }
 
 std::int64_t Grid::voxel_count() const {
@@ -364,7 +388,8 @@ void Grid::for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType>
 }
 
 std::size_t Grid::bytes() const {
-  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->journal.bytes();
+  std::size_t total =
+      sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->journal.bytes() + impl_->bounds.bytes();
   impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
   return total;
 }

@@ -107,7 +107,7 @@ class LiveGrid {
   ChangeCursor followed_;
   Chunks chunks_;
   std::unordered_set<IVec3, CoordinateHash> waiting_;
-  IBox box_;  // of all chunks that there were
+  IBox box_;               // of all chunks that there were
   DensityBook densities_;  // smooth
 };
 

@@ -11,12 +11,12 @@
 #include <thread>
 #include <vector>
 
+#include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
-#include <quoin/live/live_meshes.h>
 
-#include "mesh/smooth_material.h"
 #include "live/live_densities.h"
+#include "mesh/smooth_material.h"
 
 namespace quoin {
 

@@ -14,9 +14,9 @@
 #include <gtest/gtest.h>
 
 #include <quoin/grid/voxel_field.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
-#include <quoin/live/live_meshes.h>
 
 #include "grid/chunk_order.h"
 

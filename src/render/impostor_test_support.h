@@ -124,7 +124,7 @@ struct ImpostorWorld {
     impostor = Impostor::build(grid.grid, scene.types);
     instance = scene.add_instance({"", scene.add_grid(std::move(grid))});
   }
-  Instance& placed() { return scene.instances()[instance]; }
+  Instance& placed() { return scene.edit(instance); }
 
   [[nodiscard]] Picture drawn(const Camera& camera, const RenderOptions& options) const {
     Picture picture = taken(Scene(), camera, options);

@@ -14,7 +14,8 @@ namespace quoin::vulkan {
 /// One grid's voxels in device memory.
 class DeviceGrid {
  public:
-  /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the memory is flushed. After an error it is to be released.
+  /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the
+  /// memory is flushed. After an error it is to be released.
   ///
   /// `transparent` may be null. Requires: both are the grid's trees as it is; it is not empty; the types' visibility is
   /// that of the last time.

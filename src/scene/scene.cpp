@@ -112,9 +112,8 @@ Scene Scene::snapshot() const {
   });
   copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
   copy.book_ = std::make_unique<Book>(*book_);
-  copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) {
-    copy.book_->notices.follow(grid.grid.notice_, handle.index);
-  });
+  copy.grids_.for_each(
+      [&](GridHandle handle, const SceneGrid& grid) { copy.book_->notices.follow(grid.grid.notice_, handle.index); });
   return copy;
 }
 

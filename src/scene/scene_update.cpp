@@ -68,7 +68,8 @@ void SceneTracer::Impl::look_at_types(const TypeChanges& changes) {
     if (each == nullptr) continue;
     // Edited meanwhile, it may have lost the last voxel of such a type.
     const SceneGrid* grid = scene->grids().find(each->handle);
-    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) || has_type_of(grid->grid, changed)) {
+    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
+        has_type_of(grid->grid, changed)) {
       each->trees.forget();
     }
   }

@@ -13,12 +13,12 @@ namespace quoin {
 ///   for (const quoin::IVec3 chunk : quoin::chunks_to_mesh(grid, changes)) mesh(grid.neighbourhood(chunk));
 ///
 /// Each consumer has a cursor of its own; asking moves that cursor and no other, so consumers do not know of each
-/// other. A cursor read from a container can be asked of its snapshots, and the other way round. It may also be asked of
-/// any other container, and of one that took the place of the one it read: then all has changed.
-/// Asking costs time in proportion to what changed, whatever the size of the container. A journal keeps as many changes
-/// as the container has chunks (types, instances), twice, and some thousands; a cursor that is further behind is told
-/// that all has changed. Before the first cursor there is no journal, and edits do not pay for one.
-/// When a consumer fails halfway, it goes on with a copy of the cursor from before.
+/// other. A cursor read from a container can be asked of its snapshots, and the other way round. It may also be asked
+/// of any other container, and of one that took the place of the one it read: then all has changed. Asking costs time
+/// in proportion to what changed, whatever the size of the container. A journal keeps as many changes as the container
+/// has chunks (types, instances), twice, and some thousands; a cursor that is further behind is told that all has
+/// changed. Before the first cursor there is no journal, and edits do not pay for one. When a consumer fails halfway,
+/// it goes on with a copy of the cursor from before.
 class ChangeCursor {
  public:
   bool operator==(const ChangeCursor&) const = default;
@@ -41,8 +41,8 @@ struct Changes {
 
 class EditNotices;
 
-/// By which a container tells the one that holds it (a grid its scene) that it was edited. It stays where it is when the
-/// container's content is moved.
+/// By which a container tells the one that holds it (a grid its scene) that it was edited. It stays where it is when
+/// the container's content is moved.
 class EditNotice {
  public:
   EditNotice() = default;

@@ -25,8 +25,8 @@ struct Handle {
   }
 };
 
-/// Values by generational handle: O(1) insert, remove and find; iteration in slot order. An element stays at its address
-/// until it is removed, whatever else is inserted, and when the map is moved.
+/// Values by generational handle: O(1) insert, remove and find; iteration in slot order. An element stays at its
+/// address until it is removed, whatever else is inserted, and when the map is moved.
 template <class T>
 class SlotMap {
  public:

@@ -26,8 +26,8 @@ struct ChunkChange {
 };
 using GridChanges = Changes<ChunkChange>;
 
-/// The chunks whose blocky meshes have to be made again: those that hold one of the 26 neighbours of a changed voxel, and
-/// are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
+/// The chunks whose blocky meshes have to be made again: those that hold one of the 26 neighbours of a changed voxel,
+/// and are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
 /// has changed. `changes` are those up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
 
@@ -35,8 +35,8 @@ using GridChanges = Changes<ChunkChange>;
 struct DensityChange {
   IVec3 chunk{0};
   IBox box;  ///< the smallest around them, in the chunk's coordinates
-  /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]: how many samples past its own the chunk at that offset has to read to come
-  /// upon one of them; 0 for the chunk itself.
+  /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]: how many samples past its own the chunk at that offset has to read to
+  /// come upon one of them; 0 for the chunk itself.
   std::array<std::uint8_t, 27> distance{};
 
   /// Whether the chunk at an offset of -1 to 1 on each axis, grown by `reach` samples (0 to 64), holds one of them.

@@ -41,8 +41,9 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 /// leave about the memory that a new chunk takes; `compact` gives back the rest.
 /// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and
 /// tight bounds cost nothing to ask.
-/// Copies share their storage until one of them is written, so that a copy costs no more than a pointer; a write to what
-/// is shared copies it first. Threads: copies may be read, written and destroyed on several threads, each copy by itself.
+/// Copies share their storage until one of them is written, so that a copy costs no more than a pointer; a write to
+/// what is shared copies it first. Threads: copies may be read, written and destroyed on several threads, each copy by
+/// itself.
 class Chunk {
  public:
   explicit Chunk(VoxelType uniform = kAir) : uniform_(uniform) {}
@@ -71,8 +72,7 @@ class Chunk {
   /// Makes the whole chunk one type.
   void fill(VoxelType type);
   /// Sets the voxels of a box (clipped to the chunk); calls `on_change` for every row in which some had another type.
-  void fill_box(const IBox& box, VoxelType type,
-                FunctionRef<void(int y, int z, std::uint64_t changed)> on_change);
+  void fill_box(const IBox& box, VoxelType type, FunctionRef<void(int y, int z, std::uint64_t changed)> on_change);
 
   /// Which of a row's voxels have this type.
   [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;

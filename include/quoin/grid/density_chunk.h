@@ -24,7 +24,8 @@ namespace quoin {
 ///
 /// Samples lie in rows of 64 along x; 4x4 rows are a slab, the unit of uniformity, as in Chunk: what is far from the
 /// surface is clamped to one value by the grid, and a slab of one value holds no samples. The signs of a row are also
-/// kept as one word, so that finding the surface reads 1/16 of the bytes. Copies share their storage as those of Chunk do.
+/// kept as one word, so that finding the surface reads 1/16 of the bytes. Copies share their storage as those of Chunk
+/// do.
 class DensityChunk {
  public:
   /// All samples of one density and material.

@@ -38,8 +38,8 @@ class GridPyramid {
   GridPyramid& operator=(GridPyramid&&) noexcept;
   ~GridPyramid();
 
-  /// Halves `grid` up to `levels` times, fewer where nothing would be left. Only chunks that edits since the last update
-  /// can have changed are made again; all of another grid.
+  /// Halves `grid` up to `levels` times, fewer where nothing would be left. Only chunks that edits since the last
+  /// update can have changed are made again; all of another grid.
   ///
   /// Requires: the visibility of the types is that of the last update.
   /// Cost:     `halved_chunk` for each chunk that an edit can have changed.

@@ -22,7 +22,8 @@ namespace quoin {
 /// Edits:    setting a voxel to what it is changes nothing. A chunk that is all air is dropped. When an edit throws
 ///           (bad_alloc, or what a callback threw), what it did until then stays done and booked. `changes_since` tells
 ///           any number of consumers what edits changed.
-/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a chunk
+/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
+/// chunk
 ///           at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
 ///           its own: it may be read and destroyed on another thread while this one is edited.
@@ -36,8 +37,8 @@ class Grid {
   ~Grid();
   /// The voxels as they are now; later edits of either do not reach the other. A cursor that read this grid's changes
   /// reads on in the snapshot, and the other way round, until the snapshot is edited itself.
-  /// Cost: a fraction of a microsecond. The first edit of each chunk afterwards copies that chunk, as long as a snapshot
-  /// shares it.
+  /// Cost: a fraction of a microsecond. The first edit of each chunk afterwards copies that chunk, as long as a
+  /// snapshot shares it.
   [[nodiscard]] Grid snapshot() const;
 
   // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
@@ -57,10 +58,10 @@ class Grid {
   /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
   /// A negative or NaN radius or centre changes nothing.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
-  /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max` excluded),
-  /// x fastest, then y, then z within a chunk, chunks likewise. Returns how many changed. Requires: `pick` changes
-  /// nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was picked for earlier rows, of 64
-  /// voxels along x, but not its own.
+  /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max`
+  /// excluded), x fastest, then y, then z within a chunk, chunks likewise. Returns how many changed. Requires: `pick`
+  /// changes nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was picked for earlier
+  /// rows, of 64 voxels along x, but not its own.
   template <class Pick>
   std::int64_t edit(const IBox& box, Pick&& pick) {
     return edit_rows(box, [&pick](IVec3 first, std::span<VoxelType> row) {
@@ -70,8 +71,8 @@ class Grid {
       }
     });
   }
-  /// Likewise a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the box
-  /// along x in one chunk, from `first` on, and changes them in place.
+  /// Likewise a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
+  /// box along x in one chunk, from `first` on, and changes them in place.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, Chunk voxels);

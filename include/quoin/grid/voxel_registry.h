@@ -57,9 +57,8 @@ using TypeChanges = Changes<TypeChange>;
 
 /// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.
 ///
-/// Copies share what they hold until one of them is changed, as a Grid's snapshots do; a cursor that read one reads on in
-/// the other until then. Threads and moving: as Grid.
-/// Cost: `visibility` is one array look-up.
+/// Copies share what they hold until one of them is changed, as a Grid's snapshots do; a cursor that read one reads on
+/// in the other until then. Threads and moving: as Grid. Cost: `visibility` is one array look-up.
 class VoxelRegistry {
  public:
   /// Holds air only.

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <map>
+
+#include <tsl/robin_map.h>
+
+#include <quoin/core/vec.h>
+
+#include "grid/coordinate_hash.h"
+
+namespace quoin {
+
+/// The boxes of what chunks hold, and the box around all of them, which follows every change at a cost of O(log
+/// chunks): of each of its six sides it is known how many chunks' boxes end at which coordinate.
+class ChunkBoxes {
+ public:
+  /// An empty box takes the chunk away.
+  void put(IVec3 chunk, const IBox& box) {
+    const auto found = boxes_.find(chunk);
+    if (found != boxes_.end()) {
+      if (found->second == box) return;
+      if (is_counted_) count(found->second, -1);
+      boxes_.erase(found);
+    }
+    if (box.empty()) return;
+    boxes_.emplace(chunk, box);
+    if (is_counted_) count(box, 1);
+  }
+
+  /// The box around all. Cost: O(chunks) the first time.
+  [[nodiscard]] IBox bounds() {
+    if (!is_counted_) {
+      is_counted_ = true;
+      for (const auto& [chunk, box] : boxes_) count(box, 1);
+    }
+    IBox around;
+    for (int axis = 0; axis < 3 && !boxes_.empty(); ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      around.min[axis] = mins_[i].begin()->first;
+      around.max[axis] = maxs_[i].rbegin()->first;
+    }
+    return around;
+  }
+
+  [[nodiscard]] std::size_t size() const { return boxes_.size(); }
+  [[nodiscard]] auto begin() const { return boxes_.begin(); }
+  [[nodiscard]] auto end() const { return boxes_.end(); }
+  [[nodiscard]] std::size_t bytes() const { return boxes_.bucket_count() * (sizeof(IVec3) + sizeof(IBox)); }
+
+ private:
+  void count(const IBox& box, int by) {
+    for (int axis = 0; axis < 3; ++axis) {
+      count(mins_[static_cast<std::size_t>(axis)], box.min[axis], by);
+      count(maxs_[static_cast<std::size_t>(axis)], box.max[axis], by);
+    }
+  }
+  static void count(std::map<int, int>& ends, int at, int by) {
+    const auto found = ends.try_emplace(at, 0).first;
+    if ((found->second += by) == 0) ends.erase(found);
+  }
+
+  tsl::robin_map<IVec3, IBox, CoordinateHash> boxes_;
+  bool is_counted_ = false;
+  std::array<std::map<int, int>, 3> mins_;  // chunks whose boxes begin there
+  std::array<std::map<int, int>, 3> maxs_;  // and end
+};
+
+}  // namespace quoin

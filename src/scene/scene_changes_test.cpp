@@ -1,0 +1,186 @@
+// Who is told of what changed in a scene, where grids lie, and what snapshots keep.
+
+#include <quoin/scene/scene.h>
+
+#include <random>
+#include <set>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/death_for_tests.h"
+
+namespace quoin {
+namespace {
+
+struct Consumer {
+  ChangeCursor cursor;
+  std::set<GridHandle> grids;
+  std::set<InstanceHandle> instances;
+};
+
+template <class T>
+std::set<Handle<T>> as_set(const std::vector<Handle<T>>& handles) {
+  return {handles.begin(), handles.end()};
+}
+
+TEST(SceneChanges, EveryConsumerIsToldWhatChangedSinceItsOwnLastTime) {
+  std::mt19937 random(2);
+  Scene scene;
+  std::vector<GridHandle> grids;
+  std::vector<InstanceHandle> instances;
+  std::array<Consumer, 4> consumers;
+  for (Consumer& each : consumers) EXPECT_TRUE(scene.changes_since(each.cursor).all);
+  const auto told_of = [&](GridHandle grid) {
+    for (Consumer& each : consumers) each.grids.insert(grid);
+  };
+  const auto told_of_instance = [&](InstanceHandle instance) {
+    for (Consumer& each : consumers) each.instances.insert(instance);
+  };
+  for (int round = 0; round < 600; ++round) {
+    const auto any = [&](auto& all) -> auto& { return all[random() % all.size()]; };
+    switch (random() % 8) {
+      case 0:
+        told_of(grids.emplace_back(scene.add_grid({})));
+        break;
+      case 1:
+        if (!grids.empty()) {
+          Instance instance;
+          instance.grid = any(grids);
+          told_of_instance(instances.emplace_back(scene.add_instance(instance)));
+        }
+        break;
+      case 2:
+        if (instances.size() > 2) {
+          std::swap(any(instances), instances.back());
+          told_of_instance(instances.back());
+          EXPECT_TRUE(scene.remove_instance(instances.back()));
+          instances.pop_back();
+        }
+        break;
+      case 3:
+        if (grids.size() > 2) {
+          std::swap(any(grids), grids.back());
+          told_of(grids.back());
+          std::erase_if(instances, [&](InstanceHandle each) {
+            if (scene.instances()[each].grid != grids.back()) return false;
+            told_of_instance(each);
+            return true;
+          });
+          EXPECT_TRUE(scene.remove_grid(grids.back()));
+          grids.pop_back();
+        }
+        break;
+      case 4:
+        if (!instances.empty()) {
+          told_of_instance(any(instances));
+          scene.edit(instances.front()).position.x += 1.0;
+          told_of_instance(instances.front());
+          scene.edit(any(instances)).visible = true;
+          for (Consumer& each : consumers) each.instances.insert(instances.begin(), instances.end());
+          for (const InstanceHandle each : instances) scene.edit(each).voxel_size = 2.0;
+        }
+        break;
+      default:
+        if (!grids.empty()) {
+          const GridHandle grid = any(grids);
+          scene.edit(grid).grid.set({round, 0, 0}, 1);
+          told_of(grid);
+        }
+    }
+    for (std::size_t i = 0; i < consumers.size(); ++i) {
+      if (random() % (1U << (2 * i)) != 0) continue;
+      Consumer& each = consumers[i];
+      const SceneChanges changes =
+          random() % 4 == 0 ? scene.snapshot().changes_since(each.cursor) : scene.changes_since(each.cursor);
+      ASSERT_FALSE(changes.all);
+      ASSERT_EQ(as_set(changes.grids), each.grids);
+      ASSERT_EQ(as_set(changes.instances), each.instances);
+      each.grids.clear();
+      each.instances.clear();
+    }
+  }
+}
+
+TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
+  Scene scene;
+  const GridHandle first = scene.add_grid({});
+  Grid& kept = scene.edit(first).grid;
+  ChangeCursor cursor = scene.cursor();
+  for (int i = 0; i < 100; ++i) scene.add_grid({});
+  EXPECT_EQ(&scene.edit(first).grid, &kept) << "it stays where it is";
+  cursor = scene.cursor();
+  for (int round = 0; round < 3; ++round) {
+    kept.set({round, 2, 3}, 4);
+    kept.set({round, 2, 4}, 4);
+    EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{first}) << round;
+    EXPECT_TRUE(scene.changes_since(cursor).empty());
+  }
+  Scene moved = std::move(scene);
+  kept.set({9, 9, 9}, 4);
+  EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first});
+  kept = Grid();
+  EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first}) << "another in its place";
+  kept.set({1, 1, 1}, 1);
+  EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first});
+}
+
+TEST(SceneChanges, DifferentGridsMayBeEditedAtOnce) {
+  Scene scene;
+  std::vector<Grid*> grids;
+  for (int i = 0; i < 8; ++i) grids.push_back(&scene.edit(scene.add_grid({})).grid);
+  ChangeCursor cursor = scene.cursor();
+  for (int round = 0; round < 20; ++round) {
+    {
+      std::vector<std::jthread> editors;
+      for (Grid* grid : grids) {
+        editors.emplace_back([grid, round] {
+          for (int i = 0; i < 50; ++i) grid->set({i, round, 0}, 1);
+        });
+      }
+    }
+    EXPECT_EQ(scene.changes_since(cursor).grids.size(), grids.size());
+  }
+}
+
+TEST(SceneChanges, ASnapshotStaysAsItWas) {
+  Scene scene;
+  VoxelProperties properties;
+  properties.name = "stone";
+  const VoxelType stone = scene.types.add(properties).value();
+  SceneGrid hill;
+  hill.name = "hill";
+  hill.pivot = {1.0, 2.0, 3.0};
+  hill.grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
+  const GridHandle grid = scene.add_grid(std::move(hill));
+  Instance instance;
+  instance.grid = grid;
+  instance.name = "first";
+  const InstanceHandle placed = scene.add_instance(instance);
+  const Scene copy = scene.snapshot();
+  scene.edit(grid).grid.clear();
+  scene.edit(grid).name = "hole";
+  scene.edit(placed).position = {7, 7, 7};
+  properties.name = "gravel";
+  scene.types.replace(stone, properties);
+  scene.add_instance(instance);
+  EXPECT_EQ(copy.voxel_count(), 1'000);
+  EXPECT_EQ(copy.grids()[grid].name, "hill");
+  EXPECT_EQ(copy.grids()[grid].pivot, DVec3(1.0, 2.0, 3.0));
+  EXPECT_EQ(copy.instances()[placed].position, DVec3(0.0));
+  EXPECT_EQ(copy.instances().size(), 1U);
+  EXPECT_EQ(copy.types[stone].name, "stone");
+  EXPECT_EQ(scene.voxel_count(), 0);
+}
+
+TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
+  Scene scene;
+  const GridHandle gone = scene.add_grid({});
+  scene.remove_grid(gone);
+  QUOIN_EXPECT_MISTAKE(scene.edit(gone).name = "x", "the handle names an element");
+}
+
+}  // namespace
+}  // namespace quoin
