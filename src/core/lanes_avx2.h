@@ -1,4 +1,15 @@
-// Eight lanes in AVX2 registers. Included within a namespace and a target region, after <immintrin.h>.
+// Eight lanes in AVX2 registers.
+//
+//   F, I, Mask   | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |    32 bits each; of a mask all are set, or none
+
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace quoin::lanes_avx2 {
+namespace {
 
 constexpr int kWidth = 8;
 
@@ -162,3 +173,6 @@ inline float greatest_of(F a) {
   most = _mm_max_ps(most, _mm_movehl_ps(most, most));
   return _mm_cvtss_f32(_mm_max_ss(most, _mm_movehdup_ps(most)));
 }
+
+}  // namespace
+}  // namespace quoin::lanes_avx2

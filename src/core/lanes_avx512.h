@@ -1,4 +1,16 @@
-// Sixteen lanes in AVX-512 registers. Included within a namespace and a target region, after <immintrin.h>.
+// Sixteen lanes in AVX-512 registers.
+//
+//   F, I   | 0 | 1 | 2 | ... |15 |    32 bits each
+//   Mask   a bit each, in a register of its own
+
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace quoin::lanes_avx512 {
+namespace {
 
 constexpr int kWidth = 16;
 
@@ -163,3 +175,6 @@ inline Mask operator<(I a, I b) {
 inline float greatest_of(F a) {
   return _mm512_reduce_max_ps(a.v);
 }
+
+}  // namespace
+}  // namespace quoin::lanes_avx512

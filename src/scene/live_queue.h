@@ -15,7 +15,7 @@
 #include <quoin/mesh/smooth.h>
 #include <quoin/scene/live_meshes.h>
 
-#include "mesh/smooth_material.h"
+#include "mesh/smooth/material.h"
 #include "scene/copied_chunk.h"
 #include "scene/live_densities.h"
 
