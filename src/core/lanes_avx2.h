@@ -139,6 +139,12 @@ inline Mask test_bit(I a, I at) {
 inline I gather(const std::uint32_t* base, I at) {
   return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), at.v, 4)};
 }
+inline I as_int(F a) {
+  return {_mm256_castps_si256(a.v)};
+}
+inline F as_float(I a) {
+  return {_mm256_castsi256_ps(a.v)};
+}
 inline I to_int(F a) {
   return {_mm256_cvttps_epi32(a.v)};
 }
@@ -158,7 +164,7 @@ inline void store(float* to, F a) {
   _mm256_storeu_ps(to, a.v);
 }
 
-inline I or_of(I a, I b) {
+inline I operator|(I a, I b) {
   return {_mm256_or_si256(a.v, b.v)};
 }
 // `a` where `which` has bits, else `b`.

@@ -1,5 +1,11 @@
-// From runs to quads, a row at a time: compressing moves pick the runs that end in a row, and put their parts side by
-// side; then sixteen quads at a time are put together. Part of the mesher's kernel, for AVX-512.
+// From runs to quads, a row at a time, for AVX-512: compressing moves pick the runs that end in a row, and put their
+// parts side by side; then sixteen quads at a time are put together.
+//
+//   Parts       | first | first | ...     a byte each: the run's first cell
+//               | last  | last  | ...     its last cell
+//               | rows  | rows  | ...     its rows before this one
+//               | levels| levels| ...     its eight level bits
+//   places      | 64 plane + row | ...    two bytes each
 
 #pragma once
 

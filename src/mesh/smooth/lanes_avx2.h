@@ -20,9 +20,6 @@ namespace {
 
 using namespace lanes_avx2;
 
-inline Mask operator>(I a, I b) {
-  return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(a.v, b.v))};
-}
 inline Mask equal(I a, I b) {
   return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))};
 }
@@ -33,17 +30,8 @@ inline Mask signs_differ(F a, F b) {
 inline F only(Mask m, F a) {
   return {_mm256_and_ps(a.v, m.v)};
 }
-inline I operator|(I a, I b) {
-  return {_mm256_or_si256(a.v, b.v)};
-}
 inline I min(I a, I b) {
   return {_mm256_min_epi32(a.v, b.v)};
-}
-inline I as_int(F a) {
-  return {_mm256_castps_si256(a.v)};
-}
-inline F as_float(I a) {
-  return {_mm256_castsi256_ps(a.v)};
 }
 
 inline I load_words(const std::uint16_t* from) {

@@ -20,9 +20,6 @@ namespace {
 
 using namespace lanes_avx512;
 
-inline Mask operator>(I a, I b) {
-  return {_mm512_cmpgt_epi32_mask(a.v, b.v)};
-}
 inline Mask equal(I a, I b) {
   return {_mm512_cmpeq_epi32_mask(a.v, b.v)};
 }
@@ -33,17 +30,8 @@ inline Mask signs_differ(F a, F b) {
 inline F only(Mask m, F a) {
   return {_mm512_maskz_mov_ps(m.m, a.v)};
 }
-inline I operator|(I a, I b) {
-  return {_mm512_or_si512(a.v, b.v)};
-}
 inline I min(I a, I b) {
   return {_mm512_min_epi32(a.v, b.v)};
-}
-inline I as_int(F a) {
-  return {_mm512_castps_si512(a.v)};
-}
-inline F as_float(I a) {
-  return {_mm512_castsi512_ps(a.v)};
 }
 
 inline I load_words(const std::uint16_t* from) {

@@ -6,7 +6,6 @@
 #include "mesh/smooth/levels.h"
 #include "mesh/smooth/scratch.h"
 #include "mesh/smooth/split.h"
-#include "mesh/smooth/transition.h"
 
 namespace quoin {
 

@@ -1,4 +1,4 @@
-#include "mesh/smooth/transition.h"
+#include "mesh/smooth/levels.h"
 
 #include <algorithm>
 #include <optional>
@@ -7,7 +7,6 @@
 
 #include <quoin/core/assert.h>
 
-#include "mesh/smooth/levels.h"
 #include "mesh/smooth/quad.h"
 #include "mesh/smooth/split.h"
 #include "mesh/smooth/vertex.h"

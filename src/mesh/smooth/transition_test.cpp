@@ -9,6 +9,7 @@
 
 #include <quoin/mesh/smooth_mesh.h>
 
+#include "core/death_for_tests.h"
 #include "mesh/smooth/levels.h"
 #include "mesh/smooth/oracle.h"
 #include "mesh/smooth/surface_check.h"
@@ -332,6 +333,15 @@ TEST(SmoothLevels, CellsAwayFromOtherLevelsAreThoseOfTheKernel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, MixedLevels, testing::Range(1U, 7U));
+
+TEST(TransitionsDeathTest, AreBetweenChunksThatShareABorder) {
+  SmoothOptions options;
+  options.border = SmoothBorder::Open;
+  SmoothChunkMesh mesh;
+  QUOIN_EXPECT_MISTAKE(smooth::mesh_with_transitions(
+                           {}, options, [](SmoothChunkMesh&) {}, mesh),
+                       "must be Shared");
+}
 
 }  // namespace
 }  // namespace quoin

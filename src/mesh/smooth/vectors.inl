@@ -215,8 +215,8 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
       q[c] = (corners[c] & all(static_cast<int>(kVertexMask))) + firsts[is_last];
     }
     const Mask flip =
-        squared_length<kAxis, 1>(corners[0], corners[2]) > squared_length<kAxis, -1>(corners[3], corners[1]);
-    const Mask starts_solid = edge > all(kStartsSolid - 1);
+        squared_length<kAxis, -1>(corners[3], corners[1]) < squared_length<kAxis, 1>(corners[0], corners[2]);
+    const Mask starts_solid = all(kStartsSolid - 1) < edge;
     const I second = select(starts_solid, q[1], q[3]);
     const I fourth = select(starts_solid, q[3], q[1]);
     store_triangles(out + 6 * i, select(flip, second, q[0]), select(flip, q[2], second), select(flip, fourth, q[2]),

@@ -43,9 +43,6 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   whole.v = _mm256_set_m128(w[1], w[0]);
 }
 
-inline I as_bits(F a) {
-  return {_mm256_castps_si256(a.v)};
-}
 inline F just_below(F a) {
   const __m256 less = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a.v), _mm256_set1_epi32(1)));
   const __m256 is_positive = _mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ);
@@ -77,24 +74,49 @@ using half::kDoubles;
 
 constexpr int kWidth = 2 * half::kWidth;
 
-struct Mask {
-  half::Mask low, high;
+template <class T>
+struct Pair {
+  T low, high;
 };
-struct F {
-  half::F low, high;
-};
-struct I {
-  half::I low, high;
-};
+using Mask = Pair<half::Mask>;
+using F = Pair<half::F>;
+using I = Pair<half::I>;
 
-inline Mask operator&(Mask a, Mask b) {
+template <class T>
+inline Pair<T> operator+(Pair<T> a, Pair<T> b) {
+  return {a.low + b.low, a.high + b.high};
+}
+template <class T>
+inline Pair<T> operator-(Pair<T> a, Pair<T> b) {
+  return {a.low - b.low, a.high - b.high};
+}
+template <class T>
+inline Pair<T> operator*(Pair<T> a, Pair<T> b) {
+  return {a.low * b.low, a.high * b.high};
+}
+inline F operator/(F a, F b) {
+  return {a.low / b.low, a.high / b.high};
+}
+template <class T>
+inline Pair<T> operator&(Pair<T> a, Pair<T> b) {
   return {a.low & b.low, a.high & b.high};
 }
-inline Mask operator|(Mask a, Mask b) {
+template <class T>
+inline Pair<T> operator|(Pair<T> a, Pair<T> b) {
   return {a.low | b.low, a.high | b.high};
 }
 inline Mask operator~(Mask a) {
   return {~a.low, ~a.high};
+}
+template <class T>
+inline Mask operator<(Pair<T> a, Pair<T> b) {
+  return {a.low < b.low, a.high < b.high};
+}
+inline Mask operator<=(F a, F b) {
+  return {a.low <= b.low, a.high <= b.high};
+}
+inline Mask operator==(F a, F b) {
+  return {a.low == b.low, a.high == b.high};
 }
 inline std::uint32_t bits(Mask a) {
   return half::bits(a.low) | half::bits(a.high) << half::kWidth;
@@ -105,24 +127,11 @@ inline bool any(Mask a) {
 inline Mask mask_of(std::uint32_t b) {
   return {half::mask_of(b & 0xFFU), half::mask_of(b >> half::kWidth)};
 }
-
 inline F all(float x) {
   return {half::all(x), half::all(x)};
 }
 inline I all(int x) {
   return {half::all(x), half::all(x)};
-}
-inline F operator+(F a, F b) {
-  return {a.low + b.low, a.high + b.high};
-}
-inline F operator-(F a, F b) {
-  return {a.low - b.low, a.high - b.high};
-}
-inline F operator*(F a, F b) {
-  return {a.low * b.low, a.high * b.high};
-}
-inline F operator/(F a, F b) {
-  return {a.low / b.low, a.high / b.high};
 }
 inline F min(F a, F b) {
   return {half::min(a.low, b.low), half::min(a.high, b.high)};
@@ -136,33 +145,16 @@ inline F abs(F a) {
 inline F floor(F a) {
   return {half::floor(a.low), half::floor(a.high)};
 }
-inline Mask operator<(F a, F b) {
-  return {a.low < b.low, a.high < b.high};
+inline F just_below(F a) {
+  return {half::just_below(a.low), half::just_below(a.high)};
 }
-inline Mask operator<=(F a, F b) {
-  return {a.low <= b.low, a.high <= b.high};
-}
-inline Mask operator==(F a, F b) {
-  return {a.low == b.low, a.high == b.high};
-}
-inline F select(Mask m, F a, F b) {
+template <class T>
+inline Pair<T> select(Mask m, Pair<T> a, Pair<T> b) {
   return {half::select(m.low, a.low, b.low), half::select(m.high, a.high, b.high)};
 }
-inline F add_if(Mask m, F a, F b) {
+template <class T>
+inline Pair<T> add_if(Mask m, Pair<T> a, Pair<T> b) {
   return {half::add_if(m.low, a.low, b.low), half::add_if(m.high, a.high, b.high)};
-}
-
-inline I operator+(I a, I b) {
-  return {a.low + b.low, a.high + b.high};
-}
-inline I operator-(I a, I b) {
-  return {a.low - b.low, a.high - b.high};
-}
-inline I operator*(I a, I b) {
-  return {a.low * b.low, a.high * b.high};
-}
-inline I operator&(I a, I b) {
-  return {a.low & b.low, a.high & b.high};
 }
 inline Mask equals(I a, int b) {
   return {half::equals(a.low, b), half::equals(a.high, b)};
@@ -182,23 +174,11 @@ inline I shift_right_signed(I a) {
 inline I min_unsigned(I a, I b) {
   return {half::min_unsigned(a.low, b.low), half::min_unsigned(a.high, b.high)};
 }
-inline I select(Mask m, I a, I b) {
-  return {half::select(m.low, a.low, b.low), half::select(m.high, a.high, b.high)};
-}
-inline I add_if(Mask m, I a, I b) {
-  return {half::add_if(m.low, a.low, b.low), half::add_if(m.high, a.high, b.high)};
-}
 inline Mask test(I a, I b) {
   return {half::test(a.low, b.low), half::test(a.high, b.high)};
 }
 inline Mask test_bit(I a, I at) {
   return {half::test_bit(a.low, at.low), half::test_bit(a.high, at.high)};
-}
-inline Mask operator<(I a, I b) {
-  return {a.low < b.low, a.high < b.high};
-}
-inline I or_of(I a, I b) {
-  return {half::or_of(a.low, b.low), half::or_of(a.high, b.high)};
 }
 inline I merge(I which, I a, I b) {
   return {half::merge(which.low, a.low, b.low), half::merge(which.high, a.high, b.high)};
@@ -206,17 +186,17 @@ inline I merge(I which, I a, I b) {
 inline I gather(const std::uint32_t* base, I at) {
   return {half::gather(base, at.low), half::gather(base, at.high)};
 }
+inline I as_int(F a) {
+  return {half::as_int(a.low), half::as_int(a.high)};
+}
 inline I to_int(F a) {
   return {half::to_int(a.low), half::to_int(a.high)};
 }
 inline F to_float(I a) {
   return {half::to_float(a.low), half::to_float(a.high)};
 }
-inline void store(std::int32_t* to, I a) {
-  half::store(to, a.low);
-  half::store(to + half::kWidth, a.high);
-}
-inline void store(float* to, F a) {
+template <class T, class V>
+inline void store(T* to, Pair<V> a) {
   half::store(to, a.low);
   half::store(to + half::kWidth, a.high);
 }
@@ -229,13 +209,6 @@ inline F narrow(const double* from) {
 inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
   half::split(from, corner, base.low, rest.low, whole.low);
   half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
-}
-
-inline I as_bits(F a) {
-  return {half::as_bits(a.low), half::as_bits(a.high)};
-}
-inline F just_below(F a) {
-  return {half::just_below(a.low), half::just_below(a.high)};
 }
 inline float least_of(F a) {
   const __m256 v = _mm256_min_ps(a.low.v, a.high.v);

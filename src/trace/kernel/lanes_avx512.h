@@ -44,9 +44,6 @@ inline F just_below(F a) {
   return {_mm512_castsi512_ps(less)};
 }
 
-inline I as_bits(F a) {
-  return {_mm512_castps_si512(a.v)};
-}
 inline float least_of(F a) {
   return _mm512_reduce_min_ps(a.v);
 }

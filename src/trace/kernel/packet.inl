@@ -209,7 +209,7 @@ inline bool set_up_short(const TreeView& tree, const Rays& rays, Mask wanted, co
   out.max_t = narrow(rays.max_t);
   out.code = all(0);
   // A limit just below zero may have become one.
-  const Mask is_negative = test(as_bits(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
+  const Mask is_negative = test(as_int(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
   const Mask usual = ~is_negative & (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
   const Mask fits = start_in_window<0>(out, lanes.x, out.planes.x, rays.origins[0], tree.origin.x, dx, origin.x) &
                     start_in_window<2>(out, lanes.y, out.planes.y, rays.origins[1], tree.origin.y, dy, origin.y) &
@@ -248,7 +248,7 @@ inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& ray
     const F now = first_of(crossings(lanes, rays.planes), crossing);
     step_over(crossing, one, rays.planes);
     const I bits_of_axis = crossed(crossing, all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
-    const I filled = or_of(rays.code & bits_of_axis, crossed(crossing, sx.fill, sy.fill, sz.fill));
+    const I filled = (rays.code & bits_of_axis) | crossed(crossing, sx.fill, sy.fill, sz.fill);
     const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
     rays.code = merge(bits_of_axis, moved, rays.code);
     unsure = sure_t <= now;

@@ -130,7 +130,7 @@ inline CrossingWindow all_crossings(const WindowRay& ray) {
 inline I sums(const CrossingWindow& window, int start, I4 step) {
   alignas(64) std::int32_t times[kWidth];
   alignas(64) std::int32_t steps[kWidth];
-  const I t = as_bits(window.t);
+  const I t = as_int(window.t);
   store(times, t);
   store(steps, from_16(I{_mm512_castsi128_si512(reinterpret_cast<__m128i>(step))}, window.axis));
   // Broadcasts straight from memory: as shuffles they would all want the same port.
@@ -169,8 +169,8 @@ inline Blocked any_in_window(const TreeView& tree, const WindowRay& ray) {
   const I4 within = at - (brick << 4);
   const I4 step = I4{1, 1 << 5, 1 << 10, 0};
   const I code = sums(window, within[0] | within[1] << 5 | within[2] << 10, ray.forward ? step : -step);
-  const I spread_code = or_of(or_of(from_32(kTables.spread[0], code), from_32(kTables.spread[1], shift_right<5>(code))),
-                              from_32(kTables.spread[2], shift_right<10>(code)));
+  const I spread_code = from_32(kTables.spread[0], code) | from_32(kTables.spread[1], shift_right<5>(code)) |
+                        from_32(kTables.spread[2], shift_right<10>(code));
   const I half =
       from_16(bricks_about(tree, brick), shift_right<12>(spread_code)) + (shift_right<5>(spread_code) & all(127));
   const Mask met = test_bit(gather(tree.words, half), spread_code) & window.valid;
