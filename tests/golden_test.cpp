@@ -12,6 +12,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/terrain/terrain.h>
 
+#include "core/instruction_sets_for_tests.h"
 #include "io/glb_for_tests.h"
 #include "tests/golden_for_tests.h"
 #include "tests/golden_views.h"
@@ -69,7 +70,7 @@ TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
   const Scene scene = terrain_scene();
   RenderOptions options = options_for(view);
   const Picture usual = render(scene, view, options);
-  options.instructions = InstructionSet::Plain;
+  const InstructionSetOverride over(InstructionSet::Plain);
   options.threads = {1};
   const Picture plain = render(scene, view, options);
   EXPECT_EQ(difference_of(plain.colour, usual.colour).pixels, 0);

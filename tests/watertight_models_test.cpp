@@ -4,7 +4,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/mesh/blocky_mesh.h>
 
-#include "mesh/watertight_check.h"
+#include "mesh/blocky/watertight_check.h"
 
 namespace quoin {
 namespace {

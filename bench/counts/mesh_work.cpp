@@ -6,6 +6,7 @@
 
 #include "bench/smooth_workload.h"
 #include "bench/workloads.h"
+#include "core/instruction_set.h"
 #include "counted.h"
 
 namespace quoin::counts {
@@ -19,7 +20,7 @@ Counted blocky(const std::string& name, workloads::Blocky which, bool occlusion,
     QuadBuffer quads;
   };
   const auto state = std::make_shared<State>(
-      State{workloads::blocky_chunk(which), workloads::three_types(), BlockyMesher(instructions), {}});
+      State{workloads::blocky_chunk(which), workloads::three_types(), made_with<BlockyMesher>(instructions), {}});
   QuadOptions options;
   options.occlusion = occlusion;
   options.region = workloads::kInterior;
@@ -33,7 +34,7 @@ Counted smooth(const std::string& name, workloads::Smooth which, SmoothOcclusion
     SmoothChunkMesh mesh;
   };
   const auto state = std::make_shared<State>(
-      State{workloads::density_chunk(workloads::smooth_field(which)), SmoothMesher(instructions), {}});
+      State{workloads::density_chunk(workloads::smooth_field(which)), made_with<SmoothMesher>(instructions), {}});
   SmoothOptions options;
   options.border = SmoothBorder::Open;
   options.occlusion.form = form;
@@ -49,15 +50,15 @@ Counted smooth(const std::string& name, workloads::Smooth which, SmoothOcclusion
 std::vector<Counted> mesh_work() {
   using workloads::Blocky;
   using workloads::Smooth;
-  return {blocky("blocky/w1/ao", Blocky::W1, true, InstructionSet::Best),
-          blocky("blocky/w1/no_ao", Blocky::W1, false, InstructionSet::Best),
-          blocky("blocky/w2/ao", Blocky::W2, true, InstructionSet::Best),
-          blocky("blocky/w4/ao", Blocky::W4, true, InstructionSet::Best),
-          blocky("blocky/empty", Blocky::Empty, true, InstructionSet::Best),
+  return {blocky("blocky/w1/ao", Blocky::W1, true, instruction_set()),
+          blocky("blocky/w1/no_ao", Blocky::W1, false, instruction_set()),
+          blocky("blocky/w2/ao", Blocky::W2, true, instruction_set()),
+          blocky("blocky/w4/ao", Blocky::W4, true, instruction_set()),
+          blocky("blocky/empty", Blocky::Empty, true, instruction_set()),
           blocky("plain/blocky/w1/ao", Blocky::W1, true, InstructionSet::Plain),
-          smooth("smooth/s4", Smooth::S4, SmoothOcclusion::None, InstructionSet::Best),
-          smooth("smooth/s1", Smooth::S1, SmoothOcclusion::None, InstructionSet::Best),
-          smooth("smooth/s1/openness", Smooth::S1, SmoothOcclusion::Openness, InstructionSet::Best),
+          smooth("smooth/s4", Smooth::S4, SmoothOcclusion::None, instruction_set()),
+          smooth("smooth/s1", Smooth::S1, SmoothOcclusion::None, instruction_set()),
+          smooth("smooth/s1/openness", Smooth::S1, SmoothOcclusion::Openness, instruction_set()),
           smooth("plain/smooth/s1", Smooth::S1, SmoothOcclusion::None, InstructionSet::Plain)};
 }
 

@@ -6,7 +6,6 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/half.h>
 #include <quoin/core/image.h>
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>

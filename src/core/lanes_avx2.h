@@ -1,4 +1,15 @@
-// Eight lanes in AVX2 registers. Included within a namespace and a target region, after <immintrin.h>.
+// Eight lanes in AVX2 registers.
+//
+//   F, I, Mask   | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |    32 bits each; of a mask all are set, or none
+
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace quoin::lanes_avx2 {
+namespace {
 
 constexpr int kWidth = 8;
 
@@ -128,6 +139,12 @@ inline Mask test_bit(I a, I at) {
 inline I gather(const std::uint32_t* base, I at) {
   return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), at.v, 4)};
 }
+inline I as_int(F a) {
+  return {_mm256_castps_si256(a.v)};
+}
+inline F as_float(I a) {
+  return {_mm256_castsi256_ps(a.v)};
+}
 inline I to_int(F a) {
   return {_mm256_cvttps_epi32(a.v)};
 }
@@ -147,7 +164,7 @@ inline void store(float* to, F a) {
   _mm256_storeu_ps(to, a.v);
 }
 
-inline I or_of(I a, I b) {
+inline I operator|(I a, I b) {
   return {_mm256_or_si256(a.v, b.v)};
 }
 // `a` where `which` has bits, else `b`.
@@ -162,3 +179,6 @@ inline float greatest_of(F a) {
   most = _mm_max_ps(most, _mm_movehl_ps(most, most));
   return _mm_cvtss_f32(_mm_max_ss(most, _mm_movehdup_ps(most)));
 }
+
+}  // namespace
+}  // namespace quoin::lanes_avx2

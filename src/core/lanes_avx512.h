@@ -1,4 +1,16 @@
-// Sixteen lanes in AVX-512 registers. Included within a namespace and a target region, after <immintrin.h>.
+// Sixteen lanes in AVX-512 registers.
+//
+//   F, I   | 0 | 1 | 2 | ... |15 |    32 bits each
+//   Mask   a bit each, in a register of its own
+
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+namespace quoin::lanes_avx512 {
+namespace {
 
 constexpr int kWidth = 16;
 
@@ -131,6 +143,12 @@ inline __mmask16 each_lane() {
 inline I gather(const std::uint32_t* base, I at) {
   return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
 }
+inline I as_int(F a) {
+  return {_mm512_castps_si512(a.v)};
+}
+inline F as_float(I a) {
+  return {_mm512_castsi512_ps(a.v)};
+}
 inline I to_int(F a) {
   return {_mm512_cvttps_epi32(a.v)};
 }
@@ -150,7 +168,7 @@ inline void store(float* to, F a) {
   _mm512_storeu_ps(to, a.v);
 }
 
-inline I or_of(I a, I b) {
+inline I operator|(I a, I b) {
   return {_mm512_or_si512(a.v, b.v)};
 }
 // `a` where `which` has bits, else `b`.
@@ -163,3 +181,6 @@ inline Mask operator<(I a, I b) {
 inline float greatest_of(F a) {
   return _mm512_reduce_max_ps(a.v);
 }
+
+}  // namespace
+}  // namespace quoin::lanes_avx512

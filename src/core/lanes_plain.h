@@ -1,5 +1,14 @@
-// Four lanes in plain C++, which compilers turn into what the build's baseline has. Included within a namespace.
+// Four lanes in plain C++, which compilers turn into what the build's baseline has.
 // What a comparison with a number that is none answers, and which of two `min` and `max` take then, is as in x86-64.
+
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+namespace quoin::lanes_plain {
+namespace {
 
 constexpr int kWidth = 4;
 
@@ -106,3 +115,6 @@ inline float greatest_of(F a) {
   const float high = a.v[2] > a.v[3] ? a.v[2] : a.v[3];
   return low > high ? low : high;
 }
+
+}  // namespace
+}  // namespace quoin::lanes_plain

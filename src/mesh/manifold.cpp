@@ -92,7 +92,7 @@ bool are_one_ring(const std::vector<Arc>& arcs) {
   return arcs.empty();
 }
 
-/// Takes arcs apart into rings that pass no neighbour twice; answers the number of each arc's ring, from 0. Arcs that
+/// Takes arcs apart into rings that pass no neighbour twice; returns the number of each arc's ring, from 0. Arcs that
 /// belong to none are in ring 0.
 std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
   std::vector<std::uint32_t> ring(arcs.size(), 0);

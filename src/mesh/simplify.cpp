@@ -1,7 +1,10 @@
 #include <quoin/mesh/simplify.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include <quoin/core/assert.h>
 
 #ifdef QUOIN_HAVE_MESHOPTIMIZER
 #include <meshoptimizer.h>
@@ -15,7 +18,25 @@ namespace quoin {
 
 namespace {
 
-/// Removes triangles; answers the error reached, in samples.
+#if QUOIN_ASSERT_ENABLED
+bool has_arrays_of_one_length(const SmoothMesh& mesh) {
+  const std::size_t count = mesh.positions.size();
+  return mesh.normals.size() == count && mesh.albedo.size() == count && mesh.types.size() == count &&
+         (mesh.openness.empty() || mesh.openness.size() == count);
+}
+
+bool names_vertices(const SmoothMesh& mesh) {
+  return std::all_of(mesh.indices.begin(), mesh.indices.end(),
+                     [&](std::uint32_t index) { return index < mesh.positions.size(); });
+}
+
+bool has_finite_positions(const SmoothMesh& mesh) {
+  return std::all_of(mesh.positions.begin(), mesh.positions.end(),
+                     [](Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); });
+}
+#endif
+
+/// Removes triangles; returns the error reached, in samples.
 float remove_triangles(SmoothMesh& mesh, float error_in_samples) {
   const float* positions = &mesh.positions[0].x;
   const std::size_t count = mesh.positions.size();
@@ -61,6 +82,11 @@ bool can_simplify() {
 
 Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples) {
   if (!(error_in_samples >= 0.0F)) return fail(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+#if QUOIN_ASSERT_ENABLED
+  QUOIN_ASSERT(has_arrays_of_one_length(mesh));
+  QUOIN_ASSERT(names_vertices(mesh));
+  QUOIN_ASSERT(has_finite_positions(mesh));
+#endif
   if (mesh.indices.empty()) return 0.0F;
   const float reached = remove_triangles(mesh, error_in_samples);
   // A neck three edges round, say, is drawn together to one edge.

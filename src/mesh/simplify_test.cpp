@@ -10,8 +10,9 @@
 #include <random>
 #include <string>
 
+#include "core/death_for_tests.h"
 #include "mesh/manifold.h"
-#include "mesh/smooth_cell.h"
+#include "mesh/smooth/cell.h"
 
 namespace quoin {
 
@@ -262,6 +263,23 @@ TEST(SimplifyErrors, what_cannot_be_leaves_the_mesh) {
   }
   SmoothMesh empty;
   EXPECT_EQ(simplify_smooth_mesh(empty, 1.0F).value_or(-1.0F), can_simplify() ? 0.0F : -1.0F);
+}
+
+TEST(SimplifyDeathTest, WantsArraysOfOneLengthIndicesOfVerticesAndFinitePositions) {
+  if (!can_simplify()) GTEST_SKIP() << "this build cannot simplify";
+  const SmoothMesh mesh = surface_of([](Vec3 p) { return glm::length(p - Vec3(6.0F)) - 4.2F; }, 12);
+  [[maybe_unused]] const auto simplify = [](SmoothMesh broken) {
+    static_cast<void>(simplify_smooth_mesh(broken, 0.1F));
+  };
+  SmoothMesh fewer = mesh;
+  fewer.types.pop_back();
+  QUOIN_EXPECT_MISTAKE(simplify(fewer), "has_arrays_of_one_length");
+  SmoothMesh beyond = mesh;
+  beyond.indices[4] = static_cast<std::uint32_t>(mesh.positions.size());
+  QUOIN_EXPECT_MISTAKE(simplify(beyond), "names_vertices");
+  SmoothMesh endless = mesh;
+  endless.positions[2].y = std::numeric_limits<float>::infinity();
+  QUOIN_EXPECT_MISTAKE(simplify(endless), "has_finite_positions");
 }
 
 }  // namespace

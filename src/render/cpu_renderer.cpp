@@ -2,13 +2,18 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "render/impostor_pass.h"
+#include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
+
+#include "render/impostor/pass.h"
 #include "render/picture_detail.h"
 #include "render/picture_request.h"
 #include "render/tile.h"
@@ -22,7 +27,7 @@ class ProgressOfTiles {
  public:
   ProgressOfTiles(const Progress& listener, std::size_t samples) : listener_(&listener), samples_(samples) {}
   [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
-  /// Answers whether to go on.
+  /// Returns whether to go on.
   bool add_sample() {
     const std::lock_guard lock(mutex_);
     ++done_;
@@ -73,7 +78,7 @@ struct Subject {
 
   void leave_to_impostors(std::span<const FarInstance> far, const Camera& camera, const RenderOptions& options) {
     if (far.empty()) return;
-    impostors.emplace(view->tracer(), far, camera, options.width, options.height, options.instructions);
+    impostors.emplace(view->tracer(), far, camera, options.width, options.height);
     view->leave_to_impostors(placed_of(view->tracer(), far));
   }
 };
@@ -99,10 +104,14 @@ void CpuRenderer::update(Threads threads) {
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
+                   std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
+                   std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
+               "the camera's axes are perpendicular");
   const PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->hidden, camera, options);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, options.threads));
-  subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position, options.instructions);
+  subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position);
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <random>
 
+#include "core/death_for_tests.h"
+#include "core/instruction_sets_for_tests.h"
 #include "light/sky.h"
 #include "render/camera_rays.h"
 #include "render/render_test_support.h"
@@ -51,9 +53,9 @@ TEST(CpuRenderer, GivesTheSameBytesForAnyThreadsAndInstructions) {
     const auto reference = renderer.render(camera, options);
     ASSERT_TRUE(reference.has_value());
     for (const unsigned threads : {2U, 0U}) {
-      for (const auto set : {InstructionSet::Plain, InstructionSet::Avx2, InstructionSet::Avx512}) {
+      for (const InstructionSet set : sets_of_this_machine()) {
+        const InstructionSetOverride over(set);
         options.threads = {threads};
-        options.instructions = set;
         const auto picture = renderer.render(camera, options);
         ASSERT_TRUE(picture.has_value());
         EXPECT_EQ(picture->colour.rgb, reference->colour.rgb);
@@ -302,6 +304,14 @@ TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   renderer.expect_as_new("fewer");
   scene.edit(grid).grid.clear();
   renderer.expect_as_new("emptied");
+}
+
+TEST(CpuRendererDeathTest, WantsACameraOfPerpendicularAxes) {
+  const Scene scene = lively_scene();
+  const CpuRenderer renderer(scene);
+  Camera camera = towards({25, 18, 30}, {0, 2, 0});
+  camera.up = camera.right;
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(renderer.render(camera, sized(8, 8))), "axes are perpendicular");
 }
 
 }  // namespace

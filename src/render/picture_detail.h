@@ -9,7 +9,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
-#include "render/far_impostors.h"
+#include "render/impostor/far.h"
 
 namespace quoin {
 

@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/corner_light.h"
 #include "render/snapshot_rays.h"
 
@@ -62,6 +64,8 @@ RayPacket rays_of_texels(const SnapshotCamera& camera, int edge, int column, int
 }
 
 Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque, int view, int edge) {
+  QUOIN_ASSERT(view >= 0 && view < kImpostorViews);
+  QUOIN_ASSERT(edge >= 1 && edge <= 4096);
   const auto texels = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
   Snapshot snapshot;
   snapshot.camera = snapshot_camera(content_sphere(grid), view, edge);

@@ -13,7 +13,7 @@
 #include "light/glass.h"
 #include "light/lighting.h"
 #include "render/camera_rays.h"
-#include "render/impostor_pass.h"
+#include "render/impostor/pass.h"
 
 namespace quoin {
 
@@ -52,7 +52,7 @@ class Tile {
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
-  // Adds what is seen of the glass before `max_t`; answers what passes through it.
+  // Adds what is seen of the glass before `max_t`; returns what passes through it.
   Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);
   // A point that is to be filled in: what it sends counts so much in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);

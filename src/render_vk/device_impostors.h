@@ -9,8 +9,8 @@
 #include <quoin/render/impostor.h>
 #include <quoin/scene/scene.h>
 
-#include "render/far_impostors.h"
-#include "render/impostor_screen.h"
+#include "render/impostor/far.h"
+#include "render/impostor/screen.h"
 #include "render_vk/memory.h"
 #include "render_vk/shader_data.h"
 

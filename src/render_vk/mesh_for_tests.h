@@ -14,7 +14,7 @@
 #include <quoin/render_vk/vulkan_picture.h>
 
 #include "grid/chunk_order.h"
-#include "mesh/smooth_material.h"
+#include "mesh/smooth/material.h"
 #include "render_vk/vulkan_for_tests.h"
 
 namespace quoin::vulkan_test {

@@ -4,18 +4,12 @@
 #include <bit>
 #include <tuple>
 
+#include "trace/tree_view.h"
+
 namespace quoin::vulkan {
 namespace {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
-
-const OccupancyTree::ChunkNode* find_node(const OccupancyTree& tree, IVec3 chunk) {
-  const OccupancyTree::RegionNode* region = tree.find_region({chunk.x >> 4, chunk.y >> 4, chunk.z >> 4});
-  if (region == nullptr) return nullptr;
-  const IVec3 at = chunk & 15;
-  const std::uint32_t index = region->nodes[static_cast<std::size_t>(at.x + 16 * at.y + 256 * at.z)];
-  return index == 0 ? nullptr : tree.chunk_nodes() + index;
-}
 
 // Bit of a place in its node.
 int place_of(IVec3 at) {
@@ -27,7 +21,8 @@ int place_of(IVec3 at) {
 class RecordWriter {
  public:
   Node add_tree(const OccupancyTree& tree, IVec3 chunk) {
-    const OccupancyTree::ChunkNode* node = find_node(tree, chunk);
+    const trace::TreeNodes nodes(tree);
+    const trace::ChunkNode* node = nodes.find_chunk(chunk);
     Node root;
     if (node == nullptr) return root;
     while (record.words.size() % 8 != 0) record.words.push_back(0);
@@ -46,7 +41,7 @@ class RecordWriter {
         put(at + 2, 1);
       } else {
         put_address(at + 2, record.words.size());
-        add_words(tree.bricks()[node->bricks[i]]);
+        add_words(nodes.brick(node->bricks[i]));
       }
       at += 4;
     }
@@ -90,7 +85,7 @@ class RecordWriter {
     record.words.resize(record.words.size() + 2);
     put(record.words.size() - 2, value);
   }
-  void add_words(const OccupancyTree::Node& brick) {
+  void add_words(const trace::Node& brick) {
     for (const std::uint64_t word : brick) {
       if (word != 0) add(word);
     }

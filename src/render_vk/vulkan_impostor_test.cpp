@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "render/impostor_test_support.h"
+#include "render/impostor/test_support.h"
 #include "render_vk/vulkan_detail_support.h"
 
 namespace quoin {

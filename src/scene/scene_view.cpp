@@ -84,7 +84,6 @@ double farthest(const RayPacket& rays) {
 
 struct SceneView::Impl {
   const SceneTracer* tracer = nullptr;
-  InstructionSet instructions = InstructionSet::Best;
   std::vector<Affine> grid_from_view;
   std::vector<Affine> view_from_grid;
   DVec3 origin{0.0};
@@ -115,10 +114,8 @@ struct SceneView::Impl {
   }
 };
 
-SceneView::SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet instructions)
-    : impl_(std::make_unique<Impl>()) {
+SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_unique<Impl>()) {
   impl_->tracer = &tracer;
-  impl_->instructions = instructions;
   for (const PlacedGrid& placed : tracer.placed()) {
     // The difference of two far positions is taken first: it is small, and mostly exact.
     const DVec3 position = placed.position - origin;
@@ -154,7 +151,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   hits.grids.hit = hits.grids.starts_inside = 0;
   if (impl_->is_alone && impl_->sees_all()) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
-    quoin::first_hits(*placed[0].opaque, rays, hits.grids, impl_->instructions);
+    quoin::first_hits(*placed[0].opaque, rays, hits.grids);
     hits.placed.fill(0);
     return;
   }
@@ -169,7 +166,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
-    quoin::first_hits(*placed[i].opaque, rays, found, impl_->instructions);
+    quoin::first_hits(*placed[i].opaque, rays, found);
     if (found.hit == 0) return true;
     impl_->take_nearer(i, found, left, hits);
     for (std::uint32_t each = found.hit; each != 0; each &= each - 1) {
@@ -184,7 +181,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
   const auto own = static_cast<std::size_t>(home);
-  std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid, impl_->instructions);
+  std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
   RoomFor<RayPacket> room_in_view;
   RayPacket& in_view = *room_in_view;
@@ -200,7 +197,7 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
     if (near == 0) return true;
     move(impl_->grid_from_view[i], in_view, rays);
     rays.active = near;
-    const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays, impl_->instructions);
+    const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays);
     blocked |= found;
     in_view.active &= ~found;
     return in_view.active != 0;
@@ -222,7 +219,7 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
-    left.active &= ~quoin::any_hits(*tree, rays, impl_->instructions);
+    left.active &= ~quoin::any_hits(*tree, rays);
     return left.active != 0;
   });
   return rays_in_view.active & ~left.active;

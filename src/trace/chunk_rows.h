@@ -7,7 +7,8 @@
 
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/trace/occupancy_tree.h>
+
+#include "trace/tree_view.h"
 
 namespace quoin::trace {
 
@@ -67,7 +68,7 @@ class RowsBox {
 
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
-  std::array<OccupancyTree::Node, 4> bricks{};
+  std::array<Node, 4> bricks{};
   /// Fills them in. False when all four are empty or all four are full, as `is_full` says; `bricks` is then not set.
   bool read(const ChunkRows& rows, int y, int z, RowsBox& box);
   bool is_full = false;

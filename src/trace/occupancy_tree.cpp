@@ -12,6 +12,21 @@
 namespace quoin {
 namespace {
 
+using trace::ChunkNode, trace::Node, trace::RegionNode;
+
+// Two tables over the box of chunks around everything: what kernels of many rays read instead of regions and chunk
+// nodes, since an address is then a sum of products.
+struct FlatTables {
+  IVec3 origin{0};                    // the voxel at the least corner
+  IVec3 chunks{0};                    // size
+  std::vector<std::uint32_t> cells;   // a bit a cell of 4^3 voxels; one empty cell around everything
+  std::vector<std::uint32_t> bricks;  // indices into `bricks()`, x first, then y, then z
+
+  // Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
+  [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
+  [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
+};
+
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
 // Flat tables up to this size are made however sparse the world is.
@@ -26,6 +41,35 @@ std::size_t word_of(IVec3 unit) {
 }
 unsigned bit_of(IVec3 unit) {
   return static_cast<unsigned>((unit.x & 3) + 4 * (unit.y & 3) + 16 * (unit.z & 3));
+}
+
+trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chunks, const Node* bricks,
+                          const IBox& bounds) {
+  trace::TreeView view{};
+  view.cells = tables.cells.data();
+  view.bricks = tables.bricks.data();
+  view.nodes = bricks;
+  view.chunks = chunks;
+  view.words = reinterpret_cast<const std::uint32_t*>(bricks);
+  view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
+  view.cell_strides = tables.cell_strides();
+  view.brick_strides = tables.brick_strides();
+  view.brick_sizes = tables.chunks * 4;
+  view.first_cell = view.cell_strides.x + view.cell_strides.y + view.cell_strides.z;
+  view.origin = DVec3(tables.origin);
+  view.box = {bounds.min - tables.origin, bounds.max - tables.origin};
+  const std::int32_t strides[3] = {1, tables.chunks.x, tables.chunks.x * tables.chunks.y};
+  std::copy_n(strides, 3, view.chunk_strides);
+  const IVec3 size = view.box.size();
+  view.is_small = std::max(std::max(size.x, size.y), size.z) <= 1'900;
+  for (int axis = 0; axis < 3; ++axis) {
+    view.corner[axis] = view.origin[axis];
+    view.low[axis] = static_cast<float>(view.box.min[axis]);
+    view.high[axis] = static_cast<float>(view.box.max[axis]);
+    view.low_voxel[axis] = view.box.min[axis];
+    view.high_voxel[axis] = view.box.max[axis];
+  }
+  return view;
 }
 
 }  // namespace
@@ -106,7 +150,7 @@ struct OccupancyTree::Impl {
     return chunk_nodes[index];
   }
 
-  // Puts the words of one brick in place; answers whether they are others than before.
+  // Puts the words of one brick in place; returns whether they are others than before.
   bool set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
     std::uint32_t& index = node.bricks[brick];
     if (bricks[index] == words) return false;
@@ -132,7 +176,7 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Answers which bricks changed; `box` becomes that of the chunk's occupied voxels, in chunk coordinates.
+  // Returns which bricks changed; `box` becomes that of the chunk's occupied voxels, in chunk coordinates.
   std::uint64_t fill(ChunkNode& node, const trace::ChunkRows& rows, IBox& box) {
     std::uint64_t changed = 0;
     trace::RowsBox rows_box;
@@ -150,7 +194,7 @@ struct OccupancyTree::Impl {
     return changed;
   }
 
-  // Answers which bricks changed.
+  // Returns which bricks changed.
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
     const auto drop = [&] {
       chunk_bounds.erase(chunk);
@@ -253,7 +297,7 @@ struct OccupancyTree::Impl {
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
   void finish(std::span<const Changed> changed) {
     renew_tables(changed);
-    if (!flat_chunks.empty()) view = trace::make_view(flat, flat_nodes.data(), bricks.data(), bounds);
+    if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 
   [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
@@ -312,7 +356,7 @@ IBox OccupancyTree::bounds() const {
 }
 
 bool OccupancyTree::is_occupied(IVec3 voxel) const {
-  const RegionNode* region = find_region({voxel.x >> 10, voxel.y >> 10, voxel.z >> 10});
+  const RegionNode* region = impl_->find({voxel.x >> 10, voxel.y >> 10, voxel.z >> 10});
   if (region == nullptr) return false;
   const IVec3 chunk = (voxel >> kChunkShift) & 15;
   const ChunkNode& node = impl_->chunk_nodes[region->nodes[table_index(chunk)]];
@@ -330,18 +374,17 @@ std::size_t OccupancyTree::bytes() const {
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 
-const OccupancyTree::RegionNode* OccupancyTree::find_region(IVec3 region) const {
-  return impl_->find(region);
+trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
+    : tree_(tree.impl_.get()), chunks_(tree_->chunk_nodes.data()), bricks_(tree_->bricks.data()) {}
+
+const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {
+  return tree_->find(region);
 }
 
-const OccupancyTree::ChunkNode* OccupancyTree::chunk_nodes() const {
-  return impl_->chunk_nodes.data();
-}
-const OccupancyTree::Node* OccupancyTree::bricks() const {
-  return impl_->bricks.data();
-}
-const OccupancyTree::FlatTables* OccupancyTree::flat_tables() const {
-  return impl_->flat_chunks.empty() ? nullptr : &impl_->flat;
+const ChunkNode* trace::TreeNodes::find_chunk(IVec3 chunk) const {
+  const RegionNode* region = find_region(chunk >> kRegionShift);
+  const std::uint32_t index = region == nullptr ? 0 : region->nodes[table_index(chunk & 15)];
+  return index == 0 ? nullptr : chunks_ + index;
 }
 
 }  // namespace quoin

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
+#include <quoin/trace/packet.h>
+
+#include "trace/kernel/kernel.h"
 #include "trace/tree_view.h"
-#include "trace/walk.h"
 
 namespace quoin {
 namespace {
@@ -17,7 +20,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // same planes at the same distances, in the same order, as one voxel at a time.
 class Walk {
  public:
-  Walk(const OccupancyTree& tree, const Ray& ray) : tree_(&tree), nodes_(tree.chunk_nodes()), bricks_(tree.bricks()) {
+  Walk(const OccupancyTree& tree, const Ray& ray) : nodes_(tree) {
     for (int axis = 0; axis < 3; ++axis) {
       origin_[axis] = ray.origin[axis];
       direction_[axis] = ray.direction[axis];
@@ -172,32 +175,30 @@ class Walk {
     if (cells == 0) return 16;
     const auto cell = static_cast<std::size_t>((v.x >> 2 & 3) + 4 * (v.y >> 2 & 3) + 16 * (v.z >> 2 & 3));
     if ((cells >> cell & 1U) == 0) return 4;
-    const std::uint64_t voxels = bricks_[node_->bricks[brick]][cell];
+    const std::uint64_t voxels = nodes_.brick(node_->bricks[brick])[cell];
     return (voxels >> ((v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3)) & 1U) != 0 ? 0 : 1;
   }
 
-  // Looks up a chunk's node; answers the size of the empty block around it where there is none.
+  // Looks up a chunk's node; returns the size of the empty block around it where there is none.
   int enter_chunk(IVec3 chunk) {
     const IVec3 region = chunk >> 4;
     if (region != region_coordinates_ || !knows_region_) {
       region_coordinates_ = region;
       knows_region_ = true;
-      region_ = tree_->find_region(region);
+      region_ = nodes_.find_region(region);
     }
     if (region_ == nullptr) return 1'024;
     const IVec3 c = chunk & 15;
     const std::uint64_t word = region_->chunks[static_cast<std::size_t>((c.x >> 2) + 4 * (c.y >> 2) + 16 * (c.z >> 2))];
     if (word == 0) return 256;
     if ((word >> ((c.x & 3) + 4 * (c.y & 3) + 16 * (c.z & 3)) & 1U) == 0) return 64;
-    node_ = nodes_ + region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)];
+    node_ = &nodes_.chunk(region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)]);
     return 0;
   }
 
-  const OccupancyTree* tree_;
-  const OccupancyTree::ChunkNode* nodes_;
-  const OccupancyTree::Node* bricks_;
-  const OccupancyTree::RegionNode* region_ = nullptr;
-  const OccupancyTree::ChunkNode* node_ = nullptr;
+  trace::TreeNodes nodes_;
+  const trace::RegionNode* region_ = nullptr;
+  const trace::ChunkNode* node_ = nullptr;
   IVec3 region_coordinates_{0};
   IVec3 chunk_{0};
   bool knows_region_ = false;
@@ -220,14 +221,8 @@ bool is_usable(const Ray& ray, double max_t) {
   return length > 0.0 && max_t >= 0.0;
 }
 
-Direction face_of(const Walk& walk, const Ray& ray) {
-  if (walk.axis() < 0) return trace::facing(ray.direction);
-  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
-}
-
-}  // namespace
-
-Direction trace::facing(const DVec3& direction) {
+// The face that looks most against a direction; x before y before z.
+Direction facing(const DVec3& direction) {
   int axis = 0;
   for (int other = 1; other < 3; ++other) {
     if (std::abs(direction[other]) > std::abs(direction[axis])) axis = other;
@@ -235,33 +230,73 @@ Direction trace::facing(const DVec3& direction) {
   return static_cast<Direction>(2 * axis + (direction[axis] > 0.0 ? 1 : 0));
 }
 
-std::optional<RayHit> trace::walk_to_first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
+Direction face_of(const Walk& walk, const Ray& ray) {
+  if (walk.axis() < 0) return facing(ray.direction);
+  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
+}
+
+// `first_hit` one step at a time, for rays of any length in worlds of any size.
+std::optional<RayHit> walk_to_first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   if (!is_usable(ray, max_t)) return std::nullopt;
   Walk walk(tree, ray);
   if (!walk.enter(tree.bounds(), max_t) || !walk.find(max_t)) return std::nullopt;
   return RayHit{walk.voxel(), face_of(walk, ray), walk.t(), walk.axis() < 0};
 }
 
-std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
+}  // namespace
+
+std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   const trace::TreeView* view = tree.view();
-  if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t);
+  if (view == nullptr) return walk_to_first_hit(tree, ray, max_t);
   RayHit hit;
   bool is_unfinished = false;
-  if (!trace::kernel_of(instructions).first_hit(*view, ray, max_t, hit, is_unfinished)) {
+  if (!trace::kernel().first_hit(*view, ray, max_t, hit, is_unfinished)) {
     if (is_unfinished) [[unlikely]]
-      return trace::walk_to_first_hit(tree, ray, max_t);
+      return walk_to_first_hit(tree, ray, max_t);
     return std::nullopt;
   }
-  if (hit.starts_inside) hit.face = trace::facing(ray.direction);
+  if (hit.starts_inside) hit.face = facing(ray.direction);
   return hit;
 }
 
-bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t, InstructionSet instructions) {
+bool any_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   const trace::TreeView* view = tree.view();
-  if (view == nullptr) return trace::walk_to_first_hit(tree, ray, max_t).has_value();
+  if (view == nullptr) return walk_to_first_hit(tree, ray, max_t).has_value();
   bool is_unfinished = false;
-  const bool is_hit = trace::kernel_of(instructions).any_hit(*view, ray, max_t, is_unfinished);
-  return is_unfinished ? trace::walk_to_first_hit(tree, ray, max_t).has_value() : is_hit;
+  const bool is_hit = trace::kernel().any_hit(*view, ray, max_t, is_unfinished);
+  return is_unfinished ? walk_to_first_hit(tree, ray, max_t).has_value() : is_hit;
+}
+
+void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits) {
+  hits.hit = hits.starts_inside = 0;
+  std::uint32_t unfinished = rays.active;
+  if (const trace::TreeView* view = tree.view()) {
+    trace::kernel().first_hits(*view, rays, hits, unfinished);
+  }
+  for (std::uint32_t inside = hits.starts_inside; inside != 0; inside &= inside - 1) {
+    const int lane = std::countr_zero(inside);
+    hits.face[static_cast<std::size_t>(lane)] = facing(rays.ray(lane).direction);
+  }
+  for (; unfinished != 0; unfinished &= unfinished - 1) {
+    const int lane = std::countr_zero(unfinished);
+    const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+    if (const auto hit = walk_to_first_hit(tree, rays.ray(lane), max_t)) hits.set(lane, *hit);
+  }
+}
+
+std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
+  std::uint32_t unfinished = rays.active;
+  std::uint32_t blocked = 0;
+  if (const trace::TreeView* view = tree.view()) {
+    blocked = trace::kernel().any_hits(*view, rays, unfinished);
+  }
+  for (; unfinished != 0; unfinished &= unfinished - 1) {
+    const int lane = std::countr_zero(unfinished);
+    const bool is_blocked =
+        walk_to_first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]).has_value();
+    blocked |= std::uint32_t{is_blocked} << lane;
+  }
+  return blocked;
 }
 
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,

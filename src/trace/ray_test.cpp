@@ -10,6 +10,7 @@
 
 #include "grid/change_follower.h"
 #include "bench/workloads.h"
+#include "core/instruction_sets_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
 
@@ -203,10 +204,11 @@ TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
     const Ray ray{from, DVec3{uniform(random), 0.0, uniform(random)} - from};
     const auto hit = first_hit(tree, ray);
     ASSERT_TRUE(hit);
-    for (const InstructionSet set : {InstructionSet::Avx512, InstructionSet::Avx2, InstructionSet::Plain}) {
-      ASSERT_TRUE(first_hit(tree, ray, hit->t, set));
-      ASSERT_TRUE(any_hit(tree, ray, hit->t, set));
-      ASSERT_FALSE(any_hit(tree, ray, std::nextafter(hit->t, 0.0), set));
+    for (const InstructionSet set : sets_of_this_machine()) {
+      const InstructionSetOverride over(set);
+      ASSERT_TRUE(first_hit(tree, ray, hit->t));
+      ASSERT_TRUE(any_hit(tree, ray, hit->t));
+      ASSERT_FALSE(any_hit(tree, ray, std::nextafter(hit->t, 0.0)));
     }
   }
 }

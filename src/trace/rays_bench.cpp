@@ -13,6 +13,7 @@
 #include <quoin/trace/ray.h>
 
 #include "bench/ray_workload.h"
+#include "core/instruction_set.h"
 
 namespace quoin {
 namespace {
@@ -60,14 +61,15 @@ const Case kShuffled[] = {
 };
 
 void trace(benchmark::State& state, const Case& c, InstructionSet set) {
+  const InstructionSetOverride over(set);
   const OccupancyTree& tree = ray_workload().tree;
   const std::vector<RayQuery>& rays = c.rays();
   int hits = 0;
   for (auto _ : state) {
     hits = 0;
     for (const RayQuery& query : rays) {
-      hits += c.ask == Ask::First ? first_hit(tree, query.ray, query.max_t, set).has_value()
-                                  : any_hit(tree, query.ray, query.max_t, set);
+      hits += c.ask == Ask::First ? first_hit(tree, query.ray, query.max_t).has_value()
+                                  : any_hit(tree, query.ray, query.max_t);
     }
   }
   report(state, rays.size(), hits, c.expected);
@@ -83,6 +85,7 @@ std::vector<RayPacket> packets_of(const std::vector<RayQuery>& rays) {
 }
 
 void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
+  const InstructionSetOverride over(set);
   const OccupancyTree& tree = ray_workload().tree;
   const std::vector<RayPacket> packets = packets_of(c.rays());
   PacketHits found;
@@ -90,8 +93,8 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
   for (auto _ : state) {
     hits = 0;
     for (const RayPacket& packet : packets) {
-      if (c.ask == Ask::First) first_hits(tree, packet, found, set);
-      hits += std::popcount(c.ask == Ask::First ? found.hit : any_hits(tree, packet, set));
+      if (c.ask == Ask::First) first_hits(tree, packet, found);
+      hits += std::popcount(c.ask == Ask::First ? found.hit : any_hits(tree, packet));
     }
   }
   report(state, c.rays().size(), hits, c.expected);
@@ -99,13 +102,14 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
 
 [[maybe_unused]] const bool registered = [] {
   const auto add = [](const Case& c, const std::string& suffix, InstructionSet set) {
+    if (!has_instruction_set(set)) return;
     const std::string name = "rays/" + std::string(c.name);
     benchmark::RegisterBenchmark((name + "/single" + suffix).c_str(), trace, c, set)->Unit(benchmark::kMillisecond);
     benchmark::RegisterBenchmark((name + "/packet" + suffix).c_str(), trace_packets, c, set)
         ->Unit(benchmark::kMillisecond);
   };
-  for (const Case& c : kCases) add(c, "", InstructionSet::Best);
-  for (const Case& c : kShuffled) add(c, "/shuffled", InstructionSet::Best);
+  for (const Case& c : kCases) add(c, "", instruction_set());
+  for (const Case& c : kShuffled) add(c, "/shuffled", instruction_set());
   for (const Case& c : kCases) add(c, "/avx2", InstructionSet::Avx2);
   for (const Case& c : kCases) add(c, "/plain", InstructionSet::Plain);
   return true;

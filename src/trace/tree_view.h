@@ -1,18 +1,41 @@
 #pragma once
 
+// How an occupancy tree lies in memory.
+//
+//   region, 1,024^3 voxels      16^3 chunks                Node: bits; and the index of each ChunkNode
+//     chunk, 64^3                 16^3 cells of 4^3          Node: bits; and the index of each of its 64 bricks
+//       brick, 16^3                 16^3 voxels                Node: bits
+//
+// One shape serves all levels: a node is 16^3 units as 64 words, each the bits of 4^3 units (x + 4 y + 16 z). Beside
+// the tree lie flat tables over the box of chunks around everything, so that a kernel finds an address by adding.
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include <quoin/trace/occupancy_tree.h>
-#include <quoin/trace/packet.h>
 
 namespace quoin::trace {
+
+/// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
+using Node = std::array<std::uint64_t, 64>;
+
+/// Of 64^3 voxels: which 4^3 cells hold any, and where the bricks of 16^3 voxels lie.
+struct ChunkNode {
+  Node cells{};                            ///< word b: the cells of brick b
+  std::array<std::uint32_t, 64> bricks{};  ///< index of a brick; 0 is empty, 1 is full
+};
+
+/// Of 16^3 chunks.
+struct RegionNode {
+  Node chunks{};                            ///< which chunks hold any voxel
+  std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0 is none
+};
 
 /// A chunk as walks of single rays read it.
 struct FlatChunk {
   std::uint64_t bricks = 0;  ///< those that are not empty, x + 4 y + 16 z
-  const OccupancyTree::ChunkNode* node = nullptr;
+  const ChunkNode* node = nullptr;
 };
 
 /// What the kernels read of a tree with flat tables.
@@ -25,12 +48,12 @@ struct TreeView {
   alignas(16) std::int32_t high_voxel[4];
   alignas(16) std::int32_t chunk_strides[4];
   // As everything else reads it.
-  const std::uint32_t* cells;        ///< bits
-  const std::uint32_t* bricks;       ///< indices
-  const std::uint32_t* words;        ///< of bricks: 128 halves each, the lower half of a cell's word first
-  const OccupancyTree::Node* nodes;  ///< the bricks again
-  const FlatChunk* chunks;           ///< x first, then y, then z
-  DVec3 origin;                      ///< of the tables, in the grid
+  const std::uint32_t* cells;   ///< bits
+  const std::uint32_t* bricks;  ///< indices
+  const std::uint32_t* words;   ///< of bricks: 128 halves each, the lower half of a cell's word first
+  const Node* nodes;            ///< the bricks again
+  const FlatChunk* chunks;      ///< x first, then y, then z
+  DVec3 origin;                 ///< of the tables, in the grid
   std::uint32_t last_cell_word;
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
@@ -40,50 +63,21 @@ struct TreeView {
   bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
 };
 
-/// What a kernel leaves of the lanes it was asked about.
-struct LaneHits {
-  std::uint32_t hit = 0;
-  std::uint32_t starts_inside = 0;
-  std::uint32_t unfinished = 0;                  ///< went further than a kernel goes: to be traced in double precision
-  RayPacket::Lanes<std::int32_t> x{}, y{}, z{};  ///< voxels, from the tables' origin
-  RayPacket::Lanes<std::int32_t> axis{};         ///< of the face
+/// The nodes of a tree, until it changes.
+class TreeNodes {
+ public:
+  explicit TreeNodes(const OccupancyTree& tree);
+  /// Null where a region of 1,024^3 voxels is empty. Region coordinates are voxel coordinates / 1,024, rounded down.
+  [[nodiscard]] const RegionNode* find_region(IVec3 region) const;
+  /// Null where a chunk is empty. Chunk coordinates are voxel coordinates / 64, rounded down.
+  [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
+  [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
+  [[nodiscard]] const Node& brick(std::uint32_t index) const { return bricks_[index]; }
+
+ private:
+  const OccupancyTree::Impl* tree_;
+  const ChunkNode* chunks_;
+  const Node* bricks_;
 };
-
-// Every kernel gives the same answers, those of a walk from one lattice plane to the next where the plane P of an axis
-// is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
-// of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
-struct Kernel {
-  /// One ray; `face` is not set where it starts inside.
-  bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
-  /// Whether one ray is blocked.
-  bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);
-  /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
-  void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
-  /// Answers the lanes that are blocked.
-  std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
-};
-
-extern const Kernel kPlainKernel;
-#ifdef QUOIN_X86_KERNELS
-extern const Kernel kAvx2Kernel;
-extern const Kernel kAvx512Kernel;
-#endif
-
-#ifdef QUOIN_X86_KERNELS
-/// By instruction set, the widest that this machine has and that is no wider than asked.
-using Kernels = std::array<const Kernel*, 4>;
-[[nodiscard]] Kernels kernels_here();
-
-[[nodiscard]] inline const Kernel& kernel_of(InstructionSet instructions) {
-  static const Kernels kernels = kernels_here();
-  return *kernels[static_cast<std::size_t>(instructions)];
-}
-#else
-[[nodiscard]] inline const Kernel& kernel_of(InstructionSet) {
-  return kPlainKernel;
-}
-#endif
-[[nodiscard]] TreeView make_view(const OccupancyTree::FlatTables& tables, const FlatChunk* chunks,
-                                 const OccupancyTree::Node* bricks, const IBox& bounds);
 
 }  // namespace quoin::trace

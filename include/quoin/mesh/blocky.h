@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -25,7 +24,7 @@ struct QuadOptions {
 /// Turns chunks into quads; holds the scratch memory that this takes (about 1.5 MiB), so keep one a thread.
 class BlockyMesher {
  public:
-  explicit BlockyMesher(InstructionSet instructions = InstructionSet::Best);
+  BlockyMesher();
   BlockyMesher(BlockyMesher&&) noexcept;
   BlockyMesher& operator=(BlockyMesher&&) noexcept;
   ~BlockyMesher();

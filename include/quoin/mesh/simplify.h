@@ -6,7 +6,7 @@
 namespace quoin {
 
 /// Removes triangles where that moves the surface by at most about `error_in_samples`, drops vertices that nothing uses
-/// any more, and orders what is left for the caches of graphics processors. Answers the error reached, at most the one
+/// any more, and orders what is left for the caches of graphics processors. Returns the error reached, at most the one
 /// allowed.
 ///
 /// Error:    the root mean square distance, in samples, of a vertex from the planes of all triangles that it stands

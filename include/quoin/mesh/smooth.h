@@ -5,7 +5,6 @@
 #include <memory>
 
 #include <quoin/core/buffer.h>
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 
@@ -98,7 +97,7 @@ struct SmoothChunkMesh {
 ///         the crossings of its edges.
 class SmoothMesher {
  public:
-  explicit SmoothMesher(InstructionSet instructions = InstructionSet::Best);
+  SmoothMesher();
   SmoothMesher(SmoothMesher&&) noexcept;
   SmoothMesher& operator=(SmoothMesher&&) noexcept;
   ~SmoothMesher();

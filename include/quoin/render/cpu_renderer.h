@@ -6,7 +6,6 @@
 #include <optional>
 
 #include <quoin/core/image.h>
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -35,7 +34,6 @@ struct RenderOptions {
   /// halved, Far blue.
   bool detail_colours = false;
   Threads threads;
-  InstructionSet instructions = InstructionSet::Best;
 };
 
 struct Picture {
@@ -81,7 +79,7 @@ class CpuRenderer {
   /// Requires: the camera's axes are perpendicular.
   /// Errors:   InvalidArgument when a size is not positive, there are more than 2^28 pixels, samples are out of range,
   ///           the camera's position is not finite, its axes are not of unit length, its angle or height is
-  ///           impossible, or `check` refuses the light; Cancelled when `progress` answers false, which is asked after
+  ///           impossible, or `check` refuses the light; Cancelled when `progress` returns false, which is asked after
   ///           every sample of a tile.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {}) const;

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
@@ -89,11 +88,9 @@ class Impostor {
   /// of grids with very many faces about 0.15 microseconds a covered texel.
   ///
   /// Requires: `opaque` is the grid's tree of opaque voxels; the grid is not edited meanwhile.
-  static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                        InstructionSet instructions = InstructionSet::Best);
+  static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque);
   /// The same, with a tree of its own.
-  static Impostor build(const Grid& grid, const VoxelRegistry& types,
-                        InstructionSet instructions = InstructionSet::Best);
+  static Impostor build(const Grid& grid, const VoxelRegistry& types);
 
   /// Around all voxels of the grid, transparent ones too.
   [[nodiscard]] const ContentSphere& content() const { return content_; }

@@ -46,7 +46,7 @@ class ImpostorCache {
   [[nodiscard]] std::shared_ptr<const Impostor> find(const Scene& scene, GridHandle grid);
 
   /// Builds what is waiting, in the order in which it was asked for, until that many seconds have passed; at least one,
-  /// so that it comes to an end. Answers how many still wait. Grids that are gone are forgotten.
+  /// so that it comes to an end. Returns how many still wait. Grids that are gone are forgotten.
   /// Cost: the time of one impostor beyond the budget, times one for each thread at most.
   std::size_t build_some(const Scene& scene, double budget_seconds, Threads threads = {1});
 

@@ -82,7 +82,7 @@ class VulkanRenderer {
   /// Bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
-  /// One picture, as CpuRenderer::render; `options.threads` are for what detail needs, `instructions` mean nothing.
+  /// One picture, as CpuRenderer::render; `options.threads` are for what detail needs.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
                                        const Progress& progress = {});
 

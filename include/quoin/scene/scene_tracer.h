@@ -9,7 +9,6 @@
 
 #include <glm/mat3x3.hpp>
 
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/level_of_detail.h>
@@ -107,7 +106,7 @@ struct TransparentSpan {
 class SceneView {
  public:
   /// `tracer` must outlive it. Cost: O(instances).
-  SceneView(const SceneTracer& tracer, DVec3 origin, InstructionSet instructions = InstructionSet::Best);
+  SceneView(const SceneTracer& tracer, DVec3 origin);
   SceneView(SceneView&&) noexcept;
   SceneView& operator=(SceneView&&) noexcept;
   ~SceneView();

@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <limits>
 
-#include <quoin/core/instruction_set.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
 namespace quoin {
 
 /// Sixteen rays side by side, in grid space. Rays that start near each other and point the same way are traced together
-/// several times as fast as one by one; the answers are the same.
+/// several times as fast as one by one; with the same results.
 struct alignas(64) RayPacket {
   static constexpr int kSize = 16;
   template <class T>
@@ -19,7 +18,7 @@ struct alignas(64) RayPacket {
 
   Lanes<double> origin_x{}, origin_y{}, origin_z{};
   Lanes<double> direction_x{}, direction_y{}, direction_z{};
-  Lanes<double> max_t{};     ///< up to and including; infinity is none
+  Lanes<double> max_t{};     ///< up to and including; infinity is none, a negative number or NaN hits nothing
   std::uint32_t active = 0;  ///< bit i: ray i counts
 
   /// Puts a ray into a lane, which becomes active; lanes that are no longer wanted leave `active` by hand.
@@ -59,13 +58,10 @@ struct alignas(64) PacketHits {
   }
 };
 
-/// As the function for single rays, for each active ray: equal in every bit, whatever the other rays and the
-/// instructions.
-void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits,
-                InstructionSet instructions = InstructionSet::Best);
+/// As the function for single rays, for each active ray: equal in every bit, whatever the other rays.
+void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits);
 
 /// Bit i: ray i is active and blocked.
-[[nodiscard]] std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays,
-                                     InstructionSet instructions = InstructionSet::Best);
+[[nodiscard]] std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays);
 
 }  // namespace quoin

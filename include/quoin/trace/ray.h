@@ -5,7 +5,6 @@
 #include <optional>
 
 #include <quoin/core/direction.h>
-#include <quoin/core/instruction_set.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/occupancy_tree.h>
 
@@ -26,7 +25,7 @@ struct RayHit {
 };
 
 /// The first occupied voxel along a ray, up to and including `max_t`; nothing when there is none, or when the ray is
-/// not finite or its direction is zero.
+/// not finite, its direction is zero, or `max_t` is negative or not a number.
 ///
 /// Voxels are half-open: a point on the face between two belongs to the one on its greater side. Where a ray crosses
 /// several planes at once, x goes before y before z.
@@ -35,17 +34,16 @@ struct RayHit {
 ///            of an edge may take the voxel beside it. `t` is the distance of the face met, in double. What lies
 ///            further than 2,048 voxels within the tree's bounds, or in a world too sparse for flat tables, is walked
 ///            in double. Far from the grid's origin a ray is as exact as its own coordinates.
-/// Same bits: from every instruction set, and alone or in a packet.
+/// Same bits: on every processor, and alone or in a packet.
 /// Cost:      a few steps through empty space; never more than the planes crossed inside the bounds.
 /// Source:    the slab test as in A. Williams et al., "An efficient and robust ray-box intersection algorithm" (2005).
 [[nodiscard]] std::optional<RayHit> first_hit(const OccupancyTree& tree, const Ray& ray,
-                                              double max_t = std::numeric_limits<double>::infinity(),
-                                              InstructionSet instructions = InstructionSet::Best);
+                                              double max_t = std::numeric_limits<double>::infinity());
 
-/// Whether any occupied voxel touches the ray from 0 up to and including `max_t`. As `first_hit`, without asking where.
+/// Whether any occupied voxel touches the ray from 0 up to and including `max_t`. As `first_hit`, without asking where:
+/// false for a `max_t` that is negative or not a number.
 [[nodiscard]] bool any_hit(const OccupancyTree& tree, const Ray& ray,
-                           double max_t = std::numeric_limits<double>::infinity(),
-                           InstructionSet instructions = InstructionSet::Best);
+                           double max_t = std::numeric_limits<double>::infinity());
 
 /// A voxel that a ray passes through, from `t_enter` to `t_exit`.
 struct VoxelSpan {
@@ -57,7 +55,8 @@ struct VoxelSpan {
 };
 
 /// Calls `visit` for every occupied voxel along a ray that is entered up to and including `max_t`, in the order in
-/// which the ray passes them, until it answers false. `t_exit` is not cut at `max_t`.
+/// which the ray passes them, until it returns false. `t_exit` is not cut at `max_t`;
+/// where that is negative or not a number there is none.
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
                 const std::function<bool(const VoxelSpan&)>& visit);
 

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+namespace quoin {
+
+/// Which processor instructions kernels use, from the fewest to the most; each set has all of those before it. Every
+/// one gives the same bytes.
+enum class InstructionSet : std::uint8_t {
+  Plain,        ///< none beyond the build's baseline
+  Avx2,         ///< AVX2, BMI, BMI2
+  Avx512,       ///< AVX-512 F, BW, DQ, VL
+  Avx512Bytes,  ///< AVX-512 VBMI, VBMI2, VPOPCNTDQ; GFNI
+};
+inline constexpr std::size_t kInstructionSets = 4;
+
+// One more than the set in use; 0 until someone asks.
+inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
+
+// Looks at the machine.
+[[nodiscard]] InstructionSet find_instruction_set();
+
+/// What kernels are to use: the most that this machine has, or less by an override. Kernels ask once a call, or once
+/// an object. Cost: a load.
+[[nodiscard]] inline InstructionSet instruction_set() {
+  const std::uint8_t known = instruction_set_in_use.load(std::memory_order_relaxed);
+  return known != 0 ? static_cast<InstructionSet>(known - 1) : find_instruction_set();
+}
+
+[[nodiscard]] inline bool has_instruction_set(InstructionSet set) {
+  return set <= instruction_set();
+}
+
+/// What a processor has that has the set, for messages.
+[[nodiscard]] const char* name_of(InstructionSet set);
+
+/// For tests and benchmarks: until it goes out of scope, calls and new objects use `set` and nothing more, on every
+/// thread. Within its scope the machine counts as one that has no more. Scopes nest, on one thread at a time.
+///
+/// Requires: has_instruction_set(set).
+class InstructionSetOverride {
+ public:
+  explicit InstructionSetOverride(InstructionSet set);
+  ~InstructionSetOverride();
+  InstructionSetOverride(const InstructionSetOverride&) = delete;
+  InstructionSetOverride& operator=(const InstructionSetOverride&) = delete;
+
+ private:
+  InstructionSet before_;
+};
+
+/// An object whose kernels are those of `set`.
+template <class T>
+[[nodiscard]] T made_with(InstructionSet set) {
+  const InstructionSetOverride over(set);
+  return T();
+}
+
+}  // namespace quoin

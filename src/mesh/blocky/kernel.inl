@@ -1,0 +1,210 @@
+// The mesher's passes over a chunk.
+//
+//   voxels -> layers (z view) -> y and x views -> for each direction, eight planes at a time:
+//   faces -> runs -> growth -> quads
+//
+// Rows of 64 voxels are words. A corner's level is two bit planes, computed for 64 faces at once; merging along a row
+// and from row to row is a handful of word operations (an addition carries "every cell agrees" to a run's end). What is
+// left a quad is one flat loop without unpredictable branches.
+
+#pragma once
+
+#ifdef QUOIN_KERNEL_AVX512
+#include "mesh/blocky/emit_rows.inl"
+#else
+#include "mesh/blocky/emit_words.inl"
+#endif
+#include "mesh/blocky/layers.inl"
+#include "mesh/blocky/runs.inl"
+
+namespace quoin::blocky {
+namespace {
+
+template <int kDirection, bool kOcclusion>
+void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch& s, QuadBuffer& quads) {
+  Batch& b = s.batch;
+  for (int first = pass.planes.begin; first < pass.planes.end; first += kBatchPlanes) {
+    const int count = pass.planes.end - first < kBatchPlanes ? pass.planes.end - first : kBatchPlanes;
+    const int groups =
+        job.has_transparent ? find_faces<true>(pass, first, count, b) : find_faces<false>(pass, first, count, b);
+    if (groups == 0) continue;
+    if (!job.merge) {
+      keep_apart(groups, b);
+    } else if (pass.one_type) {
+      merge<kOcclusion, false>(pass, first, groups, b);
+    } else {
+      merge<kOcclusion, true>(pass, first, groups, b);
+    }
+    emit_batch<kDirection, kOcclusion>(pass, first, groups, types, s, quads);
+  }
+}
+
+// How the axes of a direction map to planes, rows and bits.
+Pass pass_for(Direction direction, const Job& job, const Scratch& s, bool row_ends) {
+  const FaceFrame& frame = frame_of(direction);
+  constexpr int kRowAxis[3] = {1, 2, 1};
+  const int row_axis = kRowAxis[frame.axis];
+  Pass pass{};
+  pass.view = frame.axis == 0 ? &s.x : frame.axis == 1 ? &s.y : &s.z;
+  pass.row_masks = s.row_masks[frame.axis];
+  pass.planes = {job.region.min[frame.axis], job.region.max[frame.axis]};
+  pass.rows = {rounded_down(job.region.min[row_axis]), rounded_up(job.region.max[row_axis])};
+  pass.side = frame.sign;
+  pass.row_ends = row_ends;
+  pass.one_type = job.one_type;
+  return pass;
+}
+
+void fill_row_masks(const IBox& region, Scratch& s) {
+  constexpr int kRowAxis[3] = {1, 2, 1};
+  constexpr int kBitAxis[3] = {2, 0, 0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const int first = region.min[kBitAxis[axis]];
+    const int last = region.max[kBitAxis[axis]] - 1;
+    const std::uint64_t cells = (~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last));
+    for (int row = 0; row < 72; ++row) {
+      const bool is_inside = row >= region.min[kRowAxis[axis]] && row < region.max[kRowAxis[axis]];
+      s.row_masks[axis][row] = is_inside ? cells : 0;
+    }
+  }
+}
+
+// With transparent types a face depends on both voxels' types: all six face layers are made in the z view's layout.
+void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& s) {
+  find_faces_of_all_types(job, row_ends, s);
+  for (int i = 0; i < 2; ++i) {
+    turn_bits(s.sides[i], s.x.faces[i], range.y);
+    swap_planes_and_rows(s.sides[2 + i], s.y.faces[i], range.z, range.y);
+  }
+}
+
+template <int kDirection>
+void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
+  const Pass pass = pass_for(static_cast<Direction>(kDirection), job, s, row_ends);
+  if (job.occlusion) {
+    run_pass<kDirection, true>(job, pass, types, s, out);
+  } else {
+    run_pass<kDirection, false>(job, pass, types, s, out);
+  }
+}
+
+// The type of all of a chunk's voxels besides air, when there is just one.
+bool has_one_type(const Chunk& chunk, VoxelType& type) {
+  const Chunk::Mixed* voxels = chunk.mixed();
+  if (voxels == nullptr) {
+    type = *chunk.uniform();
+    return true;
+  }
+  int found = voxels->direct() ? 2 : 0;
+  for (std::size_t i = 0; i < voxels->palette.size() && found < 2; ++i) {
+    if (voxels->counts[i] == 0 || voxels->palette[i] == kAir) continue;
+    type = voxels->palette[i];
+    ++found;
+  }
+  return found == 1;
+}
+
+// Where the quads' types come from.
+TypeSource find_types(const Chunk& centre, Scratch& s) {
+  VoxelType type = kAir;
+  if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType, 0};
+  const Chunk::Mixed& voxels = *centre.mixed();
+  for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
+    s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
+    if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);
+  }
+  return {0, __builtin_ctz(static_cast<unsigned>(voxels.bits)), index_planes(voxels)};
+}
+
+void run_directions(const Job& job, bool row_ends, const TypeSource& types, Scratch& s, QuadBuffer& out) {
+  run_direction<0>(job, row_ends, types, s, out);
+  run_direction<1>(job, row_ends, types, s, out);
+  run_direction<2>(job, row_ends, types, s, out);
+  run_direction<3>(job, row_ends, types, s, out);
+  run_direction<4>(job, row_ends, types, s, out);
+  run_direction<5>(job, row_ends, types, s, out);
+}
+
+// The region without its solid floor: layers in which every voxel, of the region and around it, is opaque, like the
+// layers below and above, show no face. A common case, the ground under a terrain's surface.
+IBox above_solid_floor(const Job& job, bool row_ends, const Scratch& s) {
+  IBox rest = job.region;
+  const std::uint64_t before = rest.min.x == 0 ? std::uint64_t{1} << 63 : 0;  // as in a view's ends
+  const std::uint64_t after = rest.max.x == 64 ? 1 : 0;
+  if ((before | after) != 0 && !row_ends) return rest;
+  const std::uint64_t first = rest.min.x > 0 ? rest.min.x - 1U : 0U;
+  const std::uint64_t last = rest.max.x < 64 ? static_cast<unsigned>(rest.max.x) : 63U;
+  const Words cells = Words{} + ((~std::uint64_t{0} << first) & (~std::uint64_t{0} >> (63 - last)));
+  const Words ends = Words{} + (before | after);
+  const int bottom = rest.min.y - 1;
+  for (int rows = rounded_down(bottom); rows < rest.max.y; rows += kLanes) {
+    Words open{};
+    for (int z = rest.min.z - 1; z <= rest.max.z; ++z) {
+      const int at = word_index(z, rows);
+      open |= cells & ~load(s.z.opaque.words + at);
+      if (row_ends) open |= ends & ~load(s.z.ends.words + at);
+    }
+    for (int i = 0; i < kLanes; ++i) {
+      const int y = rows + i;
+      if (y < bottom) continue;
+      if (y < rest.max.y && open[i] == 0) continue;
+      rest.min.y = std::max(rest.min.y, y - 1);
+      return rest;
+    }
+  }
+  rest.min.y = std::max(rest.min.y, rest.max.y - 1);
+  return rest;
+}
+
+// Nothing is the same across the chunk's border.
+void end_at_border(const SlabRange& range, Scratch& s) {
+  for (int z = range.z.begin; z < range.z.end; ++z) {
+    s.z.same_row.words[word_index(z, -1)] = s.z.same_row.words[word_index(z, 63)] = 0;
+  }
+  for (int y = range.y.begin; y < range.y.end; ++y) {
+    s.same_z.words[word_index(-1, y)] = s.same_z.words[word_index(63, y)] = 0;
+  }
+}
+
+void find_all_faces(const Job& job, Scratch& s) {
+  const SlabRange range = slabs_around(job.region);
+  fill_layers(job, range, s);
+  end_at_border(range, s);
+  find_faces_of_all_types(job, gather_border(job, s), s);
+}
+
+// The layers of the other views.
+void turn_views(const Job& job, bool row_ends, Scratch& s) {
+  const SlabRange range = slabs_around(job.region);
+  swap_planes_and_rows(s.z.opaque, s.y.opaque, range.z, range.y);
+  turn_bits(s.z.opaque, s.x.opaque, range.y);
+  turn_border<-1>(s.z.opaque, s.x.opaque);
+  turn_border<64>(s.z.opaque, s.x.opaque);
+  copy_border(row_ends, s);
+  if (row_ends) copy_row_ends(s);
+  if (!job.one_type) {
+    swap_planes_and_rows(s.z.same_bit, s.y.same_bit, range.z, range.y);
+    swap_planes_and_rows(s.same_z, s.y.same_row, range.z, range.y);
+    turn_bits(s.same_z, s.x.same_bit, range.y);
+    turn_bits(s.z.same_row, s.x.same_row, range.y);
+  }
+  if (job.has_transparent) fill_faces(job, range, row_ends, s);
+}
+
+void mesh_chunk(const Job& whole, Scratch& s, QuadBuffer& out) {
+  Job job = whole;
+  const TypeSource types = find_types(*job.chunks->centre(), s);
+  job.one_type = types.log_bits == kOneType && !job.has_transparent;
+  const SlabRange range = slabs_around(job.region);
+  fill_layers(job, range, s);
+  if (!job.one_type) end_at_border(range, s);
+  const bool row_ends = gather_border(job, s);
+  job.region = above_solid_floor(job, row_ends, s);
+  if (job.region.empty()) return;
+  fill_row_masks(job.region, s);
+  turn_views(job, row_ends, s);
+  run_directions(job, row_ends, types, s, out);
+}
+
+}  // namespace
+}  // namespace quoin::blocky

@@ -1,0 +1,19 @@
+// The mesher's kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "mesh/blocky/kernel.inl"
+
+namespace quoin::blocky {
+
+void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  mesh_chunk(job, scratch, out);
+}
+
+void find_faces_avx2(const Job& job, Scratch& scratch) {
+  find_all_faces(job, scratch);
+}
+
+}  // namespace quoin::blocky
+
+#endif

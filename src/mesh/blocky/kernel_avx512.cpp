@@ -1,0 +1,20 @@
+// The mesher's kernel for x86-64 processors with AVX-512 F, BW, DQ, VL, VBMI, VBMI2, VPOPCNTDQ and GFNI; called only
+// where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "mesh/blocky/kernel.inl"
+
+namespace quoin::blocky {
+
+void mesh_avx512(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  mesh_chunk(job, scratch, out);
+}
+
+void find_faces_avx512(const Job& job, Scratch& scratch) {
+  find_all_faces(job, scratch);
+}
+
+}  // namespace quoin::blocky
+
+#endif

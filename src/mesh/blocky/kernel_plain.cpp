@@ -1,0 +1,15 @@
+// The mesher's kernel for any processor.
+
+#include "mesh/blocky/kernel.inl"
+
+namespace quoin::blocky {
+
+void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out) {
+  mesh_chunk(job, scratch, out);
+}
+
+void find_faces_plain(const Job& job, Scratch& scratch) {
+  find_all_faces(job, scratch);
+}
+
+}  // namespace quoin::blocky

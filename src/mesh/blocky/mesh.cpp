@@ -1,0 +1,109 @@
+#include <quoin/mesh/blocky_mesh.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include <quoin/mesh/blocky.h>
+
+#include "core/progress_steps.h"
+#include "mesh/blocky/watertight.h"
+
+namespace quoin {
+namespace {
+
+void append_quad(const Quad& quad, IVec3 origin, BlockyTriangles& out) {
+  const auto base = static_cast<std::uint32_t>(out.positions.size());
+  for (int corner = 0; corner < 4; ++corner) {
+    out.positions.emplace_back(origin + quad.corner(corner));
+    out.directions.push_back(quad.direction());
+    out.levels.push_back(quad.level(corner));
+    out.types.push_back(quad.type());
+  }
+  constexpr std::array<std::uint32_t, 6> kPlain = {0, 1, 2, 0, 2, 3};
+  constexpr std::array<std::uint32_t, 6> kFlipped = {1, 2, 3, 0, 1, 3};
+  for (const std::uint32_t index : quad.flipped() ? kFlipped : kPlain) out.indices.push_back(base + index);
+}
+
+void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {
+  const auto base = static_cast<std::uint32_t>(out.positions.size());
+  for (const OutlinePoint& point : outline) {
+    out.positions.emplace_back(origin + point.position);
+    out.directions.push_back(quad.direction());
+    out.levels.push_back(point.level);
+    out.types.push_back(quad.type());
+  }
+  triangulate_outline(outline, quad.flipped(), base, out.indices);
+}
+
+}  // namespace
+
+SurfaceClass surface_class(const VoxelProperties& properties) {
+  const bool is_transparent = properties.visibility == Visibility::Transparent;
+  if (properties.emission > 0.0F) return is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;
+  return is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
+}
+
+std::int64_t BlockyMesh::triangle_count() const {
+  std::size_t total = 0;
+  for (const BlockyTriangles& surface : surfaces) total += surface.indices.size() / 3;
+  return static_cast<std::int64_t>(total);
+}
+
+std::int64_t BlockyMesh::vertex_count() const {
+  std::size_t total = 0;
+  for (const BlockyTriangles& surface : surfaces) total += surface.positions.size();
+  return static_cast<std::int64_t>(total);
+}
+
+Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
+                                     Threads threads, const Progress& progress) {
+  const std::vector<IVec3> chunks = grid.chunks();
+  std::vector<QuadBuffer> parts(chunks.size());
+  // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
+  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
+  ProgressSteps reporter(progress, 2 * chunks.size());
+  parallel_for(tasks, threads, [&](std::size_t task) {
+    BlockyMesher mesher;
+    QuadOptions quad_options;
+    quad_options.merge = options.merge;
+    quad_options.occlusion = options.occlusion;
+    for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
+      mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
+      reporter.step();
+    }
+  });
+  if (reporter.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+
+  std::vector<SurfaceClass> classes(types.size());
+  for (std::size_t i = 0; i < classes.size(); ++i) classes[i] = surface_class(types[static_cast<VoxelType>(i)]);
+  BlockyMesh mesh;
+  mesh.faces_total = 6 * grid.voxel_count();
+  OutlineFinder finder;
+  std::vector<OutlinePoint> outline;
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    QuadBuffer& quads = parts[i];
+    mesh.faces_visible += face_count(quads);
+    mesh.quads += static_cast<std::int64_t>(quads.size());
+    if (options.watertight) finder.prepare(quads);
+    for (const Quad& quad : quads) {
+      const SurfaceClass which = quad.type() < classes.size() ? classes[quad.type()] : SurfaceClass::Opaque;
+      BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(which)];
+      if (out.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
+        return fail(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");
+      }
+      if (options.watertight) {
+        finder.outline(quad, outline);
+        append_outline(quad, chunks[i] * kChunkEdge, outline, out);
+      } else {
+        append_quad(quad, chunks[i] * kChunkEdge, out);
+      }
+    }
+    quads = {};
+    reporter.step();
+    if (reporter.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+  }
+  return mesh;
+}
+
+}  // namespace quoin

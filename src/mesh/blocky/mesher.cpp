@@ -1,0 +1,271 @@
+#include <quoin/mesh/blocky.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include <quoin/mesh/occlusion.h>
+#include <quoin/mesh/visible_faces.h>
+
+#include "core/instruction_set.h"
+#include "mesh/blocky/scratch.h"
+
+namespace quoin {
+namespace blocky {
+namespace {
+
+LevelTables make_level_tables() {
+  LevelTables tables{};
+  for (unsigned around = 0; around < 512; ++around) {
+    const auto bit = [&](unsigned i) { return (around >> i & 1U) != 0; };
+    // By (bit, row): the sides are the neighbours along each, the corner the one across.
+    const std::uint8_t l00 = vertex_occlusion(bit(3), bit(1), bit(0));
+    const std::uint8_t l10 = vertex_occlusion(bit(5), bit(1), bit(2));
+    const std::uint8_t l01 = vertex_occlusion(bit(3), bit(7), bit(6));
+    const std::uint8_t l11 = vertex_occlusion(bit(5), bit(7), bit(8));
+    const auto pack = [](const FaceLevels& levels) {
+      const int packed = levels[0] | levels[1] << 2 | levels[2] << 4 | levels[3] << 6;
+      return static_cast<std::uint64_t>(packed) << Quad::kLevelsShift | std::uint64_t{flips_diagonal(levels)}
+                                                                            << Quad::kFlipShift;
+    };
+    tables.u_along_bits[around] = pack({l00, l10, l11, l01});
+    tables.u_along_rows[around] = pack({l00, l01, l11, l10});
+  }
+  for (unsigned bits = 0; bits < 256; ++bits) {
+    const auto level = [&](unsigned corner) { return static_cast<std::uint8_t>(bits >> (2 * corner) & 3U); };
+    const bool flips = flips_diagonal({level(0), level(1), level(2), level(3)});
+    tables.flips[bits / 32] |= std::uint32_t{flips} << (bits + 6) % 32;
+  }
+  for (std::uint32_t at = 0; at < kBatchWords; ++at) {
+    tables.numbers[at] = (at / kRowStride * 64 + at % kRowStride % 64) * 0x0001'0001U;
+  }
+  constexpr int kRowAxis[3] = {1, 2, 1};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::uint64_t at = 0; at < kBatchWords; ++at) {
+      tables.places[axis][at] = at / kRowStride << (6 * axis) | (at % kRowStride & 63) << (6 * kRowAxis[axis]);
+    }
+  }
+  return tables;
+}
+
+}  // namespace
+
+bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
+  if (!types.has_transparent()) return false;
+  const Chunk::Mixed* voxels = chunk.mixed();
+  if (voxels == nullptr) return types.is_transparent(*chunk.uniform());
+  if (voxels->direct()) return true;
+  for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
+    if (voxels->counts[i] != 0 && types.is_transparent(voxels->palette[i])) return true;
+  }
+  return false;
+}
+
+std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
+  if (out.size() < used + more) out.resize(std::max(used + more, out.capacity()));
+  static_assert(sizeof(Quad) == sizeof(std::uint64_t));
+  return &out[used].bits;
+}
+
+namespace {
+
+// The voxels of a row of the centre chunk that are transparent and of the same type as those of a neighbour's row.
+std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
+  const Chunk& centre = *job.chunks->centre();
+  std::uint64_t mask = 0;
+  const Chunk::Mixed* voxels = centre.mixed();
+  if (voxels != nullptr && !voxels->direct()) {
+    for (const VoxelType type : voxels->palette) {
+      if (!job.types->is_transparent(type)) continue;
+      const std::uint64_t here = centre.row_mask(y, z, type);
+      if (here != 0) mask |= here & other.row_mask(other_y, other_z, type);
+    }
+    return mask;
+  }
+  std::array<VoxelType, kChunkEdge> row{};
+  std::array<VoxelType, kChunkEdge> other_row{};
+  centre.read_row(y, z, row);
+  other.read_row(other_y, other_z, other_row);
+  for (std::size_t x = 0; x < kChunkEdge; ++x) {
+    mask |= std::uint64_t{row[x] == other_row[x] && job.types->is_transparent(row[x])} << x;
+  }
+  return mask;
+}
+
+// The layer of faces towards a direction, where some types are transparent.
+Layer& faces_towards(Direction direction, Scratch& s) {
+  const auto d = static_cast<std::size_t>(direction);
+  return d < 4 ? s.sides[d] : s.z.faces[d - 4];
+}
+
+// The neighbour beyond the border that the region's faces towards a direction reach; null when they reach none.
+const Chunk* chunk_beyond(const Job& job, Direction direction) {
+  const FaceFrame& frame = frame_of(direction);
+  const bool reaches = frame.sign > 0 ? job.region.max[frame.axis] == kChunkEdge : job.region.min[frame.axis] == 0;
+  const IVec3 n = normal_of(direction);
+  return reaches ? job.chunks->at(n.x, n.y, n.z) : nullptr;
+}
+
+}  // namespace
+
+void hide_faces_at_border(const Job& job, Scratch& s) {
+  const Chunk& centre = *job.chunks->centre();
+  for (const Direction direction : kDirections) {
+    const Chunk* other = chunk_beyond(job, direction);
+    if (other == nullptr || !holds_transparent(*other, *job.types)) continue;
+    const FaceFrame& frame = frame_of(direction);
+    const int border = frame.sign > 0 ? kChunkEdge - 1 : 0;
+    IBox box = job.region;  // of rows: whatever their x
+    if (frame.axis != 0) {
+      box.min[frame.axis] = border;
+      box.max[frame.axis] = border + 1;
+    }
+    Layer& faces = faces_towards(direction, s);
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      for (int y = box.min.y; y < box.max.y; ++y) {
+        const int at = word_index(z, y);
+        const std::uint64_t transparent = s.solid.words[at] & ~s.z.opaque.words[at];
+        if (frame.axis != 0) {
+          const int other_y = frame.axis == 1 ? kChunkEdge - 1 - y : y;
+          const int other_z = frame.axis == 2 ? kChunkEdge - 1 - z : z;
+          if (transparent != 0) faces.words[at] &= ~same_transparent(job, *other, y, z, other_y, other_z);
+        } else if ((transparent >> border & 1) != 0) {
+          const bool same = centre.get(border, y, z) == other->get(kChunkEdge - 1 - border, y, z);
+          faces.words[at] &= ~(std::uint64_t{same} << border);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace blocky
+
+namespace {
+
+// A chunk of one type whose six neighbours hide all of it: no voxel need be looked at.
+bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
+  const auto type = chunks.centre()->uniform();
+  if (!type.has_value()) return false;
+  return std::all_of(kDirections.begin(), kDirections.end(), [&](Direction d) {
+    const IVec3 n = normal_of(d);
+    const Chunk* neighbour = chunks.at(n.x, n.y, n.z);
+    if (neighbour == nullptr) return false;
+    const auto other = neighbour->uniform();
+    return other.has_value() && !face_is_visible(types, *type, *other);
+  });
+}
+
+struct Kernel {
+  void (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
+  void (*find_faces)(const blocky::Job&, blocky::Scratch&);
+};
+
+Kernel pick_kernel() {
+#ifdef QUOIN_X86_KERNELS
+  if (has_instruction_set(InstructionSet::Avx512Bytes)) return {blocky::mesh_avx512, blocky::find_faces_avx512};
+  if (has_instruction_set(InstructionSet::Avx2)) return {blocky::mesh_avx2, blocky::find_faces_avx2};
+#endif
+  return {blocky::mesh_plain, blocky::find_faces_plain};
+}
+
+}  // namespace
+
+struct BlockyMesher::Scratch : blocky::Scratch {
+  Kernel kernel{};
+};
+
+BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
+  scratch_->levels = blocky::make_level_tables();
+  scratch_->kernel = pick_kernel();
+}
+BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
+BlockyMesher& BlockyMesher::operator=(BlockyMesher&&) noexcept = default;
+BlockyMesher::~BlockyMesher() = default;
+
+void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
+                        QuadBuffer& out) {
+  scratch_->quads = 0;
+  const Chunk* centre = chunks.centre();
+  if (centre != nullptr && !is_buried(chunks, types)) {
+    const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
+    if (!region.empty()) {
+      const bool transparent = blocky::holds_transparent(*centre, types);
+      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent, false}, *scratch_,
+                            out);
+    }
+  }
+  out.resize(scratch_->quads);
+}
+
+std::int64_t face_count(const QuadBuffer& quads) {
+  std::int64_t faces = 0;
+  for (const Quad& quad : quads) faces += std::int64_t{quad.size_u()} * quad.size_v();
+  return faces;
+}
+
+void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& wanted,
+                              FaceRows& out) {
+  for (auto& rows : out.rows) rows.assign(std::size_t{kChunkEdge} * kChunkEdge, 0);
+  const Chunk* centre = chunks.centre();
+  if (centre == nullptr || is_buried(chunks, types)) return;
+  const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
+  if (region.empty()) return;
+  blocky::Scratch& s = *scratch_;
+  scratch_->kernel.find_faces({&chunks, &types, region, false, false, blocky::holds_transparent(*centre, types), false},
+                              s);
+  const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
+                                                      &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
+  const int width = region.max.x - region.min.x;
+  const std::uint64_t cells = (~std::uint64_t{0} >> (kChunkEdge - width)) << region.min.x;
+  for (std::size_t d = 0; d < layers.size(); ++d) {
+    for (int z = region.min.z; z < region.max.z; ++z) {
+      for (int y = region.min.y; y < region.max.y; ++y) {
+        out.rows[d][static_cast<std::size_t>(z * kChunkEdge + y)] = layers[d]->words[blocky::word_index(z, y)] & cells;
+      }
+    }
+  }
+}
+
+std::int64_t FaceRows::count() const {
+  std::int64_t total = 0;
+  for (const auto& direction : rows) {
+    for (const std::uint64_t row : direction) total += std::popcount(row);
+  }
+  return total;
+}
+
+void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region,
+                   std::vector<std::uint8_t>& out) {
+  const IBox inside = intersect(region, kWholeChunk);
+  const IVec3 size = inside.size();
+  out.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
+  FaceRows faces;
+  BlockyMesher().find_faces(chunks, types, inside, faces);
+  std::size_t next = 0;
+  for (int z = inside.min.z; z < inside.max.z; ++z) {
+    for (int y = inside.min.y; y < inside.max.y; ++y) {
+      for (int x = inside.min.x; x < inside.max.x; ++x, ++next) {
+        for (std::size_t d = 0; d < 6; ++d) {
+          const std::uint64_t row = faces.rows[d][static_cast<std::size_t>(z * kChunkEdge + y)];
+          out[next] = static_cast<std::uint8_t>(out[next] | (row >> x & 1U) << d);
+        }
+      }
+    }
+  }
+}
+
+FaceLevels face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel, Direction direction) {
+  const FaceFrame& frame = frame_of(direction);
+  const auto is_occluder = [&](int du, int dv) {
+    IVec3 at = voxel + normal_of(direction);
+    at[frame.u] += du;
+    at[frame.v] += dv;
+    return types.is_opaque(chunks.get(at));
+  };
+  const auto level = [&](int du, int dv) {
+    return vertex_occlusion(is_occluder(du, 0), is_occluder(0, dv), is_occluder(du, dv));
+  };
+  return {level(-1, -1), level(1, -1), level(1, 1), level(-1, 1)};
+}
+
+}  // namespace quoin

@@ -1,0 +1,159 @@
+// blocky/* of the workload specification: 62^3 interiors of padded 64^3 chunks, from the grid's own palette storage to
+// complete packed quads.
+
+#include <quoin/mesh/blocky.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "bench/workloads.h"
+#include "core/instruction_set.h"
+
+namespace quoin {
+namespace {
+
+using workloads::Blocky;
+
+struct Case {
+  const char* name;
+  Blocky which;
+};
+constexpr Case kCases[] = {{"w1", Blocky::W1},       {"w2", Blocky::W2},
+                           {"w3a", Blocky::W3a},     {"w3b", Blocky::W3b},
+                           {"w3c", Blocky::W3c},     {"w4", Blocky::W4},
+                           {"empty", Blocky::Empty}, {"full", Blocky::Full},
+                           {"glass", Blocky::Glass}, {"glass_columns", Blocky::GlassColumns}};
+constexpr struct {
+  const char* prefix;
+  InstructionSet set;
+} kLesserSets[] = {{"avx2/", InstructionSet::Avx2}, {"plain/", InstructionSet::Plain}};
+
+// W1's terrain over 4x2x4 whole chunks, its surface crossing the lower ones' tops.
+Grid terrain_of_chunks() {
+  std::vector<double> heights;
+  for (int z = 0; z < 256; ++z) {
+    for (int x = 0; x < 256; ++x) heights.push_back(workloads::height(x, z) + 24);
+  }
+  Grid grid;
+  grid.edit({IVec3{0}, {256, 128, 256}}, [&](IVec3 v, VoxelType) {
+    return workloads::terrain_type(v.y, heights[static_cast<std::size_t>(v.z * 256 + v.x)]);
+  });
+  return grid;
+}
+
+// Chunks among their neighbours; a time is of one chunk.
+void mesh_world(benchmark::State& state, bool occlusion, InstructionSet instructions) {
+  const Grid grid = terrain_of_chunks();
+  const VoxelRegistry types = workloads::three_types();
+  std::vector<Neighbourhood> chunks;
+  for (const IVec3 chunk : grid.chunks()) chunks.push_back(grid.neighbourhood(chunk));
+  QuadOptions options;
+  options.occlusion = occlusion;
+  auto mesher = made_with<BlockyMesher>(instructions);
+  QuadBuffer quads;
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.mesh(chunks[next], types, options, quads);
+    benchmark::DoNotOptimize(quads.data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  std::int64_t faces = 0;
+  for (const Neighbourhood& chunk : chunks) {
+    mesher.mesh(chunk, types, options, quads);
+    faces += face_count(quads);
+  }
+  state.counters["chunks"] = static_cast<double>(chunks.size());
+  state.counters["faces"] = static_cast<double>(faces);
+}
+
+// Empty and full chunks lie among their like.
+Neighbourhood surrounded(const Chunk& chunk, Blocky which) {
+  Neighbourhood n = lone(chunk);
+  if (which == Blocky::Full) n.chunks.fill(&chunk);
+  return n;
+}
+
+void check(Blocky which, std::int64_t faces) {
+  if (faces == workloads::expected_faces(which)) return;
+  std::fprintf(stderr, "blocky benchmark: %lld faces, expected %lld\n", static_cast<long long>(faces),
+               static_cast<long long>(workloads::expected_faces(which)));
+  std::exit(1);
+}
+
+void mesh(benchmark::State& state, Blocky which, int chunk_count, bool occlusion, InstructionSet instructions) {
+  std::vector<Chunk> chunks;
+  for (int i = 0; i < chunk_count; ++i) chunks.push_back(workloads::blocky_chunk(which, i % 8, i / 8));
+  const VoxelRegistry types = workloads::glass_types();
+  QuadOptions options;
+  options.occlusion = occlusion;
+  options.region = which == Blocky::Full ? kWholeChunk : workloads::kInterior;
+  auto mesher = made_with<BlockyMesher>(instructions);
+  QuadBuffer quads;
+  mesher.mesh(surrounded(chunks[0], which), types, options, quads);
+  const std::int64_t faces = face_count(quads);
+  check(which, faces);
+  const auto first_quads = static_cast<double>(quads.size());
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.mesh(surrounded(chunks[next], which), types, options, quads);
+    benchmark::DoNotOptimize(quads.data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["quads"] = first_quads;
+  state.counters["faces"] = static_cast<double>(faces);
+}
+
+// All workloads with the widest instructions; the lesser ones where the specification speaks of them.
+bool is_wanted(const Case& c, int count, bool is_widest) {
+  return is_widest || (count > 1 && (c.which == Blocky::W1 || c.which == Blocky::W2));
+}
+
+void register_set(const std::string& prefix, InstructionSet set) {
+  if (!has_instruction_set(set)) return;
+  for (const bool occlusion : {true, false}) {
+    const std::string style = occlusion ? "/ao" : "/no_ao";
+    for (const Case& c : kCases) {
+      for (const int count : {1, 64}) {
+        if (!is_wanted(c, count, prefix.empty())) continue;
+        const std::string name = prefix + "blocky/" + c.name + (count == 1 ? "/hot" : "/cold64") + style;
+        benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+          mesh(state, c.which, count, occlusion, set);
+        })->Unit(benchmark::kMicrosecond);
+      }
+    }
+    benchmark::RegisterBenchmark((prefix + "blocky/world" + style).c_str(), [=](benchmark::State& state) {
+      mesh_world(state, occlusion, set);
+    })->Unit(benchmark::kMicrosecond);
+  }
+}
+
+void visible_faces(benchmark::State& state) {
+  std::vector<Chunk> chunks;
+  for (int i = 0; i < 64; ++i) chunks.push_back(workloads::blocky_chunk(Blocky::W1, i % 8, i / 8));
+  const VoxelRegistry types = workloads::three_types();
+  BlockyMesher mesher;
+  FaceRows faces;
+  mesher.find_faces(lone(chunks[0]), types, workloads::kInterior, faces);
+  check(Blocky::W1, faces.count());
+  std::size_t next = 0;
+  for (auto _ : state) {
+    mesher.find_faces(lone(chunks[next]), types, workloads::kInterior, faces);
+    benchmark::DoNotOptimize(faces.rows[0].data());
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["faces"] = static_cast<double>(workloads::expected_faces(Blocky::W1));
+}
+BENCHMARK(visible_faces)->Name("visible_faces/w1/cold64")->Unit(benchmark::kMicrosecond);
+
+const bool kRegistered = [] {
+  register_set("", instruction_set());
+  for (const auto& [prefix, set] : kLesserSets) register_set(prefix, set);
+  return true;
+}();
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,173 @@
+// Faces and runs of a batch of planes.
+//
+//   faces        . X X X X . X X      a row: visible faces
+//   merged       . X X . . . X .      the next cell has the same type and levels
+//   starts       . X . . X . X .      first cells of runs
+//   ends         . . . X X . . X      last cells of runs
+//   closes       . . . . X . . X      ends of runs that do not go on in the next row, by the carry of one addition
+
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "mesh/blocky/scratch.h"
+#include "mesh/blocky/words.inl"
+
+namespace quoin::blocky {
+namespace {
+
+struct Pass {
+  const View* view;
+  const std::uint64_t* row_masks;  // by row: the cells of the region
+  Range planes;
+  Range rows;
+  int side;       // +1 or -1: where the faces look
+  bool row_ends;  // some voxel before or after a row may be opaque
+  bool one_type;  // all faces are of one type: the layers of same types are not there
+};
+
+// Visible faces of a batch of planes, and the list of groups of kLanes rows that have any.
+template <bool kTransparent>
+QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
+  int groups = 0;
+  for (int i = 0; i < plane_count; ++i) {
+    const int plane = first_plane + i;
+    const std::uint64_t* here = pass.view->opaque.words + word_index(plane, 0);
+    const std::uint64_t* front = here + pass.side * kRowStride;
+    const std::uint64_t* given = pass.view->faces[pass.side < 0].words + word_index(plane, 0);
+    for (int row = pass.rows.begin; row < pass.rows.end; row += kLanes) {
+      const Words mask = load(pass.row_masks + row);
+      const Words faces = kTransparent ? load(given + row) & mask : and_not(load(here + row), load(front + row), mask);
+      const int at = i * kRowStride + row;
+      store(b.faces + at, faces);
+      b.groups[groups] = static_cast<std::uint16_t>(at);
+      groups += static_cast<int>(any(faces));
+    }
+    b.faces[i * kRowStride + pass.rows.end] = 0;
+  }
+  return groups;
+}
+
+struct Levels {
+  Words low;
+  Words high;
+};
+
+QUOIN_INLINE Levels corner_levels(Words side1, Words side2, Words corner) {
+  return {level_low(side1, side2, corner), level_high(side1, side2, corner)};
+}
+
+// Where two pairs of levels agree.
+QUOIN_INLINE Words agree(const Levels& a, const Levels& b, const Levels& c, const Levels& d) {
+  return ~or_difference(or_difference(or_difference(a.low ^ b.low, a.high, b.high), c.low, d.low), c.high, d.high);
+}
+
+// Faces that are not to be merged: each is a run.
+QUOIN_STAGE void keep_apart(int groups, Batch& b) {
+  for (int i = 0; i < groups; ++i) {
+    const int at = b.groups[i];
+    const Words faces = load(b.faces + at);
+    store(b.starts + at, faces);
+    store(b.ends + at, faces);
+    store(b.closes + at, faces);
+  }
+}
+
+// Faces of a group whose levels are constant along the bits, and along the rows.
+template <bool kRowEnds>
+QUOIN_INLINE void constant_levels(const Pass& pass, int front, Words& along_bits, Words& along_rows) {
+  const auto row_at = [&](int offset, Words& before, Words& middle, Words& after) {
+    middle = load(pass.view->opaque.words + front + offset);
+    before = middle << 1;
+    after = middle >> 1;
+    if constexpr (kRowEnds) {
+      const Words ends = load(pass.view->ends.words + front + offset);
+      before |= ends >> 63;
+      after |= ends << 63;
+    }
+  };
+  Words a_before, a, a_after, b_before, unused, b_after, c_before, c, c_after;
+  row_at(-1, a_before, a, a_after);
+  row_at(0, b_before, unused, b_after);
+  row_at(1, c_before, c, c_after);
+  const Levels l00 = corner_levels(b_before, a, a_before);
+  const Levels l10 = corner_levels(b_after, a, a_after);
+  const Levels l01 = corner_levels(b_before, c, c_before);
+  const Levels l11 = corner_levels(b_after, c, c_after);
+  along_bits = agree(l00, l10, l01, l11);
+  along_rows = agree(l00, l01, l10, l11);
+}
+
+// Splits the faces of each listed group into runs of equal type and constant levels.
+template <bool kOcclusion, bool kRowEnds, bool kTypes>
+QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
+  for (int i = 0; i < groups; ++i) {
+    const int at = b.groups[i];
+    const int here = word_index(first_plane, 0) + at;
+    const Words faces = load(b.faces + at);
+    Words joined = faces;
+    Words mergeable = faces;
+    if constexpr (kOcclusion) {
+      Words along_bits;
+      Words along_rows;
+      constant_levels<kRowEnds>(pass, here + pass.side * kRowStride, along_bits, along_rows);
+      joined &= along_bits;
+      mergeable &= along_rows;
+    }
+    store(b.mergeable + at, mergeable);
+    Words merged = joined & (joined >> 1);
+    if constexpr (kTypes) merged &= load(pass.view->same_bit.words + here);
+    store(b.starts + at, faces & ~(merged << 1));
+    store(b.ends + at, faces & ~merged);
+  }
+}
+
+// Which runs go on in the next row: those with the same extent, type and levels constant along the rows.
+template <bool kTypes>
+QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
+  for (int i = 0; i < groups; ++i) {
+    const int at = b.groups[i];
+    const Words starts = load(b.starts + at);
+    const Words ends = load(b.ends + at);
+    // The next row may be of a group that is not listed: only its faces, none, are sure to be there.
+    Words agreed = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(b.faces + at + 1);
+    if constexpr (kTypes) agreed &= load(pass.view->same_row.words + word_index(first_plane, 0) + at);
+    agreed = and_same(and_same(agreed, starts, load(b.starts + at + 1)), ends, load(b.ends + at + 1));
+    // The sum carries from a run's first cell to its last only if all cells between agree.
+    store(b.closes + at, ends & ~(((agreed & ~ends) + starts) & agreed));
+  }
+}
+
+template <bool kOcclusion, bool kTypes>
+void merge(const Pass& pass, int first_plane, int groups, Batch& b) {
+  const auto find = [&](auto row_ends) {
+    find_runs<kOcclusion, kOcclusion && row_ends, kTypes>(pass, first_plane, groups, b);
+  };
+  pass.row_ends ? find(std::true_type{}) : find(std::false_type{});
+  find_growth<kTypes>(pass, first_plane, groups, b);
+}
+
+// Where a quad of one direction holds what.
+template <int kDirection>
+struct Layout {
+  static constexpr FaceFrame kFrame = kFaceFrames[kDirection];
+  static constexpr int kAxis = kFrame.axis;
+  static constexpr int kRowAxis = kAxis == 1 ? 2 : 1;
+  static constexpr int kBitAxis = kAxis == 0 ? 2 : 0;
+  static constexpr bool kUAlongBits = kFrame.u == kBitAxis;
+  static constexpr int kWidthShift = kUAlongBits ? Quad::kSizeUShift : Quad::kSizeVShift;
+  static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
+};
+
+// How quads learn their types: all have one, or each looks into its voxel's packed row.
+inline constexpr int kOneType = -1;
+
+struct TypeSource {
+  std::uint64_t one;  // in a quad's place; 0 when there are several
+  int log_bits;       // of the packed rows, or kOneType
+  int planes;         // of palette indices; 0 where there are none
+};
+
+}  // namespace
+}  // namespace quoin::blocky

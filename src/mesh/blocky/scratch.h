@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstdint>
+
+#include <quoin/core/direction.h>
+#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/quad.h>
+
+namespace quoin::blocky {
+
+// A layer is a bit per voxel of a chunk and of the rows around it: planes and rows run from -1 to 64, a word holds the
+// 64 voxels of a row. Row 0 of every plane is aligned to eight words, and rows -8 to 71 may be read: beyond -1 and 64
+// they are those of the planes beside.
+inline constexpr int kRowStride = 72;
+inline constexpr int kFirstRow = 8;
+inline constexpr int kLayerWords = 66 * kRowStride + kFirstRow;
+
+constexpr int word_index(int plane, int row) {
+  return (plane + 1) * kRowStride + row + kFirstRow;
+}
+
+struct alignas(64) Layer {
+  std::uint64_t words[kLayerWords];
+};
+
+// The chunk seen along one axis: faces point along `plane`, runs lie along `bit`, runs of equal extent merge along
+// `row`.
+struct View {
+  Layer opaque;    // all 66 x 66 rows
+  Layer same_bit;  // same type as the next voxel of the row
+  Layer same_row;  // same type as the voxel of the next row
+  Layer ends;      // bit 63: the voxel before the row's first is opaque; bit 0: the one after its last (as rotated in)
+  Layer faces[2];  // visible faces towards the next and the previous plane; only used with transparent types
+};
+
+// Everything that the passes over one direction need of a batch of planes. Rows are numbered as in a layer: a plane is
+// kRowStride further than the one before.
+inline constexpr int kBatchPlanes = 8;
+inline constexpr int kBatchWords = kBatchPlanes * kRowStride;
+
+struct alignas(64) Row {
+  std::uint64_t ends;
+  std::uint64_t starts;
+  std::uint64_t closes;
+  std::uint64_t place;         // a quad's bits for its direction, plane and row
+  const std::uint64_t* front;  // the row before the faces
+};
+
+struct alignas(64) Batch {
+  std::uint64_t faces[kBatchWords + 8];
+  std::uint64_t mergeable[kBatchWords + 8];  // faces whose levels are constant along the rows
+  std::uint64_t starts[kBatchWords + 8];     // first cell of each run
+  std::uint64_t ends[kBatchWords + 8];       // last cell of each run
+  std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
+  // Of the run that ends in a column: its rows so far, as a quad's bits; 0 between batches.
+  std::uint64_t rows_before[64];
+  std::uint16_t groups[kBatchWords / 4 + 8];
+  Row rows[kBatchPlanes * 64 + 8];
+};
+
+// Quads in the making, where a whole row is done at once: rows with runs, and then each quad's parts, side by side.
+// With room for a vector behind the last.
+inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
+
+struct alignas(64) Parts {
+  // Of the row in which a quad ends, its first and last cell; its rows before; its eight level bits.
+  static constexpr std::size_t kFirst = 0;
+  static constexpr std::size_t kLast = 1;
+  static constexpr std::size_t kRowsBefore = 2;
+  static constexpr std::size_t kLevels = 3;
+
+  std::uint16_t rows[kBatchPlanes * 64 + 8];  // words of a batch
+  std::uint8_t bytes[4][kBatchQuads];
+  std::uint16_t places[kBatchQuads];  // 64 * plane of the batch + row
+};
+
+// 9 front neighbours' bits -> a quad's bits for levels and diagonal, for faces whose u lies along the bits, and along
+// the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
+struct LevelTables {
+  std::uint64_t u_along_bits[512];
+  std::uint64_t u_along_rows[512];
+  std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
+  std::uint32_t numbers[kBatchWords];    // by word of a batch: 64 * plane + row, twice
+  std::uint32_t flips[8];  // by a quad's eight level bits: whether it is flipped; bit (levels + 6) % 32 of a word
+};
+
+struct Scratch {
+  View z;           // planes z, rows y, bits x
+  View y;           // planes y, rows z, bits x
+  View x;           // planes x, rows y, bits z
+  Layer solid;      // planes z, rows y: not air
+  Layer same_z;     // planes z, rows y: same type as the voxel at z + 1
+  Layer planes[4];  // planes z, rows y: the bits of the palette index
+  Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; not used by meshing opaque types
+  Batch batch;
+  Parts parts;
+  LevelTables levels;
+  std::uint64_t palette[256];          // types in a quad's place, by palette index
+  std::uint32_t narrow_palette[16];    // the first, as in the upper half of a quad
+  std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region
+  std::uint64_t patterns[256][16];     // a row of each uniform slab
+  const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
+  std::uint8_t index_class[256];       // by palette index: 0 air, 1 opaque, 2 transparent
+  std::size_t quads;                   // written so far
+};
+
+// What a kernel works on.
+struct Job {
+  const Neighbourhood* chunks;
+  const VoxelRegistry* types;
+  IBox region;  // not empty, inside the chunk, no larger than the voxels' bounds
+  bool merge;
+  bool occlusion;
+  bool has_transparent;  // some voxel of the centre chunk is
+  bool one_type;         // all its voxels but air are of one opaque type: the layers of same types are not made
+};
+
+// The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`
+// and in the z view's `faces`, for the rows of the region.
+void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
+void find_faces_plain(const Job& job, Scratch& scratch);
+#ifdef QUOIN_X86_KERNELS
+void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
+void find_faces_avx2(const Job& job, Scratch& scratch);
+void mesh_avx512(const Job& job, Scratch& scratch, QuadBuffer& out);
+void find_faces_avx512(const Job& job, Scratch& scratch);
+#endif
+
+// Makes room for `more` quads behind the first `used`; returns where they go.
+std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
+
+// Whether a voxel of the chunk is transparent.
+bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
+
+// Takes away the faces of transparent voxels that voxels of their own type hide from beyond the chunk's border, from
+// `sides` and the z view's faces.
+void hide_faces_at_border(const Job& job, Scratch& scratch);
+
+}  // namespace quoin::blocky

@@ -1,0 +1,219 @@
+#pragma once
+
+// The arithmetic of one cell and of the occlusion of its vertex, in the order that every kernel keeps, so that all give
+// the same bits. No contraction.
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include <quoin/core/vec.h>
+#include <quoin/mesh/smooth.h>
+
+namespace quoin::smooth {
+
+/// A vertex as the arithmetic of its cell gives it.
+struct CellVertex {
+  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded: normals and occlusion are computed with it
+  Vec3 snapped;   ///< rounded to 1/65,536, so that it can be added to whole numbers exactly: positions
+  Vec3 normal;    ///< unit, into the air
+};
+
+/// Density of the corners, by x + 2 y + 4 z.
+using Corners = std::array<float, 8>;
+
+/// A corner is solid below 0. -0 and 0 are air.
+inline std::uint32_t solid_corners(const Corners& d) {
+  std::uint32_t solid = 0;
+  for (std::size_t i = 0; i < 8; ++i) solid |= static_cast<std::uint32_t>(d[i] < 0.0F) << i;
+  return solid;
+}
+
+/// 1 / n for n = 0 to 12 crossings.
+inline constexpr std::array<float, 16> kReciprocals = {
+    0.0F,        1.0F,        1.0F / 2.0F,  1.0F / 3.0F,  1.0F / 4.0F,  1.0F / 5.0F, 1.0F / 6.0F, 1.0F / 7.0F,
+    1.0F / 8.0F, 1.0F / 9.0F, 1.0F / 10.0F, 1.0F / 11.0F, 1.0F / 12.0F, 0.0F,        0.0F,        0.0F};
+
+/// The sum of the fractions at which four parallel edges (a[i], b[i]) are crossed, by a single division; those that are
+/// not crossed count 0.
+inline float sum_of_crossings(const float* a, const float* b) {
+  float n[4];
+  float d[4];
+  for (int i = 0; i < 4; ++i) {
+    const bool crossed = (a[i] < 0.0F) != (b[i] < 0.0F);
+    n[i] = crossed ? a[i] : 0.0F;
+    d[i] = crossed ? a[i] - b[i] : 1.0F;
+  }
+  const float p = n[0] * d[1] + n[1] * d[0];
+  const float q = d[0] * d[1];
+  const float r = n[2] * d[3] + n[3] * d[2];
+  const float s = d[2] * d[3];
+  return (p * s + r * q) / (q * s);
+}
+
+/// 1 / sqrt(x) to about 1e-7, with products only. Requires: x is normal.
+inline float reciprocal_root(float x) {
+  const float half = 0.5F * x;
+  float y = std::bit_cast<float>(0x5F37'59DFU - (std::bit_cast<std::uint32_t>(x) >> 1));
+  y = y * (1.5F - (half * y) * y);
+  y = y * (1.5F - (half * y) * y);
+  return y * (1.5F - (half * y) * y);
+}
+
+/// Squared gradients below this have no direction.
+inline constexpr float kLeastSquaredGradient = 1e-30F;
+
+/// A gradient made unit; (0, 1, 0) where it has no direction.
+inline Vec3 unit_normal(Vec3 g) {
+  const float q = (g.x * g.x + g.y * g.y) + g.z * g.z;
+  if (!(q >= kLeastSquaredGradient)) return {0.0F, 1.0F, 0.0F};
+  const float r = reciprocal_root(q);
+  return {g.x * r, g.y * r, g.z * r};
+}
+
+/// Interpolates between four values at the corners of a unit square: first along u, then along v.
+inline float bilinear(float v00, float v10, float v01, float v11, float u, float v) {
+  const float a = v00 + u * (v10 - v00);
+  const float b = v01 + u * (v11 - v01);
+  return a + v * (b - a);
+}
+
+/// The gradient of the trilinear field at a point of the cell.
+inline Vec3 trilinear_gradient(const Corners& d, Vec3 f) {
+  return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
+          bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
+          bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
+}
+
+/// Rounds 0 to 1 to a multiple of 1/65,536.
+inline float snap(float f) {
+  return (f + 128.0F) - 128.0F;
+}
+
+/// The vertex of a cell that the surface crosses: the mean of the crossings of its edges.
+inline CellVertex cell_vertex(const Corners& d) {
+  const float x_low[4] = {d[0], d[2], d[4], d[6]};
+  const float x_high[4] = {d[1], d[3], d[5], d[7]};
+  const float y_low[4] = {d[0], d[1], d[4], d[5]};
+  const float y_high[4] = {d[2], d[3], d[6], d[7]};
+  const float z_low[4] = {d[0], d[1], d[2], d[3]};
+  const float z_high[4] = {d[4], d[5], d[6], d[7]};
+  const std::uint32_t m = solid_corners(d);
+  // Crossed edges by axis, a bit at the place of their first corner.
+  const std::uint32_t cx = (m ^ m >> 1) & 0x55U;
+  const std::uint32_t cy = (m ^ m >> 2) & 0x33U;
+  const std::uint32_t cz = (m ^ m >> 4) & 0x0FU;
+  const auto count = [](std::uint32_t bits) { return static_cast<float>(std::popcount(bits)); };
+  const float inverse = kReciprocals[static_cast<std::size_t>(std::popcount(cx | cy << 8 | cz << 16))];
+  CellVertex vertex;
+  vertex.fraction.x = (sum_of_crossings(x_low, x_high) + count((cy & 0xAAU) | (cz & 0xAAU) << 8)) * inverse;
+  vertex.fraction.y = (sum_of_crossings(y_low, y_high) + count((cx & 0xCCU) | (cz & 0xCCU) << 8)) * inverse;
+  vertex.fraction.z = (sum_of_crossings(z_low, z_high) + count((cx & 0xF0U) | (cy & 0xF0U) << 8)) * inverse;
+  for (int i = 0; i < 3; ++i) vertex.snapped[i] = snap(vertex.fraction[i]);
+  vertex.normal = unit_normal(trilinear_gradient(d, vertex.fraction));
+  return vertex;
+}
+
+/// How far above the surface the lowest samples of a plane lie.
+inline constexpr float kLift = 0.1F;
+/// The published form counts depths below this as none.
+inline constexpr float kLeastDepth = 0.001F;
+
+/// What densities are multiplied by, so that depths count in samples of the level, as the spread does.
+[[gnu::always_inline]] inline float depth_unit(int level) {
+  return 1.0F / static_cast<float>(1 << level);
+}
+
+/// Where a vertex is sampled about, relative to its cell's lowest corner.
+[[gnu::always_inline]] inline Vec3 occlusion_centre(Vec3 fraction, Vec3 n, float spread) {
+  const float lift = spread * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z)) + kLift;
+  return {fraction.x + n.x * lift, fraction.y + n.y * lift, fraction.z + n.z * lift};
+}
+
+/// The lattice points around the three samples of one axis, and where between them they lie.
+struct SampleAxis {
+  std::array<int, 3> base;
+  std::array<float, 3> fraction;
+};
+
+[[gnu::always_inline]] inline SampleAxis sample_axis(float centre, float spread) {
+  SampleAxis axis{};
+  const float whole = std::floor(spread);
+  for (int i = 0; i < 3; ++i) {
+    // With whole spreads all three have one fraction, whatever the rounding of the sum.
+    const float at = whole == spread ? centre : centre + static_cast<float>(i - 1) * spread;
+    const float below = std::floor(at);
+    axis.base[static_cast<std::size_t>(i)] =
+        static_cast<int>(below) + (whole == spread ? (i - 1) * static_cast<int>(spread) : 0);
+    axis.fraction[static_cast<std::size_t>(i)] = at - below;
+  }
+  return axis;
+}
+
+/// What the weighted forms make of the sum of the depths and the deepest (both at most 0).
+[[gnu::always_inline]] inline float weighted_openness(float sum, float least, const SmoothOcclusionOptions& options) {
+  float ratio = 0.0F;
+  if (options.form == SmoothOcclusion::Weighted) {
+    ratio = -sum / (27.0F * std::max(-least, options.spread));
+  } else if (least <= -kLeastDepth) {
+    ratio = sum / (27.0F * least);
+  }
+  const float base = ratio + options.offset;
+  const bool squared = options.power == 2.0F;
+  const float darkness = squared ? base * base : std::pow(base, options.power);
+  const float open = squared ? options.offset * options.offset : std::pow(options.offset, options.power);
+  return std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
+}
+
+/// Occlusion from the samples' densities, which come by z, then y, then x.
+[[gnu::always_inline]] inline float openness_of(const std::array<float, 27>& samples,
+                                                const SmoothOcclusionOptions& options) {
+  if (options.form == SmoothOcclusion::Openness) {
+    const auto open = std::count_if(samples.begin(), samples.end(), [](float v) { return v >= 0.0F; });
+    return static_cast<float>(open) * (1.0F / 27.0F);
+  }
+  // Nine triples along x: those of even and odd number are added up apart, as two halves of a register.
+  std::array<std::array<float, 3>, 2> sums{};
+  float least = 0.0F;
+  for (std::size_t i = 0; i < 27; ++i) {
+    const float v = std::min(samples[i], 0.0F);
+    sums[i / 3 % 2][i % 3] += v;
+    least = std::min(least, v);
+  }
+  const float sum = ((sums[0][0] + sums[1][0]) + (sums[0][1] + sums[1][1])) + (sums[0][2] + sums[1][2]);
+  return weighted_openness(sum, least, options);
+}
+
+/// The occlusion of a vertex; `density(x, y, z)` is the lattice point at that offset from the cell's lowest corner, in
+/// samples of the level.
+template <class Density>
+[[gnu::always_inline]] inline float vertex_openness(Vec3 fraction, Vec3 normal, const SmoothOcclusionOptions& options,
+                                                    Density density) {
+  const Vec3 centre = occlusion_centre(fraction, normal, options.spread);
+  const std::array<SampleAxis, 3> axes = {sample_axis(centre.x, options.spread), sample_axis(centre.y, options.spread),
+                                          sample_axis(centre.z, options.spread)};
+  std::array<float, 27> samples{};
+  for (std::size_t i = 0; i < 27; ++i) {
+    const std::size_t ix = i % 3;
+    const std::size_t iy = i / 3 % 3;
+    const std::size_t iz = i / 9;
+    const int x = axes[0].base[ix];
+    const int y = axes[1].base[iy];
+    const int z = axes[2].base[iz];
+    const auto along_z = [&](int dx, int dy) {
+      const float low = density(x + dx, y + dy, z);
+      return low + axes[2].fraction[iz] * (density(x + dx, y + dy, z + 1) - low);
+    };
+    const auto along_y = [&](int dx) {
+      const float low = along_z(dx, 0);
+      return low + axes[1].fraction[iy] * (along_z(dx, 1) - low);
+    };
+    const float low = along_y(0);
+    samples[i] = low + axes[0].fraction[ix] * (along_y(1) - low);
+  }
+  return openness_of(samples, options);
+}
+
+}  // namespace quoin::smooth

@@ -1,0 +1,17 @@
+// The Surface Nets kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "mesh/smooth/occlusion.inl"
+#include "mesh/smooth/slices.inl"
+#include "mesh/smooth/vectors.inl"
+
+namespace quoin::smooth {
+
+void mesh_avx2(Work& work, SmoothChunkMesh& out) {
+  mesh_slices(work, out);
+}
+
+}  // namespace quoin::smooth
+
+#endif

@@ -1,0 +1,17 @@
+// The Surface Nets kernel for x86-64 processors with AVX-512 F, BW, DQ, VL and VBMI2; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "mesh/smooth/occlusion.inl"
+#include "mesh/smooth/slices.inl"
+#include "mesh/smooth/vectors.inl"
+
+namespace quoin::smooth {
+
+void mesh_avx512(Work& work, SmoothChunkMesh& out) {
+  mesh_slices(work, out);
+}
+
+}  // namespace quoin::smooth
+
+#endif

@@ -1,0 +1,184 @@
+// What smooth meshing adds to core/lanes_avx512.h (VBMI2 too).
+
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include <immintrin.h>
+
+#include <quoin/core/half.h>
+#include <quoin/core/vec.h>
+
+#include "core/lanes_avx512.h"
+
+namespace quoin::smooth {
+namespace {
+
+using namespace lanes_avx512;
+
+inline Mask equal(I a, I b) {
+  return {_mm512_cmpeq_epi32_mask(a.v, b.v)};
+}
+// Lanes whose signs differ.
+inline Mask signs_differ(F a, F b) {
+  return {_mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(a.v, b.v)))};
+}
+inline F only(Mask m, F a) {
+  return {_mm512_maskz_mov_ps(m.m, a.v)};
+}
+inline I min(I a, I b) {
+  return {_mm512_min_epi32(a.v, b.v)};
+}
+
+inline I load_words(const std::uint16_t* from) {
+  return {_mm512_cvtepu16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
+}
+inline void store(void* to, I a) {
+  _mm512_storeu_si512(to, a.v);
+}
+// The pair of halves at each place, as one number.
+inline I gather_pairs(const Half* base, I place) {
+  return {_mm512_i32gather_epi32(place.v, base, 2)};
+}
+inline F gather(const float* base, I place) {
+  return {_mm512_i32gather_ps(place.v, base, 4)};
+}
+// Of a table in one register.
+inline F look_up(const std::array<float, 16>& table, I index) {
+  return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
+}
+// The first `count` lanes to their places.
+inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
+  const auto mask = static_cast<__mmask16>(count >= 16 ? 0xFFFF : (1U << count) - 1);
+  _mm512_mask_i32scatter_epi32(base, mask, place.v, value.v, 4);
+}
+// Halves as floats.
+inline F load_halves(const Half* from) {
+  return {_mm512_cvtph_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
+}
+
+struct Interleave {
+  std::int32_t first[6][16];
+  std::int32_t second[6][16];
+  std::uint16_t is_second[6];
+};
+
+// x y z of sixteen lanes, one lane after the other: of the first two registers, or of the third.
+constexpr Interleave interleave_3() {
+  Interleave t{};
+  for (int i = 0; i < 48; ++i) {
+    const int lane = i / 3;
+    t.first[i / 16][i % 16] = i % 3 == 1 ? 16 + lane : lane;
+    t.second[i / 16][i % 16] = lane;
+    if (i % 3 == 2) t.is_second[i / 16] = static_cast<std::uint16_t>(t.is_second[i / 16] | 1U << (i % 16));
+  }
+  return t;
+}
+
+// a b c a c d of sixteen lanes: of a and b, or of c and d.
+constexpr Interleave interleave_triangles() {
+  constexpr int kFirst[6] = {0, 16, 0, 0, 0, 0};
+  constexpr int kSecond[6] = {0, 0, 0, 0, 0, 16};
+  Interleave t{};
+  for (int i = 0; i < 96; ++i) {
+    const int lane = i / 6;
+    const int part = i % 6;
+    t.first[i / 16][i % 16] = kFirst[part] + lane;
+    t.second[i / 16][i % 16] = kSecond[part] + lane;
+    const bool is_second = part == 2 || part == 4 || part == 5;
+    if (is_second) t.is_second[i / 16] = static_cast<std::uint16_t>(t.is_second[i / 16] | 1U << (i % 16));
+  }
+  return t;
+}
+
+alignas(64) constexpr Interleave kInterleave3 = interleave_3();
+alignas(64) constexpr Interleave kInterleaveTriangles = interleave_triangles();
+
+inline void store_vectors(Vec3* to, F x, F y, F z) {
+  for (int i = 0; i < 3; ++i) {
+    const __m512 two = _mm512_permutex2var_ps(x.v, _mm512_load_si512(kInterleave3.first[i]), y.v);
+    _mm512_storeu_ps(
+        reinterpret_cast<float*>(to) + 16 * i,
+        _mm512_mask_permutexvar_ps(two, kInterleave3.is_second[i], _mm512_load_si512(kInterleave3.second[i]), z.v));
+  }
+}
+
+// Two triangles a lane: (a, b, c) and (a, c, d).
+inline void store_triangles(std::uint32_t* to, I a, I b, I c, I d) {
+  for (int i = 0; i < 6; ++i) {
+    const __m512i ab = _mm512_permutex2var_epi32(a.v, _mm512_load_si512(kInterleaveTriangles.first[i]), b.v);
+    const __m512i cd = _mm512_permutex2var_epi32(c.v, _mm512_load_si512(kInterleaveTriangles.second[i]), d.v);
+    _mm512_storeu_si512(to + 16 * i, _mm512_mask_blend_epi32(kInterleaveTriangles.is_second[i], ab, cd));
+  }
+}
+
+// Appends the places of a word's bits, x from `first_place` on.
+inline std::uint16_t* append_compressed(std::uint64_t bits, __m512i low, __m512i high, std::uint16_t* end) {
+  const auto low_bits = static_cast<std::uint32_t>(bits);
+  const auto high_bits = static_cast<std::uint32_t>(bits >> 32);
+  _mm512_storeu_si512(end, _mm512_maskz_compress_epi16(low_bits, low));
+  end += std::popcount(low_bits);
+  _mm512_storeu_si512(end, _mm512_maskz_compress_epi16(high_bits, high));
+  return end + std::popcount(high_bits);
+}
+
+alignas(64) constexpr auto kColumns = [] {
+  std::array<std::uint16_t, 64> columns{};
+  for (std::size_t i = 0; i < 64; ++i) columns[i] = static_cast<std::uint16_t>(i);
+  return columns;
+}();
+
+inline std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t* end) {
+  const __m512i first = _mm512_set1_epi16(static_cast<short>(first_place));
+  return append_compressed(bits, _mm512_add_epi16(first, _mm512_load_si512(kColumns.data())),
+                           _mm512_add_epi16(first, _mm512_load_si512(kColumns.data() + 32)), end);
+}
+
+inline std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_place, std::uint16_t* end) {
+  const __m512i first = _mm512_set1_epi16(static_cast<short>(first_place));
+  const __m512i starts_solid = _mm512_set1_epi16(static_cast<short>(0x8000));
+  const __m512i low = _mm512_add_epi16(first, _mm512_load_si512(kColumns.data()));
+  const __m512i high = _mm512_add_epi16(first, _mm512_load_si512(kColumns.data() + 32));
+  return append_compressed(bits, _mm512_mask_add_epi16(low, static_cast<std::uint32_t>(solid), low, starts_solid),
+                           _mm512_mask_add_epi16(high, static_cast<std::uint32_t>(solid >> 32), high, starts_solid),
+                           end);
+}
+
+// Occlusion takes two vertices at once, a half register each.
+constexpr int kVerticesAtOnce = 2;
+
+inline F load_rows(const float* const* from, std::ptrdiff_t offset) {
+  return {_mm512_insertf32x8(_mm512_castps256_ps512(_mm256_loadu_ps(from[0] + offset)),
+                             _mm256_loadu_ps(from[1] + offset), 1)};
+}
+// One value a vertex in all of its lanes.
+inline F spread_out(const float* from) {
+  return {_mm512_insertf32x8(_mm512_castps256_ps512(_mm256_set1_ps(from[0])), _mm256_set1_ps(from[1]), 1)};
+}
+// Of each vertex' eight lanes of `a` the three at 0, step, 2 step, and then those of `b`, moved by `by` lanes.
+class Thirds {
+ public:
+  Thirds(int step, int by) {
+    alignas(64) std::int32_t lanes[16];
+    for (int i = 0; i < 16; ++i) {
+      const int part = i % 8;
+      lanes[i] = part < 6 ? (part % 3) * step + by + (i / 8) * 8 + (part / 3) * 16 : 0;
+    }
+    lanes_ = _mm512_load_si512(lanes);
+  }
+  [[nodiscard]] F operator()(F a, F b) const { return {_mm512_permutex2var_ps(a.v, lanes_, b.v)}; }
+
+ private:
+  __m512i lanes_;
+};
+// A bit for each lane that is at least 0.
+inline std::uint32_t open_bits(F a) {
+  return _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GE_OQ);
+}
+
+}  // namespace
+}  // namespace quoin::smooth

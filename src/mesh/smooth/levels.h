@@ -1,0 +1,180 @@
+#pragma once
+
+// The cells of a chunk and its neighbours, each chunk at its own level of detail. All coordinates are samples of level
+// 0, from the centre chunk's sample (0, 0, 0), unless said otherwise.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <functional>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/mesh/smooth.h>
+
+#include "mesh/smooth/cell.h"
+#include "mesh/smooth/quad.h"
+
+namespace quoin::smooth {
+
+/// A cell of the centre chunk or a neighbour.
+struct LevelCell {
+  IVec3 chunk;  ///< -1 to 1 on each axis
+  IVec3 first;  ///< its first corner
+  int level;
+
+  [[nodiscard]] int size() const { return 1 << level; }
+  [[nodiscard]] SmoothCell name() const { return cell_name((first - chunk * kChunkEdge) / size(), chunk); }
+};
+
+/// The coarsest and finest level of some chunks.
+struct LevelRange {
+  int finest;
+  int coarsest;
+};
+
+class ChunkLevels {
+ public:
+  explicit ChunkLevels(const std::array<std::uint8_t, 27>& levels) : levels_(levels) {}
+
+  [[nodiscard]] int of_chunk(IVec3 chunk) const {
+    return levels_[static_cast<std::size_t>((chunk.z + 1) * 9 + (chunk.y + 1) * 3 + chunk.x + 1)];
+  }
+  [[nodiscard]] bool all_same() const {
+    return std::all_of(levels_.begin(), levels_.end(), [&](std::uint8_t level) { return level == levels_[0]; });
+  }
+
+  /// The cell that starts at a sample or contains the unit cube from it.
+  [[nodiscard]] LevelCell cell_at(IVec3 sample) const {
+    const IVec3 chunk = chunk_of(sample);
+    const int level = of_chunk(chunk);
+    return {chunk, sample & IVec3{-(1 << level)}, level};
+  }
+  /// The cell that a vertex of a mesh lies in.
+  [[nodiscard]] LevelCell cell_of(SmoothCell name) const {
+    const IVec3 chunk = name.chunk_offset();
+    const int level = of_chunk(chunk);
+    return {chunk, chunk * kChunkEdge + name.cell() * (1 << level), level};
+  }
+
+  /// The levels of the chunks that meet in the line along `axis` through a sample: one, two or four of them.
+  [[nodiscard]] LevelRange around_line(IVec3 sample, int axis) const {
+    IVec3 step{0};
+    for (const int other : {(axis + 1) % 3, (axis + 2) % 3}) step[other] = (sample[other] & (kChunkEdge - 1)) == 0;
+    return range(chunk_of(sample) - step, chunk_of(sample), [](IVec3) { return true; });
+  }
+  /// The levels of the chunks that a cell touches along a face or an edge, its own included.
+  [[nodiscard]] LevelRange around_cell(const LevelCell& cell) const {
+    IVec3 min = cell.chunk;
+    IVec3 max = cell.chunk;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (cell.first[axis] == cell.chunk[axis] * kChunkEdge) --min[axis];
+      if (cell.first[axis] + cell.size() == (cell.chunk[axis] + 1) * kChunkEdge) ++max[axis];
+    }
+    return range(min, max, [&](IVec3 chunk) {
+      const IVec3 away = glm::abs(chunk - cell.chunk);
+      return away.x + away.y + away.z < 3;
+    });
+  }
+  [[nodiscard]] bool touches_finer(const LevelCell& cell) const { return around_cell(cell).finest < cell.level; }
+  [[nodiscard]] bool touches_another(const LevelCell& cell) const {
+    const LevelRange levels = around_cell(cell);
+    return levels.finest != levels.coarsest;
+  }
+
+ private:
+  template <class Counts>
+  [[nodiscard]] LevelRange range(IVec3 min, IVec3 max, const Counts& counts) const {
+    LevelRange found{kCoarsestLevel, 0};
+    for (int z = min.z; z <= max.z; ++z) {
+      for (int y = min.y; y <= max.y; ++y) {
+        for (int x = min.x; x <= max.x; ++x) {
+          if (!counts(IVec3{x, y, z})) continue;
+          const int level = of_chunk({x, y, z});
+          found = {std::min(found.finest, level), std::max(found.coarsest, level)};
+        }
+      }
+    }
+    return found;
+  }
+
+  std::array<std::uint8_t, 27> levels_;
+};
+
+/// Density of a cell's corners.
+inline Corners corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
+  Corners corners;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
+    corners[static_cast<std::size_t>(i)] = float_from_half(chunks.get(cell.first + corner * cell.size()));
+  }
+  return corners;
+}
+
+/// Which of a cell's corners are solid, as solid_corners.
+inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
+  const IVec3 first = cell.first;
+  const bool inside = cell.level == 0 && cell.chunk == IVec3{0} && std::max({first.x, first.y, first.z}) < 63;
+  if (const DensityChunk* centre = chunks.centre(); inside && centre != nullptr) {
+    const auto pair = [&](int y, int z) {
+      return static_cast<std::uint32_t>(centre->solid_row(first.y + y, first.z + z) >> first.x & 3U);
+    };
+    return pair(0, 0) | pair(1, 0) << 2 | pair(0, 1) << 4 | pair(1, 1) << 6;
+  }
+  std::uint32_t solid = 0;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
+    solid |= static_cast<std::uint32_t>(DensityChunk::is_solid(chunks.get(first + corner * cell.size()))) << i;
+  }
+  return solid;
+}
+
+/// Whether all samples within a cell and on its boundary are solid, or all air.
+inline bool is_of_one_sign(const DensityNeighbourhood& chunks, const LevelCell& cell) {
+  const int x = cell.first.x & (kChunkEdge - 1);
+  const bool ends_within = x + cell.size() < kChunkEdge;
+  const std::uint64_t samples = ((std::uint64_t{2} << cell.size()) - 1) << x;
+  std::uint64_t any = 0;
+  std::uint64_t all = samples;
+  for (int z = cell.first.z; z <= cell.first.z + cell.size(); ++z) {
+    for (int y = cell.first.y; y <= cell.first.y + cell.size(); ++y) {
+      const IVec3 chunk = chunk_of({cell.first.x, y, z});
+      const IVec3 local = local_of({0, y, z});
+      const auto row = [&](int chunk_x) {
+        const DensityChunk* found = chunks.at(chunk_x, chunk.y, chunk.z);
+        if (found != nullptr) return found->solid_row(local.y, local.z);
+        return DensityChunk::is_solid(chunks.outside) ? ~std::uint64_t{0} : 0;
+      };
+      any |= row(chunk.x) & samples;
+      all &= row(chunk.x);
+      // The last sample of the cell may be the next chunk's first; the bit beyond the word then stands for it.
+      if (ends_within) continue;
+      const bool last = (row(chunk.x + 1) & 1U) != 0;
+      any |= last ? std::uint64_t{1} << 63 : 0;
+      if (!last) all = 0;
+    }
+  }
+  return any == 0 || all == samples;
+}
+
+/// Replaces its argument by the vertices of the centre chunk's own cells, 0 to n - 1 on each axis at its level, sorted
+/// by name, and the quads around the edges that lie between four of them.
+using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
+
+/// Replaces `out` by the surface of the centre chunk, where the chunk or a neighbour is of another level of detail.
+///
+/// Edges:    the shortest lattice edges at each place: on a face or a line between chunks, those of the finest chunk
+///           that touches it. Each that is crossed gives a polygon of the vertices of the three or four cells around
+///           it.
+/// Vertices: a cell that touches no finer chunk along a face or an edge has the vertex of the fast kernels, bit for
+///           bit. Any other has one if a shortest edge on its boundary is crossed: at the mean of their crossings,
+///           weighted by length.
+/// Order:    the fast kernel's vertices and quads, then the vertices it lacks, the quads, the triangles.
+/// Requires: options.border is Shared.
+/// Source:   T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data" (2002): polygons of the
+///           minimal edges of an octree; here of chunks of any levels. docs/decisions/020-smooth-levels-of-detail.md.
+void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+                           const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out);
+
+}  // namespace quoin::smooth

@@ -1,0 +1,274 @@
+#include <quoin/mesh/smooth_mesh.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <quoin/core/assert.h>
+
+#include "core/progress_steps.h"
+#include "grid/chunk_order.h"
+#include "mesh/smooth/material.h"
+
+namespace quoin {
+namespace {
+
+// The place of a chunk in a sorted list; the list's size when it is not there.
+std::size_t place_in(const std::vector<IVec3>& chunks, IVec3 chunk) {
+  const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk, by_zyx);
+  return static_cast<std::size_t>((found != chunks.end() && *found == chunk ? found : chunks.end()) - chunks.begin());
+}
+
+// `chunks` and all that lie at offsets from `first` to `last` on each axis, sorted.
+std::vector<IVec3> with_neighbours(const std::vector<IVec3>& chunks, int first, int last) {
+  std::vector<IVec3> all;
+  for (const IVec3 chunk : chunks) {
+    for (int z = first; z <= last; ++z) {
+      for (int y = first; y <= last; ++y) {
+        for (int x = first; x <= last; ++x) all.push_back(chunk + IVec3{x, y, z});
+      }
+    }
+  }
+  sort_and_unite(all);
+  return all;
+}
+
+// The levels of detail of all chunks that are meshed and of their neighbours, each asked for once.
+class LevelMap {
+ public:
+  Status ask(const std::vector<IVec3>& meshed, const std::function<int(IVec3)>& level_of) {
+    if (!level_of) return {};
+    chunks_ = with_neighbours(meshed, -1, 1);
+    levels_.reserve(chunks_.size());
+    for (const IVec3 chunk : chunks_) {
+      const int level = level_of(chunk);
+      if (level < 0 || level > kCoarsestLevel) {
+        return fail(ErrorCode::InvalidArgument, "level of detail " + std::to_string(level) + " of chunk " +
+                                                    std::to_string(chunk.x) + ", " + std::to_string(chunk.y) + ", " +
+                                                    std::to_string(chunk.z) + " is not 0 to " +
+                                                    std::to_string(kCoarsestLevel));
+      }
+      levels_.push_back(static_cast<std::uint8_t>(level));
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::array<std::uint8_t, 27> around(IVec3 chunk) const {
+    std::array<std::uint8_t, 27> levels{};
+    if (chunks_.empty()) return levels;
+    std::size_t i = 0;
+    for (int z = -1; z <= 1; ++z) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) levels[i++] = levels_[place_in(chunks_, chunk + IVec3{x, y, z})];
+      }
+    }
+    return levels;
+  }
+
+ private:
+  std::vector<IVec3> chunks_;  // empty: level 0 everywhere
+  std::vector<std::uint8_t> levels_;
+};
+
+// A vertex that chunks after its own may share.
+struct BorderVertex {
+  std::uint32_t name;   // SmoothCell bits
+  std::uint32_t place;  // among the chunk's own vertices
+};
+
+// What one chunk gives to the whole: the vertices of its own cells and all its triangles.
+struct Part {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;
+  std::vector<float> openness;
+  std::vector<SurfaceMaterial> materials;
+  std::vector<BorderVertex> border;    // sorted by name
+  std::vector<SmoothCell> foreign;     // vertices of chunks before this one
+  std::vector<std::uint32_t> indices;  // into the own vertices, or kForeign plus a place in `foreign`
+  static constexpr std::uint32_t kForeign = 0x8000'0000U;
+};
+
+// What a thread needs to mesh a chunk.
+struct Workspace {
+  SmoothMesher mesher;
+  SmoothChunkMesh mesh;
+  std::vector<std::uint32_t> places;  // by the mesh's vertex: as in Part::indices
+};
+
+// Lends workspaces to as many threads as ask.
+class Workspaces {
+ public:
+  std::unique_ptr<Workspace> take() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) return std::make_unique<Workspace>();
+    std::unique_ptr<Workspace> workspace = std::move(free_.back());
+    free_.pop_back();
+    return workspace;
+  }
+  void give_back(std::unique_ptr<Workspace> workspace) {
+    const std::lock_guard lock(mutex_);
+    free_.push_back(std::move(workspace));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Workspace>> free_;
+};
+
+void reserve(const SmoothChunkMesh& mesh, Part& part) {
+  part.positions.reserve(mesh.positions.size());
+  part.normals.reserve(mesh.normals.size());
+  part.openness.reserve(mesh.openness.size());
+  part.materials.reserve(mesh.positions.size());
+  part.indices.resize(mesh.indices.size());
+}
+
+Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials& materials, Workspace& workspace) {
+  const SmoothChunkMesh& mesh = workspace.mesh;
+  const int last = (kChunkEdge >> level) - 1;
+  Part part;
+  reserve(mesh, part);
+  workspace.places.resize(mesh.positions.size());
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const SmoothCell name = mesh.cells[i];
+    if (name.chunk_offset() != IVec3{0}) {
+      workspace.places[i] = Part::kForeign | static_cast<std::uint32_t>(part.foreign.size());
+      part.foreign.push_back(name);
+      continue;
+    }
+    const auto place = static_cast<std::uint32_t>(part.positions.size());
+    const IVec3 cell = name.cell();
+    workspace.places[i] = place;
+    part.positions.push_back(mesh.positions[i]);
+    part.normals.push_back(mesh.normals[i]);
+    if (!mesh.openness.empty()) part.openness.push_back(mesh.openness[i]);
+    part.materials.push_back(materials.of_cell(chunks, cell, level));
+    if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
+  }
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) part.indices[i] = workspace.places[mesh.indices[i]];
+  std::sort(part.border.begin(), part.border.end(), [](BorderVertex a, BorderVertex b) { return a.name < b.name; });
+  return part;
+}
+
+class Builder {
+ public:
+  Builder(const DensityGrid& field, const SmoothMeshOptions& options, Threads threads, const Progress& progress)
+      : field_(field),
+        options_(options),
+        threads_(threads),
+        // A surface can end in chunks that do not exist: around edges and in cells that start before a solid sample.
+        chunks_(with_neighbours(field.chunks(), -1, 0)),
+        parts_(chunks_.size()),
+        steps_(progress, 2 * chunks_.size()) {}
+
+  Result<SmoothMesh> build(const VoxelRegistry& types) {
+    if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return tl::unexpected(levels.error());
+    const SurfaceMaterials materials(types);
+    Workspaces workspaces;
+    parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
+      if (steps_.cancelled()) return;
+      std::unique_ptr<Workspace> workspace = workspaces.take();
+      mesh_chunk(i, materials, *workspace);
+      workspaces.give_back(std::move(workspace));
+      steps_.step();
+    });
+    if (steps_.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+    return weld();
+  }
+
+ private:
+  void mesh_chunk(std::size_t i, const SurfaceMaterials& materials, Workspace& workspace) {
+    SmoothOptions options;
+    options.occlusion = options_.occlusion;
+    options.split_sheets = options_.split_sheets;
+    options.levels = levels_.around(chunks_[i]);
+    const DensityNeighbourhood neighbourhood = field_.neighbourhood(chunks_[i]);
+    workspace.mesher.mesh(neighbourhood, options, workspace.mesh);
+    parts_[i] = make_part(neighbourhood, options.levels[13], materials, workspace);
+  }
+
+  Result<SmoothMesh> weld() {
+    SmoothMesh mesh;
+    std::size_t vertices = 0;
+    std::size_t indices = 0;
+    for (const Part& part : parts_) {
+      first_vertex_.push_back(static_cast<std::uint32_t>(vertices));
+      first_index_.push_back(indices);
+      vertices += part.positions.size();
+      indices += part.indices.size();
+      if (vertices >= std::numeric_limits<std::uint32_t>::max()) {
+        return fail(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 - 2 vertices");
+      }
+    }
+    mesh.positions.resize(vertices);
+    mesh.normals.resize(vertices);
+    if (options_.occlusion.form != SmoothOcclusion::None) mesh.openness.resize(vertices);
+    mesh.albedo.resize(vertices);
+    mesh.types.resize(vertices);
+    mesh.indices.resize(indices);
+    parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
+      if (steps_.cancelled()) return;
+      copy_vertices(i, mesh);
+      copy_indices(i, mesh);
+      steps_.step();
+    });
+    if (steps_.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+    return mesh;
+  }
+
+  void copy_vertices(std::size_t i, SmoothMesh& mesh) const {
+    const Part& part = parts_[i];
+    const DVec3 origin = DVec3(chunks_[i]) * static_cast<double>(kChunkEdge);
+    const std::uint32_t first = first_vertex_[i];
+    for (std::size_t v = 0; v < part.positions.size(); ++v) {
+      mesh.positions[first + v] = Vec3(DVec3(part.positions[v]) + origin);
+      mesh.albedo[first + v] = part.materials[v].albedo;
+      mesh.types[first + v] = part.materials[v].type;
+    }
+    std::copy(part.normals.begin(), part.normals.end(), mesh.normals.begin() + first);
+    std::copy(part.openness.begin(), part.openness.end(), mesh.openness.begin() + first);
+  }
+
+  void copy_indices(std::size_t i, SmoothMesh& mesh) const {
+    const Part& part = parts_[i];
+    std::vector<std::uint32_t> foreign(part.foreign.size());
+    for (std::size_t f = 0; f < foreign.size(); ++f) foreign[f] = vertex_of(chunks_[i], part.foreign[f]);
+    std::uint32_t* out = mesh.indices.data() + first_index_[i];
+    for (const std::uint32_t index : part.indices) {
+      *out++ = (index & Part::kForeign) != 0 ? foreign[index & ~Part::kForeign] : first_vertex_[i] + index;
+    }
+  }
+
+  // The vertex of the whole that `chunk` calls so. Every cell of a meshed chunk that has a vertex is in its border.
+  [[nodiscard]] std::uint32_t vertex_of(IVec3 chunk, SmoothCell name) const {
+    const std::size_t owner = place_in(chunks_, chunk + name.chunk_offset());
+    QUOIN_ASSERT(owner < chunks_.size());
+    const std::vector<BorderVertex>& border = parts_[owner].border;
+    const std::uint32_t own_name = name.bits & ~(7U << SmoothCell::kPreviousShift);
+    const auto found = std::lower_bound(border.begin(), border.end(), own_name,
+                                        [](BorderVertex vertex, std::uint32_t value) { return vertex.name < value; });
+    QUOIN_ASSERT(found != border.end() && found->name == own_name);
+    return first_vertex_[owner] + found->place;
+  }
+
+  const DensityGrid& field_;
+  const SmoothMeshOptions& options_;
+  Threads threads_;
+  std::vector<IVec3> chunks_;
+  LevelMap levels_;
+  std::vector<Part> parts_;  // by chunk
+  std::vector<std::uint32_t> first_vertex_;
+  std::vector<std::size_t> first_index_;
+  ProgressSteps steps_;
+};
+
+}  // namespace
+
+Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
+                                     const SmoothMeshOptions& options, Threads threads, const Progress& progress) {
+  return Builder(field, options, threads, progress).build(types);
+}
+
+}  // namespace quoin

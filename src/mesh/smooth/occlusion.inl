@@ -1,0 +1,156 @@
+// Occlusion with whole-number spreads, as many vertices at a time as a register holds eight lanes. All 27 samples share
+// one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn.
+//
+//   slices z, z + 1 -> one; rows y, y + 1 -> one: nine rows of eight points     | . . . . . . . . |
+//   of two rows the points 0, s, 2 s each, s the spread                          | a a a b b b - - |
+
+#pragma once
+
+#include "mesh/smooth/vectors.inl"
+
+namespace quoin::smooth {
+namespace {
+
+// Where each vertex of a slice is sampled: the lowest point that it reads, and the fractions that its samples share.
+struct Centres {
+  alignas(64) std::int32_t offset[kWidth];
+  alignas(64) std::int32_t z[kWidth];
+  alignas(64) float fx[kWidth];
+  alignas(64) float fy[kWidth];
+  alignas(64) float fz[kWidth];
+};
+
+inline Centres find_centres(const Work& work, const Slice& slice, std::size_t first) {
+  const F spread = all(work.occlusion.spread);
+  const int whole = static_cast<int>(work.occlusion.spread);
+  F n[3];
+  for (int i = 0; i < 3; ++i) n[i] = load(work.normals[i] + first);
+  const F lift = spread * ((abs(n[0]) + abs(n[1])) + abs(n[2])) + all(kLift);
+  I base[3];
+  F fraction[3];
+  for (int i = 0; i < 3; ++i) {
+    const F centre = load(work.fractions[i] + first) + n[i] * lift;
+    const F below = floor(centre);
+    fraction[i] = centre - below;
+    base[i] = to_int(below) - all(whole);
+  }
+  const I place = load_words(work.places + first) & all(kPlaceMask);
+  const I x = (place & all(kPlaceStride - 1)) + base[0];
+  const I y = shift_right<kPlaceShift>(place) + base[1];
+  Centres centres;
+  store(centres.offset, (y + all(kWidestApron - 1)) * all(kDecodedStride) + x + all(kPointX - 1));
+  store(centres.z, base[2] + all(slice.z));
+  store(centres.fx, fraction[0]);
+  store(centres.fy, fraction[1]);
+  store(centres.fz, fraction[2]);
+  return centres;
+}
+
+// The nine rows along x that are left after interpolating along z and y, and one of zeros.
+struct NineRows {
+  F v[10];
+};
+
+template <int kSpread>
+inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane) {
+  const float* lowest[kVerticesAtOnce];
+  for (std::size_t i = 0; i < kVerticesAtOnce; ++i) {
+    lowest[i] =
+        work.decoded.data() + (centres.z[lane + i] & work.decoded_mask) * kDecodedSlice + centres.offset[lane + i];
+  }
+  const F fy = spread_out(centres.fy + lane);
+  const F fz = spread_out(centres.fz + lane);
+  NineRows rows;
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      F along_z[2];
+      for (int i = 0; i < 2; ++i) {
+        const int at = k * kSpread * kDecodedSlice + (j * kSpread + i) * kDecodedStride;
+        const F low = load_rows(lowest, at);
+        along_z[i] = low + fz * (load_rows(lowest, at + kDecodedSlice) - low);
+      }
+      rows.v[3 * k + j] = along_z[0] + fy * (along_z[1] - along_z[0]);
+    }
+  }
+  rows.v[9] = all(0.0F);
+  return rows;
+}
+
+// Two rows' samples in the lowest six lanes of each vertex.
+struct Samples {
+  F v[5];
+};
+
+inline Samples samples_of(const NineRows& rows, F fx, const Thirds& low_lanes, const Thirds& high_lanes) {
+  Samples samples;
+  for (int i = 0; i < 5; ++i) {
+    const F low = low_lanes(rows.v[2 * i], rows.v[2 * i + 1]);
+    samples.v[i] = low + fx * (high_lanes(rows.v[2 * i], rows.v[2 * i + 1]) - low);
+  }
+  return samples;
+}
+
+inline void store_openness(const Samples& samples, float* out) {
+  std::uint64_t open = 0;
+  for (int i = 0; i < 4; ++i) open |= std::uint64_t{open_bits(samples.v[i])} << (16 * i);
+  const std::uint32_t last = open_bits(samples.v[4]);
+  for (int i = 0; i < kVerticesAtOnce; ++i) {
+    const int count = std::popcount(open >> (8 * i) & 0x003F'003F'003F'003FU) + std::popcount(last >> (8 * i) & 0x07U);
+    out[i] = static_cast<float>(count) * (1.0F / 27.0F);
+  }
+}
+
+inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions& options, float* out) {
+  const F zero = all(0.0F);
+  F sum = zero;
+  F least = zero;
+  for (int i = 0; i < 5; ++i) {
+    const F depth = min(samples.v[i], zero);
+    sum = sum + depth;
+    least = min(least, depth);
+  }
+  alignas(64) float sums[kWidth];
+  alignas(64) float leasts[kWidth];
+  store(sums, sum);
+  store(leasts, least);
+  for (int i = 0; i < kVerticesAtOnce; ++i) {
+    const float* const s = sums + 8 * i;
+    const float* const l = leasts + 8 * i;
+    const float deepest = std::min({l[0], l[1], l[2], l[3], l[4], l[5]});
+    out[i] = weighted_openness(((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]), deepest, options);
+  }
+}
+
+template <int kSpread>
+void add_occlusion(const Work& work, const Slice& slice, std::size_t count, float* openness) {
+  const Thirds low_lanes(kSpread, 0);
+  const Thirds high_lanes(kSpread, 1);
+  const bool is_counted = work.occlusion.form == SmoothOcclusion::Openness;
+  for (std::size_t first = 0; first < count; first += kWidth) {
+    const Centres centres = find_centres(work, slice, first);
+    const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);
+    for (std::size_t lane = 0; lane < lanes; lane += kVerticesAtOnce) {
+      const NineRows rows = rows_around<kSpread>(work, centres, lane);
+      const Samples samples = samples_of(rows, spread_out(centres.fx + lane), low_lanes, high_lanes);
+      if (is_counted) {
+        store_openness(samples, openness + first + lane);
+      } else {
+        store_weighted(samples, work.occlusion, openness + first + lane);
+      }
+    }
+  }
+}
+
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+  if (count == 0) return;
+  decode_around(work, slice.z);
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
+  if (work.occlusion.spread == 1.0F) {
+    add_occlusion<1>(work, slice, count, openness);
+  } else {
+    add_occlusion<2>(work, slice, count, openness);
+  }
+}
+
+}  // namespace
+}  // namespace quoin::smooth

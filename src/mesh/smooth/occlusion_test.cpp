@@ -1,0 +1,270 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <glm/vector_relational.hpp>
+#include <map>
+#include <numeric>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/mesh/smooth.h>
+
+#include "mesh/smooth/test_support.h"
+
+namespace quoin {
+namespace {
+
+constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::Openness, SmoothOcclusion::Weighted,
+                                      SmoothOcclusion::WeightedPublished};
+
+/// A field as far as a vertex of the middle chunk may read; the rest is not computed.
+World world_of(const std::function<double(IVec3)>& field) {
+  const int reach = reach_of(SmoothOcclusionOptions{});
+  return World([&](IVec3 p) {
+    const bool is_read =
+        glm::all(glm::greaterThanEqual(p, IVec3(-reach))) && glm::all(glm::lessThan(p, IVec3(kChunkEdge + reach)));
+    return is_read ? field(p) : kBand;
+  });
+}
+
+SmoothChunkMesh mesh_of(const World& world, SmoothOcclusion form, float spread = 2.0F) {
+  SmoothMesher mesher;
+  SmoothChunkMesh mesh;
+  mesher.mesh(world.around(), with(form, 0, spread), mesh);
+  return mesh;
+}
+
+SmoothChunkMesh mesh_of(const std::function<double(IVec3)>& field, SmoothOcclusion form) {
+  return mesh_of(world_of(field), form);
+}
+
+DVec3 random_direction(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  return glm::normalize(DVec3(normal(random), normal(random), normal(random)));
+}
+
+TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
+  std::mt19937 random(11);
+  for (int i = 0; i < 12; ++i) {
+    const DVec3 n =
+        i < 6 ? DVec3(IVec3(i % 3 == 0, i % 3 == 1, i % 3 == 2)) * (i < 3 ? 1.0 : -1.0) : random_direction(random);
+    const double at = glm::dot(n, DVec3(31.3, 30.8, 33.1));
+    const World world = world_of([=](IVec3 p) { return glm::dot(n, DVec3(p)) - at; });
+    for (const SmoothOcclusion form : kForms) {
+      for (const float spread : {0.4F, 2.0F}) {
+        const SmoothChunkMesh mesh = mesh_of(world, form, spread);
+        ASSERT_GT(mesh.openness.size(), 1'000U);
+        for (const float open : mesh.openness) {
+          ASSERT_EQ(open, 1.0F) << n.x << " " << n.y << " " << n.z << " spread " << spread;
+        }
+      }
+    }
+  }
+}
+
+TEST(SmoothOcclusion, AConvexSurfaceIsFullyOpen) {
+  for (const SmoothOcclusion form : kForms) {
+    const SmoothChunkMesh mesh = mesh_of(sphere({31.2, 32.4, 30.9}, 20.0), form);
+    for (const float open : mesh.openness) ASSERT_EQ(open, 1.0F);
+  }
+}
+
+/// A valley along z whose two slopes rise at `degrees` from the horizontal.
+double openness_in_valley(double degrees, SmoothOcclusion form) {
+  const double angle = glm::radians(degrees);
+  const DVec3 left(std::sin(angle), std::cos(angle), 0);
+  const DVec3 right(-std::sin(angle), std::cos(angle), 0);
+  const DVec3 bottom(31.37, 20.41, 0);
+  const SmoothChunkMesh mesh = mesh_of(
+      [=](IVec3 p) {
+        const DVec3 d = DVec3(p.x, p.y, 0) - bottom;
+        return std::min(glm::dot(left, d), glm::dot(right, d));
+      },
+      form);
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    if (std::abs(mesh.positions[i].x - bottom.x) > 1.0) continue;
+    sum += mesh.openness[i];
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST(SmoothOcclusion, AValleyIsTheDarkerTheSharperItIs) {
+  for (const SmoothOcclusion form : kForms) {
+    double last = 1.0;
+    EXPECT_EQ(openness_in_valley(0, form), 1.0);
+    for (const double degrees : {15, 30, 45, 60}) {
+      const double open = openness_in_valley(degrees, form);
+      EXPECT_LT(open, last) << degrees;
+      last = open;
+    }
+    EXPECT_LT(last, 0.8);
+  }
+}
+
+double hills(DVec3 p) {
+  return 1.5 *
+         (std::sin(0.31 * p.x + 1) + std::sin(0.27 * p.y + 2) * std::cos(0.23 * p.z) + std::cos(0.37 * p.z + 0.5));
+}
+
+/// One of the 48 ways to turn and mirror the cube: axes permuted, some negated.
+struct Symmetry {
+  std::array<int, 3> axes;
+  DVec3 signs;
+
+  [[nodiscard]] DVec3 operator()(DVec3 p) const { return DVec3(p[axes[0]], p[axes[1]], p[axes[2]]) * signs; }
+};
+
+std::vector<Symmetry> symmetries() {
+  std::vector<Symmetry> all;
+  std::array<int, 3> axes = {0, 1, 2};
+  do {
+    for (int s = 0; s < 8; ++s) all.push_back({axes, DVec3((s & 1) ? -1 : 1, (s & 2) ? -1 : 1, (s & 4) ? -1 : 1)});
+  } while (std::next_permutation(axes.begin(), axes.end()));
+  return all;
+}
+
+// A field that is as much larger as its cells are; air between its lattice points.
+World enlarged(const World& small, int level) {
+  const DensityNeighbourhood chunks = small.around();
+  const int size = 1 << level;
+  return World([&](IVec3 p) {
+    const bool is_on_lattice = (p & IVec3(size - 1)) == IVec3(0);
+    return is_on_lattice ? size * double{float_from_half(chunks.get(p / size))} : 0.0;
+  });
+}
+
+TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
+  // Within the band at every size.
+  const World small(
+      [](IVec3 p) { return 0.3 * (std::sin(0.7 * p.x) + std::sin(0.9 * p.y + 1.0) + std::cos(0.8 * p.z)); });
+  for (int level = 1; level <= kCoarsestLevel; ++level) {
+    const World large = enlarged(small, level);
+    for (const SmoothOcclusion form : kForms) {
+      for (const float spread : {0.7F, 2.0F}) {
+        const SmoothChunkMesh fine = mesh_of(small, form, spread);
+        std::map<std::uint32_t, float> openness;
+        for (std::size_t i = 0; i < fine.cells.size(); ++i) openness[fine.cells[i].bits] = fine.openness[i];
+        SmoothMesher mesher;
+        SmoothChunkMesh coarse;
+        mesher.mesh(large.around(), with(form, level, spread), coarse);
+        ASSERT_GT(coarse.cells.size(), 40U);
+        EXPECT_LT(*std::min_element(coarse.openness.begin(), coarse.openness.end()), 1.0F);
+        for (std::size_t i = 0; i < coarse.cells.size(); ++i) {
+          if (coarse.cells[i].chunk_offset() != IVec3(0)) continue;  // called by other names in the small field
+          ASSERT_EQ(coarse.openness[i], openness.at(coarse.cells[i].bits)) << "level " << level << " spread " << spread;
+        }
+      }
+    }
+  }
+}
+
+TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
+  const DVec3 centre(31.5);
+  using Cell = std::array<int, 3>;
+  const auto openness_by_cell = [&](const Symmetry& turn, SmoothOcclusion form) {
+    const SmoothChunkMesh mesh = mesh_of([&](IVec3 p) { return hills(turn(DVec3(p) - centre)); }, form);
+    std::map<Cell, float> cells;
+    for (std::size_t i = 0; i < mesh.cells.size(); ++i) {
+      if (mesh.cells[i].chunk_offset() != IVec3(0)) continue;
+      const DVec3 cell = turn(DVec3(mesh.cells[i].cell()) + 0.5 - centre) + centre;
+      cells[{static_cast<int>(std::floor(cell.x)), static_cast<int>(std::floor(cell.y)),
+             static_cast<int>(std::floor(cell.z))}] = mesh.openness[i];
+    }
+    return cells;
+  };
+  const std::vector<Symmetry> all = symmetries();
+  ASSERT_EQ(all.size(), 48U);
+  for (const SmoothOcclusion form : {SmoothOcclusion::Openness, SmoothOcclusion::Weighted}) {
+    // The sum is held to all 48, the count, which shares all but its last step, to every fifth.
+    const std::size_t step = form == SmoothOcclusion::Openness ? 5 : 1;
+    const auto expected = openness_by_cell(all[0], form);
+    int shared = 0;
+    int jumps = 0;
+    for (std::size_t i = 0; i < all.size(); i += step) {
+      for (const auto& [cell, open] : openness_by_cell(all[i], form)) {
+        // Cells at x, y or z = 63 have their mirror images in cell -1, which the neighbour owns.
+        const auto found = expected.find(cell);
+        if (found == expected.end()) continue;
+        ++shared;
+        const double difference = std::abs(open - found->second);
+        // A count jumps where a sample is 0 but for rounding.
+        if (form == SmoothOcclusion::Openness && std::abs(difference - 1.0 / 27) < 1e-6) {
+          ++jumps;
+        } else {
+          ASSERT_LE(difference, 1e-5);
+        }
+      }
+    }
+    EXPECT_GT(shared, static_cast<int>(all.size() / step) * 5'000);
+    EXPECT_LE(jumps, shared / 20'000);
+  }
+}
+
+TEST(SmoothOcclusion, ChunksAgreeBitForBitAtSharedVertices) {
+  DensityGrid grid(kBand);
+  const auto field = [](IVec3 p) { return hills(DVec3(p) * 1.7) * 1.3; };
+  for (int i = 0; i < 64; ++i) {
+    const IVec3 chunk(i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1);
+    grid.put_chunk(chunk, chunk_of_field(field, chunk));
+  }
+  SmoothMesher mesher;
+  for (const SmoothOcclusion form : kForms) {
+    for (int i = 0; i < 7; ++i) {
+      const IVec3 step((i + 1) & 1, (i + 1) >> 1 & 1, (i + 1) >> 2 & 1);
+      SmoothChunkMesh low;
+      SmoothChunkMesh high;
+      mesher.mesh(grid.neighbourhood(IVec3(0)), with(form), low);
+      mesher.mesh(grid.neighbourhood(step), with(form), high);
+      std::map<std::uint32_t, std::size_t> by_cell;
+      for (std::size_t v = 0; v < low.cells.size(); ++v) by_cell[low.cells[v].bits] = v;
+      int shared = 0;
+      for (std::size_t v = 0; v < high.cells.size(); ++v) {
+        if (high.cells[v].chunk_offset() != -step) continue;
+        const auto found = by_cell.find(high.cells[v].bits & 0x3FFFF);
+        ASSERT_NE(found, by_cell.end());
+        ++shared;
+        ASSERT_EQ(low.positions[found->second], high.positions[v] + Vec3(step * kChunkEdge));
+        ASSERT_EQ(std::memcmp(&low.normals[found->second], &high.normals[v], sizeof(Vec3)), 0);
+        ASSERT_EQ(low.openness[found->second], high.openness[v]);
+      }
+      EXPECT_GT(shared, i == 6 ? -1 : 10) << step.x << step.y << step.z;
+    }
+  }
+}
+
+TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
+  const auto field = [](IVec3 p) { return hills(DVec3(p)); };
+  for (const int level : {0, 2}) {
+    const SmoothOptions options = with(SmoothOcclusion::Weighted, level);
+    const int reach = reach_of(options.occlusion, level);
+    DensityGrid grid(kBand);
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 chunk(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      grid.put_chunk(chunk, chunk_of_field(field, chunk));
+    }
+    SmoothMesher mesher;
+    SmoothChunkMesh before;
+    mesher.mesh(grid.neighbourhood(IVec3(0)), options, before);
+    grid.edit({{-64, -64, -64}, {128, 128, -reach}}, [](IVec3, DensitySample s) {
+      return DensitySample{-s.density, 1};
+    });
+    SmoothChunkMesh after;
+    mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
+    ASSERT_EQ(before.openness.size(), after.openness.size());
+    EXPECT_EQ(std::memcmp(before.openness.data(), after.openness.data(), 4 * before.openness.size()), 0);
+    // One sample nearer it matters: the reach is not wider than it must be by more than what the corner case takes.
+    grid.edit({{-64, -64, -reach}, {128, 128, 0}}, [](IVec3, DensitySample) { return DensitySample{-8.0F, 1}; });
+    mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
+    const bool is_same = before.openness.size() == after.openness.size() &&
+                         std::memcmp(before.openness.data(), after.openness.data(), 4 * before.openness.size()) == 0;
+    EXPECT_FALSE(is_same);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

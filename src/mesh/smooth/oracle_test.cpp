@@ -1,0 +1,79 @@
+// Every kernel gives the bytes of the slow, obvious mesher.
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+#include <quoin/mesh/smooth.h>
+
+#include "core/instruction_sets_for_tests.h"
+#include "mesh/smooth/oracle.h"
+#include "mesh/smooth/surface_check.h"
+
+namespace quoin {
+namespace {
+
+template <class T>
+void expect_same_bytes(const Buffer<T>& a, const Buffer<T>& b, const char* what) {
+  ASSERT_EQ(a.size(), b.size()) << what;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(std::memcmp(&a[i], &b[i], sizeof(T)), 0) << what << " " << i << " of " << a.size();
+  }
+}
+
+void expect_same(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
+  expect_same_bytes(a.positions, b.positions, "positions");
+  expect_same_bytes(a.normals, b.normals, "normals");
+  expect_same_bytes(a.openness, b.openness, "openness");
+  expect_same_bytes(a.cells, b.cells, "cells");
+  expect_same_bytes(a.indices, b.indices, "indices");
+}
+
+class SmoothKernels : public testing::TestWithParam<unsigned> {
+ protected:
+  // A field that fills the chunk and reaches into all of its neighbours.
+  DensityGrid grid() const {
+    const IBox box{IVec3{-12}, IVec3{64 + 13}};
+    switch (GetParam() % 3) {
+      case 0:
+        return oracle::grid_of(box, oracle::scatter(GetParam(), 0.5));
+      case 1:
+        return oracle::grid_of(box, oracle::waves(GetParam(), 9.0));
+      default:
+        return oracle::grid_of(box, oracle::waves(GetParam(), 50.0));
+    }
+  }
+};
+
+TEST_P(SmoothKernels, GiveTheOraclesBytes) {
+  const DensityGrid field = grid();
+  const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
+  std::vector<SmoothMesher> meshers;
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride over(set);
+    meshers.emplace_back();
+  }
+  SmoothChunkMesh expected;
+  SmoothChunkMesh mesh;
+  for (int level = 0; level <= kCoarsestLevel; ++level) {
+    for (const SmoothBorder border : {SmoothBorder::Shared, SmoothBorder::Open}) {
+      SmoothOptions options;
+      options.border = border;
+      options.levels.fill(static_cast<std::uint8_t>(level));
+      options.occlusion.form = static_cast<SmoothOcclusion>((GetParam() + static_cast<unsigned>(level)) % 4);
+      options.occlusion.spread = level % 2 == 0 ? 2.0F : 0.4F;
+      SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", level " << level);
+      oracle::smooth_mesh(chunks, options, expected);
+      ASSERT_GT(expected.indices.size(), 0U);
+      for (SmoothMesher& mesher : meshers) {
+        mesher.mesh(chunks, options, mesh);
+        expect_same(mesh, expected);
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, SmoothKernels, testing::Range(1U, 4U));
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,155 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/density_chunk.h>
+#include <quoin/mesh/smooth.h>
+
+namespace quoin::smooth {
+
+// What is meshed lies on a lattice: every 2^level-th sample of the chunk and its neighbours. Lattice points of the
+// chunk are 0 to n - 1 on each axis (n = 64 >> level), cell c spans lattice points c and c + 1. Within a slice of cells
+// or points, (x, y) has the place (y + 1) * 128 + x + 1: x and y begin at -1.
+
+inline constexpr int kPlaceShift = 7;
+inline constexpr int kPlaceStride = 1 << kPlaceShift;
+inline constexpr int kSlicePlaces = 66 * kPlaceStride;
+
+constexpr int place_of(int x, int y) {
+  return (y + 1) * kPlaceStride + x + 1;
+}
+
+// The widest apron of lattice points around the chunk: occlusion of spread 4.
+inline constexpr int kWidestApron = 12;
+// A row of points is 128 long, point x at x + 16.
+inline constexpr int kPointX = 16;
+// Slices of points that occlusion may read begin at row -kWidestApron.
+inline constexpr int kApronRows = 64 + 2 * kWidestApron + 2;
+
+inline constexpr int kPointSlice = 66 * kPlaceStride;
+inline constexpr int kDecodedStride = 96;
+inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
+inline constexpr int kRepeatedSlices = 5;
+
+// Words of signs: rows -1 to 64 of a slice.
+inline constexpr int kSignRows = 72;
+
+// The range of cells that a mesh covers, the same on each axis: [first, last).
+struct CellRange {
+  int first = -1;
+  int last = 64;
+
+  // Where edges start that lie along an axis: [first_edge, last) on it, [first + 1, last) on the others.
+  [[nodiscard]] int first_edge() const { return first < 0 ? 0 : first; }
+};
+
+// A bit for each row of a slice of points, row y at bit y + 16.
+struct RowSet {
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+
+  // Row -1, and rows 0 to 63 by their bits.
+  static RowSet of(bool has_first, std::uint64_t rows) {
+    return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
+  }
+  [[nodiscard]] bool has(int y) const {
+    const int bit = y + 16;
+    return ((bit < 64 ? low : high) >> (bit & 63) & 1U) != 0;
+  }
+  [[nodiscard]] bool empty() const { return (low | high) == 0; }
+  void unite(const RowSet& other) {
+    low |= other.low;
+    high |= other.high;
+  }
+  // Towards larger rows.
+  [[nodiscard]] RowSet raised() const { return {low << 1, high << 1 | low >> 63}; }
+  [[nodiscard]] RowSet lowered() const { return {low >> 1 | high << 63, high >> 1}; }
+};
+
+// What the kernels read and write. Points are addressed by `point`.
+struct Work {
+  int level = 0;
+  int n = 64;
+  CellRange cells;
+  SmoothOcclusionOptions occlusion;
+
+  // Signs of the points of each row: bit x, and those of points -1 and n in words of their own (bit 0).
+  std::uint64_t solid[66][kSignRows];
+  std::uint64_t before[66][kSignRows];
+  std::uint64_t after[66][kSignRows];
+  // Of each row of cells, [z + 1][y + 1]: cells 0 to n - 1, and cell -1 in bit 0 of a word of its own.
+  std::uint64_t active[65][kSignRows];
+  std::uint64_t active_before[65][kSignRows];
+  // Which rows of cells have an active one, by slice [z + 1].
+  std::array<RowSet, 66> active_rows;
+  // Which rows of points the cells' corners are, and which occlusion reads besides, by slice [z + kWidestApron].
+  std::array<RowSet, kApronRows> corner_rows;
+  std::array<RowSet, kApronRows> occlusion_rows;
+
+  const DensityNeighbourhood* chunks = nullptr;
+  // The points of the two slices that are at work: [z & 1], rows -1 to 64.
+  std::vector<Half> points = std::vector<Half>(std::size_t{2} * kPointSlice + 64);
+
+  // Places of the active cells of a slice, and of crossed edges, those that start at a solid point with bit 15 set.
+  alignas(64) std::uint16_t places[kSlicePlaces + 64];
+  // What a place of the two last slices holds: the vertex, counted from the slice's first, in 13 bits, and its
+  // fractions in 64ths, 6 bits each.
+  alignas(64) std::uint32_t vertices[2][kSlicePlaces + 64];
+  // Of the slice's vertices, for occlusion.
+  alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
+  alignas(64) float normals[3][kSlicePlaces / 2 + 64];
+
+  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX]. The first
+  // kRepeatedSlices follow the last again, so that what one vertex reads lies at fixed distances.
+  std::vector<float> decoded;
+  int decoded_mask = 0;
+  int next_decoded = 0;  // the first slice that is not there yet
+  int apron = 0;         // how many points below and above a cell's own occlusion reads
+
+  // The row of points (y, z): x = 0 is at its begin.
+  [[nodiscard]] Half* row(int y, int z) {
+    return points.data() + static_cast<std::ptrdiff_t>(z & 1) * kPointSlice + (y + 1) * kPlaceStride + kPointX;
+  }
+  [[nodiscard]] float* decoded_row(int y, int z) {
+    return decoded.data() + static_cast<std::ptrdiff_t>(z & decoded_mask) * kDecodedSlice +
+           (y + kWidestApron) * kDecodedStride + kPointX;
+  }
+};
+
+inline constexpr int kVertexBits = 13;
+
+// Lattice points beyond its cell's that a vertex may read, for occlusion.
+[[nodiscard]] int apron_of(const SmoothOcclusionOptions& occlusion);
+
+// The options with every number brought into its range.
+[[nodiscard]] SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level);
+
+// Whether the vector kernels serve this occlusion.
+[[nodiscard]] inline bool is_whole_spread(const SmoothOcclusionOptions& occlusion) {
+  return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
+}
+
+// Fills in the signs; false when all are the same.
+[[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
+// A row of one chunk's samples, or the one value that all of them have.
+struct RowPart {
+  const Half* samples;  // null: all are `value`
+  Half value;
+};
+// The row of points (y, z) in the chunk before, the chunk and the chunk after.
+[[nodiscard]] std::array<RowPart, 3> row_parts(const Work& work, int y, int z);
+// Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
+// where x = 0 is.
+void gather_row(const Work& work, int y, int z, Half* row);
+// Makes room for the slices that occlusion reads, from that of the first cells on.
+void begin_occlusion(Work& work);
+
+void mesh_plain(Work& work, SmoothChunkMesh& out);
+void mesh_avx2(Work& work, SmoothChunkMesh& out);
+void mesh_avx512(Work& work, SmoothChunkMesh& out);
+
+}  // namespace quoin::smooth

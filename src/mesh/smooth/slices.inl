@@ -1,0 +1,323 @@
+// The walk over the slices of a chunk, for every kernel.
+//
+//   signs          solid[z + 1][y + 1]     a word a row of points, and points -1 and n in words of their own
+//   active cells   active[z + 1][y + 1]    a word a row of cells: the 2x2x2 points differ
+//   slice z        places of active cells  -> vertices, remembered by place for two slices
+//                  places of crossed edges -> quads of the vertices of this slice and the last
+//   points         decoded[z & mask]       floats of the last slices, for occlusion
+
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include "mesh/smooth/cell.h"
+#include "mesh/smooth/scratch.h"
+
+namespace quoin::smooth {
+namespace {
+
+// Room that the stores of the vector kernels may overrun.
+constexpr std::size_t kSlack = 32;
+
+enum class Axis : std::uint8_t { X, Y, Z };
+
+struct Slice {
+  int z = 0;
+  std::uint32_t first_vertex = 0;          // of this slice
+  std::uint32_t first_vertex_of_last = 0;  // of the one before
+};
+
+// A place's column and row, from -1.
+int column_of(int place) {
+  return (place & (kPlaceStride - 1)) - 1;
+}
+int row_of(int place) {
+  return (place >> kPlaceShift) - 1;
+}
+
+SmoothCell cell_code(int x, int y, int z, int n) {
+  const auto mask = static_cast<std::uint32_t>(n - 1);
+  const auto part = [&](int c, int shift, int axis) {
+    return (static_cast<std::uint32_t>(c) & mask) << shift | static_cast<std::uint32_t>(c < 0)
+                                                                 << (SmoothCell::kPreviousShift + axis);
+  };
+  return {part(x, 0, 0) | part(y, 6, 1) | part(z, 12, 2)};
+}
+
+constexpr int kPlaceMask = 0x3FFF;
+constexpr int kStartsSolid = 0x8000;
+constexpr std::uint32_t kVertexMask = (1U << kVertexBits) - 1;
+
+// The four cells around an edge that starts at a place, counter-clockwise as seen from the end of its axis; (u, v) are
+// the next two axes. Corners 0 to 3: before in both, in v, in none, in u.
+template <Axis kAxis>
+struct Around {
+  // How many places a cell lies back in its slice, and whether that is the slice before.
+  static constexpr int kX = 1;
+  static constexpr int kY = kPlaceStride;
+  static constexpr std::array<int, 4> back = kAxis == Axis::X   ? std::array{kY, 0, 0, kY}
+                                             : kAxis == Axis::Y ? std::array{kX, kX, 0, 0}
+                                                                : std::array{kX + kY, kY, 0, kX};
+  static constexpr std::array<bool, 4> is_last = kAxis == Axis::X   ? std::array{true, true, false, false}
+                                                 : kAxis == Axis::Y ? std::array{true, false, false, true}
+                                                                    : std::array{false, false, false, false};
+  static constexpr int u = (static_cast<int>(kAxis) + 1) % 3;
+  static constexpr int v = (static_cast<int>(kAxis) + 2) % 3;
+};
+
+// From corner 0 to corner 2, and from corner 3 to corner 1, in whole cells: (1, 1) and (1, -1) along (u, v).
+template <Axis kAxis>
+constexpr std::array<int, 3> along_diagonal(int v_sign) {
+  std::array<int, 3> along{};
+  along[Around<kAxis>::u] = 1;
+  along[Around<kAxis>::v] = v_sign;
+  return along;
+}
+
+// What each kernel has of its own: finding the places of bits, halves as floats, vertices and quads.
+std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t* end);
+std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_place, std::uint16_t* end);
+void decode_row(const Half* from, float* to, int count);
+void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness);
+template <Axis kAxis>
+void make_quads(const Work& work, const Slice& slice, std::size_t count, std::uint32_t* out);
+
+#ifndef QUOIN_KERNEL_AVX512
+// One by one.
+std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t* end) {
+  for (; bits != 0; bits &= bits - 1) *end++ = static_cast<std::uint16_t>(first_place + std::countr_zero(bits));
+  return end;
+}
+
+std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_place, std::uint16_t* end) {
+  for (; bits != 0; bits &= bits - 1) {
+    const int x = std::countr_zero(bits);
+    *end++ = static_cast<std::uint16_t>((first_place + x) | static_cast<int>(solid >> x & 1U) << 15);
+  }
+  return end;
+}
+#endif
+
+// A row of cells is active where its 2x2 rows of points are neither all solid nor all air.
+void find_active(Work& work) {
+  const CellRange& cells = work.cells;
+  const std::uint64_t in_range = ~std::uint64_t{0} >> (kChunkEdge - std::min(cells.last, work.n));
+  const std::uint64_t with_before = cells.first < 0 ? 1 : 0;
+  const int top = work.n - 1;
+  for (int z = cells.first; z < cells.last; ++z) {
+    const auto s = [&](const auto& words, int dy, int dz) { return words[z + 1 + dz] + dy; };
+    const std::uint64_t* const s00 = s(work.solid, 0, 0);
+    const std::uint64_t* const s01 = s(work.solid, 0, 1);
+    const std::uint64_t* const a00 = s(work.after, 0, 0);
+    const std::uint64_t* const a01 = s(work.after, 0, 1);
+    const std::uint64_t* const b00 = s(work.before, 0, 0);
+    const std::uint64_t* const b01 = s(work.before, 0, 1);
+    std::uint64_t* const active = work.active[z + 1];
+    std::uint64_t* const active_before = work.active_before[z + 1];
+    for (int i = cells.first + 1; i <= cells.last; ++i) {
+      const std::uint64_t any = s00[i] | s00[i + 1] | s01[i] | s01[i + 1];
+      const std::uint64_t all = s00[i] & s00[i + 1] & s01[i] & s01[i + 1];
+      const std::uint64_t any_after = a00[i] | a00[i + 1] | a01[i] | a01[i + 1];
+      const std::uint64_t all_after = a00[i] & a00[i + 1] & a01[i] & a01[i + 1];
+      const std::uint64_t any_before = b00[i] | b00[i + 1] | b01[i] | b01[i + 1];
+      const std::uint64_t all_before = b00[i] & b00[i + 1] & b01[i] & b01[i + 1];
+      active[i] = (any | any >> 1 | any_after << top) & ~(all & (all >> 1 | all_after << top)) & in_range;
+      active_before[i] = (any | any_before) & ~(all & all_before) & with_before;
+    }
+    // Row y stands at [y + 1]; -1 is alone.
+    std::uint64_t rows = 0;
+    for (int y = 0; y < cells.last; ++y) {
+      rows |= std::uint64_t{(active[y + 1] | active_before[y + 1]) != 0} << y;
+    }
+    const bool has_first = cells.first < 0 && (active[0] | active_before[0]) != 0;
+    work.active_rows[static_cast<std::size_t>(z + 1)] = RowSet::of(has_first, rows);
+  }
+}
+
+// Rows of points that are corners of an active cell, and those within the apron of one.
+bool find_needed(Work& work) {
+  work.corner_rows.fill({});
+  work.occlusion_rows.fill({});
+  bool is_any = false;
+  for (int z = work.cells.first; z < work.cells.last; ++z) {
+    RowSet rows = work.active_rows[static_cast<std::size_t>(z + 1)];
+    if (rows.empty()) continue;
+    is_any = true;
+    rows.unite(rows.raised());
+    const auto slice = [z](auto& sets, int dz) -> RowSet& {
+      return sets[static_cast<std::size_t>(z + dz + kWidestApron)];
+    };
+    for (int dz = 0; dz <= 1; ++dz) slice(work.corner_rows, dz).unite(rows);
+    if (work.occlusion.form == SmoothOcclusion::None) continue;
+    for (int i = 0; i < work.apron; ++i) {
+      const RowSet raised = rows.raised();
+      rows.unite(rows.lowered());
+      rows.unite(raised);
+    }
+    for (int dz = -work.apron; dz <= work.apron + 1; ++dz) slice(work.occlusion_rows, dz).unite(rows);
+  }
+  return is_any;
+}
+
+void gather_slice(Work& work, int z) {
+  const RowSet& needed = work.corner_rows[static_cast<std::size_t>(z + kWidestApron)];
+  if (needed.empty()) return;
+  for (int y = -1; y <= work.n; ++y) {
+    if (needed.has(y)) gather_row(work, y, z, work.row(y, z));
+  }
+}
+
+void decode_part(const RowPart& part, int first, int count, float* to) {
+  if (part.samples != nullptr) return decode_row(part.samples + first, to, count);
+  alignas(64) Half same[kChunkEdge];
+  std::fill_n(same, count, part.value);
+  decode_row(same, to, count);
+}
+
+// The row of points (y, z), with sixteen before and after; x = 0 is at `to`.
+void decode_points(const Work& work, int y, int z, float* to) {
+  if (work.level == 0) {
+    const std::array<RowPart, 3> parts = row_parts(work, y, z);
+    decode_part(parts[0], kChunkEdge - kPointX, kPointX, to - kPointX);
+    decode_part(parts[1], 0, kChunkEdge, to);
+    decode_part(parts[2], 0, kPointX, to + kChunkEdge);
+    return;
+  }
+  alignas(64) Half halves[kPlaceStride] = {};
+  gather_row(work, y, z, halves + kPointX);
+  const int count = work.n + 2 * kPointX;
+  decode_row(halves, to - kPointX, count);
+  // Exact: the unit is a power of two.
+  const float unit = depth_unit(work.level);
+  for (int i = 0; i < count; ++i) to[i - kPointX] *= unit;
+}
+
+void decode_slice(Work& work, int z) {
+  const RowSet& needed = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
+  if (needed.empty()) return;
+  const int slices = work.decoded_mask + 1;
+  const bool is_repeated = (z & work.decoded_mask) < kRepeatedSlices;
+  for (int y = -work.apron - 1; y <= work.n + work.apron; ++y) {
+    if (!needed.has(y)) continue;
+    float* const row = work.decoded_row(y, z);
+    decode_points(work, y, z, row);
+    if (!is_repeated) continue;
+    std::memcpy(row - kPointX + std::ptrdiff_t{slices} * kDecodedSlice, row - kPointX, sizeof(float) * kDecodedStride);
+  }
+}
+
+// Makes sure that all is there that the vertices of slice z of cells are occluded by.
+void decode_around(Work& work, int z) {
+  const int last = z + work.apron + 1;
+  for (int next = std::max(work.next_decoded, z - work.apron); next <= last; ++next) decode_slice(work, next);
+  work.next_decoded = last + 1;
+}
+
+void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out,
+                          float* openness) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const int place = work.places[i];
+    const Vec3 fraction(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
+    openness[i] = vertex_openness(
+        fraction, out.normals.data()[slice.first_vertex + i], work.occlusion,
+        [&](int x, int y, int z) { return work.decoded_row(row_of(place) + y, slice.z + z)[column_of(place) + x]; });
+  }
+}
+
+// Lists the active cells of slice z of cells.
+std::size_t list_cells(Work& work, int z) {
+  const RowSet& rows = work.active_rows[static_cast<std::size_t>(z + 1)];
+  std::uint16_t* end = work.places;
+  const auto list_row = [&](int y) {
+    if (work.active_before[z + 1][y + 1] != 0) *end++ = static_cast<std::uint16_t>(place_of(-1, y));
+    end = append_places(work.active[z + 1][y + 1], place_of(0, y), end);
+  };
+  for (std::uint64_t left = rows.low; left != 0; left &= left - 1) list_row(std::countr_zero(left) - 16);
+  for (std::uint64_t left = rows.high; left != 0; left &= left - 1) list_row(std::countr_zero(left) + 48);
+  return static_cast<std::size_t>(end - work.places);
+}
+
+// Which edges along an axis are crossed that start in the row of points (y, z).
+template <Axis kAxis>
+std::uint64_t crossed_edges(const Work& work, int y, int z, std::uint64_t columns) {
+  const std::uint64_t start = work.solid[z + 1][y + 1];
+  std::uint64_t end = 0;
+  if constexpr (kAxis == Axis::X) {
+    end = start >> 1 | work.after[z + 1][y + 1] << (work.n - 1);
+  } else if constexpr (kAxis == Axis::Y) {
+    end = work.solid[z + 1][y + 2];
+  } else {
+    end = work.solid[z + 2][y + 1];
+  }
+  return (start ^ end) & columns;
+}
+
+// Lists the crossed edges along an axis that start at points of slice z.
+template <Axis kAxis>
+std::size_t list_edges(Work& work, int z) {
+  const CellRange& cells = work.cells;
+  const auto first = [&](Axis axis) { return kAxis == axis ? cells.first_edge() : cells.first + 1; };
+  if (z < first(Axis::Z)) return 0;
+  const std::uint64_t columns =
+      (~std::uint64_t{0} >> (kChunkEdge - cells.last)) & (~std::uint64_t{0} << first(Axis::X));
+  // A crossed edge belongs to an active cell of its own row, or of the one before; the row's own is always in range.
+  const RowSet& rows = work.active_rows[static_cast<std::size_t>(z + 1)];
+  std::uint16_t* end = work.places;
+  const auto list_row = [&](int y) {
+    if (y < first(Axis::Y)) return;
+    const std::uint64_t crossed = crossed_edges<kAxis>(work, y, z, columns);
+    if (crossed != 0) end = append_edges(crossed, work.solid[z + 1][y + 1], place_of(0, y), end);
+  };
+  for (std::uint64_t left = rows.low; left != 0; left &= left - 1) list_row(std::countr_zero(left) - 16);
+  for (std::uint64_t left = rows.high; left != 0; left &= left - 1) list_row(std::countr_zero(left) + 48);
+  return static_cast<std::size_t>(end - work.places);
+}
+
+template <Axis kAxis>
+void quads_of_slice(Work& work, const Slice& slice, SmoothChunkMesh& out) {
+  const std::size_t count = list_edges<kAxis>(work, slice.z);
+  if (count == 0) return;
+  const std::size_t before = out.indices.size();
+  out.indices.reserve(before + 6 * (count + kSlack));
+  make_quads<kAxis>(work, slice, count, out.indices.data() + before);
+  out.indices.resize(before + 6 * count);
+}
+
+void mesh_slices(Work& work, SmoothChunkMesh& out) {
+  find_active(work);
+  if (!find_needed(work)) return;
+  const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
+  Slice slice;
+  if (has_occlusion) begin_occlusion(work);
+  gather_slice(work, work.cells.first);
+  for (slice.z = work.cells.first; slice.z < work.cells.last; ++slice.z) {
+    slice.first_vertex_of_last = slice.first_vertex;
+    slice.first_vertex = static_cast<std::uint32_t>(out.positions.size());
+    const std::size_t count = list_cells(work, slice.z);
+    const std::size_t vertices = slice.first_vertex + count;
+    gather_slice(work, slice.z + 1);
+    out.positions.reserve(vertices + kSlack);
+    out.normals.reserve(vertices + kSlack);
+    out.cells.reserve(vertices + kSlack);
+    make_vertices(work, slice, count, out);
+    out.positions.resize(vertices);
+    out.normals.resize(vertices);
+    out.cells.resize(vertices);
+    if (has_occlusion) {
+      out.openness.reserve(vertices + kSlack);
+      add_occlusion(work, slice, count, out, out.openness.data() + slice.first_vertex);
+      out.openness.resize(vertices);
+    }
+    quads_of_slice<Axis::X>(work, slice, out);
+    quads_of_slice<Axis::Y>(work, slice, out);
+    quads_of_slice<Axis::Z>(work, slice, out);
+  }
+}
+
+}  // namespace
+}  // namespace quoin::smooth

@@ -1,0 +1,287 @@
+#include "mesh/smooth/split.h"
+
+#include <algorithm>
+#include <unordered_map>
+
+#include <quoin/core/assert.h>
+
+#include "mesh/smooth/levels.h"
+#include "mesh/smooth/quad.h"
+#include "mesh/smooth/vertex.h"
+
+namespace quoin::smooth {
+namespace {
+
+constexpr std::size_t kEdges = 12;
+
+IVec3 corner_place(int corner) {
+  return {corner & 1, corner >> 1 & 1, corner >> 2};
+}
+
+int corner_at(IVec3 place) {
+  return place.x + 2 * place.y + 4 * place.z;
+}
+
+// Where an edge of a cell starts, in cells.
+IVec3 edge_start(std::size_t edge) {
+  const int axis = static_cast<int>(edge / 4);
+  IVec3 start{0};
+  start[(axis + 1) % 3] = static_cast<int>(edge & 1U);
+  start[(axis + 2) % 3] = static_cast<int>(edge >> 1U & 1U);
+  return start;
+}
+
+// The edge between two neighbouring corners.
+std::size_t edge_between(int a, int b) {
+  const IVec3 first = corner_place(a & b);
+  const IVec3 step = corner_place(a ^ b);
+  const int axis = step.x != 0 ? 0 : step.y != 0 ? 1 : 2;
+  return static_cast<std::size_t>(4 * axis + first[(axis + 1) % 3] + 2 * first[(axis + 2) % 3]);
+}
+
+// The corners of a face, one after the other around it.
+std::array<int, 4> face_corners(int face) {
+  const int axis = face / 2;
+  const IVec3 base = unit_axis(axis) * (face % 2);
+  const IVec3 u = unit_axis((axis + 1) % 3);
+  const IVec3 v = unit_axis((axis + 2) % 3);
+  return {corner_at(base), corner_at(base + u), corner_at(base + u + v), corner_at(base + v)};
+}
+
+// The edges on both sides of each corner of a face: where a corner is cut off, they belong together.
+struct FaceEdges {
+  std::array<std::size_t, 4> before{};
+  std::array<std::size_t, 4> after{};
+};
+
+FaceEdges edges_of_face(const std::array<int, 4>& corners) {
+  FaceEdges edges;
+  for (std::size_t i = 0; i < 4; ++i) {
+    edges.after[i] = edge_between(corners[i], corners[(i + 1) % 4]);
+    edges.before[(i + 1) % 4] = edges.after[i];
+  }
+  return edges;
+}
+
+bool is_solid_corner(std::uint32_t solid, int corner) {
+  return (solid >> corner & 1U) != 0;
+}
+
+// Four crossings: opposite corners are alike, neighbours are not.
+bool has_four_crossings(std::uint32_t solid, const std::array<int, 4>& corners) {
+  return is_solid_corner(solid, corners[0]) == is_solid_corner(solid, corners[2]) &&
+         is_solid_corner(solid, corners[1]) == is_solid_corner(solid, corners[3]) &&
+         is_solid_corner(solid, corners[0]) != is_solid_corner(solid, corners[1]);
+}
+
+using SheetOfEdge = std::array<std::uint8_t, kEdges>;
+
+void join(SheetOfEdge& sheets, std::size_t a, std::size_t b) {
+  const std::uint8_t from = std::max(sheets[a], sheets[b]);
+  const std::uint8_t to = std::min(sheets[a], sheets[b]);
+  std::replace(sheets.begin(), sheets.end(), from, to);
+}
+
+void join_on_face(std::uint32_t solid, int face, bool flipped, SheetOfEdge& sheets) {
+  const std::array<int, 4> corners = face_corners(face);
+  const FaceEdges edges = edges_of_face(corners);
+  if (has_four_crossings(solid, corners)) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (is_solid_corner(solid, corners[i]) != flipped) join(sheets, edges.before[i], edges.after[i]);
+    }
+    return;
+  }
+  std::size_t last = kEdges;
+  for (const std::size_t edge : edges.after) {
+    if (sheets[edge] == Sheets::kUncrossed) continue;
+    if (last != kEdges) join(sheets, last, edge);
+    last = edge;
+  }
+}
+
+Sheets find_sheets(std::uint32_t solid, int flipped_face) {
+  Sheets sheets;
+  for (std::size_t edge = 0; edge < kEdges; ++edge) {
+    const int first = corner_at(edge_start(edge));
+    const int second = first + corner_at(unit_axis(static_cast<int>(edge / 4)));
+    const bool crossed = is_solid_corner(solid, first) != is_solid_corner(solid, second);
+    sheets.of_edge[edge] = crossed ? static_cast<std::uint8_t>(edge) : Sheets::kUncrossed;
+  }
+  for (int face = 0; face < 6; ++face) join_on_face(solid, face, face == flipped_face, sheets.of_edge);
+  // Sheets bear the numbers of their first edges; now those of 0, 1, ...
+  for (std::size_t edge = 0; edge < kEdges; ++edge) {
+    if (sheets.of_edge[edge] != edge) continue;
+    std::replace(sheets.of_edge.begin() + static_cast<std::ptrdiff_t>(edge), sheets.of_edge.end(),
+                 static_cast<std::uint8_t>(edge), static_cast<std::uint8_t>(sheets.count));
+    ++sheets.count;
+  }
+  return sheets;
+}
+
+int find_joined_face(std::uint32_t solid) {
+  const Sheets sheets = find_sheets(solid, kNoFace);
+  for (int face = 0; face < 6; ++face) {
+    const std::array<int, 4> corners = face_corners(face);
+    if (!has_four_crossings(solid, corners)) continue;
+    const FaceEdges edges = edges_of_face(corners);
+    if (sheets.of_edge[edges.before[0]] == sheets.of_edge[edges.before[2]] &&
+        sheets.of_edge[edges.after[0]] == sheets.of_edge[edges.after[2]] &&
+        sheets.of_edge[edges.before[0]] == sheets.of_edge[edges.after[0]]) {
+      return face;
+    }
+  }
+  return kNoFace;
+}
+
+struct SheetTables {
+  std::array<std::array<Sheets, kNoFace + 1>, 256> sheets;  // by solid corners, then flipped face
+  std::array<std::uint8_t, 256> joined_face;
+  SheetTables() {
+    for (std::uint32_t solid = 0; solid < 256; ++solid) {
+      joined_face[solid] = static_cast<std::uint8_t>(find_joined_face(solid));
+      for (int face = 0; face <= kNoFace; ++face) {
+        sheets[solid][static_cast<std::size_t>(face)] = find_sheets(solid, face);
+      }
+    }
+  }
+};
+
+const SheetTables& tables() {
+  static const SheetTables built;
+  return built;
+}
+
+// The mean of the crossings of one sheet.
+Vec3 mean_of_crossings(const Corners& corners, const Sheets& sheets, int sheet) {
+  Vec3 sum{0.0F};
+  float count = 0.0F;
+  for (std::size_t edge = 0; edge < kEdges; ++edge) {
+    if (sheets.of_edge[edge] != sheet) continue;
+    const int axis = static_cast<int>(edge / 4);
+    const IVec3 start = edge_start(edge);
+    const float a = corners[static_cast<std::size_t>(corner_at(start))];
+    const float b = corners[static_cast<std::size_t>(corner_at(start + unit_axis(axis)))];
+    Vec3 at(start);
+    at[axis] = a / (a - b);
+    sum += at;
+    count += 1.0F;
+  }
+  return sum / count;
+}
+
+class Splitter {
+ public:
+  Splitter(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out)
+      : chunks_(chunks), options_(options), levels_(options.levels), same_levels_(levels_.all_same()), out_(out) {}
+
+  void run(std::size_t quad_indices) {
+    const std::size_t vertices = out_.cells.size();
+    for (std::size_t i = 0; i < vertices; ++i) split_vertex(static_cast<std::uint32_t>(i));
+    if (split_.empty()) return;
+    is_split_.assign(vertices, false);
+    for (const auto& [vertex, split] : split_) is_split_[vertex] = true;
+    for (std::size_t i = 0; i < quad_indices; i += 6) {
+      const std::uint32_t* quad = out_.indices.data() + i;
+      if (is_split_[quad[0]] || is_split_[quad[1]] || is_split_[quad[2]] || is_split_[quad[5]]) rewire_quad(i);
+    }
+  }
+
+ private:
+  struct Split {
+    Sheets sheets;
+    std::uint32_t second;  // the vertices of sheets 1, 2, ... follow each other from here
+  };
+
+  void split_vertex(std::uint32_t vertex) {
+    const LevelCell cell = levels_.cell_of(out_.cells[vertex]);
+    const std::uint32_t solid = solid_corners_of(chunks_, cell);
+    const int joined = tables().joined_face[solid];
+    if (joined == kNoFace && tables().sheets[solid][kNoFace].count < 2) return;
+    if (!same_levels_ && levels_.touches_another(cell)) return;
+    const bool flipped = joined != kNoFace && joins_as_well(cell, joined);
+    const Sheets& sheets = tables().sheets[solid][static_cast<std::size_t>(flipped ? joined : kNoFace)];
+    if (sheets.count < 2) return;
+    split_.emplace(vertex, Split{sheets, static_cast<std::uint32_t>(out_.positions.size())});
+    const Corners corners = corners_of(chunks_, cell);
+    for (int sheet = 0; sheet < sheets.count; ++sheet) {
+      const Vec3 fraction = mean_of_crossings(corners, sheets, sheet);
+      const CellVertex placed = vertex_at(fraction, trilinear_gradient(corners, fraction));
+      const SmoothCell name{out_.cells[vertex].bits | static_cast<std::uint32_t>(sheet) << SmoothCell::kSheetShift};
+      if (sheet == 0) {
+        write_vertex(chunks_, options_.occlusion, cell, placed, vertex, out_);
+      } else {
+        append_vertex(chunks_, options_.occlusion, cell, placed, name, out_);
+      }
+    }
+  }
+
+  // Whether the cell on the other side of a face also has all four crossings of that face in one sheet.
+  [[nodiscard]] bool joins_as_well(const LevelCell& cell, int face) const {
+    const IVec3 step = unit_axis(face / 2) * (face % 2 == 1 ? cell.size() : -cell.size());
+    LevelCell other = cell;
+    other.first += step;
+    if (options_.border == SmoothBorder::Open) {
+      const int last = kChunkEdge - 2 * cell.size();
+      const bool inside = std::min({other.first.x, other.first.y, other.first.z}) >= 0 &&
+                          std::max({other.first.x, other.first.y, other.first.z}) <= last;
+      if (!inside) return false;
+    }
+    other.chunk = chunk_of(other.first);
+    return tables().joined_face[solid_corners_of(chunks_, other)] == (face ^ 1);
+  }
+
+  void rewire_quad(std::size_t first_index) {
+    std::uint32_t* quad = out_.indices.data() + first_index;
+    std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, out_);
+    std::array<LevelCell, 4> cells{};
+    for (std::size_t i = 0; i < 4; ++i) cells[i] = levels_.cell_of(out_.cells[cycle[i]]);
+    // The cells around an edge share its start, the first corner of the last of them, and their extent along it.
+    const IVec3 start = cells[2].first;
+    const IVec3 across = start - cells[0].first;
+    const int axis = across.x == 0 ? 0 : across.y == 0 ? 1 : 2;
+    std::array<QuadCorner, 4> corners;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::uint32_t vertex = sheet_vertex(cycle[i], cells[i], start, axis);
+      corners[i] = quad_corner(vertex, out_.positions[vertex], cells[i].first, cells[i].level);
+    }
+    const std::array<std::uint32_t, 6> triangles = triangles_of(corners);
+    std::copy(triangles.begin(), triangles.end(), quad);
+  }
+
+  // The vertex of the sheet that an edge crosses, of those that `vertex` was split into.
+  [[nodiscard]] std::uint32_t sheet_vertex(std::uint32_t vertex, const LevelCell& cell, IVec3 start, int axis) const {
+    if (!is_split_[vertex]) return vertex;
+    const Split& split = split_.find(vertex)->second;
+    const IVec3 place = (start - cell.first) / cell.size();
+    const auto edge = static_cast<std::size_t>(4 * axis + place[(axis + 1) % 3] + 2 * place[(axis + 2) % 3]);
+    const std::uint8_t sheet = split.sheets.of_edge[edge];
+    QUOIN_ASSERT(sheet != Sheets::kUncrossed);
+    return sheet == 0 ? vertex : split.second + sheet - 1U;
+  }
+
+  const DensityNeighbourhood& chunks_;
+  const SmoothOptions& options_;
+  ChunkLevels levels_;
+  bool same_levels_;
+  SmoothChunkMesh& out_;
+  std::unordered_map<std::uint32_t, Split> split_;  // by vertex
+  std::vector<bool> is_split_;                      // by vertex, of those before
+};
+
+}  // namespace
+
+Sheets sheets_of(std::uint32_t solid, int flipped_face) {
+  return tables().sheets[solid][static_cast<std::size_t>(flipped_face)];
+}
+
+int joined_face(std::uint32_t solid) {
+  QUOIN_ASSERT(solid < 256, "eight corners");
+  return tables().joined_face[solid];
+}
+
+void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,
+                  SmoothChunkMesh& out) {
+  Splitter(chunks, options, out).run(quad_indices);
+}
+
+}  // namespace quoin::smooth

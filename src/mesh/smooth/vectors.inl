@@ -1,0 +1,232 @@
+// Vertices and quads, a register of lanes at a time. The arithmetic is that of cell.h, step for step.
+//
+//   lanes       | cell 0 | cell 1 | cell 2 | ...       by the list of their places
+//   d[8]        the densities of their corners, x first, then y, then z; a pair of halves along x is one gather
+//   vertices    | index: 13 bits | x, y, z in 64ths: 6 bits each |      what a place remembers
+
+#pragma once
+
+#ifdef QUOIN_KERNEL_AVX512
+#include "mesh/smooth/lanes_avx512.h"
+#else
+#include "mesh/smooth/lanes_avx2.h"
+#endif
+#include "mesh/smooth/slices.inl"
+
+namespace quoin::smooth {
+namespace {
+
+// Crossings by configuration of a cell: how many there are on its edges at the high end of each axis, and in all, a
+// byte each. Bits of a configuration: x low at (y, z) 00, 10, 01, 11, then x high.
+constexpr auto kCrossings = [] {
+  std::array<std::uint32_t, 256> counts{};
+  for (unsigned c = 0; c < 256; ++c) {
+    const auto solid = [&](unsigned x, unsigned y, unsigned z) { return c >> (4 * x + y + 2 * z) & 1U; };
+    std::array<std::uint32_t, 4> n{};
+    for (unsigned u = 0; u < 2; ++u) {
+      for (unsigned v = 0; v < 2; ++v) {
+        const std::uint32_t x = solid(0, u, v) ^ solid(1, u, v);
+        const std::uint32_t y = solid(u, 0, v) ^ solid(u, 1, v);
+        const std::uint32_t z = solid(u, v, 0) ^ solid(u, v, 1);
+        n[0] += (y + z) * u;
+        n[1] += x * u + z * v;
+        n[2] += (x + y) * v;
+        n[3] += x + y + z;
+      }
+    }
+    counts[c] = n[0] | n[1] << 8 | n[2] << 16 | n[3] << 24;
+  }
+  return counts;
+}();
+
+// The densities of a cell's corners, and its configuration.
+struct CornerLanes {
+  F d[8];
+  I configuration;
+};
+
+inline F low_half(I pair) {
+  return as_float(shift_right_signed<3>(shift_left<16>(pair)) & all(static_cast<int>(0x8FFFE000U))) * all(0x1p112F);
+}
+inline F high_half(I pair) {
+  return as_float(shift_right_signed<3>(pair) & all(static_cast<int>(0x8FFFE000U))) * all(0x1p112F);
+}
+
+inline CornerLanes load_corners(const Half* low, const Half* high, I place) {
+  const I pairs[4] = {gather_pairs(low, place), gather_pairs(low + kPlaceStride, place), gather_pairs(high, place),
+                      gather_pairs(high + kPlaceStride, place)};
+  CornerLanes corners;
+  for (int i = 0; i < 4; ++i) {
+    corners.d[2 * i] = low_half(pairs[i]);
+    corners.d[2 * i + 1] = high_half(pairs[i]);
+  }
+  const I signs = all(static_cast<int>(0x80008000U));
+  const I bits = shift_right<3>(pairs[0] & signs) | shift_right<2>(pairs[1] & signs) |
+                 shift_right<1>(pairs[2] & signs) | (pairs[3] & signs);
+  corners.configuration = (shift_right<12>(bits) & all(0x0F)) | (shift_right<24>(bits) & all(0xF0));
+  return corners;
+}
+
+struct Lanes3 {
+  F x, y, z;
+};
+
+struct Crossing {
+  F part;
+  F whole;
+};
+
+inline Crossing crossing(F a, F b) {
+  const Mask is_crossed = signs_differ(a, b);
+  return {only(is_crossed, a), select(is_crossed, a - b, all(1.0F))};
+}
+
+inline F sum_of_crossings(const F* d, const int (&low)[4], int step) {
+  Crossing c[4];
+  for (int i = 0; i < 4; ++i) c[i] = crossing(d[low[i]], d[low[i] + step]);
+  const F p = c[0].part * c[1].whole + c[1].part * c[0].whole;
+  const F q = c[0].whole * c[1].whole;
+  const F r = c[2].part * c[3].whole + c[3].part * c[2].whole;
+  const F s = c[2].whole * c[3].whole;
+  return (p * s + r * q) / (q * s);
+}
+
+inline Lanes3 mean_of_crossings(const CornerLanes& corners) {
+  const I counts = gather(kCrossings.data(), corners.configuration);
+  const F inverse = look_up(kReciprocals, shift_right<24>(counts));
+  const I byte = all(0xFF);
+  return {(sum_of_crossings(corners.d, {0, 2, 4, 6}, 1) + to_float(counts & byte)) * inverse,
+          (sum_of_crossings(corners.d, {0, 1, 4, 5}, 2) + to_float(shift_right<8>(counts) & byte)) * inverse,
+          (sum_of_crossings(corners.d, {0, 1, 2, 3}, 4) + to_float(shift_right<16>(counts) & byte)) * inverse};
+}
+
+inline F bilinear(F v00, F v10, F v01, F v11, F u, F v) {
+  const F a = v00 + u * (v10 - v00);
+  const F b = v01 + u * (v11 - v01);
+  return a + v * (b - a);
+}
+
+inline Lanes3 unit_normals(Lanes3 g) {
+  const F q = (g.x * g.x + g.y * g.y) + g.z * g.z;
+  const F half = all(0.5F) * q;
+  F r = as_float(all(0x5F3759DF) - shift_right<1>(as_int(q)));
+  for (int i = 0; i < 3; ++i) r = r * (all(1.5F) - (half * r) * r);
+  const Mask none = q < all(kLeastSquaredGradient);
+  const F zero = all(0.0F);
+  return {select(none, zero, g.x * r), select(none, all(1.0F), g.y * r), select(none, zero, g.z * r)};
+}
+
+inline Lanes3 normals_at(const F* d, Lanes3 f) {
+  return unit_normals({bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
+                       bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
+                       bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)});
+}
+
+inline F snapped(F f) {
+  return (f + all(128.0F)) - all(128.0F);
+}
+
+// SmoothCell::bits of cells of slice z: x and y are one more than the cell's.
+inline I cell_codes(I x, I y, int z, int n) {
+  const std::uint32_t z_bits = cell_code(0, 0, z, n).bits;
+  const I mask = all(n - 1);
+  const auto previous = [](I c, int axis) {
+    return select(equal(c, all(0)), all(1 << (SmoothCell::kPreviousShift + axis)), all(0));
+  };
+  const I x_bits = ((x + mask) & mask) | previous(x, 0);
+  const I y_bits = shift_left<6>((y + mask) & mask) | previous(y, 1);
+  return x_bits | y_bits | all(static_cast<int>(z_bits));
+}
+
+inline I in_64ths(F f) {
+  return min(to_int(f * all(64.0F)), all(63));
+}
+
+inline I lane_numbers() {
+  alignas(64) constexpr std::int32_t kNumbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  return as_int(load(reinterpret_cast<const float*>(kNumbers)));
+}
+
+// What the two last slices remember of their vertices.
+inline void remember(Work& work, const Slice& slice, std::size_t first, std::size_t count, I place, Lanes3 at) {
+  const I index = lane_numbers() + all(static_cast<int>(first));
+  const I fractions = shift_left<kVertexBits>(in_64ths(at.x)) | shift_left<kVertexBits + 6>(in_64ths(at.y)) |
+                      shift_left<kVertexBits + 12>(in_64ths(at.z));
+  scatter(work.vertices[slice.z & 1], place, index | fractions, count - first);
+}
+
+inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3 fraction, Lanes3 normal) {
+  const F parts[6] = {fraction.x, fraction.y, fraction.z, normal.x, normal.y, normal.z};
+  for (int i = 0; i < 3; ++i) {
+    store(work.fractions[i] + first, parts[i]);
+    store(work.normals[i] + first, parts[3 + i]);
+  }
+}
+
+void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out) {
+  const F scale = all(static_cast<float>(1 << work.level));
+  const Half* const low = work.row(0, slice.z) - place_of(0, 0);
+  const Half* const high = work.row(0, slice.z + 1) - place_of(0, 0);
+  const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
+  for (std::size_t first = 0; first < count; first += kWidth) {
+    const I place = load_words(work.places + first) & all(kPlaceMask);
+    const CornerLanes corners = load_corners(low, high, place);
+    const Lanes3 fraction = mean_of_crossings(corners);
+    const Lanes3 normal = normals_at(corners.d, fraction);
+    const Lanes3 at = {snapped(fraction.x), snapped(fraction.y), snapped(fraction.z)};
+    const I x = place & all(kPlaceStride - 1);
+    const I y = shift_right<kPlaceShift>(place);
+    const std::size_t vertex = slice.first_vertex + first;
+    store_vectors(out.positions.data() + vertex, (to_float(x - all(1)) + at.x) * scale,
+                  (to_float(y - all(1)) + at.y) * scale, (all(static_cast<float>(slice.z)) + at.z) * scale);
+    store_vectors(out.normals.data() + vertex, normal.x, normal.y, normal.z);
+    store(out.cells.data() + vertex, cell_codes(x, y, slice.z, work.n));
+    remember(work, slice, first, count, place, at);
+    if (has_occlusion) keep_for_occlusion(work, first, fraction, normal);
+  }
+}
+
+// The squared lengths of diagonals, in 64ths of a cell.
+template <int kShift>
+inline I squared_part(I from, I to, int cells) {
+  const I d = (shift_right<kShift>(to) & all(63)) - (shift_right<kShift>(from) & all(63)) + all(64 * cells);
+  return d * d;
+}
+
+template <Axis kAxis, int kSign>
+inline I squared_length(I from, I to) {
+  constexpr std::array<int, 3> kCells = along_diagonal<kAxis>(kSign);
+  return squared_part<kVertexBits>(from, to, kCells[0]) + squared_part<kVertexBits + 6>(from, to, kCells[1]) +
+         squared_part<kVertexBits + 12>(from, to, kCells[2]);
+}
+
+template <Axis kAxis>
+void make_quads(const Work& work, const Slice& slice, std::size_t count, std::uint32_t* out) {
+  using Cells = Around<kAxis>;
+  const I firsts[2] = {all(static_cast<int>(slice.first_vertex)), all(static_cast<int>(slice.first_vertex_of_last))};
+  for (std::size_t i = 0; i < count; i += kWidth) {
+    const I edge = load_words(work.places + i);
+    const I place = edge & all(kPlaceMask);
+    I corners[4];
+    I q[4];
+    for (int c = 0; c < 4; ++c) {
+      const int is_last = Cells::is_last[static_cast<std::size_t>(c)] ? 1 : 0;
+      corners[c] = gather(work.vertices[(slice.z ^ is_last) & 1] - Cells::back[static_cast<std::size_t>(c)], place);
+      q[c] = (corners[c] & all(static_cast<int>(kVertexMask))) + firsts[is_last];
+    }
+    const Mask flip =
+        squared_length<kAxis, -1>(corners[3], corners[1]) < squared_length<kAxis, 1>(corners[0], corners[2]);
+    const Mask starts_solid = all(kStartsSolid - 1) < edge;
+    const I second = select(starts_solid, q[1], q[3]);
+    const I fourth = select(starts_solid, q[3], q[1]);
+    store_triangles(out + 6 * i, select(flip, second, q[0]), select(flip, q[2], second), select(flip, fourth, q[2]),
+                    select(flip, q[0], fourth));
+  }
+}
+
+void decode_row(const Half* from, float* to, int count) {
+  for (int i = 0; i < count; i += kWidth) store(to + i, load_halves(from + i));
+}
+
+}  // namespace
+}  // namespace quoin::smooth

@@ -1,0 +1,63 @@
+#pragma once
+
+// Putting single vertices into a chunk's mesh, in scalar: for the cells that the fast kernels leave out.
+
+#include <quoin/grid/density_chunk.h>
+#include <quoin/mesh/smooth.h>
+
+#include "mesh/smooth/cell.h"
+#include "mesh/smooth/levels.h"
+#include "mesh/smooth/scratch.h"
+
+namespace quoin::smooth {
+
+/// Writes all that a mesh knows of a vertex to an index that is there already.
+inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
+                         const LevelCell& cell, const CellVertex& vertex, std::uint32_t index, SmoothChunkMesh& out) {
+  out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());
+  out.normals[index] = vertex.normal;
+  if (occlusion.form == SmoothOcclusion::None) return;
+  const auto density = [&](int x, int y, int z) {
+    return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
+  };
+  out.openness[index] = vertex_openness(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
+}
+
+/// The index of a new vertex.
+inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
+                                   const LevelCell& cell, const CellVertex& vertex, SmoothCell name,
+                                   SmoothChunkMesh& out) {
+  const std::size_t index = out.positions.size();
+  out.positions.resize(index + 1);
+  out.normals.resize(index + 1);
+  if (occlusion.form != SmoothOcclusion::None) out.openness.resize(index + 1);
+  out.cells.push_back(name);
+  write_vertex(chunks, occlusion, cell, vertex, static_cast<std::uint32_t>(index), out);
+  return static_cast<std::uint32_t>(index);
+}
+
+/// A vertex at a place in its cell, with the gradient there.
+inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
+  CellVertex vertex;
+  vertex.fraction = fraction;
+  for (int i = 0; i < 3; ++i) vertex.snapped[i] = snap(fraction[i]);
+  vertex.normal = unit_normal(gradient);
+  return vertex;
+}
+
+/// The corners of a quad of six indices, in its winding, beginning with the corner of the first cell.
+inline std::array<std::uint32_t, 4> corners_of_quad(const std::uint32_t* indices, const SmoothChunkMesh& mesh) {
+  std::array<std::uint32_t, 4> cycle = {indices[0], indices[1], indices[2], indices[5]};
+  const auto cell = [&](std::uint32_t vertex) {
+    // Whatever the level: within a quad of one level, the chunk before counts less than any cell of this one.
+    const SmoothCell name = mesh.cells[vertex];
+    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
+    return place.x + place.y + place.z;
+  };
+  const auto first =
+      std::min_element(cycle.begin(), cycle.end(), [&](std::uint32_t a, std::uint32_t b) { return cell(a) < cell(b); });
+  std::rotate(cycle.begin(), first, cycle.end());
+  return cycle;
+}
+
+}  // namespace quoin::smooth

@@ -1,0 +1,113 @@
+#include <bit>
+#include <memory>
+#include <vector>
+
+#include <glm/common.hpp>
+
+#include <quoin/core/assert.h>
+#include <quoin/render/impostor.h>
+
+#include "core/srgb.h"
+#include "light/lighting.h"
+#include "render/camera_rays.h"
+#include "render/impostor/pass.h"
+#include "render/on_face.h"
+#include "render/picture_request.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kTile = ImpostorPass::kTile;
+constexpr int kBlock = CameraRays::kBlock;
+
+// Draws one square of the picture.
+class FarTile {
+ public:
+  FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,
+          OcclusionMode mode, Picture& picture)
+      : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), picture_(&picture) {}
+
+  void draw(int column, int row) {
+    pass_->draw(column, row, PixelPoint{}, *far_);
+    RayPacket rays;
+    for (int y = row; y < row + kTile; y += kBlock) {
+      for (int x = column; x < column + kTile; x += kBlock) {
+        rays_->block(x, y, PixelPoint{}, rays);
+        if (rays.active != 0) draw_block(x, y, rays);
+      }
+    }
+    std::vector<Vec3> lit(points_.size());
+    lighting_->light(points_, lit);
+    const SrgbEncoder& encode = SrgbEncoder::shared();
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+      // The minimum is taken second: what is not a number becomes 0.
+      const Vec3 colour = glm::min(glm::max(Vec3(0.0F), lit[i]), Vec3(1.0F));
+      for (int channel = 0; channel < 3; ++channel) {
+        picture_->colour.rgb[3 * pixels_[i] + static_cast<std::size_t>(channel)] = encode(colour[channel]);
+      }
+    }
+  }
+
+ private:
+  void draw_block(int column, int row, const RayPacket& rays) {
+    SceneHits hits;
+    FarFaces faces;
+    hits.grids.hit = hits.grids.starts_inside = 0;
+    pass_->find(column, row, rays, *far_, hits, faces);
+    for (std::uint32_t left = faces.found; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const auto i = static_cast<std::size_t>(lane);
+      const auto pixel =
+          static_cast<std::size_t>(row + lane / kBlock) * static_cast<std::size_t>(picture_->depth.width) +
+          static_cast<std::size_t>(column + lane % kBlock);
+      const auto depth = static_cast<float>(hits.grids.t[i]);
+      if (!(depth < picture_->depth.values[pixel])) continue;
+      picture_->depth.values[pixel] = depth;
+      const Ray ray = rays.ray(lane);
+      SurfacePoint& point = points_.emplace_back();
+      point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
+      point.face = hits.grids.face[i];
+      point.placed = hits.placed[i];
+      point.position = on_face(view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
+                               point.voxel, point.face);
+      point.type = faces.face[i]->type;
+      point.openness = openness_of(*faces.face[i], mode_, point.position);
+      pixels_.push_back(pixel);
+    }
+  }
+
+  const ImpostorPass* pass_;
+  const SceneView* view_;
+  const CameraRays* rays_;
+  const Lighting* lighting_;
+  OcclusionMode mode_;
+  Picture* picture_;
+  std::unique_ptr<raster::Canvas> far_ = std::make_unique<raster::Canvas>();
+  std::vector<SurfacePoint> points_;
+  std::vector<std::size_t> pixels_;
+};
+
+}  // namespace
+
+void draw_impostors(const SceneTracer& scene, const VoxelRegistry& types, std::span<const FarInstance> far,
+                    const Camera& camera, const RenderOptions& options, Picture& picture) {
+  QUOIN_ASSERT(check(camera, options).has_value(), "a camera and options that CpuRenderer accepts");
+  QUOIN_ASSERT(picture.colour.width == options.width && picture.colour.height == options.height &&
+                   picture.depth.width == options.width && picture.depth.height == options.height,
+               "a picture of the options' size, with depth");
+  const SceneView view(scene, camera.position);
+  const Surfaces surfaces(types);
+  const Lighting lighting(view, types, surfaces, options.light);
+  const CameraRays rays(camera, options.width, options.height);
+  const ImpostorPass pass(scene, far, camera, options.width, options.height);
+  const int across = (options.width + kTile - 1) / kTile;
+  const int down = (options.height + kTile - 1) / kTile;
+  parallel_for(static_cast<std::size_t>(across * down), options.threads, [&](std::size_t i) {
+    const int column = static_cast<int>(i) % across * kTile;
+    const int row = static_cast<int>(i) / across * kTile;
+    if (pass.may_show(column, row))
+      FarTile(pass, view, rays, lighting, options.light.occlusion, picture).draw(column, row);
+  });
+}
+
+}  // namespace quoin

@@ -1,0 +1,207 @@
+// The snapshots of an impostor: where they are taken from and what they hold.
+
+#include <quoin/render/impostor.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+#include <tuple>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/trace/ray.h>
+
+#include "core/death_for_tests.h"
+#include "light/corner_light.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
+
+VoxelRegistry two_types() {
+  VoxelRegistry types;
+  for (const Rgba8 colour : {Rgba8{0, 0, 0, 255}, Rgba8{200, 90, 60, 255}}) {
+    VoxelProperties properties;
+    properties.colour = colour;
+    EXPECT_TRUE(types.add(properties).has_value());
+  }
+  return types;
+}
+
+Grid blobs(unsigned seed) {
+  std::mt19937 random(seed);
+  Grid grid;
+  for (int i = 0; i < 20; ++i) {
+    const auto coordinate = [&] { return static_cast<int>(random() % 30); };
+    const IVec3 at{coordinate(), coordinate(), coordinate()};
+    grid.fill_box(at, at + IVec3(static_cast<int>(random() % 6)), static_cast<VoxelType>(1 + random() % 2));
+  }
+  return grid;
+}
+
+Ray ray_of_texel(const SnapshotCamera& camera, int x, int y) {
+  const double half = 0.5 * Impostor::kEdge;
+  const DVec3 direction =
+      camera.right * (x + 0.5 - half) + camera.up * (half - y - 0.5) + camera.forward * camera.focal;
+  return {camera.position, glm::normalize(direction)};
+}
+
+TEST(ImpostorViews, AreTheSpecifiedOnesInTheirOrder) {
+  const std::array<IVec3, 10> first = {IVec3{1, 0, 0}, {-1, 0, 0},  {0, 1, 0},   {0, -1, 0},  {0, 0, 1},
+                                       {0, 0, -1},     {-1, -1, 0}, {-1, 0, -1}, {0, -1, -1}, {-1, 1, 0}};
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_LT(glm::length(impostor_view(static_cast<int>(i)) - glm::normalize(DVec3(first[i]))), 1e-15) << i;
+  }
+  for (int i = 0; i < 8; ++i) {
+    const DVec3 corner{(i & 4) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 1) != 0 ? 1 : -1};
+    EXPECT_LT(glm::length(impostor_view(18 + i) - glm::normalize(corner)), 1e-15) << i;
+  }
+}
+
+TEST(ImpostorViews, AreUnitDistinctAndInAllOctants) {
+  std::set<std::tuple<double, double, double>> distinct;
+  for (int i = 0; i < kImpostorViews; ++i) {
+    const DVec3 view = impostor_view(i);
+    EXPECT_NEAR(glm::length(view), 1.0, 1e-12);
+    distinct.insert({view.x, view.y, view.z});
+    for (int j = 0; j < i; ++j) EXPECT_LT(glm::dot(view, impostor_view(j)), 0.9);
+  }
+  EXPECT_EQ(distinct.size(), 26U);
+}
+
+TEST(ImpostorViews, NearestIsTheLargestProductAndNeverFurtherThanStated) {
+  EXPECT_EQ(nearest_impostor_view({1, 0, 0}), 0);
+  EXPECT_EQ(nearest_impostor_view({0, 0, -1}), 5);
+  EXPECT_EQ(nearest_impostor_view({1, 1, 1}), 25);
+  EXPECT_EQ(nearest_impostor_view({1e300, 0, 0}), 0);
+  EXPECT_EQ(nearest_impostor_view({0, -1e-300, 0}), 3);
+  for (const DVec3 none : {DVec3(0.0), DVec3(kNotANumber, 0, 0), DVec3(0, kInfinity, 0)}) {
+    EXPECT_EQ(nearest_impostor_view(none), std::nullopt);
+  }
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  double worst = 1.0;
+  for (int i = 0; i < 200'000; ++i) {
+    const DVec3 direction = glm::normalize(DVec3(normal(random), normal(random), normal(random)));
+    const double found = glm::dot(direction, impostor_view(nearest_impostor_view(direction).value_or(0)));
+    for (int view = 0; view < kImpostorViews; ++view)
+      ASSERT_LE(glm::dot(direction, impostor_view(view)), found + 1e-15);
+    worst = std::min(worst, found);
+  }
+  EXPECT_NEAR(std::acos(worst) * 180.0 / 3.14159265358979, 27.57, 0.1);
+}
+
+TEST(ImpostorViews, CamerasShowTheWholeSphereAndNoMore) {
+  const ContentSphere content{{3, -7, 1e6}, 35.5};
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const SnapshotCamera camera = snapshot_camera(content, view, 128);
+    EXPECT_NEAR(glm::length(camera.position - content.centre), 8 * 35.5, 1e-6);
+    EXPECT_LT(glm::length(glm::cross(camera.forward, camera.up) - camera.right), 1e-12);
+    EXPECT_NEAR(glm::dot(camera.up, camera.forward), 0.0, 1e-12);
+    const DVec3 upright = std::abs(camera.forward.y) > 0.99 ? DVec3(1, 0, 0) : DVec3(0, 1, 0);
+    EXPECT_GT(glm::dot(camera.up, upright), 0.5);
+    const double sine = 1.0 / 8.0;  // of the cone around the sphere
+    EXPECT_NEAR(camera.focal * sine / std::sqrt(1.0 - sine * sine), 64.0, 1e-9);
+    EXPECT_NEAR(camera.half_size(), 35.5 * 8.0 / std::sqrt(63.0), 1e-9);
+  }
+  EXPECT_EQ(snapshot_camera({{0, 0, 0}, 0.2}, 0, 128).distance, 8.0) << "a radius of 1 at least";
+}
+
+TEST(Impostor, HoldsWhatSingleRaysSee) {
+  const VoxelRegistry types = two_types();
+  const Grid grid = blobs(4);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  GridReader reader(grid);
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    for (std::size_t i = 0; i < snapshot.types.size(); i += 37) {
+      const Ray ray = ray_of_texel(snapshot.camera, static_cast<int>(i % 128), static_cast<int>(i / 128));
+      const auto hit = first_hit(tree, ray);
+      ASSERT_EQ(snapshot.types[i], hit ? reader.get(hit->voxel) : kAir);
+      if (!hit) {
+        ASSERT_EQ(snapshot.depth[i], kInfinity);
+        continue;
+      }
+      ASSERT_NEAR(snapshot.depth[i], hit->t, 1e-4);
+      ASSERT_EQ(snapshot.faces[i], hit->face);
+      const float level = level_at(corner_levels(reader, types, hit->voxel, hit->face), hit->voxel, hit->face,
+                                   ray.origin + ray.direction * hit->t);
+      ASSERT_NEAR(snapshot.occlusion[i], level * 85.0F, 0.51F);
+    }
+  }
+}
+
+TEST(Impostor, BlackVoxelsAreNoHoles) {
+  const VoxelRegistry types = two_types();
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {9, 9, 9}, 1);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    for (int y = 60; y < 68; ++y) {
+      for (int x = 60; x < 68; ++x) EXPECT_EQ(snapshot.types[static_cast<std::size_t>(y * 128 + x)], 1);
+    }
+  }
+}
+
+TEST(Impostor, OfNothingIsEmpty) {
+  EXPECT_TRUE(Impostor().is_empty());
+  const VoxelRegistry types = two_types();
+  const Grid grid;
+  EXPECT_TRUE(Impostor::build(grid, types).is_empty());
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+    ASSERT_EQ(snapshot.types.size(), 128U * 128U);
+    EXPECT_TRUE(std::all_of(snapshot.types.begin(), snapshot.types.end(), [](auto type) { return type == kAir; }));
+    EXPECT_TRUE(std::all_of(snapshot.depth.begin(), snapshot.depth.end(), [](auto d) { return d == kInfinity; }));
+  }
+}
+
+TEST(Impostor, SeesWhateverLiesInABoxFromEveryView) {
+  const VoxelRegistry types = two_types();
+  std::mt19937 random(7);
+  for (int round = 0; round < 12; ++round) {
+    Grid grid;
+    for (int i = 0; i <= round; ++i) {
+      const auto coordinate = [&] { return static_cast<int>(random() % 41) - 20; };
+      grid.set({coordinate(), coordinate(), coordinate()}, 2);
+    }
+    const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+    for (int view = 0; view < kImpostorViews; ++view) {
+      const Snapshot snapshot = take_snapshot(grid, types, tree, view);
+      EXPECT_NE(std::count(snapshot.types.begin(), snapshot.types.end(), VoxelType{2}), 0) << round << " " << view;
+      for (std::size_t i = 0; i < 128; ++i) {  // and none is cropped
+        ASSERT_LE(snapshot.types[i] + snapshot.types[128 * i] + snapshot.types[128 * i + 127], round == 0 ? 6 : 3);
+      }
+    }
+  }
+}
+
+TEST(Impostor, LeavesTransparentVoxelsOut) {
+  Scene scene;
+  const VoxelType glass = add_type(scene, {90, 120, 220, 120}, Visibility::Transparent);
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {4, 4, 4}, glass);
+  EXPECT_TRUE(Impostor::build(grid, scene.types).is_empty());
+}
+
+TEST(ImpostorDeathTest, ThereAre26ViewsAndSnapshotsHaveOneTexelAtLeast) {
+  const VoxelRegistry types = two_types();
+  const Grid grid = blobs(1);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(impostor_view(kImpostorViews)), "index < kImpostorViews");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, -1)), "view >= 0");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, 0, 0)), "edge >= 1");
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,222 @@
+// The kernel of raster.h for lanes of any width, each of which holds a face.
+//
+//   Groups      boxes around 16 faces     | box 0 | box 1 | ...      which tile's pixels may each show in?
+//     Level       faces of one direction    | face 0 | face 1 | ...    which pixels may each show in?
+//       pixels      of each lane's face one, until the largest has none left
+
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <limits>
+
+#include "core/lanes.h"
+#include "render/impostor/raster.h"
+
+namespace quoin::raster {
+namespace {
+
+using namespace lanes;
+
+constexpr std::size_t kLanes = kWidth;
+constexpr float kMargin = 0.01F;  // pixels: for rounding
+
+// What is the same for all faces of one direction.
+struct Side {
+  std::size_t axis;
+  std::size_t u;
+  std::size_t v;
+  float sign;
+  float half;   // from a face's middle to its edges
+  float reach;  // and a little further, since faces that share an edge meet at slightly different points of it
+};
+
+// Pixels, all inclusive.
+struct Areas {
+  F left;
+  F top;
+  F right;
+  F bottom;
+  Mask shown;
+};
+
+inline F dot(const Vector& by, const F (&q)[3]) {
+  return all(by[0]) * q[0] + all(by[1]) * q[1] + all(by[2]) * q[2];
+}
+inline F linear(const LinearVector& vector, std::size_t axis, F x, F y) {
+  return all(vector.at[axis]) + all(vector.x[axis]) * x + all(vector.y[axis]) * y;
+}
+
+// The pixels that boxes around `q` may show in: never fewer than they do.
+inline void project(const Job& job, const F (&q)[3], const F (&half)[3], Areas& areas) {
+  const F ahead = dot(job.ahead, q) + all(job.ahead_at);
+  const F inverse = all(1.0F) / ahead;
+  const F column = (dot(job.across, q) + all(job.across_at)) * inverse;
+  const F row = (dot(job.down, q) + all(job.down_at)) * inverse;
+  F deep = all(0.0F);
+  F wide = all(0.0F);
+  F high = all(0.0F);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const F forward = all(job.ahead[axis]);
+    deep = deep + half[axis] * abs(forward);
+    wide = wide + half[axis] * abs(all(job.across[axis]) - column * forward);
+    high = high + half[axis] * abs(all(job.down[axis]) - row * forward);
+  }
+  // Boxes that reach to the camera's plane may show anywhere.
+  const F nearest = ahead - deep;
+  const Mask is_before = all(0.01F) * ahead < nearest;
+  const F scale = all(1.0F) / nearest;
+  const auto low = [&](F middle, F size, float at, int least) {
+    const F edge = all(static_cast<float>(least));
+    const F value = all(0.0F) - floor(all(0.0F) - (middle - size * scale + all(at - kMargin)));
+    return select(is_before, min(max(value, edge), all(64.0F)), edge);
+  };
+  const auto high_of = [&](F middle, F size, float at, int most) {
+    const F edge = all(static_cast<float>(most));
+    const F value = floor(middle + size * scale + all(at + kMargin));
+    return select(is_before, max(min(value, edge), all(-64.0F)), edge);
+  };
+  areas.left = low(column, wide, job.column_at, job.left);
+  areas.top = low(row, high, job.row_at, job.top);
+  areas.right = high_of(column, wide, job.column_at, job.right - 1);
+  areas.bottom = high_of(row, high, job.row_at, job.bottom - 1);
+  areas.shown = (areas.left <= areas.right) & (areas.top <= areas.bottom) & (all(0.0F) < ahead + deep);
+}
+
+inline void put(std::size_t pixel, float depth, std::int32_t id, std::uint32_t face, Canvas& canvas) {
+  const auto index = static_cast<std::int32_t>(face);
+  const float nearest = canvas.depth[pixel];
+  // Squares of one plane may overlap, and wide registers come to them in another order than narrow ones.
+  const bool is_lower = id < canvas.id[pixel] || (id == canvas.id[pixel] && index < canvas.face[pixel]);
+  if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
+  canvas.depth[pixel] = depth;
+  canvas.id[pixel] = id;
+  canvas.face[pixel] = index;
+}
+
+// Of each lane's face one pixel: where its ray meets the face's plane.
+inline void meet(const Job& job, const Side& side, const F (&q)[3], F x, F y, Mask wanted, const std::uint32_t* faces,
+                 Canvas& canvas) {
+  const F towards = linear(job.direction, side.axis, x, y);
+  const F along = (q[side.axis] - linear(job.point, side.axis, x, y)) / towards;
+  const F at_u = linear(job.point, side.u, x, y) + along * linear(job.direction, side.u, x, y);
+  const F at_v = linear(job.point, side.v, x, y) + along * linear(job.direction, side.v, x, y);
+  const F depth = all(job.depth_at) + along * all(job.depth_step);
+  const F reach = all(side.reach);
+  const Mask met = wanted & (abs(at_u - q[side.u]) <= reach) & (abs(at_v - q[side.v]) <= reach) &
+                   (towards * all(side.sign) < all(0.0F)) & (all(0.0F) < depth);
+  std::uint32_t left = bits(met);
+  if (left == 0) return;
+  alignas(64) float depths[kLanes];
+  alignas(64) std::int32_t columns[kLanes];
+  alignas(64) std::int32_t rows[kLanes];
+  store(depths, depth), store(columns, to_int(x)), store(rows, to_int(y));
+  for (; left != 0; left &= left - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+    put(index_of(columns[lane], rows[lane]), depths[lane], job.id, faces[lane], canvas);
+  }
+}
+
+void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& canvas) {
+  const ImpostorFaces::Level& level = *job.level;
+  F half[3] = {all(side.half), all(side.half), all(side.half)};
+  half[side.axis] = all(0.0F);
+  Areas areas;
+  for (std::size_t first = begin; first < begin + ImpostorFaces::kGroup; first += kLanes) {
+    const F q[3] = {load(level.centre[0].data() + first), load(level.centre[1].data() + first),
+                    load(level.centre[2].data() + first)};
+    project(job, q, half, areas);
+    const auto* views = reinterpret_cast<const std::int32_t*>(level.views.data() + first);
+    const Mask shown = areas.shown & test(load(views), all(static_cast<int>(job.views)));
+    if (!any(shown)) continue;
+    const F none = all(-1.0F);
+    const float width = greatest_of(select(shown, areas.right - areas.left, none));
+    const float height = greatest_of(select(shown, areas.bottom - areas.top, none));
+    for (float down = 0.0F; down <= height; down += 1.0F) {
+      const F y = areas.top + all(down);
+      const Mask in_row = shown & (y <= areas.bottom);
+      for (float across = 0.0F; across <= width; across += 1.0F) {
+        const F x = areas.left + all(across);
+        meet(job, side, q, x, y, in_row & (x <= areas.right), level.face.data() + first, canvas);
+      }
+    }
+  }
+}
+
+// Whether what is there is nearer than `depth` in all blocks that an area touches.
+inline bool is_hidden(int left, int top, int right, int bottom, float depth, const Canvas& canvas) {
+  for (int y = top / kBlock; y <= bottom / kBlock; ++y) {
+    for (int x = left / kBlock; x <= right / kBlock; ++x) {
+      if (!(canvas.furthest[static_cast<std::size_t>(y * (kTile / kBlock) + x)] < depth)) return false;
+    }
+  }
+  return true;
+}
+
+void draw_side(const Job& job, const Side& side, std::size_t begin, std::size_t end, Canvas& canvas) {
+  const ImpostorFaces::Groups& groups = job.level->groups;
+  Areas areas;
+  alignas(64) float least[kLanes];  // depth
+  alignas(64) std::int32_t edges[4][kLanes];
+  for (std::size_t first = begin; first < end; first += kLanes) {
+    F q[3];
+    F half[3];
+    F near = all(0.0F);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      q[axis] = load(groups.centre[axis].data() + first);
+      half[axis] = load(groups.half[axis].data() + first);
+      near = near + q[axis] * all(job.forward[axis]) - half[axis] * abs(all(job.forward[axis]));
+    }
+    project(job, q, half, areas);
+    std::uint32_t shown = bits(areas.shown);
+    if (end - first < kLanes) shown &= (1U << (end - first)) - 1U;
+    if (shown == 0) continue;
+    store(least, near * all(job.depth_step) + all(job.depth_at));
+    store(edges[0], to_int(areas.left)), store(edges[1], to_int(areas.top));
+    store(edges[2], to_int(areas.right)), store(edges[3], to_int(areas.bottom));
+    for (; shown != 0; shown &= shown - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(shown));
+      if ((groups.views[first + i] & job.views) == 0) continue;
+      if (is_hidden(edges[0][i], edges[1][i], edges[2][i], edges[3][i], least[i], canvas)) continue;
+      draw_group(job, side, (first + i) * ImpostorFaces::kGroup, canvas);
+    }
+  }
+}
+
+void find_furthest(const Job& job, Canvas& canvas) {
+  for (int y = job.top / kBlock; y <= (job.bottom - 1) / kBlock; ++y) {
+    for (int x = job.left / kBlock; x <= (job.right - 1) / kBlock; ++x) {
+      const std::size_t first = index_of(x * kBlock, y * kBlock);
+      F most = load(canvas.depth.data() + first);
+      for (std::size_t i = kLanes; i < 16; i += kLanes) most = max(most, load(canvas.depth.data() + first + i));
+      canvas.furthest[first / 16] = greatest_of(most);
+    }
+  }
+}
+
+// Whether any ray goes against the normal. What is linear is least or greatest in a corner.
+bool is_seen(const Job& job, const Side& side) {
+  const auto at = [&](int x, int y) {
+    const float direction = job.direction.at[side.axis] + job.direction.x[side.axis] * static_cast<float>(x) +
+                            job.direction.y[side.axis] * static_cast<float>(y);
+    return direction * side.sign < 1e-6F;
+  };
+  return at(job.left, job.top) || at(job.right, job.top) || at(job.left, job.bottom) || at(job.right, job.bottom);
+}
+
+void draw_faces(const Job& job, Canvas& canvas) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    const std::size_t begin = job.level->begin[i] / ImpostorFaces::kGroup;
+    const std::size_t end = job.level->begin[i + 1] / ImpostorFaces::kGroup;
+    if (begin == end) continue;
+    const FaceFrame& frame = kFaceFrames[i];
+    const float half = job.level->half;
+    const float reach = half + 1e-5F + 2e-6F * job.level->size;
+    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), half, reach};
+    if (is_seen(job, side)) draw_side(job, side, begin, end, canvas);
+  }
+  find_furthest(job, canvas);
+}
+
+}  // namespace
+}  // namespace quoin::raster

@@ -1,0 +1,9 @@
+// The kernel of impostors for any processor.
+
+#include "render/impostor/raster.inl"
+
+namespace quoin::raster {
+
+const Draw kDrawPlain = draw_faces;
+
+}  // namespace quoin::raster

@@ -1,0 +1,250 @@
+// The kernels that draw faces, against every face asked for every pixel in double precision.
+
+#include "render/impostor/raster.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "bench/workloads.h"
+#include "core/instruction_sets_for_tests.h"
+#include "render/impostor/seen.h"
+
+namespace quoin {
+namespace {
+
+struct Shape {
+  std::vector<SeenFace> faces;
+  ContentSphere content;
+  ImpostorFaces::Level level;
+
+  explicit Shape(unsigned seed) {
+    std::mt19937 random(seed);
+    Grid grid;
+    for (int i = 0; i < 12; ++i) {
+      const auto coordinate = [&](unsigned most) { return static_cast<int>(random() % most); };
+      const IVec3 at{coordinate(20), coordinate(20), coordinate(20)};
+      grid.fill_box(at, at + IVec3{coordinate(7), coordinate(7), coordinate(7)}, 1);
+    }
+    content = content_sphere(grid);
+    const OccupancyTree tree = OccupancyTree::build(grid, workloads::three_types(), Occupancy::Opaque);
+    const auto shell = ImpostorShell::build(tree, 1 << 20, 1 << 20);
+    for (const VoxelFace& face : shell.value().faces()) faces.push_back({face, {}});
+    level = all_faces(faces, content);
+    for (std::size_t i = 0; i < level.views.size(); ++i) {
+      if (level.views[i] != 0) level.views[i] = 1U << random() % 26;
+    }
+    for (std::uint32_t& views : level.groups.views) views = ~0U;
+  }
+
+  // As of coarse snapshots: squares that overlap their neighbours'.
+  [[nodiscard]] ImpostorFaces::Level coarse() const {
+    std::vector<SeenFace> seen = faces;
+    for (SeenFace& face : seen) face.views[3] = 1;
+    return faces_of_level(seen, 3, 16, content);
+  }
+};
+
+raster::Aim random_aim(std::mt19937& random, double radius) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  const auto direction = [&] { return glm::normalize(DVec3(normal(random), normal(random), normal(random))); };
+  raster::Aim aim;
+  aim.forward = direction();
+  aim.right = glm::normalize(glm::cross(aim.forward, direction()));
+  aim.down = glm::cross(aim.forward, aim.right);
+  if (share(random) < 0.2) aim.right = -aim.right;  // as of a mirrored instance
+  aim.is_perspective = share(random) < 0.8;
+  aim.voxel_size = std::exp2(normal(random));
+  const double distance = radius * (share(random) < 0.3 ? 1.5 * share(random) : 2.0 + 30.0 * share(random));
+  aim.centre = {0.2 * radius * normal(random), 0.2 * radius * normal(random), distance + 1e-3};
+  const double pixels = 4.0 + 60.0 * share(random);
+  aim.focal = pixels / (2.0 * radius) * (aim.is_perspective ? aim.centre.z : 1.0);
+  return aim;
+}
+
+struct Met {
+  double depth = std::numeric_limits<double>::infinity();
+  double rim = 0.0;  // how far inside the nearest face's edge, voxels
+  double next = std::numeric_limits<double>::infinity();
+  int face = -1;
+};
+
+// What a pixel's ray meets first, and how clearly.
+Met met_by(const Shape& shape, const raster::Aim& aim, std::uint32_t views, double x, double y) {
+  DVec3 origin = -(aim.right * aim.centre.x + aim.down * aim.centre.y + aim.forward * aim.centre.z);
+  DVec3 direction = aim.forward;
+  const DVec3 across = (aim.right * x + aim.down * y) / aim.focal;
+  (aim.is_perspective ? direction : origin) += across;
+  Met met;
+  for (std::size_t i = 0; i < shape.level.views.size(); ++i) {
+    if ((shape.level.views[i] & views) == 0) continue;
+    const auto index = shape.level.face[i];
+    const VoxelFace& face = shape.faces[index].face;
+    const FaceFrame& frame = frame_of(face.direction);
+    const DVec3 middle = DVec3(face.voxel) + 0.5 + 0.5 * DVec3(normal_of(face.direction)) - shape.content.centre;
+    if (direction[frame.axis] * frame.sign >= 0.0) continue;
+    const double along = (middle[frame.axis] - origin[frame.axis]) / direction[frame.axis];
+    if (along <= 0.0) continue;
+    const DVec3 beside = glm::abs(origin + direction * along - middle);
+    const double rim = 0.5 - std::max(beside[frame.u], beside[frame.v]);
+    if (rim < 0.0) continue;
+    const double depth = along * aim.voxel_size;
+    if (depth < met.depth) {
+      met.next = met.depth;
+      met = {depth, rim, met.next, static_cast<int>(index)};
+    } else {
+      met.next = std::min(met.next, depth);
+    }
+  }
+  return met;
+}
+
+TEST(ImpostorRaster, MeetsWhatEveryFaceAskedForEveryPixelMeets) {
+  std::int64_t pixels = 0;
+  std::int64_t others = 0;
+  std::int64_t covered = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Shape shape(seed);
+    std::mt19937 random(seed);
+    for (int round = 0; round < 16; ++round) {
+      const raster::Aim aim = random_aim(random, shape.content.radius);
+      raster::Job job;
+      job.level = &shape.level;
+      job.views = round % 2 == 0 ? ~0U : 0x155'5555U;
+      job.id = 3;
+      raster::Canvas canvas;
+      canvas.clear();
+      raster::set_aim(aim, -15.7, -16.2, job);
+      raster::draw()(job, canvas);
+      for (int y = 0; y < raster::kTile; ++y) {
+        for (int x = 0; x < raster::kTile; ++x) {
+          const std::size_t i = raster::index_of(x, y);
+          const Met met = met_by(shape, aim, job.views, x - 15.7, y - 16.2);
+          const double size = aim.voxel_size;
+          // Not where single precision may choose another: at a face's edge, or where two lie close together.
+          if (met.face >= 0 && (met.rim < 1e-3 || met.next - met.depth < 2e-3 * size)) continue;
+          ++pixels;
+          covered += met.face >= 0;
+          const bool is_met = std::isfinite(canvas.depth[i]);
+          others += is_met != (met.face >= 0) || (is_met && canvas.face[i] != met.face);
+          if (is_met && canvas.face[i] == met.face) {
+            ASSERT_NEAR(static_cast<double>(canvas.depth[i]), met.depth, 2e-3 * size) << seed;
+            ASSERT_EQ(canvas.id[i], 3);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(covered, 20'000);
+  EXPECT_LE(others, pixels / 10'000) << "rays that pass an outer edge within rounding";
+}
+
+void expect_same(const raster::Canvas& a, const raster::Canvas& b) {
+  ASSERT_EQ(a.depth, b.depth);
+  ASSERT_EQ(a.id, b.id);
+  ASSERT_EQ(a.furthest, b.furthest);
+  for (std::size_t p = 0; p < raster::kPixels; ++p) {
+    if (std::isinf(a.depth[p])) continue;
+    ASSERT_EQ(a.face[p], b.face[p]);
+  }
+}
+
+void expect_nothing_outside(const raster::Job& job, const raster::Canvas& canvas) {
+  for (int y = 0; y < raster::kTile; ++y) {
+    for (int x = 0; x < raster::kTile; ++x) {
+      if (x >= job.left && x < job.right && y >= job.top && y < job.bottom) continue;
+      ASSERT_TRUE(std::isinf(canvas.depth[raster::index_of(x, y)]));
+    }
+  }
+}
+
+// Draws from all around, one over the other.
+void expect_same_as_plain(const ImpostorFaces::Level& level, double radius, unsigned seed, InstructionSet with) {
+  std::mt19937 random(100 + seed);
+  std::array<raster::Canvas, 2> canvases;
+  for (raster::Canvas& canvas : canvases) canvas.clear();
+  for (int round = 0; round < 6; ++round) {
+    SCOPED_TRACE(round);
+    raster::Aim aim = random_aim(random, radius);
+    if (round == 4) aim.centre.z = 1e-30;
+    if (round == 5) aim.centre.x = std::numeric_limits<double>::quiet_NaN();
+    raster::Job job;
+    job.level = &level;
+    job.views = ~0U;
+    job.id = 9 - round;
+    job.left = static_cast<int>(random() % 20), job.right = 32 - static_cast<int>(random() % 10);
+    job.top = static_cast<int>(random() % 20), job.bottom = 32 - static_cast<int>(random() % 10);
+    raster::set_aim(aim, -15.7, -16.2, job);
+    std::size_t i = 0;
+    for (const InstructionSet set : {InstructionSet::Plain, with}) {
+      const InstructionSetOverride over(set);
+      raster::draw()(job, canvases[i++]);
+    }
+    expect_same(canvases[0], canvases[1]);
+    if (round == 0) expect_nothing_outside(job, canvases[0]);
+  }
+}
+
+class RasterSets : public testing::TestWithParam<InstructionSet> {};
+
+TEST_P(RasterSets, WriteTheBitsOfThePlainKernel) {
+  QUOIN_SKIP_WITHOUT(GetParam());
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const Shape shape(seed);
+    expect_same_as_plain(shape.level, shape.content.radius, seed, GetParam());
+    const ImpostorFaces::Level coarse = shape.coarse();
+    EXPECT_GT(coarse.half, 0.7F) << "neighbours overlap";
+    expect_same_as_plain(coarse, shape.content.radius, seed, GetParam());
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(InstructionSets, RasterSets, testing::Values(InstructionSet::Avx2, InstructionSet::Avx512),
+                         name_of_set);
+
+TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
+  const VoxelRegistry types = workloads::three_types();
+  for (const workloads::Blocky which : {workloads::Blocky::W4, workloads::Blocky::W2}) {
+    Grid grid;
+    grid.put_chunk({-1, 0, 0}, workloads::blocky_chunk(which));
+    const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
+    const ContentSphere content = content_sphere(grid);
+    const auto shell = ImpostorShell::build(tree, 1 << 20, 1 << 20);
+    ASSERT_TRUE(shell.has_value());
+    const auto drawn = faces_seen_of(*shell, tree.bounds(), content, 128);
+    const auto met = faces_seen_by_rays(tree, content, 128);
+    ASSERT_GT(drawn.size(), 5'000U);
+    const auto key_of = [](const VoxelFace& face) {
+      return std::tuple(face.voxel.x, face.voxel.y, face.voxel.z, static_cast<int>(face.direction));
+    };
+    std::map<std::tuple<int, int, int, int>, SeenFace> by_face;
+    for (const SeenFace& face : met) by_face[key_of(face.face)] = face;
+    std::size_t views = 0;
+    std::size_t others = 0;
+    for (const SeenFace& face : drawn) {
+      const auto found = by_face.find(key_of(face.face));
+      for (std::size_t level = 0; level < face.views.size(); ++level) {
+        const std::uint32_t by_rays = found == by_face.end() ? 0 : found->second.views[level];
+        views += static_cast<std::size_t>(std::popcount(face.views[level]));
+        // Rays' faces have the views of those beside them too.
+        others += static_cast<std::size_t>(
+            std::popcount(level == 0 ? face.views[level] & ~by_rays : face.views[level] ^ by_rays));
+      }
+    }
+    EXPECT_GT(views, 50'000U);
+    EXPECT_LE(others, views / 500);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include <quoin/render/impostor.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "render/impostor/faces.h"
+#include "render/impostor/raster.h"
+
+namespace quoin {
+
+/// Pixels of a picture, `right` and `bottom` exclusive.
+struct PixelArea {
+  int left = 0;
+  int top = 0;
+  int right = 0;
+  int bottom = 0;
+};
+
+/// A far instance as one picture shows it.
+struct DrawnImpostor {
+  std::int32_t placed = 0;  ///< index into SceneTracer::placed
+  const ImpostorFaces* faces = nullptr;
+  std::size_t level = 0;    ///< of the faces
+  std::uint32_t views = 0;  ///< faces that none of these saw are left out
+  PixelArea area;           ///< where it may show
+  double nearest = 0.0;     ///< depth
+  raster::Aim aim;
+  glm::dmat3 axes{1.0};  ///< a point p of the view is axes * p / voxel_size + offset in the grid, about the
+  DVec3 offset{0.0};     ///< content's centre
+
+  /// With the finest level, crevices that no view looked into are drawn too.
+  [[nodiscard]] bool has_unseen() const { return level == 0; }
+};
+
+/// A picture that impostors are drawn into.
+class ImpostorScreen {
+ public:
+  ImpostorScreen(const Camera& camera, int width, int height);
+
+  /// Nothing for what draw_impostors leaves out, or what cannot show. `impostor` must outlive what is answered.
+  [[nodiscard]] std::optional<DrawnImpostor> drawn(const PlacedGrid& placed, std::int32_t index,
+                                                   const Impostor& impostor) const;
+
+ private:
+  struct Sphere;
+  // Where in the picture it may lie, if it is to be drawn.
+  [[nodiscard]] std::optional<PixelArea> area_of(const Sphere& sphere) const;
+
+  Camera camera_;
+  bool is_perspective_;
+  int width_;
+  int height_;
+  double focal_;  // perspective: pixels at distance 1; orthographic: pixels a world unit
+};
+
+}  // namespace quoin

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/trace/occupancy_tree.h>
+
+namespace quoin {
+
+/// A face of a voxel.
+struct VoxelFace {
+  IVec3 voxel{0};
+  Direction direction = Direction::PosX;
+  bool operator==(const VoxelFace&) const = default;
+};
+
+/// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
+///
+/// Memory: a bit a voxel of the box and of what lies within four voxels of it.
+class ImpostorShell {
+ public:
+  /// None where the box and what it keeps around it have more than `most_voxels`, or there are more than `most_faces`.
+  static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t most_voxels,
+                                            std::int64_t most_faces);
+
+  /// By direction, then by cell of 4^3 voxels.
+  [[nodiscard]] std::vector<VoxelFace> faces() const;
+  /// Requires: `voxel` is at most one beside the box.
+  [[nodiscard]] bool is_occupied(IVec3 voxel) const {
+    const IVec3 local = voxel - origin_;
+    QUOIN_ASSERT((IBox{IVec3{0}, size_ * 4}.contains(local)), "at most one beside the box");
+    return (cells_[cell_of(local)] >> bit_of(local) & 1U) != 0;
+  }
+
+ private:
+  explicit ImpostorShell(const IBox& box);
+  [[nodiscard]] std::size_t cell_of(IVec3 local) const {
+    return static_cast<std::size_t>(((local.z >> 2) * size_.y + (local.y >> 2)) * size_.x + (local.x >> 2));
+  }
+  [[nodiscard]] static int bit_of(IVec3 local) { return (local.x & 3) + 4 * (local.y & 3) + 16 * (local.z & 3); }
+  void copy_chunk(const OccupancyTree& tree, IVec3 chunk);
+  // The voxels of a cell that have a face in that direction.
+  [[nodiscard]] std::uint64_t exposed(Direction direction, std::size_t cell) const;
+  [[nodiscard]] std::int64_t count_faces() const;
+
+  IVec3 origin_{0};  // the voxel at the least corner, a multiple of 4
+  IVec3 size_{0};    // cells; one empty cell around everything
+  std::vector<std::uint64_t> cells_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <quoin/trace/packet.h>
+
+#include "core/instruction_set.h"
+#include "trace/tree_view.h"
+
+namespace quoin::trace {
+
+// Every kernel gives the same answers, those of a walk from one lattice plane to the next where the plane P of an axis
+// is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
+// of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
+struct Kernel {
+  /// One ray; `face` is not set where it starts inside.
+  bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
+  /// Whether one ray is blocked.
+  bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);
+  /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
+  void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
+  /// Returns the lanes that are blocked.
+  std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
+};
+
+extern const Kernel kPlainKernel;
+#ifdef QUOIN_X86_KERNELS
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+#endif
+
+#ifdef QUOIN_X86_KERNELS
+inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel,
+                                                             &kAvx512Kernel};
+#endif
+
+/// That of the widest instructions that this machine has.
+[[nodiscard]] inline const Kernel& kernel() {
+#ifdef QUOIN_X86_KERNELS
+  return *kKernels[static_cast<std::size_t>(instruction_set())];
+#else
+  return kPlainKernel;
+#endif
+}
+
+}  // namespace quoin::trace

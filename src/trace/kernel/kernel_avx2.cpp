@@ -1,0 +1,16 @@
+// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#include "trace/kernel/kernel.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "trace/kernel/packet.inl"
+#include "trace/kernel/single.inl"
+
+namespace quoin::trace {
+
+const Kernel kAvx2Kernel = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any};
+
+}  // namespace quoin::trace
+
+#endif

@@ -1,0 +1,230 @@
+// Sixteen lanes in pairs of AVX2 registers: what one half waits for, the other works through.
+//
+//   F, I, Mask   low  | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |     half::F, half::I, half::Mask
+//                high | 8 | 9 |10 |11 |12 |13 |14 |15 |
+
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/lanes_avx2.h"
+#include "trace/tree_view.h"
+
+namespace quoin::trace {
+namespace {
+
+// Eight lanes: what tracing adds to core/lanes_avx2.h.
+namespace half {
+
+using namespace lanes_avx2;
+
+constexpr std::size_t kDoubles = 4;
+
+inline F narrow(const double* from) {
+  return {_mm256_set_m128(_mm256_cvtpd_ps(_mm256_loadu_pd(from + 4)), _mm256_cvtpd_ps(_mm256_loadu_pd(from)))};
+}
+
+// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
+  __m128i b[2];
+  __m128 r[2];
+  __m128 w[2];
+  for (int half = 0; half < 2; ++half) {
+    const __m256d x = _mm256_sub_pd(_mm256_loadu_pd(from + 4 * half), _mm256_set1_pd(corner));
+    const __m256d v = _mm256_floor_pd(x);
+    const __m256d start =
+        _mm256_mul_pd(_mm256_floor_pd(_mm256_mul_pd(x, _mm256_set1_pd(0.015625))), _mm256_set1_pd(64.0));
+    b[half] = _mm256_cvttpd_epi32(start);
+    r[half] = _mm256_cvtpd_ps(_mm256_sub_pd(x, start));
+    w[half] = _mm256_cvtpd_ps(_mm256_sub_pd(v, start));
+  }
+  base.v = _mm256_set_m128i(b[1], b[0]);
+  rest.v = _mm256_set_m128(r[1], r[0]);
+  whole.v = _mm256_set_m128(w[1], w[0]);
+}
+
+inline F just_below(F a) {
+  const __m256 less = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a.v), _mm256_set1_epi32(1)));
+  const __m256 is_positive = _mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ);
+  return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
+}
+
+// The indices of 4^3 bricks.
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const std::uint32_t* corner =
+        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+    for (int row = 0; row < 16; ++row) {
+      const std::uint32_t* from = corner + (row & 3) * tree.brick_strides.y + (row >> 2) * tree.brick_strides.z;
+      _mm_store_si128(reinterpret_cast<__m128i*>(bricks_ + 4 * row),
+                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+    }
+  }
+  // By x + 4 y + 16 z; further bits do not count.
+  [[nodiscard]] I brick(I place) const { return gather(bricks_, place & all(63)); }
+
+ private:
+  alignas(32) std::uint32_t bricks_[64];
+};
+
+}  // namespace half
+
+using half::kDoubles;
+
+constexpr int kWidth = 2 * half::kWidth;
+
+template <class T>
+struct Pair {
+  T low, high;
+};
+using Mask = Pair<half::Mask>;
+using F = Pair<half::F>;
+using I = Pair<half::I>;
+
+template <class T>
+inline Pair<T> operator+(Pair<T> a, Pair<T> b) {
+  return {a.low + b.low, a.high + b.high};
+}
+template <class T>
+inline Pair<T> operator-(Pair<T> a, Pair<T> b) {
+  return {a.low - b.low, a.high - b.high};
+}
+template <class T>
+inline Pair<T> operator*(Pair<T> a, Pair<T> b) {
+  return {a.low * b.low, a.high * b.high};
+}
+inline F operator/(F a, F b) {
+  return {a.low / b.low, a.high / b.high};
+}
+template <class T>
+inline Pair<T> operator&(Pair<T> a, Pair<T> b) {
+  return {a.low & b.low, a.high & b.high};
+}
+template <class T>
+inline Pair<T> operator|(Pair<T> a, Pair<T> b) {
+  return {a.low | b.low, a.high | b.high};
+}
+inline Mask operator~(Mask a) {
+  return {~a.low, ~a.high};
+}
+template <class T>
+inline Mask operator<(Pair<T> a, Pair<T> b) {
+  return {a.low < b.low, a.high < b.high};
+}
+inline Mask operator<=(F a, F b) {
+  return {a.low <= b.low, a.high <= b.high};
+}
+inline Mask operator==(F a, F b) {
+  return {a.low == b.low, a.high == b.high};
+}
+inline std::uint32_t bits(Mask a) {
+  return half::bits(a.low) | half::bits(a.high) << half::kWidth;
+}
+inline bool any(Mask a) {
+  return half::any(a.low | a.high);
+}
+inline Mask mask_of(std::uint32_t b) {
+  return {half::mask_of(b & 0xFFU), half::mask_of(b >> half::kWidth)};
+}
+inline F all(float x) {
+  return {half::all(x), half::all(x)};
+}
+inline I all(int x) {
+  return {half::all(x), half::all(x)};
+}
+inline F min(F a, F b) {
+  return {half::min(a.low, b.low), half::min(a.high, b.high)};
+}
+inline F max(F a, F b) {
+  return {half::max(a.low, b.low), half::max(a.high, b.high)};
+}
+inline F abs(F a) {
+  return {half::abs(a.low), half::abs(a.high)};
+}
+inline F floor(F a) {
+  return {half::floor(a.low), half::floor(a.high)};
+}
+inline F just_below(F a) {
+  return {half::just_below(a.low), half::just_below(a.high)};
+}
+template <class T>
+inline Pair<T> select(Mask m, Pair<T> a, Pair<T> b) {
+  return {half::select(m.low, a.low, b.low), half::select(m.high, a.high, b.high)};
+}
+template <class T>
+inline Pair<T> add_if(Mask m, Pair<T> a, Pair<T> b) {
+  return {half::add_if(m.low, a.low, b.low), half::add_if(m.high, a.high, b.high)};
+}
+inline Mask equals(I a, int b) {
+  return {half::equals(a.low, b), half::equals(a.high, b)};
+}
+template <int kBits>
+inline I shift_left(I a) {
+  return {half::shift_left<kBits>(a.low), half::shift_left<kBits>(a.high)};
+}
+template <int kBits>
+inline I shift_right(I a) {
+  return {half::shift_right<kBits>(a.low), half::shift_right<kBits>(a.high)};
+}
+template <int kBits>
+inline I shift_right_signed(I a) {
+  return {half::shift_right_signed<kBits>(a.low), half::shift_right_signed<kBits>(a.high)};
+}
+inline I min_unsigned(I a, I b) {
+  return {half::min_unsigned(a.low, b.low), half::min_unsigned(a.high, b.high)};
+}
+inline Mask test(I a, I b) {
+  return {half::test(a.low, b.low), half::test(a.high, b.high)};
+}
+inline Mask test_bit(I a, I at) {
+  return {half::test_bit(a.low, at.low), half::test_bit(a.high, at.high)};
+}
+inline I merge(I which, I a, I b) {
+  return {half::merge(which.low, a.low, b.low), half::merge(which.high, a.high, b.high)};
+}
+inline I gather(const std::uint32_t* base, I at) {
+  return {half::gather(base, at.low), half::gather(base, at.high)};
+}
+inline I as_int(F a) {
+  return {half::as_int(a.low), half::as_int(a.high)};
+}
+inline I to_int(F a) {
+  return {half::to_int(a.low), half::to_int(a.high)};
+}
+inline F to_float(I a) {
+  return {half::to_float(a.low), half::to_float(a.high)};
+}
+template <class T, class V>
+inline void store(T* to, Pair<V> a) {
+  half::store(to, a.low);
+  half::store(to + half::kWidth, a.high);
+}
+inline I load(const std::int32_t* from) {
+  return {half::load(from), half::load(from + half::kWidth)};
+}
+inline F narrow(const double* from) {
+  return {half::narrow(from), half::narrow(from + half::kWidth)};
+}
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
+  half::split(from, corner, base.low, rest.low, whole.low);
+  half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
+}
+inline float least_of(F a) {
+  const __m256 v = _mm256_min_ps(a.low.v, a.high.v);
+  __m128 least = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+  least = _mm_min_ps(least, _mm_movehl_ps(least, least));
+  return _mm_cvtss_f32(_mm_min_ss(least, _mm_movehdup_ps(least)));
+}
+
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin) : window_(tree, origin) {}
+  [[nodiscard]] I brick(I place) const { return {window_.brick(place.low), window_.brick(place.high)}; }
+
+ private:
+  half::BrickWindow window_;
+};
+
+}  // namespace
+}  // namespace quoin::trace

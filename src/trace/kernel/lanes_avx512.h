@@ -1,0 +1,100 @@
+// What tracing adds to the sixteen lanes of core/lanes_avx512.h.
+
+#pragma once
+
+#include <immintrin.h>
+
+#include "core/lanes_avx512.h"
+#include "trace/tree_view.h"
+
+namespace quoin::trace {
+namespace {
+
+using namespace lanes_avx512;
+
+constexpr std::size_t kDoubles = 8;
+
+inline __m512 join(__m256 low, __m256 high) {
+  return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+}
+
+inline F narrow(const double* from) {
+  return {join(_mm512_cvtpd_ps(_mm512_loadu_pd(from)), _mm512_cvtpd_ps(_mm512_loadu_pd(from + 8)))};
+}
+
+// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
+  constexpr int kDown = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+  const __m512d low = _mm512_sub_pd(_mm512_loadu_pd(from), _mm512_set1_pd(corner));
+  const __m512d high = _mm512_sub_pd(_mm512_loadu_pd(from + 8), _mm512_set1_pd(corner));
+  const __m512i floor = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvt_roundpd_epi32(low, kDown)),
+                                           _mm512_cvt_roundpd_epi32(high, kDown), 1);
+  base.v = _mm512_and_si512(floor, _mm512_set1_epi32(~63));
+  const __m512d low_base = _mm512_cvtepi32_pd(_mm512_castsi512_si256(base.v));
+  const __m512d high_base = _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(base.v, 1));
+  rest.v = join(_mm512_cvtpd_ps(_mm512_sub_pd(low, low_base)), _mm512_cvtpd_ps(_mm512_sub_pd(high, high_base)));
+  whole.v = _mm512_cvtepi32_ps(_mm512_and_si512(floor, _mm512_set1_epi32(63)));
+}
+
+// The next number below one that is not negative: all that lie below it and are no closer to it than 1e-30.
+inline F just_below(F a) {
+  const __mmask16 is_positive = _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GT_OQ);
+  const __m512i less = _mm512_mask_sub_epi32(_mm512_castps_si512(_mm512_set1_ps(-1e-30F)), is_positive,
+                                             _mm512_castps_si512(a.v), _mm512_set1_epi32(1));
+  return {_mm512_castsi512_ps(less)};
+}
+
+inline float least_of(F a) {
+  return _mm512_reduce_min_ps(a.v);
+}
+// Entry `at % 16`, or `at % 32`, of a table.
+inline I from_16(I table, I at) {
+  return {_mm512_permutexvar_epi32(at.v, table.v)};
+}
+inline I from_32(const std::int32_t* table, I at) {
+  return {_mm512_permutex2var_epi32(load(table).v, at.v, load(table + 16).v)};
+}
+inline F from_16(F table, I at) {
+  return {_mm512_permutexvar_ps(at.v, table.v)};
+}
+// The eight brick indices x, y and z further than `corner` or not, times 128.
+inline I eight_of(const std::uint32_t* corner, int x, int y, int z) {
+  const __m256i xs = _mm256_setr_epi32(0, -1, 0, -1, 0, -1, 0, -1);
+  const __m256i ys = _mm256_setr_epi32(0, 0, -1, -1, 0, 0, -1, -1);
+  const __m256i zs = _mm256_setr_epi32(0, 0, 0, 0, -1, -1, -1, -1);
+  const __m256i at = _mm256_add_epi32(
+      _mm256_and_si256(xs, _mm256_set1_epi32(x)),
+      _mm256_add_epi32(_mm256_and_si256(ys, _mm256_set1_epi32(y)), _mm256_and_si256(zs, _mm256_set1_epi32(z))));
+  const __m256i bricks = _mm256_i32gather_epi32(reinterpret_cast<const int*>(corner), at, 4);
+  return {_mm512_castsi256_si512(_mm256_slli_epi32(bricks, 7))};
+}
+
+// The indices of 4^3 bricks.
+class BrickWindow {
+ public:
+  BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const std::uint32_t* corner =
+        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+    for (int z = 0; z < 4; ++z) {
+      const auto row = [&](int y) {
+        return _mm_loadu_si128(
+            reinterpret_cast<const __m128i*>(corner + y * tree.brick_strides.y + z * tree.brick_strides.z));
+      };
+      const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(row(0)), row(1), 1);
+      const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(row(2)), row(3), 1);
+      layers_[z] = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+    }
+  }
+  // By x + 4 y + 16 z.
+  [[nodiscard]] I brick(I place) const {
+    const __m512i low = _mm512_permutex2var_epi32(layers_[0], place.v, layers_[1]);
+    const __m512i high = _mm512_permutex2var_epi32(layers_[2], place.v, layers_[3]);
+    return select(test(place, all(32)), I{high}, I{low});
+  }
+
+ private:
+  __m512i layers_[4];
+};
+
+}  // namespace
+}  // namespace quoin::trace
