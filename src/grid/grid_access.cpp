@@ -1,6 +1,6 @@
 #include <quoin/grid/grid.h>
 
-#include "grid/packed_row.h"
+#include "grid/chunk/packed_row.h"
 
 namespace quoin {
 

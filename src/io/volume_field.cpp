@@ -11,7 +11,7 @@
 
 #include <quoin/core/hash.h>
 
-#include "grid/stored_density.h"
+#include "grid/density/stored_density.h"
 
 namespace quoin {
 namespace {

@@ -18,7 +18,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "scene/kept_trees.h"
+#include "scene/tracer/kept_trees.h"
 
 namespace quoin {
 namespace {

@@ -12,7 +12,7 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/grid.h>
 
-#include "grid/chunk_difference.h"
+#include "grid/chunk/chunk_difference.h"
 #include "grid/coordinate_hash.h"
 
 namespace quoin {

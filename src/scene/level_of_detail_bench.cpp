@@ -10,7 +10,7 @@
 
 #include <quoin/scene/level_of_detail.h>
 
-#include "scene/mixed_scene.h"
+#include "scene/tracer/mixed_scene.h"
 
 namespace quoin {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <quoin/terrain/noise.h>
 
-#include "grid/stored_density.h"
+#include "grid/density/stored_density.h"
 #include "terrain/lattice.h"
 
 namespace quoin::terrain {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "grid/packed_row.h"
+#include "grid/chunk/packed_row.h"
 
 namespace quoin::trace {
 namespace {

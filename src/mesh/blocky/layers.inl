@@ -10,7 +10,7 @@
 
 #include <cstdint>
 
-#include "grid/packed_row.h"
+#include "grid/chunk/packed_row.h"
 #include "mesh/blocky/scratch.h"
 #include "mesh/blocky/words.inl"
 

@@ -1,0 +1,70 @@
+#include "grid/chunk/chunk_difference.h"
+
+#include <array>
+#include <cstring>
+
+namespace quoin {
+namespace {
+
+// Whether the indices of two chunks mean the same types.
+bool share_palette(const Chunk::Mixed* a, const Chunk::Mixed* b) {
+  return a != nullptr && b != nullptr && a->bits == b->bits && a->palette == b->palette;
+}
+
+// Whether a row is stored alike in both. Requires: they share a palette.
+bool is_stored_alike(const Chunk::Mixed& a, const Chunk::Mixed& b, int y, int z) {
+  const std::uint32_t in_a = a.slabs[Chunk::slab_index(y, z)];
+  const std::uint32_t in_b = b.slabs[Chunk::slab_index(y, z)];
+  if (((in_a | in_b) & Chunk::kUniformSlab) != 0) return in_a == in_b;
+  const int row = Chunk::row_in_slab(y, z);
+  return std::memcmp(a.row(in_a, row), b.row(in_b, row), static_cast<std::size_t>(a.bits) * sizeof(std::uint64_t)) == 0;
+}
+
+// Calls `compare(y, z, old row, new row)` for the rows that may differ.
+template <class Compare>
+void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, Compare&& compare) {
+  if (before.shares_storage_with(after)) return;
+  const bool share = share_palette(before.mixed(), after.mixed());
+  std::array<VoxelType, kChunkEdge> old_row;
+  std::array<VoxelType, kChunkEdge> new_row;
+  for (int z = within.min.z; z < within.max.z; ++z) {
+    for (int y = within.min.y; y < within.max.y; ++y) {
+      if (share && is_stored_alike(*before.mixed(), *after.mixed(), y, z)) continue;
+      before.read_row(y, z, old_row);
+      after.read_row(y, z, new_row);
+      compare(y, z, old_row, new_row);
+    }
+  }
+}
+
+std::uint64_t other_types(const std::array<VoxelType, kChunkEdge>& a, const std::array<VoxelType, kChunkEdge>& b) {
+  std::uint64_t types = 0;
+  for (std::size_t x = 0; x < kChunkEdge; ++x) types |= std::uint64_t{a[x] != b[x]} << x;
+  return types;
+}
+
+}  // namespace
+
+void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit) {
+  for_each_other_row(before, after, kWholeChunk, [&](int y, int z, const auto& old_row, const auto& new_row) {
+    edit.add(y, z, other_types(old_row, new_row));
+  });
+}
+
+ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
+  static const Chunk kAllAir;
+  const Chunk& a = before == nullptr ? kAllAir : *before;
+  const Chunk& b = after == nullptr ? kAllAir : *after;
+  ChunkDifference found;
+  for_each_other_row(a, b, within, [&](int y, int z, const auto& old_row, const auto& new_row) {
+    std::uint64_t solid = 0;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      solid |= std::uint64_t{(old_row[x] == kAir) != (new_row[x] == kAir)} << x;
+    }
+    found.types.add(y, z, other_types(old_row, new_row));
+    found.solid.add(y, z, solid);
+  });
+  return found;
+}
+
+}  // namespace quoin

@@ -1,0 +1,75 @@
+#include <array>
+#include <cmath>
+
+#include "grid/density/density_grid_impl.h"
+
+namespace quoin {
+namespace {
+
+/// A cell between samples and a point in it.
+struct Cell {
+  IVec3 low{0};
+  DVec3 fraction{0.0};
+
+  /// Answers whether all corners have int32 coordinates; NaN has none.
+  bool locate(DVec3 point) {
+    constexpr double kLow = -2'147'483'648.0;
+    constexpr double kHigh = 2'147'483'647.0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(point[axis] >= kLow && point[axis] < kHigh)) return false;
+      const double whole = std::floor(point[axis]);
+      low[axis] = static_cast<int>(whole);
+      fraction[axis] = point[axis] - whole;
+    }
+    return true;
+  }
+};
+
+// Densities of the corners, by x + 2 y + 4 z.
+std::array<double, 8> corners_of(const DensityStore& store, IVec3 low) {
+  std::array<double, 8> corners{};
+  const IVec3 local = local_of(low);
+  const bool is_in_one_chunk = local.x < kChunkEdge - 1 && local.y < kChunkEdge - 1 && local.z < kChunkEdge - 1;
+  const DensityStore::Entry* entry = is_in_one_chunk ? store.find(chunk_of(low)) : nullptr;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 offset{i & 1, i >> 1 & 1, i >> 2};
+    const IVec3 p = local + offset;
+    const Half half = !is_in_one_chunk   ? store.get(low + offset)
+                      : entry == nullptr ? store.far()
+                                         : entry->samples.get(p.x, p.y, p.z);
+    corners[static_cast<std::size_t>(i)] = float_from_half(half);
+  }
+  return corners;
+}
+
+double between(double a, double b, double t) {
+  return a + t * (b - a);
+}
+
+double bilinear(double v00, double v10, double v01, double v11, double u, double v) {
+  return between(between(v00, v10, u), between(v01, v11, u), v);
+}
+
+}  // namespace
+
+float DensityGrid::density_at(DVec3 point) const {
+  Cell cell;
+  if (!cell.locate(point)) return band();
+  const std::array<double, 8> d = corners_of(impl_->store, cell.low);
+  const DVec3 f = cell.fraction;
+  const double low = bilinear(d[0], d[1], d[2], d[3], f.x, f.y);
+  const double high = bilinear(d[4], d[5], d[6], d[7], f.x, f.y);
+  return static_cast<float>(between(low, high, f.z));
+}
+
+DVec3 DensityGrid::gradient_at(DVec3 point) const {
+  Cell cell;
+  if (!cell.locate(point)) return DVec3(0.0);
+  const std::array<double, 8> d = corners_of(impl_->store, cell.low);
+  const DVec3 f = cell.fraction;
+  return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
+          bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
+          bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
+}
+
+}  // namespace quoin

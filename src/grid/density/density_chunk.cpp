@@ -1,0 +1,157 @@
+#include <quoin/grid/density_chunk.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <quoin/core/assert.h>
+
+#include "grid/chunk/content_hash.h"
+#include "grid/density/stored_density.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kSlabRows = 16;
+constexpr std::size_t kSlabValues = kSlabRows * kChunkEdge;
+
+std::uint64_t differences(const Half* a, const Half* b) {
+  std::uint64_t mask = 0;
+  for (std::size_t x = 0; x < kChunkEdge; ++x) mask |= std::uint64_t{a[x] != b[x]} << x;
+  return mask;
+}
+
+std::uint64_t solid_bits(const Half* row) {
+  std::uint64_t mask = 0;
+  for (std::size_t x = 0; x < kChunkEdge; ++x) mask |= std::uint64_t{row[x]} >> 15 << x;
+  return mask;
+}
+
+}  // namespace
+
+Half stored_density(float density, float band) {
+  QUOIN_ASSERT(band > 0.0F, "a positive band");
+  return stored_within(density, largest_within(band));
+}
+
+DensityChunk::DensityChunk(Half density, VoxelType material) : uniform_(density), materials_(material) {}
+
+void DensityChunk::fill(Half density) {
+  mixed_.reset();
+  uniform_ = density;
+}
+
+void DensityChunk::read_row(int y, int z, std::span<Half, kChunkEdge> out) const {
+  const Half* samples = row(y, z);
+  if (samples != nullptr) {
+    std::memcpy(out.data(), samples, sizeof(Half) * kChunkEdge);
+  } else {
+    std::fill(out.begin(), out.end(), get(0, y, z));
+  }
+}
+
+void DensityChunk::make_mixed() {
+  mixed_ = make_ref<Mixed>();
+  mixed_->slabs.fill(kUniformSlab | uniform_);
+  mixed_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
+}
+
+// A slot of its own for a slab, filled with the slab's density where it had none.
+std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
+  Mixed& m = *mixed_;
+  const std::uint32_t entry = m.slabs[slab];
+  if ((entry & kUniformSlab) == 0) return entry;
+  std::uint32_t slot = 0;
+  if (!m.free_slots.empty()) {
+    slot = m.free_slots.back();
+    m.free_slots.pop_back();
+  } else {
+    slot = static_cast<std::uint32_t>(m.values.size() / kSlabValues);
+    m.values.resize(m.values.size() + kSlabValues);
+  }
+  std::fill_n(m.values.data() + std::size_t{slot} * kSlabValues, kSlabValues, static_cast<Half>(entry));
+  m.slabs[slab] = slot;
+  return slot;
+}
+
+std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunkEdge> densities) {
+  std::array<Half, kChunkEdge> uniform_row;
+  const Half* old = row(y, z);
+  if (old == nullptr) {
+    uniform_row.fill(get(0, y, z));
+    old = uniform_row.data();
+  }
+  if (std::memcmp(old, densities.data(), sizeof(Half) * kChunkEdge) == 0) return 0;
+  const std::uint64_t changed = differences(old, densities.data());
+  if (mixed_ == nullptr) make_mixed();
+  mixed_.make_own();
+  const std::uint32_t slot = slot_for_writing(Chunk::slab_index(y, z));
+  const std::size_t first = (std::size_t{slot} * kSlabRows + static_cast<std::size_t>(Chunk::row_in_slab(y, z)));
+  std::memcpy(mixed_->values.data() + first * kChunkEdge, densities.data(), sizeof(Half) * kChunkEdge);
+  mixed_->solid[static_cast<std::size_t>(z * kChunkEdge + y)] = solid_bits(densities.data());
+  return changed;
+}
+
+void DensityChunk::unite_slabs() {
+  if (mixed_ == nullptr) return;
+  for (std::size_t i = 0; i < mixed_->slabs.size(); ++i) {
+    const std::uint32_t slab = mixed_->slabs[i];
+    if ((slab & kUniformSlab) != 0) continue;
+    const Half* values = mixed_->row(slab, 0);
+    // All are equal when each equals the next.
+    if (std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) != 0) continue;
+    const Half value = *values;
+    mixed_.make_own();
+    mixed_->free_slots.push_back(slab);
+    mixed_->slabs[i] = kUniformSlab | value;
+  }
+  const std::uint32_t first = mixed_->slabs[0];
+  if ((first & kUniformSlab) == 0) return;
+  const bool is_uniform =
+      std::all_of(mixed_->slabs.begin(), mixed_->slabs.end(), [&](std::uint32_t s) { return s == first; });
+  if (is_uniform) fill(static_cast<Half>(first));
+}
+
+void DensityChunk::compact() {
+  unite_slabs();
+  materials_.compact();
+  // What others share they would keep all the same.
+  if (mixed_ == nullptr || mixed_.is_shared()) return;
+  std::vector<Half> values;
+  Mixed& m = *mixed_;
+  values.reserve(m.values.size() - m.free_slots.size() * kSlabValues);
+  for (std::uint32_t& slab : m.slabs) {
+    if ((slab & kUniformSlab) != 0) continue;
+    const Half* from = m.row(slab, 0);
+    slab = static_cast<std::uint32_t>(values.size() / kSlabValues);
+    values.insert(values.end(), from, from + kSlabValues);
+  }
+  m.values = std::move(values);
+  m.free_slots = {};
+}
+
+bool DensityChunk::is_full() const {
+  if (mixed_ == nullptr) return is_solid(uniform_);
+  return std::all_of(mixed_->solid.begin(), mixed_->solid.end(), [](std::uint64_t row) { return ~row == 0; });
+}
+
+std::uint64_t DensityChunk::content_hash() const {
+  std::uint64_t hash = materials_.content_hash();
+  std::array<Half, kChunkEdge> row{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      read_row(y, z, row);
+      hash = mixed_with(hash, hash_of_row(row));
+    }
+  }
+  return hash;
+}
+
+std::size_t DensityChunk::bytes() const {
+  const std::size_t fixed = sizeof(DensityChunk) - sizeof(Chunk) + materials_.bytes();
+  if (mixed_ == nullptr) return fixed;
+  return fixed + sizeof(Mixed) + mixed_->values.capacity() * sizeof(Half) +
+         mixed_->free_slots.capacity() * sizeof(std::uint32_t);
+}
+
+}  // namespace quoin

@@ -1,0 +1,154 @@
+#include <algorithm>
+#include <cmath>
+
+#include "grid/density/density_grid_impl.h"
+#include "grid/density/density_shapes.h"
+
+namespace quoin {
+namespace {
+
+// From the middle of a chunk's samples, and of a row's, to the farthest one.
+constexpr double kMiddle = 0.5 * (kChunkEdge - 1);
+constexpr double kChunkRadius = 54.6;
+constexpr double kRowRadius = kMiddle;
+
+/// The least of two distances; where they differ by less than `blend`, a parabola that meets both without a crease.
+///
+/// Densities end at the band: one that reads `band` may be anything beyond, so the blend narrows to nothing towards it.
+/// Source: I. Quilez, "smooth minimum": min(a, b) - h^2 / (4 k), h = max(k - |a - b|, 0).
+double united(double a, double b, double blend, double band) {
+  const double width = std::min(blend, band - std::max(a, b));
+  if (!(width > 0.0)) return std::min(a, b);
+  const double overlap = std::max(width - std::abs(a - b), 0.0);
+  return std::min(a, b) - overlap * overlap / (4.0 * width);
+}
+
+bool is_length(double value) {
+  return value >= 0.0 && std::isfinite(value);
+}
+
+// Gives part of a row new densities: `combine(density, distance to the shape)`. Samples that become solid take
+// `material`.
+template <class Shape, class Combine>
+void combine_row(const Shape& shape, IVec3 start, int first, int end, VoxelType material, SampleRow& row,
+                 Combine&& combine) {
+  for (int x = first; x < end; ++x) {
+    const auto i = static_cast<std::size_t>(x);
+    const float before = row.densities[i];
+    const double distance = shape.distance(DVec3(start) + DVec3{static_cast<double>(x), 0.0, 0.0});
+    row.densities[i] = static_cast<float>(combine(double{before}, distance));
+    if (!(before < 0.0F) && row.densities[i] < 0.0F) row.materials[i] = material;
+  }
+}
+
+// Applies `combine` wherever the shape's distance is below the band; elsewhere it must leave densities as they are.
+template <class Shape, class Combine>
+std::int64_t apply_shape(DensityStore& store, const Shape& shape, bool adds, VoxelType material, Combine&& combine) {
+  const double band = store.band();
+  const auto choose = [&](IVec3 chunk) {
+    const double distance = shape.distance(DVec3(chunk) * double{kChunkEdge} + kMiddle);
+    if (distance - kChunkRadius >= band) return ChunkEdit::Nothing;
+    return adds && distance + kChunkRadius <= -band ? ChunkEdit::Solid : ChunkEdit::Rows;
+  };
+  const auto change = [&](IVec3 start, int first, int end, SampleRow& row) {
+    if (shape.distance(DVec3(start) + DVec3{kMiddle, 0.0, 0.0}) - kRowRadius >= band) return false;
+    combine_row(shape, start, first, end, material, row, combine);
+    return true;
+  };
+  return store.edit(box_around(shape.min() - band, shape.max() + band), adds, material, choose, change);
+}
+
+template <class Shape>
+std::int64_t add_shape(DensityStore& store, const Shape& shape, VoxelType material, double blend) {
+  if (!shape.is_sound() || !is_length(blend)) return 0;
+  return apply_shape(store, shape, true, material,
+                     [&](double a, double b) { return united(a, b, blend, store.band()); });
+}
+
+template <class Shape>
+std::int64_t remove_shape(DensityStore& store, const Shape& shape, double blend) {
+  if (!shape.is_sound() || !is_length(blend)) return 0;
+  return apply_shape(store, shape, false, kAir,
+                     [&](double a, double b) { return -united(-a, b, blend, store.band()); });
+}
+
+}  // namespace
+
+bool DensityGrid::set(IVec3 sample, DensitySample value) {
+  notice_.give();
+  const auto replace = [&](IVec3 start, int, int, SampleRow& row) {
+    const auto i = static_cast<std::size_t>(sample.x - start.x);
+    row.densities[i] = value.density;
+    row.materials[i] = value.material;
+    return true;
+  };
+  const auto rows = [](IVec3) { return ChunkEdit::Rows; };
+  return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace) != 0;
+}
+
+std::int64_t DensityGrid::edit_rows(
+    const IBox& box,
+    FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change) {
+  notice_.give();
+  const auto change_part = [&](IVec3 start, int first, int end, SampleRow& row) {
+    const auto from = static_cast<std::size_t>(first);
+    const auto count = static_cast<std::size_t>(end - first);
+    change(start + IVec3{first, 0, 0}, std::span(row.densities).subspan(from, count),
+           std::span(row.materials).subspan(from, count));
+    return true;
+  };
+  const auto rows = [](IVec3) { return ChunkEdit::Rows; };
+  return impl_->store.edit(box_from(box), true, kAir, rows, change_part);
+}
+
+std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend) {
+  notice_.give();
+  return add_shape(impl_->store, Sphere(centre, radius), material, blend);
+}
+
+std::int64_t DensityGrid::remove_sphere(DVec3 centre, double radius, double blend) {
+  notice_.give();
+  return remove_shape(impl_->store, Sphere(centre, radius), blend);
+}
+
+std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend) {
+  notice_.give();
+  return add_shape(impl_->store, RoundedBox(min, max, rounding), material, blend);
+}
+
+std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, double blend) {
+  notice_.give();
+  return remove_shape(impl_->store, RoundedBox(min, max, rounding), blend);
+}
+
+std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength,
+                                  VoxelType material) {
+  const Brush brush(centre, radius, strength);
+  const Plane plane(point, normal);
+  if (!brush.is_sound() || !plane.is_sound()) return 0;
+  notice_.give();
+  DensityStore& store = impl_->store;
+  const double band = store.band();
+  const auto choose = [&](IVec3 chunk) {
+    const DVec3 middle = DVec3(chunk) * double{kChunkEdge} + kMiddle;
+    if (brush.sphere().distance(middle) >= kChunkRadius) return ChunkEdit::Nothing;
+    const bool stays_air = plane.distance(middle) - kChunkRadius >= band && store.find(chunk) == nullptr;
+    return stays_air ? ChunkEdit::Nothing : ChunkEdit::Rows;
+  };
+  const auto change = [&](IVec3 start, int first, int end, SampleRow& row) {
+    for (int x = first; x < end; ++x) {
+      const DVec3 at = DVec3(start) + DVec3{static_cast<double>(x), 0.0, 0.0};
+      const double weight = brush.weight(at);
+      if (weight == 0.0) continue;
+      float& density = row.densities[static_cast<std::size_t>(x)];
+      const double wanted = std::clamp(plane.distance(at), -band, band);
+      const auto moved = static_cast<float>(density + weight * (wanted - density));
+      if (!(density < 0.0F) && moved < 0.0F) row.materials[static_cast<std::size_t>(x)] = material;
+      density = moved;
+    }
+    return true;
+  };
+  return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, material, choose, change);
+}
+
+}  // namespace quoin

@@ -1,0 +1,143 @@
+#include <quoin/grid/density_grid.h>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include <quoin/core/assert.h>
+
+#include "grid/density/density_grid_impl.h"
+
+namespace quoin {
+
+DensityGrid::DensityGrid(float band) : impl_(std::make_unique<Impl>(band)) {}
+DensityGrid::DensityGrid(DensityGrid&&) noexcept = default;
+DensityGrid& DensityGrid::operator=(DensityGrid&&) noexcept = default;
+DensityGrid::~DensityGrid() = default;
+
+DensityGrid::DensityGrid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+DensityGrid DensityGrid::snapshot() const {
+  return DensityGrid(std::make_unique<Impl>(*impl_));
+}
+
+float DensityGrid::band() const {
+  return impl_->store.band();
+}
+
+float DensityGrid::density(IVec3 sample) const {
+  return float_from_half(impl_->store.get(sample));
+}
+
+VoxelType DensityGrid::material(IVec3 sample) const {
+  return impl_->store.material(sample);
+}
+
+void DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
+  impl_->store.put(chunk, std::move(samples));
+  notice_.give();
+}
+
+void DensityGrid::clear() {
+  impl_->store.clear();
+  notice_.give();
+}
+
+const DensityChunk* DensityGrid::find_chunk(IVec3 chunk) const {
+  const DensityStore::Entry* entry = impl_->store.find(chunk);
+  return entry == nullptr ? nullptr : &entry->samples;
+}
+
+std::vector<IVec3> DensityGrid::chunks() const {
+  return impl_->store.chunks();
+}
+
+std::size_t DensityGrid::chunk_count() const {
+  return impl_->store.entries().size();
+}
+
+DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
+  DensityNeighbourhood result;
+  result.outside = impl_->store.far();
+  std::size_t i = 0;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) result.chunks[i++] = find_chunk(chunk + IVec3{dx, dy, dz});
+    }
+  }
+  return result;
+}
+
+IBox DensityGrid::solid_bounds() const {
+  IBox box;
+  impl_->store.entries().for_each([&](IVec3 at, const DensityStore::Entry& entry) {
+    IBox inside;
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        const std::uint64_t solid = entry.samples.solid_row(y, z);
+        if (solid == 0) continue;
+        inside = unite(inside, {{std::countr_zero(solid), y, z}, {kChunkEdge - std::countl_zero(solid), y + 1, z + 1}});
+      }
+    }
+    if (!inside.empty()) box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
+  });
+  return box;
+}
+
+std::int64_t DensityGrid::solid_count() const {
+  std::int64_t count = 0;
+  impl_->store.entries().for_each([&](IVec3, const DensityStore::Entry& entry) {
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) count += std::popcount(entry.samples.solid_row(y, z));
+    }
+  });
+  return count;
+}
+
+DensityChanges DensityGrid::changes_since(ChangeCursor& cursor) const {
+  DensityChanges changes;
+  changes.all = !impl_->store.journal().visit_since(
+      cursor, [&](const DensityRecord& record) { changes.items.push_back(record.change()); });
+  unite_changes(changes.items, by_chunk, [](DensityChange& into, const DensityChange& other) {
+    into.box = unite(into.box, other.box);
+    for (std::size_t i = 0; i < 27; ++i) into.distance[i] = std::min(into.distance[i], other.distance[i]);
+  });
+  return changes;
+}
+
+bool DensityGrid::has_changed_since(const ChangeCursor& cursor) const {
+  return impl_->store.journal().has_changed_since(cursor);
+}
+
+ChangeCursor DensityGrid::cursor() const {
+  return impl_->store.journal().present();
+}
+
+std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges& changes, int reach) {
+  QUOIN_ASSERT(reach >= 0 && reach <= kChunkEdge, "0 <= reach <= 64");
+  std::vector<IVec3> chunks;
+  const auto add_around = [&](IVec3 chunk, auto&& is_affected) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 offset{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      if (is_affected(offset)) chunks.push_back(chunk + offset);
+    }
+  };
+  if (changes.all) {
+    for (const IVec3 chunk : grid.chunks()) add_around(chunk, [](IVec3) { return true; });
+  }
+  for (const DensityChange& change : changes.items) {
+    add_around(change.chunk, [&](IVec3 offset) { return change.affects(offset, reach); });
+  }
+  sort_and_unite(chunks);
+  return chunks;
+}
+
+std::size_t DensityGrid::bytes() const {
+  return impl_->store.bytes();
+}
+
+void DensityGrid::compact() {
+  impl_->store.compact();
+}
+
+}  // namespace quoin

@@ -1,0 +1,264 @@
+#include <quoin/grid/voxel_field.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "grid/chunk_order.h"
+#include "grid/density/stored_density.h"
+
+namespace quoin {
+namespace {
+
+// Squared distances are bytes: what is farther than the reach counts as one more.
+constexpr int kReach = 8;
+constexpr int kFarSquared = (kReach + 1) * (kReach + 1);
+// Half the width of the smoothing kernel.
+constexpr int kBlur = 2;
+constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples whose distance is wanted, along an edge
+constexpr int kMargin = kReach + kBlur;
+constexpr int kRegion = kChunkEdge + 2 * kMargin;  // voxels that are looked at, along an edge
+constexpr int kPitch = 80;                         // kSmoothed, rounded up to whole vectors
+// Solid voxels keep more of their own distance of 0.5 than air does: what is one voxel thick would shrink to a wire.
+constexpr float kLeastSolid = 0.35F;
+constexpr float kLeastAir = 0.1F;
+constexpr float kBand = 8.0F;
+static_assert(kMargin == kVoxelFieldReach);
+
+using ByteRow = std::array<std::uint8_t, kPitch>;
+
+/// The voxels of a row of the region that are not air; bit 0 is the first.
+struct RegionRow {
+  std::uint64_t low = 0;
+  std::uint64_t high = 0;
+
+  static constexpr std::uint64_t kHighBits = (std::uint64_t{1} << (kRegion - 64)) - 1;
+  [[nodiscard]] bool has_none() const { return (low | high) == 0; }
+  [[nodiscard]] bool has_all() const { return ~low == 0 && high == kHighBits; }
+  [[nodiscard]] bool has(int i) const { return ((i < 64 ? low >> i : high >> (i - 64)) & 1) != 0; }
+};
+
+struct Scratch {
+  std::array<RegionRow, kRegion * kRegion> rows;  // [z][y]
+  // Squared distances to the nearest voxel of a kind: along x, then in x and y, then in space.
+  std::array<ByteRow, kRegion * kRegion> along_x;       // [z][y]
+  std::array<ByteRow, kRegion * kSmoothed> along_xy;    // [z][y]
+  std::array<ByteRow, kSmoothed * kSmoothed> to_solid;  // [z][y]
+  std::array<ByteRow, kSmoothed * kSmoothed> to_air;
+  std::array<float, kSmoothed * kSmoothed * kChunkEdge> blurred_x;   // [z][y][x]
+  std::array<float, kSmoothed * kChunkEdge * kChunkEdge> blurred_y;  // [z][y][x]
+};
+
+// Which voxels of a row of the neighbourhood's chunks are not air. Requires: -64 <= y, z < 128.
+std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
+  const Chunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
+  return chunk == nullptr ? 0 : ~chunk->row_mask(y & (kChunkEdge - 1), z & (kChunkEdge - 1), kAir);
+}
+
+// Answers whether all voxels of the region are solid, none is, or neither.
+std::optional<bool> read_region(const Neighbourhood& chunks, Scratch& scratch) {
+  bool is_all_solid = true;
+  bool is_all_air = true;
+  for (int z = 0; z < kRegion; ++z) {
+    for (int y = 0; y < kRegion; ++y) {
+      const auto part = [&](int dx) { return solid_row(chunks, dx, y - kMargin, z - kMargin); };
+      const std::uint64_t middle = part(0);
+      RegionRow& row = scratch.rows[static_cast<std::size_t>(z * kRegion + y)];
+      row.low = part(-1) >> (64 - kMargin) | middle << kMargin;
+      row.high = (middle >> (64 - kMargin) | part(1) << kMargin) & RegionRow::kHighBits;
+      is_all_solid = is_all_solid && row.has_all();
+      is_all_air = is_all_air && row.has_none();
+    }
+  }
+  if (is_all_solid) return true;
+  return is_all_air ? std::optional(false) : std::nullopt;
+}
+
+// Squared distances along a row to the nearest voxel that is solid, or is not.
+void measure_row(const RegionRow& row, bool solid, ByteRow& out) {
+  if (solid ? row.has_none() : row.has_all()) return out.fill(kFarSquared);
+  if (solid ? row.has_all() : row.has_none()) return out.fill(0);
+  std::array<int, kRegion> distances;
+  int distance = kReach + 1;
+  for (int i = 0; i < kRegion; ++i) {
+    distance = row.has(i) == solid ? 0 : std::min(distance + 1, kReach + 1);
+    distances[static_cast<std::size_t>(i)] = distance;
+  }
+  distance = kReach + 1;
+  out.fill(kFarSquared);
+  for (int i = kRegion - 1; i >= kReach; --i) {
+    distance = row.has(i) == solid ? 0 : std::min(distance + 1, kReach + 1);
+    const int least = std::min(distance, distances[static_cast<std::size_t>(i)]);
+    if (i < kReach + kSmoothed) out[static_cast<std::size_t>(i - kReach)] = static_cast<std::uint8_t>(least * least);
+  }
+}
+
+// One more axis: the least of the neighbours' squared distances, each with the square of its own offset.
+void spread(const ByteRow* middle, int stride, ByteRow& out) {
+  out = *middle;
+  for (int offset = 1; offset <= kReach; ++offset) {
+    const ByteRow& before = *(middle - offset * stride);
+    const ByteRow& after = *(middle + offset * stride);
+    const auto square = static_cast<std::uint8_t>(offset * offset);
+    for (std::size_t x = 0; x < kPitch; ++x) {
+      const auto through = static_cast<std::uint8_t>(std::min(before[x], after[x]) + square);
+      out[x] = std::min(out[x], through);
+    }
+  }
+}
+
+// The squared distance of every sample to the nearest solid voxel, or the nearest that is air.
+// Source: P. Felzenszwalb, D. Huttenlocher, "Distance Transforms of Sampled Functions" (2012), an axis at a time, with
+//         a short reach in place of envelopes.
+void measure(Scratch& scratch, bool solid, std::array<ByteRow, kSmoothed * kSmoothed>& out) {
+  for (std::size_t row = 0; row < scratch.rows.size(); ++row) {
+    measure_row(scratch.rows[row], solid, scratch.along_x[row]);
+  }
+  for (int z = 0; z < kRegion; ++z) {
+    for (int y = 0; y < kSmoothed; ++y) {
+      spread(&scratch.along_x[static_cast<std::size_t>(z * kRegion + y + kReach)], 1,
+             scratch.along_xy[static_cast<std::size_t>(z * kSmoothed + y)]);
+    }
+  }
+  for (int z = 0; z < kSmoothed; ++z) {
+    for (int y = 0; y < kSmoothed; ++y) {
+      spread(&scratch.along_xy[static_cast<std::size_t>((z + kReach) * kSmoothed + y)], kSmoothed,
+             out[static_cast<std::size_t>(z * kSmoothed + y)]);
+    }
+  }
+}
+
+// Distances to the surface by squared distances to the nearest voxel of the other kind.
+std::array<float, kFarSquared + 1> surface_distances() {
+  std::array<float, kFarSquared + 1> table{};
+  for (std::size_t i = 1; i < table.size(); ++i) table[i] = std::sqrt(static_cast<float>(i)) - 0.5F;
+  return table;
+}
+
+constexpr std::array<float, 5> kKernel = {1.0F / 16.0F, 4.0F / 16.0F, 6.0F / 16.0F, 4.0F / 16.0F, 1.0F / 16.0F};
+
+// Smooths the signed distances along x.
+void blur_along_x(Scratch& scratch) {
+  static const std::array<float, kFarSquared + 1> distance_of = surface_distances();
+  std::array<float, kSmoothed> signed_distances;
+  for (std::size_t row = 0; row < kSmoothed * kSmoothed; ++row) {
+    const ByteRow& to_solid = scratch.to_solid[row];
+    const ByteRow& to_air = scratch.to_air[row];
+    // One of the two is 0.
+    for (std::size_t x = 0; x < kSmoothed; ++x) signed_distances[x] = distance_of[to_solid[x]] - distance_of[to_air[x]];
+    float* out = scratch.blurred_x.data() + row * kChunkEdge;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      const float* d = signed_distances.data() + x;
+      out[x] = (kKernel[0] * (d[0] + d[4]) + kKernel[1] * (d[1] + d[3])) + kKernel[2] * d[2];
+    }
+  }
+}
+
+// Smooths a row of 64 with those beside it, `stride` values apart.
+void blur_rows(const float* first, std::size_t stride, float* out) {
+  for (std::size_t x = 0; x < kChunkEdge; ++x) {
+    const float* d = first + x;
+    const float outer = d[0] + d[4 * stride];
+    const float inner = d[stride] + d[3 * stride];
+    out[x] = (kKernel[0] * outer + kKernel[1] * inner) + kKernel[2] * d[2 * stride];
+  }
+}
+
+void blur_along_y(Scratch& scratch) {
+  for (std::size_t z = 0; z < kSmoothed; ++z) {
+    for (std::size_t y = 0; y < kChunkEdge; ++y) {
+      blur_rows(scratch.blurred_x.data() + (z * kSmoothed + y) * kChunkEdge, kChunkEdge,
+                scratch.blurred_y.data() + (z * kChunkEdge + y) * kChunkEdge);
+    }
+  }
+}
+
+// The last axis; densities keep the signs of their voxels.
+void write_densities(const Scratch& scratch, Half far, DensityChunk& out) {
+  constexpr std::size_t kPlane = std::size_t{kChunkEdge} * kChunkEdge;
+  std::array<float, kChunkEdge> smoothed;
+  std::array<Half, kChunkEdge> row;
+  for (std::size_t z = 0; z < kChunkEdge; ++z) {
+    for (std::size_t y = 0; y < kChunkEdge; ++y) {
+      blur_rows(scratch.blurred_y.data() + z * kPlane + y * kChunkEdge, kPlane, smoothed.data());
+      const ByteRow& to_solid = scratch.to_solid[(z + kBlur) * kSmoothed + y + kBlur];
+      for (std::size_t x = 0; x < kChunkEdge; ++x) {
+        const bool is_solid = to_solid[x + kBlur] == 0;
+        row[x] = stored_within(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), far);
+      }
+      out.write_row(static_cast<int>(y), static_cast<int>(z), row);
+    }
+  }
+}
+
+bool is_one_kind_throughout(const Neighbourhood& chunks) {
+  const auto kind = [](const Chunk* chunk) -> std::optional<bool> {
+    if (chunk == nullptr) return false;
+    const auto uniform = chunk->uniform();
+    return uniform ? std::optional(*uniform != kAir) : std::nullopt;
+  };
+  const std::optional<bool> first = kind(chunks.chunks[0]);
+  return first.has_value() && std::all_of(chunks.chunks.begin(), chunks.chunks.end(),
+                                          [&](const Chunk* chunk) { return kind(chunk) == first; });
+}
+
+// The chunks that hold a voxel, and those around them: the band reaches into these.
+std::vector<IVec3> chunks_near(const Grid& grid) {
+  std::vector<IVec3> all;
+  for (const IVec3 at : grid.chunks()) {
+    for (int i = 0; i < 27; ++i) all.push_back(at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
+  }
+  sort_and_unite(all);
+  return all;
+}
+
+}  // namespace
+
+DensityChunk density_of_voxels(const Neighbourhood& chunks) {
+  const Half far = largest_within(kBand);
+  const Half deep = stored_within(-kBand, far);
+  const Chunk* voxels = chunks.at(0, 0, 0);
+  DensityChunk made(far);
+  if (voxels != nullptr) made.materials() = *voxels;
+  std::optional<bool> is_solid;
+  std::unique_ptr<Scratch> scratch;
+  if (is_one_kind_throughout(chunks)) {
+    is_solid = voxels != nullptr;
+  } else {
+    scratch.reset(new Scratch);  // without writing zeros first
+    is_solid = read_region(chunks, *scratch);
+  }
+  if (is_solid.has_value()) {
+    if (*is_solid) made.fill(deep);
+    return made;
+  }
+  measure(*scratch, true, scratch->to_solid);
+  measure(*scratch, false, scratch->to_air);
+  blur_along_x(*scratch);
+  blur_along_y(*scratch);
+  write_densities(*scratch, far, made);
+  made.unite_slabs();
+  return made;
+}
+
+DensityGrid field_from_grid(const Grid& grid, Threads threads) {
+  DensityGrid field(kBand);
+  const std::vector<IVec3> places = chunks_near(grid);
+  // In batches, so that little waits to be put in place.
+  constexpr std::size_t kBatch = 64;
+  std::vector<std::optional<DensityChunk>> made(std::min(kBatch, places.size()));
+  for (std::size_t first = 0; first < places.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, places.size() - first);
+    parallel_for(count, threads,
+                 [&](std::size_t i) { made[i] = density_of_voxels(grid.neighbourhood(places[first + i])); });
+    for (std::size_t i = 0; i < count; ++i) field.put_chunk(places[first + i], std::move(*made[i]));
+  }
+  return field;
+}
+
+}  // namespace quoin

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "render_vk/device/instance.h"
+
+namespace quoin::vulkan {
+
+/// A device, its one queue, and one batch of commands at a time.
+class Device {
+ public:
+  /// Errors: Unsupported, LimitExceeded.
+  [[nodiscard]] static Result<std::unique_ptr<Device>> create(const VulkanOptions& options);
+  ~Device();
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
+  [[nodiscard]] const Api& api() const { return api_; }
+  [[nodiscard]] VkDevice handle() const { return handle_; }
+  [[nodiscard]] const VulkanDevice& description() const { return physical_.description; }
+  /// What it can do, and how it is known to Vulkan.
+  [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
+  [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
+  [[nodiscard]] VkQueue queue() const { return queue_; }
+  /// Of the window that pictures are shown in; null where there is none.
+  [[nodiscard]] VkSurfaceKHR surface() const { return instance_->surface(); }
+
+  /// What a failed call comes to. `doing`: as in "drawing".
+  [[nodiscard]] Error error_of(VkResult result, const std::string& doing) const;
+  /// Nothing on success.
+  [[nodiscard]] Status check(VkResult result, const std::string& doing) const {
+    if (result == VK_SUCCESS) return {};
+    return tl::unexpected<Error>(error_of(result, doing));
+  }
+
+  /// Has the commands that `record` records run, and waits for them. What they write is then seen by the processor
+  /// and by later commands.
+  [[nodiscard]] Status run(const std::string& doing, const std::function<void(VkCommandBuffer)>& record);
+
+  /// Between commands of which the later read or overwrite what the earlier wrote.
+  void separate(VkCommandBuffer commands) const;
+
+ private:
+  Device() = default;
+  Status open(const PhysicalDevice& physical);
+  VkResult make_commands();
+
+  std::unique_ptr<VulkanInstance> instance_;
+  Api api_;
+  PhysicalDevice physical_;
+  VkPhysicalDeviceMemoryProperties memory_{};
+  VkDevice handle_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,240 @@
+#include "render_vk/device/instance.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <optional>
+
+namespace quoin::vulkan {
+namespace {
+
+constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
+
+tl::unexpected<Error> refuse(std::string message) {
+  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+}
+
+bool has_validation(const Api& api) {
+  std::uint32_t count = 0;
+  api.vkEnumerateInstanceLayerProperties(&count, nullptr);
+  std::vector<VkLayerProperties> layers(count);
+  api.vkEnumerateInstanceLayerProperties(&count, layers.data());
+  return std::any_of(layers.begin(), layers.end(), [](const VkLayerProperties& layer) {
+    return std::strcmp(layer.layerName, kValidationLayer) == 0;
+  });
+}
+
+VKAPI_ATTR VkBool32 VKAPI_CALL pass_on(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                                       const VkDebugUtilsMessengerCallbackDataEXT* data, void* listener) {
+  (*static_cast<const MessageListener*>(listener))(data->pMessage);
+  return VK_FALSE;
+}
+
+VkDebugUtilsMessengerCreateInfoEXT messenger_info(MessageListener& listener) {
+  auto info = info_of<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+  info.messageSeverity =
+      VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+  info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_PERFORMANCE_BIT_EXT;
+  info.pfnUserCallback = pass_on;
+  info.pUserData = &listener;
+  return info;
+}
+
+std::string kind_of(VkPhysicalDeviceType type) {
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return "discrete";
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return "integrated";
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return "virtual";
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return "cpu";
+    default:
+      return "other";
+  }
+}
+
+// The better a device, the less.
+int rank_of(const PhysicalDevice& device) {
+  constexpr std::array kOrder = {VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU, VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU,
+                                 VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU, VK_PHYSICAL_DEVICE_TYPE_CPU};
+  return static_cast<int>(std::find(kOrder.begin(), kOrder.end(), device.type) - kOrder.begin());
+}
+
+// The first family whose queues can do all that `wanted` says.
+std::optional<std::uint32_t> queue_family(const Api& api, VkPhysicalDevice device, VkQueueFlags wanted) {
+  std::uint32_t count = 0;
+  api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  const auto found = std::find_if(families.begin(), families.end(), [=](const VkQueueFamilyProperties& family) {
+    return (family.queueFlags & wanted) == wanted && family.queueCount > 0;
+  });
+  if (found == families.end()) return std::nullopt;
+  return static_cast<std::uint32_t>(found - families.begin());
+}
+
+bool has_addresses(const Api& api, VkPhysicalDevice device) {
+  auto addresses = info_of<VkPhysicalDeviceBufferDeviceAddressFeatures>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
+  VkPhysicalDeviceFeatures2 features{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &addresses, {}};
+  api.vkGetPhysicalDeviceFeatures2(device, &features);
+  return addresses.bufferDeviceAddress != VK_FALSE;
+}
+
+// Whether queues of the family can show pictures in the window.
+bool can_present(const Api& api, VkPhysicalDevice device, std::uint32_t family, VkSurfaceKHR surface) {
+  std::uint32_t count = 0;
+  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
+  const bool has_swapchain = std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties& one) {
+    return std::strcmp(one.extensionName, VK_KHR_SWAPCHAIN_EXTENSION_NAME) == 0;
+  });
+  VkBool32 can = VK_FALSE;
+  return has_swapchain && api.vkGetPhysicalDeviceSurfaceSupportKHR(device, family, surface, &can) == VK_SUCCESS &&
+         can != VK_FALSE;
+}
+
+PhysicalDevice describe(const Api& api, VkPhysicalDevice handle, VkSurfaceKHR surface) {
+  VkPhysicalDeviceProperties properties{};
+  api.vkGetPhysicalDeviceProperties(handle, &properties);
+  PhysicalDevice device;
+  device.handle = handle;
+  device.type = properties.deviceType;
+  device.description = {properties.deviceName, kind_of(properties.deviceType), ""};
+  auto family = queue_family(api, handle, VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT);
+  device.draws_triangles = family.has_value();
+  if (!family) family = queue_family(api, handle, VK_QUEUE_COMPUTE_BIT);
+  if (properties.apiVersion < VK_API_VERSION_1_2) {
+    device.description.missing = "Vulkan 1.2";
+  } else if (!family) {
+    device.description.missing = "a queue that computes";
+  } else if (!has_addresses(api, handle)) {
+    device.description.missing = "bufferDeviceAddress";
+  } else if (surface != VK_NULL_HANDLE && !(device.draws_triangles && can_present(api, handle, *family, surface))) {
+    device.description.missing = "a way to show pictures in this window";
+  }
+  VkPhysicalDeviceFeatures features{};
+  api.vkGetPhysicalDeviceFeatures(handle, &features);
+  device.draws_lines = device.draws_triangles && features.fillModeNonSolid != VK_FALSE;
+  device.queue_family = family.value_or(0);
+  return device;
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() && text.size() < 9 &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+}  // namespace
+
+Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener, const VulkanSurface& window) {
+  auto api = Api::load();
+  if (!api) return tl::unexpected(api.error());
+  std::unique_ptr<VulkanInstance> instance(new VulkanInstance(*api, std::move(listener)));
+  if (Status opened = instance->open(window); !opened) return tl::unexpected(opened.error());
+  if (Status listed = instance->list_devices(); !listed) return tl::unexpected(listed.error());
+  return instance;
+}
+
+VulkanInstance::~VulkanInstance() {
+  if (handle_ == VK_NULL_HANDLE) return;
+  if (surface_ != VK_NULL_HANDLE) api_.vkDestroySurfaceKHR(handle_, surface_, nullptr);
+  if (messenger_ != VK_NULL_HANDLE) {
+    const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
+        api_.vkGetInstanceProcAddr(handle_, "vkDestroyDebugUtilsMessengerEXT"));
+    destroy(handle_, messenger_, nullptr);
+  }
+  api_.vkDestroyInstance(handle_, nullptr);
+}
+
+Status VulkanInstance::open(const VulkanSurface& window) {
+  std::uint32_t version = 0;
+  if (api_.vkEnumerateInstanceVersion(&version) != VK_SUCCESS || version < VK_API_VERSION_1_2) {
+    return refuse("the loader here is older than version 1.2");
+  }
+  if (listener_ && !has_validation(api_)) return refuse(std::string("there is no ") + kValidationLayer + " here");
+  auto application = info_of<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
+  application.pApplicationName = application.pEngineName = "quoin";
+  application.apiVersion = VK_API_VERSION_1_2;
+  std::vector<const char*> extensions;
+  for (const std::string& name : window.extensions) extensions.push_back(name.c_str());
+  VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
+  auto info = info_of<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
+  info.pApplicationInfo = &application;
+  if (listener_) {
+    info.pNext = &messenger;
+    info.enabledLayerCount = 1;
+    info.ppEnabledLayerNames = &kValidationLayer;
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+  }
+  info.enabledExtensionCount = static_cast<std::uint32_t>(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
+  if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &handle_); result != VK_SUCCESS) {
+    if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("there is no driver for any graphics device here");
+    if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver here shows pictures in windows");
+    return refuse("no instance can be made (VkResult " + std::to_string(result) + ")");
+  }
+  api_.load_instance(handle_);
+  if (Status heard = listen(); !heard || !window.make) return heard;
+  const std::uint64_t surface = window.make(handle_);
+  if (surface == 0) return refuse("the window cannot show pictures");
+  std::memcpy(&surface_, &surface, sizeof surface_);
+  return {};
+}
+
+Status VulkanInstance::listen() {
+  if (!listener_) return {};
+  const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
+  const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+      api_.vkGetInstanceProcAddr(handle_, "vkCreateDebugUtilsMessengerEXT"));
+  if (create(handle_, &messenger, nullptr, &messenger_) != VK_SUCCESS) return refuse("validation cannot be heard");
+  return {};
+}
+
+Status VulkanInstance::list_devices() {
+  std::uint32_t count = 0;
+  std::vector<VkPhysicalDevice> handles;
+  if (api_.vkEnumeratePhysicalDevices(handle_, &count, nullptr) == VK_SUCCESS) {
+    handles.resize(count);
+    api_.vkEnumeratePhysicalDevices(handle_, &count, handles.data());
+    handles.resize(count);
+  }
+  if (handles.empty()) return refuse("there is no driver for any graphics device here");
+  for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle, surface_));
+  return {};
+}
+
+Result<PhysicalDevice> VulkanInstance::choose(const std::string& wanted) const {
+  const PhysicalDevice* chosen = nullptr;
+  if (is_number(wanted)) {
+    const auto index = static_cast<std::size_t>(std::stoul(wanted));
+    if (index < devices_.size()) chosen = &devices_[index];
+  } else {
+    for (const PhysicalDevice& device : devices_) {
+      if (!wanted.empty() && lower(device.description.name).find(lower(wanted)) == std::string::npos) continue;
+      const auto score = [](const PhysicalDevice& d) { return std::pair(!d.description.missing.empty(), rank_of(d)); };
+      if (chosen == nullptr || score(device) < score(*chosen)) chosen = &device;
+    }
+  }
+  if (chosen == nullptr) {
+    std::string all;
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      all += (i == 0 ? "" : ", ") + std::to_string(i) + " " + devices_[i].description.name;
+    }
+    return refuse("there is no device \"" + wanted + "\"; there is " + all);
+  }
+  const VulkanDevice& description = chosen->description;
+  if (!description.missing.empty()) return refuse(description.name + " lacks " + description.missing);
+  return *chosen;
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "render_vk/device/api.h"
+
+namespace quoin::vulkan {
+
+using MessageListener = std::function<void(const std::string&)>;
+
+/// A device that could be used, or the reason why not.
+struct PhysicalDevice {
+  VkPhysicalDevice handle = VK_NULL_HANDLE;
+  VkPhysicalDeviceType type = VK_PHYSICAL_DEVICE_TYPE_OTHER;
+  std::uint32_t queue_family = 0;
+  bool draws_triangles = false;  ///< that queue
+  bool draws_lines = false;      ///< for the edges of triangles
+  VulkanDevice description;
+};
+
+/// Vulkan as this program sees it.
+class VulkanInstance {
+ public:
+  /// With `listener` the validation layer is loaded; with `window`, a surface is made. Errors: Unsupported.
+  [[nodiscard]] static Result<std::unique_ptr<VulkanInstance>> create(MessageListener listener,
+                                                                      const VulkanSurface& window = {});
+  ~VulkanInstance();
+  VulkanInstance(const VulkanInstance&) = delete;
+  VulkanInstance& operator=(const VulkanInstance&) = delete;
+
+  [[nodiscard]] const Api& api() const { return api_; }
+  [[nodiscard]] const std::vector<PhysicalDevice>& devices() const { return devices_; }
+  /// Of the window; null where there is none.
+  [[nodiscard]] VkSurfaceKHR surface() const { return surface_; }
+  /// As VulkanOptions::device says. Errors: Unsupported.
+  [[nodiscard]] Result<PhysicalDevice> choose(const std::string& wanted) const;
+
+ private:
+  explicit VulkanInstance(const Api& api, MessageListener listener) : api_(api), listener_(std::move(listener)) {}
+  Status open(const VulkanSurface& window);
+  Status listen();
+  Status list_devices();
+
+  Api api_;
+  MessageListener listener_;
+  VkInstance handle_ = VK_NULL_HANDLE;
+  VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
+  VkSurfaceKHR surface_ = VK_NULL_HANDLE;
+  std::vector<PhysicalDevice> devices_;
+};
+
+}  // namespace quoin::vulkan

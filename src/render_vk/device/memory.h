@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render_vk/device/device.h"
+
+namespace quoin::vulkan {
+
+/// A kind of memory that is among the `allowed` ones and has all that is wanted.
+[[nodiscard]] std::optional<std::uint32_t> memory_type(const VkPhysicalDeviceMemoryProperties& memory,
+                                                       std::uint32_t allowed, VkMemoryPropertyFlags wanted);
+
+/// One buffer with memory of its own.
+class Buffer {
+ public:
+  enum class Where : std::uint8_t {
+    Device,  ///< where the device reads fastest
+    Upload,  ///< written by the processor through `mapped`
+    Read,    ///< read by the processor through `mapped`
+  };
+
+  Buffer() = default;
+  /// Errors: LimitExceeded when that memory is full.
+  [[nodiscard]] static Result<Buffer> create(const Device& device, VkDeviceSize size, Where where,
+                                             const std::string& doing);
+  Buffer(Buffer&& other) noexcept { swap(other); }
+  Buffer& operator=(Buffer&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~Buffer();
+
+  [[nodiscard]] VkBuffer handle() const { return handle_; }
+  [[nodiscard]] VkDeviceSize size() const { return size_; }
+  [[nodiscard]] VkDeviceAddress address() const { return address_; }
+  [[nodiscard]] std::byte* mapped() const { return mapped_; }
+
+ private:
+  void swap(Buffer& other) noexcept;
+
+  const Device* device_ = nullptr;
+  VkBuffer handle_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkDeviceSize size_ = 0;
+  VkDeviceAddress address_ = 0;
+  std::byte* mapped_ = nullptr;
+};
+
+/// A part of a block of device memory. Shaders know it by its address, a multiple of 32.
+struct Place {
+  std::size_t block = 0;
+  VkDeviceSize offset = 0;
+  VkDeviceSize size = 0;  ///< 0: nothing
+  VkDeviceAddress address = 0;
+};
+
+/// Device memory, in as many blocks as it takes, each a buffer that is cut up; and the way there.
+class DeviceMemory {
+ public:
+  static constexpr VkDeviceSize kAlignment = 32;
+
+  DeviceMemory(Device& device, VkDeviceSize block_bytes) : device_(&device), block_bytes_(block_bytes) {}
+
+  /// What is larger than a block gets a block of its own. Errors: LimitExceeded when the device's memory is full.
+  [[nodiscard]] Result<Place> allocate(VkDeviceSize size, const std::string& doing);
+  /// Leaves `place` empty. Requires: no commands that use it run.
+  void release(Place& place);
+
+  /// Puts bytes in place, before what `flush` is followed by.
+  [[nodiscard]] Status write(const Place& place, std::span<const std::byte> bytes, VkDeviceSize offset = 0);
+  [[nodiscard]] Status flush();
+  /// Forgets what was written since the last `flush`.
+  void discard();
+
+  /// The buffer that a place lies in, at its offset.
+  [[nodiscard]] VkBuffer buffer_of(const Place& place) const { return blocks_[place.block]->buffer.handle(); }
+  [[nodiscard]] std::size_t block_count() const;
+  /// By `write`, so far.
+  [[nodiscard]] std::uint64_t written() const { return written_; }
+
+ private:
+  struct Block {
+    Buffer buffer;
+    std::map<VkDeviceSize, VkDeviceSize> free;  // size by offset
+  };
+  struct Copy {
+    VkBuffer to;
+    VkBufferCopy region;
+  };
+  [[nodiscard]] Place take(std::size_t block, VkDeviceSize size);
+
+  Device* device_;
+  VkDeviceSize block_bytes_;
+  std::vector<std::unique_ptr<Block>> blocks_;  // null: given back
+  Buffer staging_;
+  VkDeviceSize staged_ = 0;
+  std::vector<Copy> copies_;
+  std::uint64_t written_ = 0;
+};
+
+}  // namespace quoin::vulkan

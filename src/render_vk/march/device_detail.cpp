@@ -1,0 +1,128 @@
+#include "render_vk/march/device_detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin::vulkan {
+namespace {
+
+// What the device knows of the place of a grid that is traced halved.
+void put_in(const CoarseLevel& coarse, const SceneGrid& grid, const DeviceGrid& voxels, std::int32_t index,
+            DevicePlaced& each) {
+  each.placed.grid = &grid;
+  coarse.put_in(each.placed);
+  each.grid = index;
+  each.origin = voxels.origin();
+  each.low = DVec3(coarse.tight.min - each.origin);
+  each.high = DVec3(coarse.tight.max - each.origin);
+}
+
+}  // namespace
+
+void DeviceDetail::clear() {
+  memory_->discard();
+  for (auto& [key, level] : levels_) level.voxels.release(*memory_);
+  levels_.clear();
+  coarse_.forget([](GridHandle) { return true; });
+  impostors_.forget([](GridHandle) { return true; });
+  memory_->release(table_place_);
+  table_.clear();
+}
+
+void DeviceDetail::look_at(const Scene& scene) {
+  if (has_other_visibility(scene.types, followed_types_)) clear();
+  const SceneChanges changes = scene.changes_since(followed_scene_);
+  const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
+  if (!changes.all && std::none_of(changes.grids.begin(), changes.grids.end(), is_gone)) return;
+  coarse_.forget(is_gone);
+  impostors_.forget(is_gone);
+  for (auto level = levels_.begin(); level != levels_.end();) {
+    const auto each = level++;
+    if (!is_gone(each->first.grid)) continue;
+    each->second.voxels.release(*memory_);
+    levels_.erase(each);
+  }
+}
+
+Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
+                                      const Camera& camera, const RenderOptions& options, std::uint64_t most_bytes) {
+  ++picture_;
+  Placement placement = device.placement();
+  const ImpostorScreen screen(camera, options.width, options.height);
+  Status done = put_halved(device, scene, detail.selected, options.threads, placement);
+  if (done) done = impostors_.draw(scene, detail.far, screen, options.width, options.height, placement);
+  if (done) done = memory_->flush();
+  if (!done) {
+    clear();
+    return tl::unexpected(done.error());
+  }
+  drop_unused(most_bytes);
+  impostors_.drop_unused(most_bytes);
+  return placement;
+}
+
+Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
+                                std::span<const SelectedInstance> selected, Threads threads, Placement& placement) {
+  std::vector<ShaderGrid> table = device.grid_table();
+  std::vector<InstanceTree::Change> halved;
+  const CoarseGrids::Lock coarse = coarse_.make(scene, selected, threads);
+  auto next = placement.placed.begin();
+  for (const SelectedInstance& choice : selected) {
+    next = find_placed(next, placement.placed.end(), choice.instance);
+    if (next == placement.placed.end()) break;
+    if (next->placed.instance != choice.instance) continue;
+    next->placed.detail = choice.detail;
+    const GridHandle grid = scene.instances()[choice.instance].grid;
+    const CoarseLevel* found = coarse.find(grid, choice.halvings);
+    if (found == nullptr) continue;
+    const Level* level = nullptr;
+    if (Status done = put_level(*found, grid, table, level); !done) return done;
+    put_in(*found, scene.grids()[grid], level->voxels, level->index, *next);
+    halved.push_back(
+        {static_cast<std::size_t>(next - placement.placed.begin()), bounds_in_world(next->placed, found->tight)});
+  }
+  placement.instances.change(halved);
+  if (!is_same(table, table_)) {
+    table_ = std::move(table);
+    if (Status done = put_table(*memory_, table_place_, std::as_bytes(std::span(table_))); !done) return done;
+  }
+  placement.grids = table_place_.address;
+  return {};
+}
+
+// Brings a level up to date and into the table, once a picture.
+Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table,
+                               const Level*& level) {
+  Level& known = levels_[{grid, coarse.halvings}];
+  level = &known;
+  if (known.last_use == picture_) return {};
+  Status done = known.voxels.update(*memory_, *coarse.voxels, coarse.trees.opaque(), coarse.trees.transparent());
+  known.last_use = picture_;
+  known.index = static_cast<std::int32_t>(table.size());
+  table.push_back(known.voxels.shader_grid());
+  return done;
+}
+
+void DeviceDetail::drop_unused(std::uint64_t most_bytes) {
+  std::uint64_t held = halved_bytes();
+  while (held > most_bytes) {
+    const auto oldest = std::min_element(levels_.begin(), levels_.end(), [](const auto& a, const auto& b) {
+      return a.second.last_use < b.second.last_use;
+    });
+    if (oldest == levels_.end() || oldest->second.last_use == picture_) return;
+    held -= oldest->second.voxels.bytes();
+    oldest->second.voxels.release(*memory_);
+    levels_.erase(oldest);
+  }
+}
+
+std::uint64_t DeviceDetail::halved_bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& [key, level] : levels_) sum += level.voxels.bytes();
+  return sum;
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <quoin/scene/level_of_detail.h>
+#include <quoin/scene/scene.h>
+
+#include "render/picture_detail.h"
+#include "render_vk/march/device_grid.h"
+#include "render_vk/march/device_impostors.h"
+#include "render_vk/march/device_scene.h"
+#include "scene/tracer/coarse_grids.h"
+
+namespace quoin::vulkan {
+
+/// Halved grids and impostors in device memory, made when a picture first asks for them and kept from picture to
+/// picture.
+class DeviceDetail {
+ public:
+  static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
+
+  explicit DeviceDetail(DeviceMemory& memory) : memory_(&memory), impostors_(memory) {}
+
+  /// After an update of the device's scene: releases what was made of grids that are gone or were replaced, and
+  /// everything when types became transparent or opaque. Of edited grids the chunks that changed are made and sent
+  /// anew, when they are next asked for.
+  void look_at(const Scene& scene);
+  void clear();
+
+  /// Answers the scene's instances in their detail: traced in grids halved as often as `detail` says, or less often
+  /// where that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
+  /// `most_bytes` of device memory, of each of both, those are released that pictures have not asked for longest; what
+  /// this one asks for stays.
+  ///
+  /// Requires: `device` was updated with `scene`, which is as it was then; no commands run.
+  /// Errors:   those of DeviceImpostors::draw; then it holds nothing.
+  [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
+                                        const Camera& camera, const RenderOptions& options,
+                                        std::uint64_t most_bytes = kMostBytes);
+
+  /// Of device memory that halved grids take, and impostors.
+  [[nodiscard]] std::uint64_t halved_bytes() const;
+  [[nodiscard]] std::uint64_t impostor_bytes() const { return impostors_.bytes(); }
+
+ private:
+  struct Key {
+    GridHandle grid;
+    int halvings = 0;
+    bool operator<(const Key& other) const {
+      return grid != other.grid ? grid < other.grid : halvings < other.halvings;
+    }
+  };
+  struct Level {
+    DeviceGrid voxels;
+    std::uint64_t last_use = 0;
+    std::int32_t index = 0;  // in the table of the picture that used it last
+  };
+  Status put_halved(const DeviceScene& device, const Scene& scene, std::span<const SelectedInstance> selected,
+                    Threads threads, Placement& placement);
+  Status put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table, const Level*& level);
+  void drop_unused(std::uint64_t most_bytes);
+
+  DeviceMemory* memory_;
+  DeviceImpostors impostors_;
+  CoarseGrids coarse_;
+  std::map<Key, Level> levels_;
+  ChangeCursor followed_scene_;
+  ChangeCursor followed_types_;
+  std::uint64_t picture_ = 0;
+  Place table_place_;
+  std::vector<ShaderGrid> table_;
+};
+
+}  // namespace quoin::vulkan

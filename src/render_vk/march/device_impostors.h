@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <quoin/render/impostor.h>
+#include <quoin/scene/scene.h>
+
+#include "render/impostor/far.h"
+#include "render/impostor/screen.h"
+#include "render_vk/device/memory.h"
+#include "render_vk/march/shader_data.h"
+
+namespace quoin::vulkan {
+
+struct Placement;
+
+/// Impostors in device memory, sent when a picture first shows them and kept from picture to picture.
+class DeviceImpostors {
+ public:
+  explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
+
+  /// Has the far instances of a picture, which is `width` by `height` pixels, drawn from their impostors: rays of the
+  /// camera pass them by, and Placement::far says what shows of them. Memory as DeviceDetail::place.
+  ///
+  /// Errors: LimitExceeded when a memory is full, or when those instances' faces are more than 2^32. It then is to be
+  ///         cleared.
+  [[nodiscard]] Status draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
+                            int height, Placement& placement);
+  /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
+  void drop_unused(std::uint64_t most_bytes);
+
+  /// What was made of a grid goes when `is_gone(handle)`.
+  template <class IsGone>
+  void forget(IsGone&& is_gone) {
+    for (auto entry = entries_.begin(); entry != entries_.end();) {
+      const auto each = entry++;
+      if (!is_gone(each->first)) continue;
+      memory_->release(each->second.place);
+      entries_.erase(each);
+    }
+  }
+
+  /// Of device memory.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Impostor> impostor;
+    Place place;
+    std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // the last: those that no view saw
+    std::uint64_t faces = 0;                                          // address
+    std::uint64_t last_use = 0;
+  };
+  Status put(const std::shared_ptr<const Impostor>& impostor, Entry& entry);
+  [[nodiscard]] static ShaderFar shader_far(const Entry& entry, const DrawnImpostor& drawn);
+
+  DeviceMemory* memory_;
+  std::map<GridHandle, Entry> entries_;
+  std::uint64_t picture_ = 0;
+};
+
+/// Which impostors show in which tile of a picture.
+struct FarTiles {
+  struct Range {
+    std::uint32_t first = 0;  ///< in `parts`
+    std::uint32_t count = 0;
+    std::uint32_t groups = 0;  ///< that draw them
+  };
+  std::vector<ShaderFarPart> parts;
+  std::vector<Range> ranges;  ///< of each tile, row by row
+};
+
+/// `edge`: of the tiles, in pixels. Cost: O(impostors + tiles that they touch).
+[[nodiscard]] FarTiles far_tiles(const std::vector<ShaderFar>& far, int edge, int width, int height);
+
+}  // namespace quoin::vulkan

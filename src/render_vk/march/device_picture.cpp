@@ -1,0 +1,105 @@
+#include "render_vk/march/device_picture.h"
+
+#include <cstring>
+#include <utility>
+
+#include "render_vk/march/renderer_impl.h"
+
+namespace quoin {
+
+namespace {
+
+const char* const kDoing = "making room for a picture";
+
+}  // namespace
+
+VulkanPicture::VulkanPicture(VulkanRenderer& renderer) : impl_(std::make_unique<Impl>(*renderer.impl().device)) {}
+VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
+VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
+VulkanPicture::~VulkanPicture() = default;
+
+Status VulkanPicture::Impl::resize(int new_width, int new_height) {
+  if (width == new_width && height == new_height) return {};
+  width = height = samples = 0;
+  rays = 0;
+  colours = {};
+  sums = {};
+  const VkDeviceSize bytes =
+      VkDeviceSize{4} * static_cast<VkDeviceSize>(new_width) * static_cast<VkDeviceSize>(new_height);
+  auto made = vulkan::Buffer::create(*device, bytes, vulkan::Buffer::Where::Device, kDoing);
+  if (!made) return tl::unexpected(made.error());
+  colours = std::move(*made);
+  width = new_width;
+  height = new_height;
+  return {};
+}
+
+Status VulkanPicture::Impl::begin_sums() {
+  samples = 0;
+  rays = 0;
+  if (sums.handle() != VK_NULL_HANDLE) return {};
+  auto made = vulkan::Buffer::create(*device, colours.size() * 4, vulkan::Buffer::Where::Device, kDoing);
+  if (!made) return tl::unexpected(made.error());
+  sums = std::move(*made);
+  return {};
+}
+
+int VulkanPicture::width() const {
+  return impl_->width;
+}
+int VulkanPicture::height() const {
+  return impl_->height;
+}
+int VulkanPicture::samples() const {
+  return impl_->samples;
+}
+std::int64_t VulkanPicture::rays() const {
+  return impl_->rays;
+}
+std::size_t VulkanPicture::bytes() const {
+  return static_cast<std::size_t>(impl_->colours.size() + impl_->sums.size());
+}
+
+Result<Image> VulkanPicture::read() const {
+  if (impl_->samples == 0) return fail(ErrorCode::InvalidArgument, "vulkan: nothing was drawn that could be read");
+  vulkan::Device& device = *impl_->device;
+  auto landing =
+      vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Read, "reading a picture");
+  if (!landing) return tl::unexpected(landing.error());
+  const Status done = device.run("reading a picture", [&](VkCommandBuffer commands) {
+    const VkBufferCopy all{0, 0, landing->size()};
+    device.api().vkCmdCopyBuffer(commands, impl_->colours.handle(), landing->handle(), 1, &all);
+  });
+  if (!done) return tl::unexpected(done.error());
+  Image image;
+  image.width = impl_->width;
+  image.height = impl_->height;
+  const std::size_t pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  image.rgb.resize(3 * pixels);
+  for (std::size_t i = 0; i < pixels; ++i) std::memcpy(image.rgb.data() + 3 * i, landing->mapped() + 4 * i, 3);
+  return image;
+}
+
+Status VulkanPicture::write(const Image& image) {
+  const bool has_pixels = image.width > 0 && image.height > 0;
+  const std::size_t pixels =
+      has_pixels ? static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) : 0;
+  if (pixels == 0 || image.rgb.size() != 3 * pixels) {
+    return fail(ErrorCode::InvalidArgument, "vulkan: a picture without pixels");
+  }
+  if (Status sized = impl_->resize(image.width, image.height); !sized) return sized;
+  vulkan::Device& device = *impl_->device;
+  auto staging = vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Upload, kDoing);
+  if (!staging) return tl::unexpected(staging.error());
+  for (std::size_t i = 0; i < pixels; ++i) std::memcpy(staging->mapped() + 4 * i, image.rgb.data() + 3 * i, 3);
+  Status done = device.run("uploading a picture", [&](VkCommandBuffer commands) {
+    const VkBufferCopy all{0, 0, staging->size()};
+    device.api().vkCmdCopyBuffer(commands, staging->handle(), impl_->colours.handle(), 1, &all);
+  });
+  impl_->samples = done ? 1 : 0;
+  impl_->rays = 0;
+  impl_->sums = {};  // of another picture
+  return done;
+}
+
+}  // namespace quoin

@@ -1,0 +1,217 @@
+#include "render_vk/march/device_scene.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "light/surfaces.h"
+#include "scene/instance_axes.h"
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin::vulkan {
+namespace {
+
+constexpr std::int64_t kWidest = std::int64_t{1} << 29;  // voxels; shaders count in 32 bits
+constexpr std::size_t kMostInstances = std::size_t{1} << 24;
+
+template <class T>
+std::span<const std::byte> bytes_of(const std::vector<T>& values) {
+  return std::as_bytes(std::span(values));
+}
+
+bool is_too_wide(const IBox& bounds) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::int64_t{bounds.max[axis]} - bounds.min[axis] > kWidest) return true;
+  }
+  return false;
+}
+
+bool can_be_traced(const Instance& instance, const SceneGrid* grid, bool hidden) {
+  return grid != nullptr && (instance.visible || hidden) && has_place(instance) && is_finite(grid->pivot) &&
+         !grid->grid.bounds().empty();
+}
+
+bool has_other_pivot(const Placement& placement, const SceneGrid& grid, const Scene& scene, GridHandle handle) {
+  return std::any_of(placement.placed.begin(), placement.placed.end(), [&](const DevicePlaced& each) {
+    return scene.instances()[each.placed.instance].grid == handle && each.placed.pivot != grid.pivot;
+  });
+}
+
+PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
+  PlacedGrid placed;
+  placed.instance = handle;
+  placed.pivot = grid.pivot;
+  placed.world_axes = world_axes(instance);
+  placed.position = instance.position;
+  placed.voxel_size = instance.voxel_size;
+  return placed;
+}
+
+}  // namespace
+
+Status DeviceScene::update(const Scene& scene, bool hidden, Threads threads) {
+  try {
+    Status done = try_update(scene, hidden, threads);
+    if (done) done = memory_->flush();
+    if (!done) clear();
+    return done;
+  } catch (...) {
+    clear();
+    throw;
+  }
+}
+
+void DeviceScene::clear() {
+  memory_->discard();
+  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
+  grids_.clear();
+  placement_ = {};
+  grid_table_.clear();
+  surface_table_.clear();
+  memory_->release(grids_place_);
+  memory_->release(surfaces_place_);
+  surface_table_.clear();
+  followed_types_ = followed_visibility_ = followed_scene_ = {};
+}
+
+bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed) {
+  const TypeChanges changes = types.changes_since(followed);
+  return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
+                                    [](const TypeChange& change) { return change.visibility; });
+}
+
+// Lists the instances and keeps, of the known grids, those that are among them.
+void DeviceScene::place(const Scene& scene, bool hidden) {
+  placement_.placed.clear();
+  std::vector<DBox> boxes;
+  std::map<GridHandle, KnownGrid> kept;
+  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    const SceneGrid* grid = scene.grids().find(instance.grid);
+    if (!can_be_traced(instance, grid, hidden)) return;
+    if (const auto known = grids_.find(instance.grid); known != grids_.end()) kept.insert(grids_.extract(known));
+    const IBox bounds = grid->grid.bounds();
+    kept[instance.grid].bounds = bounds;
+    placement_.placed.push_back({placed_as(instance, *grid, handle)});
+    boxes.push_back(bounds_in_world(placement_.placed.back().placed, bounds));
+  });
+  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
+  grids_ = std::move(kept);
+  std::int32_t index = 0;
+  for (auto& [handle, known] : grids_) known.index = index++;
+  placement_.instances = InstanceTree(std::move(boxes));
+}
+
+// The placed grids that may be other than before; `places` where instances are to be placed anew.
+std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, bool hidden, bool& places) {
+  const SceneChanges changes = scene.changes_since(followed_scene_);
+  places = changes.all || hidden != hidden_ || !changes.instances.empty();
+  hidden_ = hidden;
+  std::vector<GridHandle> changed;
+  for (const GridHandle handle : changes.grids) {
+    const auto known = grids_.find(handle);
+    const SceneGrid* grid = scene.grids().find(handle);
+    // One that was empty may now be placed, and whose pivot moved is placed elsewhere.
+    places |= known == grids_.end() || grid == nullptr || !(grid->grid.bounds() == known->second.bounds);
+    places |= known != grids_.end() && grid != nullptr && has_other_pivot(placement_, *grid, scene, handle);
+    if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
+  }
+  if (!places) return changed;
+  place(scene, hidden);
+  changed.clear();
+  for (const auto& [handle, known] : grids_) changed.push_back(handle);
+  return changed;
+}
+
+// What depends on the grids as they are by now.
+void DeviceScene::finish_placed(const Scene& scene) {
+  for (DevicePlaced& each : placement_.placed) {
+    const KnownGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
+    each.grid = known.index;
+    each.origin = known.voxels.origin();
+    each.low = DVec3(known.bounds.min - each.origin);
+    each.high = DVec3(known.bounds.max - each.origin);
+  }
+}
+
+Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads) {
+  std::vector<std::pair<KnownGrid*, const Grid*>> all;
+  for (const GridHandle handle : changed) {
+    KnownGrid& known = grids_.find(handle)->second;
+    if (is_too_wide(known.bounds)) return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
+    all.emplace_back(&known, &scene.grids()[handle].grid);
+  }
+  parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->trees.update(*all[i].second, scene.types); });
+  for (const auto& [known, grid] : all) {
+    Status done = known->voxels.update(*memory_, *grid, known->trees.opaque(), known->trees.transparent());
+    if (!done) return done;
+  }
+  return {};
+}
+
+Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
+  // Grids are packed by what their types are.
+  if (has_other_visibility(scene.types, followed_visibility_)) {
+    for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
+    grids_.clear();
+    followed_scene_ = {};
+  }
+  bool places = false;
+  const std::vector<GridHandle> changed = changed_grids(scene, hidden, places);
+  if (placement_.placed.size() > kMostInstances) {
+    return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
+  }
+  if (Status done = update_grids(scene, changed, threads); !done) return done;
+  if (places) finish_placed(scene);
+  if (places || !changed.empty()) {
+    placement_.has_transparent = std::any_of(grids_.begin(), grids_.end(),
+                                             [](const auto& grid) { return grid.second.voxels.has_transparent(); });
+  }
+  if (!scene.types.changes_since(followed_types_).empty()) {
+    if (Status done = put_surfaces(scene.types); !done) return done;
+  }
+  return put_grids();
+}
+
+Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes) {
+  if (bytes.size() > place.size || place.size == 0) {
+    memory.release(place);
+    const auto larger = memory.allocate(bytes.size(), "uploading the scene");
+    if (!larger) return tl::unexpected(larger.error());
+    place = *larger;
+  }
+  return memory.write(place, bytes);
+}
+
+bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ShaderGrid)) == 0);
+}
+
+Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
+  // A product with an infinite logarithm is not sure to be a number on every device.
+  constexpr float kLeast = -1e30F;
+  const Surfaces surfaces(types);
+  std::vector<Vec4> table;
+  last_surface_ = static_cast<std::uint32_t>(types.size());
+  for (std::uint32_t type = 0; type <= last_surface_; ++type) {
+    const Surface& surface = surfaces[static_cast<VoxelType>(type)];
+    table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
+    table.emplace_back(surface.emitted, 0.0F);
+    table.emplace_back(glm::max(surface.log_transmittance, Vec3(kLeast)), 0.0F);
+  }
+  if (table == surface_table_) return {};
+  surface_table_ = std::move(table);
+  return put_table(*memory_, surfaces_place_, bytes_of(surface_table_));
+}
+
+Status DeviceScene::put_grids() {
+  std::vector<ShaderGrid> table;
+  for (const auto& [handle, grid] : grids_) table.push_back(grid.voxels.shader_grid());
+  if (!is_same(table, grid_table_)) {
+    grid_table_ = std::move(table);
+    if (Status done = put_table(*memory_, grids_place_, bytes_of(grid_table_)); !done) return done;
+  }
+  placement_.grids = grids_place_.address;
+  return {};
+}
+
+}  // namespace quoin::vulkan

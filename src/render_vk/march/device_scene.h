@@ -1,0 +1,95 @@
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "render_vk/march/device_grid.h"
+#include "render_vk/device/memory.h"
+#include "scene/tracer/instance_tree.h"
+#include "scene/tracer/kept_trees.h"
+
+namespace quoin::vulkan {
+
+/// An instance and what frames need to know of it.
+struct DevicePlaced {
+  PlacedGrid placed;      ///< its pointers mean nothing
+  std::int32_t grid = 0;  ///< index into the device's grids
+  IVec3 origin{0};        ///< of the tree's coordinates, in the grid
+  DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates
+  DVec3 high{0.0};
+  bool is_far = false;  ///< drawn from its impostor: the camera's rays pass it by
+};
+
+/// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.
+template <class Iterator>
+[[nodiscard]] Iterator find_placed(Iterator begin, Iterator end, InstanceHandle instance) {
+  return std::lower_bound(begin, end, instance, [](const DevicePlaced& each, InstanceHandle handle) {
+    return each.placed.instance < handle;
+  });
+}
+
+/// What rays meet: instances, and the table of the grids that they place.
+struct Placement {
+  std::vector<DevicePlaced> placed;  ///< in the order of their handles
+  InstanceTree instances;            ///< their boxes in the world
+  std::uint64_t grids = 0;           ///< the table's address
+  bool has_transparent = false;
+  std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
+};
+
+/// Whether any type became transparent or opaque, or may have; moves the cursor to the present.
+[[nodiscard]] bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed);
+/// Puts a table in place, or in a larger one.
+[[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
+[[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
+
+/// A scene's voxels in device memory, and its instances.
+class DeviceScene {
+ public:
+  explicit DeviceScene(DeviceMemory& memory) : memory_(&memory) {}
+
+  /// As VulkanRenderer::update. After an error it holds nothing.
+  [[nodiscard]] Status update(const Scene& scene, bool hidden, Threads threads);
+
+  [[nodiscard]] const Placement& placement() const { return placement_; }
+  [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
+  [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
+  [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+
+ private:
+  struct KnownGrid {
+    IBox bounds;
+    KeptTrees trees;
+    DeviceGrid voxels;
+    std::int32_t index = 0;
+  };
+
+  void clear();
+  void place(const Scene& scene, bool hidden);
+  [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, bool hidden, bool& places);
+  Status update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads);
+  void finish_placed(const Scene& scene);
+  Status try_update(const Scene& scene, bool hidden, Threads threads);
+  Status put_surfaces(const VoxelRegistry& types);
+  Status put_grids();
+
+  DeviceMemory* memory_;
+  std::map<GridHandle, KnownGrid> grids_;
+  ChangeCursor followed_types_;
+  ChangeCursor followed_visibility_;
+  ChangeCursor followed_scene_;
+  bool hidden_ = false;
+  Placement placement_;
+  Place grids_place_;
+  std::vector<ShaderGrid> grid_table_;
+  Place surfaces_place_;
+  std::vector<Vec4> surface_table_;
+  std::uint32_t last_surface_ = 0;
+};
+
+}  // namespace quoin::vulkan

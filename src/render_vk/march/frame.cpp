@@ -1,0 +1,273 @@
+#include "render_vk/march/frame.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include "core/srgb.h"
+#include "light/light_model.h"
+#include "light/occlusion_directions.h"
+#include "light/sky.h"
+#include "render/camera_rays.h"
+
+namespace quoin::vulkan {
+namespace {
+
+// How far, in voxels, the points from which things are counted may lie from a grid's bounds: what lies within keeps its
+// precision, and what lies further has none to lose.
+constexpr double kNearby = 1024.0;
+
+Vec4 to_vec4(DVec3 v, double w = 0.0) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
+}
+
+// What is left when `to_vec4` rounds.
+Vec4 low_vec4(DVec3 v) {
+  return to_vec4(v - DVec3(Vec3(v)));
+}
+
+// A multiple of 64 voxels at a point, not far from the grid.
+IVec3 base_at(DVec3 point, const DevicePlaced& grid) {
+  const DVec3 near = glm::clamp(point, grid.low - kNearby, grid.high + kNearby);
+  return IVec3(glm::floor(near)) & ~63;
+}
+
+// How far ahead of the camera, along its forward direction, the grid begins; 0 where that is not far.
+double depth_of(const DevicePlaced& grid, const glm::dmat3& view_axes, DVec3 camera_in_grid, DVec3 forward) {
+  double depth = std::numeric_limits<double>::infinity();
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 point{(corner & 1) != 0 ? grid.high.x : grid.low.x, (corner & 2) != 0 ? grid.high.y : grid.low.y,
+                      (corner & 4) != 0 ? grid.high.z : grid.low.z};
+    depth = std::min(depth, glm::dot(view_axes * (point - camera_in_grid), forward));
+  }
+  const double voxel = grid.placed.voxel_size;
+  if (!(depth > kNearby * voxel)) return 0.0;
+  // A number of few bits, so that the difference of two of them is exact on the device too.
+  int exponent = 0;
+  const double fraction = std::frexp(depth * (1.0 - 1e-5) - voxel, &exponent);
+  return std::ldexp(std::floor(fraction * 4096.0), exponent - 12);
+}
+
+// A box in single precision, with room for its rounding and that of rays.
+void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vector<Vec4>& out) {
+  const DVec3 room = glm::max(glm::abs(box.min), glm::abs(box.max)) * 1e-5 + 1e-6;
+  Vec4 low = to_vec4(box.min - room);
+  Vec4 high = to_vec4(box.max + room);
+  low.w = std::bit_cast<float>(low_w);
+  high.w = std::bit_cast<float>(high_w);
+  out.push_back(low);
+  out.push_back(high);
+}
+
+// `view_origin`: from the camera.
+void add_instances(const Placement& scene, const Camera& camera, DVec3 view_origin, FrameData& data) {
+  const InstanceTree& tree = scene.instances;
+  // Two far positions first, as everywhere.
+  const auto in_view = [&](const DBox& box) {
+    return DBox{box.min - camera.position - view_origin, box.max - camera.position - view_origin};
+  };
+  for (const InstanceTree::Node& node : tree.nodes()) {
+    const int count = node.count > 0 ? static_cast<int>(node.count) : -1 - node.axis;
+    add_box(in_view(node.box), static_cast<std::uint32_t>(node.first), count, data.tree);
+  }
+  for (const std::size_t i : tree.order())
+    add_box(in_view(tree.boxes()[i]), static_cast<std::uint32_t>(i), scene.placed[i].is_far ? 1 : 0, data.leaves);
+}
+
+// The camera's numbers as CameraRays has them.
+struct Rays {
+  bool is_perspective;
+  DVec3 right, down, corner, forward;
+
+  // What a pixel to the right or down is at a depth.
+  [[nodiscard]] double spread(double depth) const { return is_perspective ? depth : 1.0; }
+};
+
+// A grid's space, seen from the camera.
+struct GridSpace {
+  glm::dmat3 grid_axes;  // grid from view
+  glm::dmat3 view_axes;
+  DVec3 camera{0.0};  // in the tree's coordinates
+
+  GridSpace(const DevicePlaced& grid, const Camera& from) {
+    const PlacedGrid& placed = grid.placed;
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 position = placed.position - from.position;
+    grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
+    view_axes = placed.world_axes * placed.voxel_size;
+    camera = placed.pivot - grid_axes * position - DVec3(grid.origin);
+  }
+};
+
+void set_start(const DevicePlaced& grid, const GridSpace& space, const Rays& rays, double depth,
+               const RenderOptions& options, ShaderPlaced& out) {
+  // For pixel (x, y): origin + x right + y down, in the grid.
+  const double spread = rays.spread(depth);
+  const DVec3 right = space.grid_axes * (rays.right * spread);
+  const DVec3 down = space.grid_axes * (rays.down * spread);
+  const DVec3 origin = space.camera + space.grid_axes * (rays.forward * depth + rays.corner * spread);
+  const IVec3 base = base_at(origin + right * (0.5 * options.width) + down * (0.5 * options.height), grid);
+  out.start_base = IVec4(base, 0);
+  out.start = to_vec4(origin - DVec3(base), depth);
+  out.start_x = to_vec4(right);
+  out.start_y = to_vec4(down);
+  out.start_low = low_vec4(origin - DVec3(base));
+  out.start_x_low = low_vec4(right);
+  out.start_y_low = low_vec4(down);
+}
+
+// `view_origin`: from the camera.
+void set_spaces(const DevicePlaced& grid, const GridSpace& space, DVec3 view_origin, ShaderPlaced& out) {
+  for (int axis = 0; axis < 3; ++axis) {
+    out.grid_axes[static_cast<std::size_t>(axis)] = to_vec4(space.grid_axes[axis]);
+    out.grid_axes_low[static_cast<std::size_t>(axis)] = low_vec4(space.grid_axes[axis]);
+    out.view_axes[static_cast<std::size_t>(axis)] = to_vec4(space.view_axes[axis]);
+  }
+  const DVec3 origin = space.camera + space.grid_axes * view_origin;
+  const DVec3 ref = glm::clamp(origin, grid.low - kNearby, grid.high + kNearby);
+  const IVec3 base = base_at(ref, grid);
+  out.ref_base = IVec4(base, grid.grid);
+  out.ref_inside = to_vec4(ref - DVec3(base), grid.placed.voxel_size);
+  out.ref_view = to_vec4(space.view_axes * (ref - origin), grid.placed.voxels_per_cell());
+}
+
+void set_sun(const PlacedGrid& placed, DVec3 sun, ShaderPlaced& out) {
+  const DVec3 sun_in_grid = glm::transpose(placed.world_axes) * sun;
+  out.to_sun = to_vec4(sun_in_grid);
+  for (const Direction face : kDirections) {
+    const auto i = static_cast<std::size_t>(face);
+    const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
+    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0));
+  }
+}
+
+// Where rays start, and view space has its origin: as far ahead as there is nothing.
+void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
+                FrameData& data) {
+  const DVec3 sun = to_sun(options.light);
+  std::vector<GridSpace> spaces;
+  std::vector<double> depths;
+  double least = scene.placed.empty() ? 0.0 : std::numeric_limits<double>::infinity();
+  for (const DevicePlaced& grid : scene.placed) {
+    const GridSpace& space = spaces.emplace_back(grid, camera);
+    depths.push_back(depth_of(grid, space.view_axes, space.camera, rays.forward));
+    least = std::min(least, depths.back());
+  }
+  const DVec3 view_origin = rays.forward * least;
+  for (std::size_t i = 0; i < spaces.size(); ++i) {
+    const DevicePlaced& grid = scene.placed[i];
+    ShaderPlaced& placed = data.placed.emplace_back();
+    set_start(grid, spaces[i], rays, depths[i], options, placed);
+    set_spaces(grid, spaces[i], view_origin, placed);
+    set_sun(grid.placed, sun, placed);
+    placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.halvings), 0.0F};
+  }
+  const double spread = rays.spread(least);
+  data.frame.view_depth = static_cast<float>(least);
+  data.frame.start = to_vec4(rays.corner * spread);
+  data.frame.start_x = to_vec4(rays.right * spread);
+  data.frame.start_y = to_vec4(rays.down * spread);
+  add_instances(scene, camera, view_origin, data);
+}
+
+void add_directions(int rays, FrameData& data) {
+  const OcclusionDirections directions(rays);
+  if (directions.is_fixed()) {
+    data.frame.flags |= kFixedDirections;
+    data.directions.resize(std::size_t{6} * 9);
+    for (std::size_t face = 0; face < 6; ++face) {
+      for (int ray = 0; ray < rays; ++ray) {
+        data.directions[face * 9 + static_cast<std::size_t>(ray)] = to_vec4(directions.fixed(face, ray));
+      }
+    }
+    return;
+  }
+  for (const OcclusionDirections::Angle& angle : directions.ring_angles()) {
+    data.directions.push_back(to_vec4({angle.cosine, angle.sine, 0.0}));
+  }
+  for (const OcclusionDirections::Angle& angle : directions.turns()) {
+    data.turns.push_back(to_vec4({angle.cosine, angle.sine, 0.0}));
+  }
+}
+
+std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
+  const LightOptions& light = options.light;
+  std::uint32_t flags = 0;
+  if (camera.projection == Camera::Projection::Perspective) flags |= kPerspective;
+  if (light.lit) flags |= kLit;
+  if (light.shadows) flags |= kShadows;
+  if (light.occlusion == OcclusionMode::Rays) flags |= kOcclusionRays;
+  if (light.occlusion == OcclusionMode::Vertex) flags |= kOcclusionVertex;
+  if (light.occlusion_affects == OcclusionAffects::All) flags |= kAffectsAll;
+  if (options.detail_colours) flags |= kDetailColours;
+  return flags;
+}
+
+float capped(double value) {
+  return static_cast<float>(std::min<double>(value, std::numeric_limits<float>::max()));
+}
+
+void set_light(const RenderOptions& options, ShaderFrame& frame) {
+  const LightOptions& light = options.light;
+  frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
+  frame.lift = static_cast<float>(kRayLift);
+  frame.sky_zenith = {sky::kZenith, 0.0F};
+  frame.sky_horizon = {sky::kHorizon, 0.0F};
+  frame.sky_ground = {sky::kGround, 0.0F};
+  frame.ground_begins = sky::kGroundBegins;
+  frame.ground_is_full = sky::kGroundIsFull;
+  frame.occlusion_count = light.occlusion_rays;
+  frame.occlusion_distance = capped(light.occlusion_distance);
+  frame.shadow_distance = capped(light.shadow_distance);
+  frame.exposure = exposure_of(light);
+}
+
+}  // namespace
+
+FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options) {
+  FrameData data;
+  const CameraRays picture(camera, options.width, options.height);
+  const Rays rays{picture.is_perspective(), picture.right(), picture.down(), picture.corner(), picture.forward()};
+  ShaderFrame& frame = data.frame;
+  frame.flags = flags_of(camera, options);
+  frame.right = to_vec4(rays.right);
+  frame.down = to_vec4(rays.down);
+  frame.corner = to_vec4(rays.corner);
+  frame.forward = to_vec4(rays.forward);
+  frame.right_low = low_vec4(rays.right);
+  frame.down_low = low_vec4(rays.down);
+  frame.corner_low = low_vec4(rays.corner);
+  frame.forward_low = low_vec4(rays.forward);
+  frame.sky_scale = static_cast<float>(picture.sky_scale());
+  frame.width = options.width;
+  frame.height = options.height;
+  frame.samples = static_cast<float>(options.samples);
+  frame.placed_count = static_cast<std::uint32_t>(scene.placed.size());
+  set_light(options, frame);
+  add_placed(scene, camera, options, rays, data);
+  add_directions(options.light.occlusion_rays, data);
+  return data;
+}
+
+std::vector<float> srgb_thresholds() {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  std::vector<float> thresholds(256, 0.0F);
+  for (std::uint32_t byte = 1; byte < 256; ++byte) {
+    // Floats of one sign are in the order of their bits.
+    std::uint32_t below = 0;
+    std::uint32_t reached = std::bit_cast<std::uint32_t>(1.0F);
+    while (reached - below > 1) {
+      const std::uint32_t middle = below + (reached - below) / 2;
+      (encode(std::bit_cast<float>(middle)) >= byte ? reached : below) = middle;
+    }
+    thresholds[byte] = std::bit_cast<float>(reached);
+  }
+  return thresholds;
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/camera.h>
+
+#include "render_vk/march/device_scene.h"
+#include "render_vk/march/shader_data.h"
+
+namespace quoin::vulkan {
+
+/// What shaders need to know of one picture, but for where things lie in memory.
+struct FrameData {
+  ShaderFrame frame;
+  std::vector<ShaderPlaced> placed;
+  std::vector<Vec4> tree;
+  std::vector<Vec4> leaves;
+  std::vector<Vec4> directions;
+  std::vector<Vec4> turns;
+};
+
+/// All that is in the world is made relative to the camera here, in double precision. Cost: O(instances).
+[[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
+
+/// The least light of each byte but the first: SrgbEncoder as a table.
+[[nodiscard]] std::vector<float> srgb_thresholds();
+
+}  // namespace quoin::vulkan

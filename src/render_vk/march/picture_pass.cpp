@@ -1,0 +1,330 @@
+#include "render_vk/march/picture_pass.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "light/occlusion_directions.h"
+#include "render/camera_rays.h"
+#include "render/picture_request.h"
+
+namespace quoin::vulkan {
+namespace {
+
+// What commands do should be over before anything thinks that the device hangs: of one tile, and of one batch.
+constexpr std::int64_t kMostRays = std::int64_t{1} << 22;
+constexpr std::int64_t kMostRaysAtOnce = std::int64_t{1} << 24;
+const char* const kDoing = "drawing";
+
+std::int64_t rays_of_pixel(const RenderOptions& options) {
+  const LightOptions& light = options.light;
+  return 2 + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
+}
+
+// The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass
+// take 1.5 kB a pixel.
+std::int32_t tile_edge(const RenderOptions& options, bool has_glass, bool is_processor) {
+  std::int32_t edge = is_processor ? 256 : 1024;
+  if (has_glass) edge = is_processor ? 128 : 256;
+  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options) > kMostRays) edge /= 2;
+  return edge;
+}
+
+std::int64_t rays_in(const ShaderCounters& counters) {
+  return static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
+}
+
+const std::vector<float>& thresholds() {
+  static const std::vector<float> shared = srgb_thresholds();
+  return shared;
+}
+
+}  // namespace
+
+PicturePass::~PicturePass() {
+  memory_->discard();
+  for (Place& place : places_) memory_->release(place);
+}
+
+Status PicturePass::reserve(std::size_t bytes, std::uint64_t& address) {
+  const auto place = memory_->allocate(bytes, kDoing);
+  if (!place) return tl::unexpected(place.error());
+  places_.push_back(*place);
+  address = place->address;
+  return {};
+}
+
+template <class T>
+Status PicturePass::upload(const std::vector<T>& values, std::uint64_t& address) {
+  const auto bytes = std::as_bytes(std::span(values));
+  if (bytes.empty()) return {};
+  if (Status done = reserve(bytes.size(), address); !done) return done;
+  return memory_->write(places_.back(), bytes);
+}
+
+Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
+  FrameData data = make_frame(*placement_, camera, options);
+  frame_ = data.frame;
+  frame_.grids = placement_->grids;
+  frame_.last_surface = scene_->last_surface();
+  frame_.surfaces = scene_->surfaces_address();
+  Status done = upload(data.placed, frame_.placed);
+  if (done) done = upload(data.tree, frame_.tree);
+  if (done) done = upload(data.leaves, frame_.leaves);
+  if (done) done = upload(data.directions, frame_.directions);
+  if (done) done = upload(data.turns, frame_.turns);
+  if (done) done = upload(thresholds(), frame_.thresholds);
+  if (done) done = make_tile_buffers(options);
+  if (done) done = put_far(options);
+  if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
+  if (done) done = memory_->flush();
+  return done;
+}
+
+Status PicturePass::put_far(const RenderOptions& options) {
+  const FarTiles tiles = far_tiles(placement_->far, tile_edge_, options.width, options.height);
+  far_ = tiles.ranges;
+  frame_.far_count = static_cast<std::uint32_t>(placement_->far.size());
+  if (tiles.parts.empty()) return {};
+  Status done = upload(placement_->far, frame_.fars);
+  if (done) done = upload(tiles.parts, frame_.far_parts);
+  const auto pixels = static_cast<std::size_t>(tile_edge_) * static_cast<std::size_t>(tile_edge_);
+  if (done) done = reserve(pixels * 8, frame_.far_depths);
+  if (!done) return done;
+  far_place_ = places_.back();
+  frame_.far_numbers = frame_.far_depths + pixels * 4;
+  return {};
+}
+
+Status PicturePass::make_tile_buffers(const RenderOptions& options) {
+  const bool has_glass = placement_->has_transparent;
+  tile_edge_ = tile_edge(options, has_glass, device_->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU);
+  const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
+                      static_cast<std::size_t>(std::min(tile_edge_, options.height));
+  const VkDeviceSize bytes = (target_ == nullptr ? pixels * 8 : 0) + sizeof(ShaderCounters) + 16;
+  for (Buffer* buffer : {&output_, &results_}) {
+    const auto where = buffer == &output_ ? Buffer::Where::Device : Buffer::Where::Read;
+    auto made = Buffer::create(*device_, bytes, where, kDoing);
+    if (!made) return tl::unexpected(made.error());
+    *buffer = std::move(*made);
+  }
+  frame_.counters = output_.address();
+  frame_.colours = output_.address() + sizeof(ShaderCounters);
+  frame_.depths = frame_.colours + pixels * 4;
+  Status done = reserve(pixels * kPointBytes, frame_.points);
+  if (done) done = reserve(pixels * kStateBytes, frame_.states);
+  if (target_ != nullptr) {
+    frame_.colours = target_->colours.address();
+    frame_.sums = target_->sums.address();
+    if (done) done = reserve(pixels * 4, frame_.depths);
+  } else if (done) {
+    done = reserve(pixels * kSumBytes, frame_.sums);
+  }
+  if (!has_glass) return done;
+  if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.bodies);
+  if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.sun_bodies);
+  return done;
+}
+
+ShaderPush PicturePass::push_for(const Tile& tile) const {
+  ShaderPush push;
+  push.frame = frame_address_;
+  push.corner_x = tile.x;
+  push.corner_y = tile.y;
+  push.size_x = tile.width;
+  push.size_y = tile.height;
+  push.far_first = tile.far.first;
+  push.far_count = tile.far.count;
+  push.far_groups = tile.far.groups;
+  push.pitch = static_cast<std::uint32_t>(target_ == nullptr ? tile.width : target_->width);
+  if (target_ != nullptr)
+    push.base = static_cast<std::uint32_t>(tile.y) * push.pitch + static_cast<std::uint32_t>(tile.x);
+  return push;
+}
+
+ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
+  ShaderPush push = push_for(tile);
+  const PixelPoint point = sample_point(sample);
+  push.point_x = static_cast<float>(point.x);
+  push.point_y = static_cast<float>(point.y);
+  push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
+  push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
+  push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
+  push.first = sample == 0 ? 1 : 0;
+  return push;
+}
+
+// What each pixel's ray meets.
+void PicturePass::find_hits(VkCommandBuffer commands, const ShaderPush& push) const {
+  if (push.far_groups > 0) {
+    const VkDeviceSize half = (frame_.far_numbers - frame_.far_depths);
+    const VkBuffer buffer = memory_->buffer_of(far_place_);
+    constexpr std::uint32_t kInfinity = 0x7F800000;
+    device_->api().vkCmdFillBuffer(commands, buffer, far_place_.offset, half, kInfinity);
+    device_->api().vkCmdFillBuffer(commands, buffer, far_place_.offset + half, half, ~0U);
+    device_->separate(commands);
+    pipelines_->dispatch_far(commands, Pass::FarDepths, push);
+    pipelines_->dispatch_far(commands, Pass::FarFaces, push);
+  }
+  pipelines_->dispatch(commands, Pass::Primary, push);
+}
+
+Status PicturePass::take_sample(const Tile& tile, int sample) {
+  const ShaderPush push = push_for_sample(tile, sample);
+  const bool has_glass = placement_->has_transparent;
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+    find_hits(commands, push);
+    if (has_glass) return;
+    pipelines_->dispatch(commands, Pass::Light, push);
+  });
+  return done && has_glass ? finish_glass(push) : done;
+}
+
+// Bodies of glass are lit as many at a time as there is room for, until no pixel has more.
+Status PicturePass::finish_glass(ShaderPush push) {
+  for (;;) {
+    Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+      const VkDeviceSize pending = offsetof(ShaderCounters, pending);
+      device_->api().vkCmdFillBuffer(commands, output_.handle(), pending, 4, 0);
+      device_->separate(commands);
+      pipelines_->dispatch(commands, Pass::Glass, push);
+      pipelines_->dispatch(commands, Pass::LightWithGlass, push);
+      const VkBufferCopy counters{0, 0, sizeof(ShaderCounters)};
+      device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &counters);
+    });
+    if (!done) return done;
+    ShaderCounters counters;
+    std::memcpy(&counters, results_.mapped(), sizeof counters);
+    if (counters.pending == 0) return {};
+    ++push.round;
+  }
+}
+
+Status PicturePass::read_tile(const Tile& tile, Picture& picture) {
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+    pipelines_->dispatch(commands, Pass::Resolve, push_for(tile));
+    const VkBufferCopy all{0, 0, output_.size()};
+    device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &all);
+  });
+  if (!done) return done;
+  const std::byte* colours = results_.mapped() + (frame_.colours - frame_.counters);
+  const std::byte* depths = results_.mapped() + (frame_.depths - frame_.counters);
+  const auto columns = static_cast<std::size_t>(tile.width);
+  for (std::int32_t y = 0; y < tile.height; ++y) {
+    const std::size_t from = static_cast<std::size_t>(y) * columns;
+    const std::size_t to = static_cast<std::size_t>(tile.y + y) * static_cast<std::size_t>(picture.colour.width) +
+                           static_cast<std::size_t>(tile.x);
+    for (std::size_t x = 0; x < columns; ++x) {
+      std::memcpy(picture.colour.rgb.data() + 3 * (to + x), colours + 4 * (from + x), 3);
+    }
+    if (picture.depth.values.empty()) continue;
+    std::memcpy(picture.depth.values.data() + to, depths + 4 * from, 4 * columns);
+  }
+  return {};
+}
+
+Status PicturePass::read_counters(ShaderCounters& counters) {
+  Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
+    const VkBufferCopy region{0, 0, sizeof(ShaderCounters)};
+    device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &region);
+  });
+  if (done) std::memcpy(&counters, results_.mapped(), sizeof counters);
+  return done;
+}
+
+std::vector<PicturePass::Tile> PicturePass::tiles_of(const RenderOptions& options) const {
+  std::vector<Tile> tiles;
+  for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
+    for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
+      const FarTiles::Range far = far_[tiles.size()];
+      tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y), far});
+    }
+  }
+  return tiles;
+}
+
+Status PicturePass::begin(const Camera& camera, const RenderOptions& options) {
+  if (Status done = put_frame(camera, options); !done) return done;
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    device_->api().vkCmdFillBuffer(commands, output_.handle(), 0, sizeof(ShaderCounters), 0);
+  });
+}
+
+Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
+  Status done = begin(camera, options);
+  if (!done) return tl::unexpected(done.error());
+  Picture picture = empty_picture(options);
+  const std::vector<Tile> tiles = tiles_of(options);
+  const double all = static_cast<double>(tiles.size()) * options.samples;
+  double count = 0.0;
+  for (const Tile& tile : tiles) {
+    for (int sample = 0; sample < options.samples && done; ++sample) {
+      done = take_sample(tile, sample);
+      count += 1.0;
+      if (done && progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+    }
+    if (done) done = read_tile(tile, picture);
+  }
+  ShaderCounters counters;
+  if (done) done = read_counters(counters);
+  if (!done) return tl::unexpected(done.error());
+  picture.rays = rays_in(counters);
+  picture.pixels_hit = counters.hits;
+  return picture;
+}
+
+// One sample of some tiles; without glass, which the processor counts rounds for, all in one batch.
+Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
+  if (placement_->has_transparent) {
+    for (const Tile& tile : tiles) {
+      if (Status done = take_sample(tile, sample); !done) return done;
+    }
+    return {};
+  }
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    for (const Tile& tile : tiles) {
+      const ShaderPush push = push_for_sample(tile, sample);
+      find_hits(commands, push);
+      pipelines_->dispatch(commands, Pass::Light, push);
+    }
+  });
+}
+
+Status PicturePass::resolve(std::span<const Tile> tiles) {
+  return device_->run(kDoing, [&](VkCommandBuffer commands) {
+    for (const Tile& tile : tiles) pipelines_->dispatch(commands, Pass::Resolve, push_for(tile));
+  });
+}
+
+Status PicturePass::add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress) {
+  const std::vector<Tile> tiles = tiles_of(options);
+  const std::int64_t rays_of_tile = rays_of_pixel(options) * tile_edge_ * tile_edge_;
+  const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMostRaysAtOnce / rays_of_tile, 1));
+  const double all = static_cast<double>(tiles.size()) * options.samples;
+  double count = 0.0;
+  for (int sample = 0; sample < options.samples; ++sample) {
+    for (std::size_t first = 0; first < tiles.size(); first += at_once) {
+      const auto some = std::span(tiles).subspan(first, std::min(at_once, tiles.size() - first));
+      if (Status done = take_sample(some, picture.samples + sample); !done) return done;
+      count += static_cast<double>(some.size());
+      if (progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+    }
+  }
+  return resolve(tiles);
+}
+
+Status PicturePass::draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+                         const Progress& progress) {
+  target_ = &picture;
+  RenderOptions all = options;
+  all.samples += picture.samples;  // what the sums are divided by
+  Status done = begin(camera, all);
+  if (done) done = add_samples(picture, options, progress);
+  ShaderCounters counters;
+  if (done) done = read_counters(counters);
+  // Sums to which not every tile was added are of no use.
+  picture.samples = done ? all.samples : 0;
+  picture.rays = done ? picture.rays + rays_in(counters) : 0;
+  return done;
+}
+
+}  // namespace quoin::vulkan

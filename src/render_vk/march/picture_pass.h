@@ -1,0 +1,77 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <quoin/core/progress.h>
+#include <quoin/render/cpu_renderer.h>
+
+#include "render_vk/march/device_impostors.h"
+#include "render_vk/march/device_picture.h"
+#include "render_vk/march/device_scene.h"
+#include "render_vk/march/frame.h"
+#include "render_vk/device/memory.h"
+#include "render_vk/march/pipelines.h"
+
+namespace quoin::vulkan {
+
+/// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
+class PicturePass {
+ public:
+  /// `placement` is of `scene`.
+  PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
+              const Placement& placement)
+      : device_(&device), memory_(&memory), pipelines_(&pipelines), scene_(&scene), placement_(&placement) {}
+  ~PicturePass();
+  PicturePass(const PicturePass&) = delete;
+  PicturePass& operator=(const PicturePass&) = delete;
+
+  /// As VulkanRenderer::render, of what is right.
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, const Progress& progress);
+
+  /// As VulkanRenderer::draw, of what is right.
+  [[nodiscard]] Status draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+                            const Progress& progress);
+
+ private:
+  struct Tile {
+    std::int32_t x, y, width, height;
+    FarTiles::Range far;
+  };
+
+  template <class T>
+  Status upload(const std::vector<T>& values, std::uint64_t& address);
+  Status reserve(std::size_t bytes, std::uint64_t& address);
+  Status put_frame(const Camera& camera, const RenderOptions& options);
+  Status put_far(const RenderOptions& options);
+  void find_hits(VkCommandBuffer commands, const ShaderPush& push) const;
+  Status begin(const Camera& camera, const RenderOptions& options);
+  Status make_tile_buffers(const RenderOptions& options);
+  [[nodiscard]] std::vector<Tile> tiles_of(const RenderOptions& options) const;
+  [[nodiscard]] ShaderPush push_for_sample(const Tile& tile, int sample) const;
+  Status take_sample(const Tile& tile, int sample);
+  Status add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress);
+  Status take_sample(std::span<const Tile> tiles, int sample);
+  Status resolve(std::span<const Tile> tiles);
+  Status finish_glass(ShaderPush push);
+  Status read_tile(const Tile& tile, Picture& picture);
+  Status read_counters(ShaderCounters& counters);
+  [[nodiscard]] ShaderPush push_for(const Tile& tile) const;
+
+  Device* device_;
+  DeviceMemory* memory_;
+  const Pipelines* pipelines_;
+  const DeviceScene* scene_;
+  const Placement* placement_;
+  const VulkanPicture::Impl* target_ = nullptr;  // null: what is drawn is read
+  std::vector<Place> places_;
+  ShaderFrame frame_;
+  std::uint64_t frame_address_ = 0;
+  std::int32_t tile_edge_ = 0;
+  std::vector<FarTiles::Range> far_;  // of the tiles
+  Place far_place_;                   // depths and numbers of a tile's impostors, half each
+  Buffer output_;                     // colours, depths, counters
+  Buffer results_;                    // the same, for the processor
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,111 @@
+#include "render_vk/march/pipelines.h"
+
+#include <algorithm>
+#include <span>
+
+namespace quoin::vulkan {
+namespace {
+
+constexpr std::uint32_t kFar[] = {
+#include "far.comp.inc"
+};
+constexpr std::uint32_t kPrimary[] = {
+#include "primary.comp.inc"
+};
+constexpr std::uint32_t kGlass[] = {
+#include "glass.comp.inc"
+};
+constexpr std::uint32_t kLight[] = {
+#include "light.comp.inc"
+};
+constexpr std::uint32_t kResolve[] = {
+#include "resolve.comp.inc"
+};
+
+std::span<const std::uint32_t> code_of(Pass pass) {
+  switch (pass) {
+    case Pass::FarDepths:
+    case Pass::FarFaces:
+      return kFar;
+    case Pass::Primary:
+      return kPrimary;
+    case Pass::Glass:
+      return kGlass;
+    case Pass::Resolve:
+      return kResolve;
+    default:
+      return kLight;
+  }
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
+  std::unique_ptr<Pipelines> made(new Pipelines(device));
+  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(ShaderPush)};
+  auto layout = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  layout.pushConstantRangeCount = 1;
+  layout.pPushConstantRanges = &range;
+  VkResult result = device.api().vkCreatePipelineLayout(device.handle(), &layout, nullptr, &made->layout_);
+  for (std::size_t pass = 0; pass < kPassCount && result == VK_SUCCESS; ++pass) {
+    result = made->make(static_cast<Pass>(pass));
+  }
+  if (Status status = device.check(result, "compiling shaders"); !status) return tl::unexpected(status.error());
+  return made;
+}
+
+Pipelines::~Pipelines() {
+  const Api& api = device_->api();
+  for (const VkPipeline pipeline : pipelines_) {
+    if (pipeline != VK_NULL_HANDLE) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+  }
+  if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
+}
+
+VkResult Pipelines::make(Pass pass) {
+  const Api& api = device_->api();
+  const std::span<const std::uint32_t> code = code_of(pass);
+  auto module = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  module.codeSize = code.size_bytes();
+  module.pCode = code.data();
+  auto info = info_of<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+  info.layout = layout_;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.pName = "main";
+  // Two passes of a shader differ in its one constant.
+  const VkBool32 is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces ? VK_TRUE : VK_FALSE;
+  const VkSpecializationMapEntry entry{0, 0, sizeof is_second};
+  const VkSpecializationInfo constants{1, &entry, sizeof is_second, &is_second};
+  const bool has_constant = is_second == VK_TRUE || pass == Pass::Light || pass == Pass::FarDepths;
+  if (has_constant) info.stage.pSpecializationInfo = &constants;
+  VkResult result = api.vkCreateShaderModule(device_->handle(), &module, nullptr, &info.stage.module);
+  if (result != VK_SUCCESS) return result;
+  result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr,
+                                        &pipelines_[static_cast<std::size_t>(pass)]);
+  api.vkDestroyShaderModule(device_->handle(), info.stage.module, nullptr);
+  return result;
+}
+
+void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
+  constexpr std::int32_t kGroup = 8;
+  const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
+  dispatch(commands, pass, push, groups(push.size_x), groups(push.size_y));
+}
+
+void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
+  constexpr std::uint32_t kMostAcross = 32768;
+  const std::uint32_t across = std::min(push.far_groups, kMostAcross);
+  dispatch(commands, pass, push, across, (push.far_groups + across - 1) / across);
+}
+
+void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, std::uint32_t across,
+                         std::uint32_t down) const {
+  const Api& api = device_->api();
+  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[static_cast<std::size_t>(pass)]);
+  api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
+  api.vkCmdDispatch(commands, across, down, 1);
+  device_->separate(commands);
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "render_vk/device/device.h"
+#include "render_vk/march/shader_data.h"
+
+namespace quoin::vulkan {
+
+/// The passes of a sample of a tile, in their order, and of a finished tile.
+enum class Pass : std::uint8_t {
+  FarDepths,  ///< of the nearest faces of impostors
+  FarFaces,   ///< which these are
+  Primary,    ///< the nearest opaque voxel of each pixel
+  Glass,      ///< the transparent bodies before it
+  Light,
+  LightWithGlass,
+  Resolve,  ///< the samples' mean as bytes
+};
+constexpr std::size_t kPassCount = 7;
+
+class Pipelines {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
+  ~Pipelines();
+  Pipelines(const Pipelines&) = delete;
+  Pipelines& operator=(const Pipelines&) = delete;
+
+  /// Records the pass over a tile, after which its results may be read.
+  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
+  /// The same over impostors: ShaderPush::far_groups workgroups.
+  void dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
+
+ private:
+  explicit Pipelines(Device& device) : device_(&device) {}
+  VkResult make(Pass pass);
+  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, std::uint32_t across,
+                std::uint32_t down) const;
+
+  Device* device_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  std::array<VkPipeline, kPassCount> pipelines_{};
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include "render/picture_detail.h"
+#include "render_vk/device/device.h"
+#include "render_vk/march/device_detail.h"
+#include "render_vk/march/device_scene.h"
+#include "render_vk/device/memory.h"
+#include "render_vk/march/pipelines.h"
+
+namespace quoin {
+
+/// What the renderers and pictures of one device share.
+struct VulkanRenderer::Impl {
+  static constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
+
+  Impl(std::unique_ptr<vulkan::Device> of_device, std::unique_ptr<vulkan::Pipelines> with_pipelines,
+       std::uint64_t block_bytes)
+      : device(std::move(of_device)),
+        pipelines(std::move(with_pipelines)),
+        memory(*device, std::max(block_bytes, kLeastBlock)),
+        scene(memory),
+        detail(memory) {}
+
+  /// Null: there is none.
+  void look_at(const Scene* updated, bool hidden_too) {
+    if (chooser == nullptr || updated != voxels) chooser = std::make_unique<DetailChooser>();
+    voxels = updated;
+    hidden = hidden_too;
+    if (updated == nullptr) return detail.clear();
+    chooser->look_at_types(updated->types);
+    detail.look_at(*updated);
+  }
+
+  std::unique_ptr<vulkan::Device> device;
+  std::unique_ptr<vulkan::Pipelines> pipelines;
+  vulkan::DeviceMemory memory;
+  vulkan::DeviceScene scene;
+  vulkan::DeviceDetail detail;
+  /// What levels of detail are made of, as of the last update: null where there was none.
+  const Scene* voxels = nullptr;
+  bool hidden = false;
+  std::unique_ptr<DetailChooser> chooser;  // for that scene
+  std::uint64_t uploaded = 0;
+};
+
+}  // namespace quoin

@@ -1,0 +1,142 @@
+#include "render_vk/march/tree_packing.h"
+
+#include <algorithm>
+#include <bit>
+#include <tuple>
+
+#include "trace/tree_view.h"
+
+namespace quoin::vulkan {
+namespace {
+
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+// Bit of a place in its node.
+int place_of(IVec3 at) {
+  return (at.x & 3) + 4 * (at.y & 3) + 16 * (at.z & 3);
+}
+
+}  // namespace
+
+class RecordWriter {
+ public:
+  Node add_tree(const OccupancyTree& tree, IVec3 chunk) {
+    const trace::TreeNodes nodes(tree);
+    const trace::ChunkNode* node = nodes.find_chunk(chunk);
+    Node root;
+    if (node == nullptr) return root;
+    while (record.words.size() % 8 != 0) record.words.push_back(0);
+    headers_.push_back(record.words.size());
+    record.words.resize(record.words.size() + 4);
+    const std::size_t bricks = record.words.size();
+    for (unsigned i = 0; i < 64; ++i) root.mask |= std::uint64_t{node->cells[i] != 0} << i;
+    record.words.resize(bricks + 4 * static_cast<std::size_t>(std::popcount(root.mask)));
+    std::size_t at = bricks;
+    bool is_full = root.mask == kAll;
+    for (std::size_t i = 0; i < 64; ++i) {
+      if (node->cells[i] == 0) continue;
+      is_full &= node->bricks[i] == 1;
+      put(at, node->cells[i]);
+      if (node->bricks[i] == 1) {
+        put(at + 2, 1);
+      } else {
+        put_address(at + 2, record.words.size());
+        add_words(nodes.brick(node->bricks[i]));
+      }
+      at += 4;
+    }
+    root.children = bricks * 4 + (is_full ? 1 : 0);
+    return root;
+  }
+
+  void add_types(const Chunk& voxels) {
+    const Chunk::Mixed* mixed = voxels.mixed();
+    const std::size_t begin = record.words.size();
+    for (const std::size_t header : headers_) {
+      if (mixed == nullptr) {
+        record.words[header + 3] = *voxels.uniform();
+        continue;
+      }
+      put_address(header, begin);
+      record.words[header + 2] = static_cast<std::uint32_t>(mixed->bits);
+      record.words[header + 3] = static_cast<std::uint32_t>(256 + (mixed->palette.size() + 1) / 2);
+    }
+    if (mixed == nullptr) return;
+    record.words.insert(record.words.end(), mixed->slabs.begin(), mixed->slabs.end());
+    for (std::size_t i = 0; i < mixed->palette.size(); i += 2) {
+      const std::uint32_t next = i + 1 < mixed->palette.size() ? mixed->palette[i + 1] : 0;
+      record.words.push_back(mixed->palette[i] | next << 16);
+    }
+    for (const std::uint64_t word : mixed->words) add(word);
+  }
+
+  ChunkRecord record;
+
+ private:
+  void put(std::size_t at, std::uint64_t value) {
+    record.words[at] = static_cast<std::uint32_t>(value);
+    record.words[at + 1] = static_cast<std::uint32_t>(value >> 32);
+  }
+  void put_address(std::size_t at, std::size_t word) {
+    put(at, word * 4);
+    record.addresses_.push_back(at);
+  }
+  void add(std::uint64_t value) {
+    record.words.resize(record.words.size() + 2);
+    put(record.words.size() - 2, value);
+  }
+  void add_words(const trace::Node& brick) {
+    for (const std::uint64_t word : brick) {
+      if (word != 0) add(word);
+    }
+  }
+
+  std::vector<std::size_t> headers_;
+};
+
+void ChunkRecord::move_to(std::uint64_t address) {
+  for (const std::size_t at : addresses_) {
+    const std::uint64_t moved = (words[at] | std::uint64_t{words[at + 1]} << 32) + address;
+    words[at] = static_cast<std::uint32_t>(moved);
+    words[at + 1] = static_cast<std::uint32_t>(moved >> 32);
+  }
+  for (Node* node : {&opaque, &transparent}) {
+    if (node->mask != 0) node->children += address;
+  }
+}
+
+ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
+                       IVec3 chunk) {
+  RecordWriter writer;
+  writer.record.opaque = writer.add_tree(opaque, chunk);
+  if (transparent != nullptr) writer.record.transparent = writer.add_tree(*transparent, chunk);
+  writer.add_types(voxels);
+  return std::move(writer.record);
+}
+
+TopTree build_top_tree(std::vector<ChunkNodeAt> level, std::uint64_t address) {
+  TopTree tree;
+  if (level.empty()) return tree;
+  while (level.size() > 1 || level.front().chunk != IVec3(0)) {
+    const auto key = [](const ChunkNodeAt& n) {
+      const IVec3 parent = n.chunk >> 2;
+      return std::tuple(parent.z, parent.y, parent.x, place_of(n.chunk));
+    };
+    std::sort(level.begin(), level.end(), [&](const ChunkNodeAt& a, const ChunkNodeAt& b) { return key(a) < key(b); });
+    std::vector<ChunkNodeAt> parents;
+    for (const ChunkNodeAt& child : level) {
+      const IVec3 parent = child.chunk >> 2;
+      if (parents.empty() || parents.back().chunk != parent) {
+        parents.push_back({parent, {0, address + tree.nodes.size() * sizeof(Node)}});
+      }
+      parents.back().node.mask |= std::uint64_t{1} << place_of(child.chunk);
+      tree.nodes.push_back(child.node);
+    }
+    level = std::move(parents);
+    ++tree.root_level;
+  }
+  tree.root = level.front().node;
+  return tree;
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/chunk.h>
+#include <quoin/trace/occupancy_tree.h>
+
+#include "render_vk/march/shader_data.h"
+
+namespace quoin::vulkan {
+
+/// A chunk as shaders read it: its part of the opaque and of the transparent tree, and the types of its voxels.
+///
+///   for each tree that holds any of it, at a multiple of 32 bytes: a header (address of the types, bits a voxel, where
+///   the voxels' words begin; for a chunk of one type 0 bits and that type), the nodes of its bricks, the words of
+///   their cells; then the types: slabs, palette, words, as Chunk::Mixed has them.
+struct ChunkRecord {
+  std::vector<std::uint32_t> words;
+  Node opaque;  ///< of the whole chunk; mask 0 where there is none
+  Node transparent;
+
+  /// Addresses count from the record's beginning until they are moved to where it lies.
+  void move_to(std::uint64_t address);
+
+ private:
+  friend class RecordWriter;
+  std::vector<std::size_t> addresses_;  // where in `words` they stand
+};
+
+/// `transparent` may be null.
+[[nodiscard]] ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
+                                     IVec3 chunk);
+
+/// The nodes above chunks.
+struct TopTree {
+  Node root;
+  int root_level = 2;
+  std::vector<Node> nodes;
+};
+
+struct ChunkNodeAt {
+  IVec3 chunk{0};  ///< from the tree's origin: not negative
+  Node node;
+};
+
+/// `address`: where the nodes will lie.
+[[nodiscard]] TopTree build_top_tree(std::vector<ChunkNodeAt> chunks, std::uint64_t address);
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,234 @@
+#ifdef QUOIN_HAVE_VULKAN
+
+// Impostors, drawn by the device and by the processor.
+
+#include <cmath>
+
+#include "render/impostor/test_support.h"
+#include "render_vk/march/vulkan_detail_support.h"
+
+namespace quoin {
+namespace {
+
+using render_test::from_above;
+using render_test::ImpostorWorld;
+using render_test::Model;
+using render_test::orbiting;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::add_blobs;
+using vulkan_test::add_crowd;
+using vulkan_test::expect_equal;
+using vulkan_test::in_detail;
+
+class VulkanImpostors : public vulkan_test::VulkanDetailTest {
+ protected:
+  // All of one model, on a floor.
+  void add_model(Model model) {
+    ImpostorWorld world(model);
+    scene_ = std::move(world.scene);
+    SceneGrid slab;
+    slab.grid.fill_box({-300, 0, -300}, {300, 0, 300}, 2);
+    Instance ground;
+    ground.grid = scene_.add_grid(std::move(slab));
+    ground.position = {0, -1.2 * world.radius, 0};
+    scene_.add_instance(ground);
+  }
+  static RenderOptions far_options(int size) { return in_detail(size, size, 128); }
+};
+
+TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
+  for (const Model model : {Model::Ball, Model::Castle, Model::Ship, Model::Comb, Model::Blobs}) {
+    add_model(model);
+    const ImpostorWorld world(model);
+    const std::string name = "far_" + std::to_string(static_cast<int>(model)) + "_";
+    int view = 0;
+    // Every level of the snapshots.
+    for (const double pixels : {110.0, 60.0, 25.0, 12.0, 5.0}) {
+      const Camera camera = orbiting(world, 0.7 + view, 0.6 - 0.2 * view, 0.3 * view, pixels, 128);
+      compare(camera, far_options(128), name + std::to_string(view++));
+    }
+    EXPECT_GT(impostor_bytes(), 0U);
+  }
+}
+
+TEST_F(VulkanImpostors, EveryKindOfLight) {
+  add_model(Model::Castle);
+  const ImpostorWorld world(Model::Castle);
+  const Camera camera = orbiting(world, 0.7, 0.6, 0.2, 100.0, 148);
+  const auto with = [&](const std::string& name, auto&& change) {
+    RenderOptions options = far_options(148);
+    change(options);
+    compare(camera, options, "far_" + name);
+  };
+  with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
+  with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+  with("all", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
+  with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
+  with("unlit", [](RenderOptions& o) { o.light.lit = false; });
+  with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
+  with("samples", [](RenderOptions& o) { o.samples = 5; });
+  with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+  const Picture far = taken_as_is(camera, far_options(148));
+  EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
+}
+
+TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
+  add_crowd(scene_, {add_blobs(scene_, 31, 12), add_blobs(scene_, 32, 12)}, 6, 320.0);
+  Camera camera = towards({-150, 160, -150}, {900, -60, 900}, 0.7);
+  // More than a tile, Near, Mid and Far.
+  RenderOptions options = in_detail(320, 200, 128);
+  compare(camera, options, "crowd");
+  options.detail_colours = true;
+  compare(camera, options, "crowd_colours");
+  options.samples = 2;
+  compare(camera, options, "crowd_samples");
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 2000.0;
+  compare(camera, options, "crowd_orthographic");
+  EXPECT_GT(impostor_bytes(), 0U);
+}
+
+// As far as single precision and further.
+TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 5, 260.0);
+  const DVec3 away{1e9, -3e8, 5e8};
+  for (const InstanceHandle handle : scene_.instances().handles()) scene_.instances()[handle].position += away;
+  const RenderOptions options = in_detail(256, 192, 128);
+  compare(towards(away + DVec3(-300, 420, -500), away + DVec3(500, 0, 500), 0.9), options, "far_away");
+  compare(towards(away + DVec3(-3e5, 4e5, -5e5), away + DVec3(500, 0, 500), 0.004), options, "far_telescope");
+}
+
+TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {
+  const GridHandle grid = add_blobs(scene_, 31);
+  // Without glass: that would begin where the other's opaque voxels do, but for rounding.
+  Grid& voxels = scene_.edit(grid).grid;
+  voxels.edit(voxels.bounds(), [](IVec3, VoxelType type) { return type == 3 ? VoxelType{1} : type; });
+  SceneGrid other;
+  other.pivot = scene_.grids()[grid].pivot;
+  other.grid = voxels.snapshot();
+  other.grid.edit(voxels.bounds(), [](IVec3, VoxelType type) { return type == kAir ? kAir : VoxelType{4}; });
+  add_crowd(scene_, {grid}, 3, 400.0);
+  const GridHandle glowing = scene_.add_grid(std::move(other));
+  for (const InstanceHandle handle : scene_.instances().handles()) {
+    Instance same = scene_.instances()[handle];
+    same.grid = glowing;
+    scene_.add_instance(same);
+  }
+  compare(towards({-900, 1200, -1500}, {400, 0, 400}, 0.7), in_detail(256, 192, 128), "same_place");
+}
+
+TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
+  const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
+  add_crowd(scene_, grids, 4, 300.0);
+  const Camera camera = towards({-900, 1200, -1500}, {400, 0, 400}, 0.7);
+  const RenderOptions options = in_detail(256, 192, 128);
+  compare(camera, options, "far_before");
+  const std::uint64_t both = impostor_bytes();
+  scene_.edit(grids[0]).grid.fill_box({-40, -40, -40}, {80, 60, 70}, 2);
+  compare(camera, options, "far_edited");
+  for (const InstanceHandle handle : scene_.instances().handles()) {
+    if (scene_.instances()[handle].grid == grids[0]) scene_.remove_instance(handle);
+  }
+  scene_.remove_grid(grids[0]);
+  compare(camera, options, "far_removed");
+  EXPECT_LT(impostor_bytes(), both);
+  EXPECT_GT(impostor_bytes(), 0U);
+  VoxelProperties glass = scene_.types[2];
+  glass.visibility = Visibility::Transparent;
+  glass.colour.a = 100;
+  scene_.types.replace(2, glass);
+  compare(camera, options, "far_other_types");
+  ASSERT_TRUE(renderer_->update(Scene()));
+  EXPECT_EQ(impostor_bytes(), 0U);
+}
+
+TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
+  add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
+  const std::vector<InstanceHandle> handles = scene_.instances().handles();
+  for (std::size_t i = 0; i < handles.size(); i += 2) scene_.edit(handles[i]).visible = false;
+  const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
+  const RenderOptions options = in_detail(128, 96, 128);
+  compare(camera, options, "far_without_hidden");
+  ASSERT_TRUE(renderer_->update(scene_, true));
+  const auto all = CpuRenderer(scene_, true).render(camera, options);
+  expect_equal(taken_as_is(camera, options), *all, "far_with_hidden");
+  EXPECT_GT(all->pixels_hit, render_test::taken(scene_, camera, options).pixels_hit);
+}
+
+// Voxels smaller than texels, which grow to the size of these.
+TEST_F(VulkanImpostors, OfALargeGrid) {
+  add_model(Model::Terrain);
+  const ImpostorWorld world(Model::Terrain);
+  for (const int view : {0, 1, 2}) {
+    const Camera camera = orbiting(world, 0.4 + view, 0.9 - 0.3 * view, 0.0, 120.0 / (1 + 2 * view), 128);
+    compare(camera, far_options(128), "far_large_" + std::to_string(view));
+  }
+}
+
+TEST_F(VulkanImpostors, AroundTheCamera) {
+  add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 2, 120.0);
+  RenderOptions options = in_detail(128, 96, 1'000'000);
+  int view = 0;
+  for (const DVec3 eye : {DVec3(60, 20, -130), DVec3(60, 30, 60), DVec3(-20, 10, 5)}) {
+    compare(towards(eye, {60, 0, 55}, 1.2), options, "far_around_" + std::to_string(view++));
+  }
+  Camera above = from_above(60, 300, 60, 200);
+  above.right = glm::normalize(DVec3(1, 0, 0.3));
+  above.up = glm::cross(above.right, above.forward);
+  compare(above, options, "far_above");
+}
+
+TEST_F(VulkanImpostors, RandomScenesAndPolicies) {
+  for (std::uint32_t seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    scene_ = Scene();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    add_crowd(scene_, {add_blobs(scene_, seed, 8), add_blobs(scene_, seed + 100, 5)}, 4, 150.0 + 100.0 * unit(random));
+    RenderOptions options = in_detail(96 + static_cast<int>(random() % 200), 64, static_cast<int>(random() % 400));
+    options.detail->cell_pixels = 1.0 + unit(random);
+    options.detail->voxel_pixels = 1.5 + unit(random);
+    options.samples = 1 + static_cast<int>(random() % 2);
+    options.light.occlusion = random() % 2 == 0 ? OcclusionMode::Rays : OcclusionMode::Vertex;
+    options.detail_colours = random() % 3 == 0;
+    const double distance = std::exp(7.0 + 2.0 * unit(random));
+    const DVec3 eye = DVec3(unit(random), 0.2 + std::abs(unit(random)), unit(random)) * distance;
+    Camera camera = towards(eye, {200, 0, 200}, 0.6 + 0.3 * unit(random));
+    if (random() % 3 == 0) {
+      camera.projection = Camera::Projection::Orthographic;
+      camera.view_height = 800.0;
+    }
+    compare(camera, options, "random_detail_" + std::to_string(seed));
+  }
+}
+
+TEST_F(VulkanImpostors, WhatIsNotReadyInTimeIsTraced) {
+  add_model(Model::Castle);
+  const ImpostorWorld world(Model::Castle);
+  const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
+  RenderOptions options = far_options(148);
+  options.impostor_seconds = 0.0;
+  compare(camera, options, "far_not_ready");
+  EXPECT_EQ(impostor_bytes(), 0U);
+}
+
+TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
+  add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
+  ASSERT_TRUE(renderer_->update(scene_));
+  const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
+  // More than a tile.
+  RenderOptions options = in_detail(300, 100, 128);
+  VulkanPicture picture(*renderer_);
+  for (int sample = 0; sample < 3; ++sample) ASSERT_TRUE(renderer_->draw(picture, camera, options, sample == 0));
+  options.samples = 3;
+  const Picture whole = taken_as_is(camera, options);
+  EXPECT_EQ(picture.read()->rgb, whole.colour.rgb);
+  EXPECT_EQ(picture.rays(), whole.rays);
+  EXPECT_GT(impostor_bytes(), 0U);
+}
+
+}  // namespace
+}  // namespace quoin
+
+#endif

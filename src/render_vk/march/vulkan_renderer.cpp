@@ -1,0 +1,102 @@
+#include <quoin/render_vk/vulkan_renderer.h>
+
+#include <optional>
+#include <utility>
+
+#include "render/picture_request.h"
+#include "render_vk/march/picture_pass.h"
+#include "render_vk/march/renderer_impl.h"
+
+namespace quoin {
+namespace {
+
+// What a picture is taken of: the instances as the scene has them, or in their detail.
+class Subject {
+ public:
+  [[nodiscard]] static Result<Subject> of(VulkanRenderer::Impl& impl, const Camera& camera,
+                                          const RenderOptions& options) {
+    Subject subject(impl.scene.placement());
+    if (!options.detail || impl.voxels == nullptr) return subject;
+    const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.hidden, camera, options);
+    auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
+    if (!placed) return tl::unexpected(placed.error());
+    subject.detailed_ = std::move(*placed);
+    return subject;
+  }
+
+  [[nodiscard]] const vulkan::Placement& placement() const { return detailed_ ? *detailed_ : *plain_; }
+
+ private:
+  explicit Subject(const vulkan::Placement& plain) : plain_(&plain) {}
+
+  const vulkan::Placement* plain_;
+  std::optional<vulkan::Placement> detailed_;
+};
+
+}  // namespace
+
+Result<std::vector<VulkanDevice>> vulkan_devices() {
+  const auto instance = vulkan::VulkanInstance::create({});
+  if (!instance) return tl::unexpected(instance.error());
+  std::vector<VulkanDevice> devices;
+  for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
+  return devices;
+}
+
+VulkanRenderer::VulkanRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VulkanRenderer::VulkanRenderer(VulkanRenderer&&) noexcept = default;
+VulkanRenderer& VulkanRenderer::operator=(VulkanRenderer&&) noexcept = default;
+VulkanRenderer::~VulkanRenderer() = default;
+
+Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions& options) {
+  auto device = vulkan::Device::create(options);
+  if (!device) return tl::unexpected(device.error());
+  auto pipelines = vulkan::Pipelines::create(**device);
+  if (!pipelines) return tl::unexpected(pipelines.error());
+  return VulkanRenderer(std::make_unique<Impl>(std::move(*device), std::move(*pipelines), options.block_bytes));
+}
+
+const VulkanDevice& VulkanRenderer::device() const {
+  return impl_->device->description();
+}
+
+Status VulkanRenderer::update(const Scene& scene, bool hidden, Threads threads) {
+  const std::uint64_t before = impl_->memory.written();
+  Status done = impl_->scene.update(scene, hidden, threads);
+  impl_->uploaded = impl_->memory.written() - before;
+  impl_->look_at(done ? &scene : nullptr, hidden);
+  return done;
+}
+
+std::uint64_t VulkanRenderer::uploaded_bytes() const {
+  return impl_->uploaded;
+}
+
+Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
+  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  const auto subject = Subject::of(*impl_, camera, options);
+  if (!subject) return tl::unexpected(subject.error());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
+  return pass.render(camera, options, progress);
+}
+
+Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
+                            const Progress& progress) {
+  constexpr int kMostSamples = 4096;
+  if (Status status = check(camera, options); !status) return status;
+  VulkanPicture::Impl& target = picture.impl();
+  if (Status status = target.resize(options.width, options.height); !status) return status;
+  // Samples of meshes, and of pictures that were written, have no sums to add to.
+  if (is_new || target.samples == 0 || target.sums.handle() == VK_NULL_HANDLE) {
+    if (Status status = target.begin_sums(); !status) return status;
+  }
+  if (target.samples + options.samples > kMostSamples) {
+    return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
+  }
+  const auto subject = Subject::of(*impl_, camera, options);
+  if (!subject) return tl::unexpected(subject.error());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
+  return pass.draw(target, camera, options, progress);
+}
+
+}  // namespace quoin

@@ -1,0 +1,248 @@
+// Scenes of many kinds, drawn by the device and by the processor.
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render_vk/device/vulkan_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::from_above;
+using render_test::place;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::expect_equal;
+
+class VulkanScene : public vulkan_test::VulkanTest {
+ protected:
+  void compare(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
+    expect_equal(taken(scene, camera, options), render_test::taken(scene, camera, options), name);
+  }
+};
+
+/// A hut of two opaque types on a floor, with a window of glass and a lamp.
+struct Types {
+  VoxelType wall, roof, glass, water, lamp;
+};
+
+Types add_types(Scene& scene) {
+  return {add_type(scene, {200, 180, 150}), add_type(scene, {150, 40, 30}),
+          add_type(scene, {120, 200, 230, 90}, Visibility::Transparent),
+          add_type(scene, {30, 80, 160, 140}, Visibility::Transparent),
+          add_type(scene, {255, 220, 120}, Visibility::Opaque, 3.0F)};
+}
+
+Grid hut(const Types& types, bool has_glass = true) {
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {19, 0, 19}, types.wall);
+  grid.fill_box({4, 1, 4}, {15, 8, 15}, types.wall);
+  grid.fill_box({5, 1, 5}, {14, 8, 14}, kAir);
+  for (int i = 0; i < 5; ++i) grid.fill_box({3 + i, 9 + i, 3 + i}, {16 - i, 9 + i, 16 - i}, types.roof);
+  grid.fill_box({8, 3, 15}, {11, 6, 15}, has_glass ? types.glass : kAir);
+  grid.fill_box({15, 3, 8}, {15, 6, 11}, has_glass ? types.glass : kAir);
+  grid.set({10, 1, 17}, types.lamp);
+  if (has_glass) grid.fill_box({0, 1, 17}, {4, 2, 19}, types.water);
+  return grid;
+}
+
+InstanceHandle add_instance(Scene& scene, GridHandle grid, DVec3 position, DQuat rotation, double size, bool mirrored) {
+  Instance instance;
+  instance.grid = grid;
+  instance.position = position;
+  instance.rotation = glm::normalize(rotation);
+  instance.voxel_size = size;
+  instance.mirrored = mirrored;
+  return scene.add_instance(instance);
+}
+
+/// Huts turned, mirrored, large and small, some of which touch or stand in others.
+Scene village(DVec3 centre, bool has_glass) {
+  Scene scene;
+  const Types types = add_types(scene);
+  SceneGrid placed;
+  placed.grid = hut(types, has_glass);
+  placed.pivot = {10, 0, 10};
+  const GridHandle grid = scene.add_grid(std::move(placed));
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int i = 0; i < 24; ++i) {
+    const DVec3 position = centre + DVec3{40 * unit(random), 8 * unit(random), 40 * unit(random)};
+    const DQuat rotation{unit(random), unit(random), unit(random), unit(random)};
+    add_instance(scene, grid, position, rotation, std::exp(unit(random)), i % 3 == 0);
+  }
+  SceneGrid ground;
+  ground.grid.fill_box({-60, -13, -60}, {60, -10, 60}, types.wall);
+  place(scene, ground.grid.snapshot(), centre);
+  return scene;
+}
+
+TEST_F(VulkanScene, TurnedMirroredAndScaledInstances) {
+  const Scene scene = village(DVec3(0.0), false);
+  compare(scene, towards({50, 40, 70}, {0, 0, 0}), sized(160, 120), "village");
+}
+
+TEST_F(VulkanScene, ManyInstances) {
+  Scene scene;
+  const Types types = add_types(scene);
+  SceneGrid small;
+  small.grid.fill_sphere({0, 0, 0}, 3, types.roof);
+  small.grid.fill_box({-1, 3, -1}, {1, 4, 1}, types.glass);
+  const GridHandle grid = scene.add_grid(std::move(small));
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (int i = 0; i < 900; ++i) {
+    const DVec3 position{70 * unit(random), 12 * unit(random), 70 * unit(random)};
+    add_instance(scene, grid, position, {unit(random), unit(random), unit(random), unit(random)}, 0.6, i % 2 == 0);
+  }
+  compare(scene, towards({60, 30, 70}, {0, 0, 0}), sized(96, 72), "many");
+  // Along the axes, where directions are 0.
+  compare(scene, from_above(0.3, 60, -0.7, 80), sized(64, 64), "many_from_above");
+}
+
+TEST_F(VulkanScene, GlassOfTurnedInstances) {
+  const Scene scene = village(DVec3(0.0), true);
+  compare(scene, towards({-40, 30, 60}, {0, 0, 0}), sized(128, 96), "glass_village");
+}
+
+TEST_F(VulkanScene, AThousandMillionAway) {
+  const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
+  const Scene scene = village(far, true);
+  compare(scene, towards(far + DVec3(50, 40, 70), far), sized(96, 72), "far_village");
+}
+
+TEST_F(VulkanScene, AVillageSeenFromAfarThroughALongLens) {
+  const Scene scene = village(DVec3(0.0), true);
+  compare(scene, towards({4e5, 3e5, 6e5}, {0, 0, 0}, 1.3e-4), sized(96, 72), "long_lens");
+}
+
+TEST_F(VulkanScene, OrthographicCameras) {
+  const Scene scene = village(DVec3(0.0), true);
+  compare(scene, from_above(3.3, 60, -2.7, 90), sized(96, 96), "orthographic");
+  Camera slanted = towards({300, 260, 400}, {0, 0, 0});
+  slanted.projection = Camera::Projection::Orthographic;
+  slanted.view_height = 110;
+  compare(scene, slanted, sized(128, 96), "slanted");
+  slanted.position *= 100.0;
+  compare(scene, slanted, sized(96, 72), "slanted_from_afar");
+}
+
+TEST_F(VulkanScene, EveryOptionOfLight) {
+  Scene scene;
+  place(scene, hut(add_types(scene)));
+  const Camera camera = towards({34, 26, 46}, {9, 5, 9});
+  const auto with = [&](const char* name, const std::function<void(RenderOptions&)>& change) {
+    RenderOptions options = sized(96, 72);
+    change(options);
+    compare(scene, camera, options, name);
+  };
+  with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
+  with("vertex_all", [](RenderOptions& o) {
+    o.light.occlusion = OcclusionMode::Vertex;
+    o.light.occlusion_affects = OcclusionAffects::All;
+  });
+  with("no_occlusion", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+  with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
+  with("unlit", [](RenderOptions& o) { o.light.lit = false; });
+  with("all_rays", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
+  with("six_rays", [](RenderOptions& o) { o.light.occlusion_rays = 6; });
+  with("hashed_rays", [](RenderOptions& o) { o.light.occlusion_rays = 13; });
+  with("samples", [](RenderOptions& o) { o.samples = 4; });
+  with("hashed_samples", [](RenderOptions& o) {
+    o.samples = 3;
+    o.light.occlusion_rays = 5;
+  });
+  with("short_shadows", [](RenderOptions& o) { o.light.shadow_distance = 3.0; });
+  with("low_sun", [](RenderOptions& o) { o.light.sun = {1e-30, 0.3e-30, 1e-30}; });
+  with("exposed", [](RenderOptions& o) { o.light.exposure = 2.5; });
+  with("many_tiles", [](RenderOptions& o) {
+    o.width = 530;
+    o.height = 20;
+    o.light.lit = false;
+  });
+  with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+}
+
+TEST_F(VulkanScene, FromInsideGlassAndStone) {
+  Scene scene;
+  const Types types = add_types(scene);
+  Grid grid;
+  const VoxelType clear = add_type(scene, {60, 140, 220, 9}, Visibility::Transparent);
+  grid.fill_box({0, 0, 0}, {30, 30, 30}, clear);
+  grid.fill_box({0, 0, 0}, {30, 3, 30}, types.wall);
+  grid.fill_sphere({20, 8, 20}, 5, types.roof);
+  grid.fill_box({8, 4, 24}, {12, 12, 26}, types.glass);
+  place(scene, std::move(grid));
+  compare(scene, towards({4.3, 15.2, 5.1}, {20, 8, 20}), sized(96, 72), "under_water");
+  compare(scene, towards({10.4, 8.3, 25.6}, {20, 8, 20}), sized(96, 72), "in_glass");
+  compare(scene, towards({20.4, 8.3, 20.6}, {2, 8, 2}), sized(32, 24), "in_stone");
+}
+
+TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
+  Scene scene;
+  const Types types = add_types(scene);
+  const VoxelType clear = add_type(scene, {250, 230, 240, 12}, Visibility::Transparent);
+  const VoxelType other = add_type(scene, {200, 250, 210, 20}, Visibility::Transparent);
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {80, 0, 20}, types.wall);
+  grid.fill_box({0, 0, 0}, {0, 20, 20}, types.roof);
+  for (int x = 4; x < 78; x += 2) grid.fill_box({x, 1, 2}, {x, 14, 18}, x % 4 == 0 ? clear : other);
+  place(scene, std::move(grid));
+  // A second grid whose panes touch those of the first.
+  Grid beside;
+  for (int x = 4; x < 40; x += 2) beside.fill_box({x + 1, 1, 2}, {x + 1, 7, 18}, x % 4 == 0 ? clear : other);
+  place(scene, std::move(beside));
+  RenderOptions options = sized(96, 72);
+  options.light.sun = {1.0, 0.25, 0.1};
+  compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "panes");
+}
+
+TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
+  Scene scene;
+  const Types types = add_types(scene);
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {15, 0, 15}, types.wall);
+  for (int i = 0; i < 12; ++i) {
+    grid.fill_box({20'000 + i, 0, 2 * i}, {20'000 + i, 1 + i, 2 * i + 3}, i % 2 != 0 ? types.roof : types.wall);
+  }
+  place(scene, std::move(grid));
+  compare(scene, towards({3.2, 6.1, 7.7}, {20'000, 6, 15}, 2e-3), sized(96, 72), "corridor");
+}
+
+TEST_F(VulkanScene, AnEmptySceneIsTheSky) {
+  const Scene scene;
+  compare(scene, towards({0, 0, 0}, {1, 0.2, 0}, 2.0), sized(64, 48), "sky");
+  compare(scene, from_above(0, 10, 0, 20), sized(64, 48), "ground");
+}
+
+TEST_F(VulkanScene, RandomScenesFromRandomPlaces) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    Scene scene;
+    const Types types = add_types(scene);
+    const VoxelType kinds[] = {types.wall, types.roof, types.glass, types.water, types.lamp};
+    for (int i = 0; i < 3; ++i) {
+      SceneGrid grid;
+      for (int j = 0; j < 30; ++j) {
+        grid.grid.fill_sphere(DVec3(unit(random), unit(random), unit(random)) * 50.0, 3 + 8 * std::abs(unit(random)),
+                              kinds[random() % 5]);
+      }
+      const GridHandle handle = scene.add_grid(std::move(grid));
+      add_instance(scene, handle, DVec3(unit(random), unit(random), unit(random)) * 60.0,
+                   {unit(random), unit(random), unit(random), unit(random)}, 1.0 + 0.5 * unit(random), random() % 2);
+    }
+    const DVec3 eye = DVec3(unit(random), unit(random), unit(random)) * 110.0;
+    RenderOptions options = sized(96, 64);
+    options.light.occlusion_rays = seed % 2 == 0 ? 9 : 4;
+    compare(scene, towards(eye, {0, 0, 0}), options, "random_" + std::to_string(seed));
+  }
+}
+
+}  // namespace
+}  // namespace quoin

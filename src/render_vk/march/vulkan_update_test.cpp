@@ -1,0 +1,187 @@
+// What the device holds after edits, and how worlds of all sizes get there.
+
+#include <functional>
+#include <random>
+
+#include "render_vk/device/vulkan_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::place;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::expect_equal;
+
+class VulkanUpdate : public vulkan_test::VulkanTest {
+ protected:
+  /// After an update the picture is that of the processor, and to the byte that of a renderer that knew nothing before.
+  void expect_current(const Scene& scene, const Camera& camera, const std::string& name) {
+    const RenderOptions options = sized(64, 48);
+    const Picture updated = taken_as_is(camera, options);
+    expect_equal(updated, render_test::taken(scene, camera, options), name);
+    auto fresh = VulkanRenderer::create(test_options());
+    if (!fresh) return;
+    ASSERT_TRUE(fresh->update(scene));
+    const Picture anew = fresh->render(camera, options).value();
+    EXPECT_EQ(updated.colour.rgb, anew.colour.rgb) << name;
+    EXPECT_EQ(updated.depth.values, anew.depth.values) << name;
+  }
+};
+
+/// Hills of many chunks, of two types in patches.
+Grid hills(VoxelType ground, VoxelType stone, int edge) {
+  Grid grid;
+  for (int x = 0; x < edge; x += 4) {
+    for (int z = 0; z < edge; z += 4) {
+      const int height = 20 + static_cast<int>(12.0 * std::sin(x * 0.06) + 9.0 * std::cos(z * 0.09));
+      grid.fill_box({x, 0, z}, {x + 3, height, z + 3}, (x / 16 + z / 16) % 2 == 0 ? ground : stone);
+    }
+  }
+  return grid;
+}
+
+TEST_F(VulkanUpdate, AnEditSendsWhatItChangedAndNoMore) {
+  Scene scene;
+  const VoxelType ground = add_type(scene, {90, 160, 70});
+  const VoxelType stone = add_type(scene, {140, 140, 150});
+  const VoxelType glass = add_type(scene, {120, 200, 230, 90}, Visibility::Transparent);
+  const InstanceHandle instance = place(scene, hills(ground, stone, 512));
+  Grid& grid = scene.edit(scene.instances()[instance].grid).grid;
+  const Camera camera = towards({150, 70, 210}, {70, 20, 70});
+  ASSERT_TRUE(renderer_->update(scene));
+  const std::uint64_t all = renderer_->uploaded_bytes();
+  ASSERT_TRUE(renderer_->update(scene));
+  EXPECT_EQ(renderer_->uploaded_bytes(), 0U) << "nothing changed";
+  const auto edited = [&](const char* name, const std::function<void()>& edit) {
+    edit();
+    ASSERT_TRUE(renderer_->update(scene)) << name;
+    EXPECT_GT(renderer_->uploaded_bytes(), 0U) << name;
+    EXPECT_LT(renderer_->uploaded_bytes(), all / 8) << name;
+    expect_current(scene, camera, name);
+  };
+  edited("one_voxel", [&] { grid.set({100, 60, 100}, stone); });
+  edited("hole", [&] { grid.fill_sphere({70, 8, 90}, 12, kAir); });
+  edited("glass", [&] { grid.fill_box({80, 30, 80}, {100, 50, 82}, glass); });
+  edited("new_chunk_below", [&] { grid.fill_box({-70, 0, 60}, {-66, 30, 64}, stone); });
+  edited("chunk_away", [&] { grid.fill_box({-70, 0, 60}, {-66, 30, 64}, kAir); });
+}
+
+TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, {140, 140, 150});
+  const VoxelType brick = add_type(scene, {170, 80, 60});
+  Grid floor;
+  floor.fill_box({0, 0, 0}, {63, 1, 63}, stone);
+  place(scene, std::move(floor));
+  Grid tower;
+  tower.fill_box({0, 0, 0}, {7, 23, 7}, brick);
+  const InstanceHandle first = place(scene, tower.snapshot(), {12, 2, 12});
+  const Camera camera = towards({90, 60, 100}, {30, 8, 30});
+  const auto then = [&](const char* name) {
+    ASSERT_TRUE(renderer_->update(scene)) << name;
+    expect_current(scene, camera, name);
+  };
+  then("two");
+  const InstanceHandle second = place(scene, tower.snapshot(), {40, 2, 30});
+  then("three");
+  scene.instances()[first].position.x += 20.25;
+  then("moved");
+  EXPECT_TRUE(scene.remove_grid(scene.instances()[second].grid));
+  then("removed");
+  scene.edit(first).visible = false;
+  then("hidden");
+  scene.edit(first).visible = true;
+  VoxelProperties glass = scene.types[brick];
+  glass.visibility = Visibility::Transparent;
+  glass.colour = {90, 200, 120, 60};
+  scene.types.replace(brick, glass);
+  then("glass_now");
+  scene.edit(scene.instances()[first].grid).grid = tower.snapshot();
+  then("assigned");
+}
+
+TEST_F(VulkanUpdate, AnotherSceneWithTheSameHandlesAndVersions) {
+  const Camera camera = towards({40, 30, 50}, {8, 8, 8});
+  for (int size = 4; size < 16; size += 5) {
+    Scene scene;
+    const VoxelType stone = add_type(scene, {140, 140, 150});
+    Grid grid;
+    grid.fill_box({0, 0, 0}, {size, size, size}, stone);
+    place(scene, std::move(grid));
+    ASSERT_TRUE(renderer_->update(scene));
+    expect_current(scene, camera, "scene_" + std::to_string(size));
+  }
+}
+
+TEST_F(VulkanUpdate, WorldsLargerThanABlock) {
+  VulkanOptions options = test_options();
+  options.block_bytes = 64 << 10;
+  auto small = VulkanRenderer::create(options);
+  if (!small) GTEST_SKIP() << small.error().message;
+  renderer_ = std::make_unique<VulkanRenderer>(std::move(*small));
+  Scene scene;
+  const VoxelType ground = add_type(scene, {90, 160, 70});
+  const VoxelType stone = add_type(scene, {140, 140, 150});
+  place(scene, hills(ground, stone, 640));
+  const Camera camera = towards({700, 150, 740}, {300, 10, 300});
+  const RenderOptions wanted = sized(96, 64);
+  expect_equal(taken(scene, camera, wanted), render_test::taken(scene, camera, wanted), "small_blocks");
+  EXPECT_GT(renderer_->uploaded_bytes(), 20 * options.block_bytes);
+}
+
+TEST_F(VulkanUpdate, IslandsFarApart) {
+  Scene scene;
+  const VoxelType ground = add_type(scene, {90, 160, 70});
+  const VoxelType stone = add_type(scene, {140, 140, 150});
+  Grid grid = hills(ground, stone, 64);
+  grid.fill_sphere({-3e6, 4e6, -5e6}, 20, stone);
+  grid.fill_sphere({90, 40, 30}, 20, ground);
+  const InstanceHandle instance = place(scene, std::move(grid));
+  const RenderOptions options = sized(96, 64);
+  const Camera near = towards({150, 70, 160}, {50, 20, 40});
+  expect_equal(taken(scene, near, options), render_test::taken(scene, near, options), "island");
+  const Camera far = towards({-3e6 + 60, 4e6 + 50, -5e6 + 70}, {-3e6, 4e6, -5e6});
+  expect_equal(taken_as_is(far, options), render_test::taken(scene, far, options), "far_island");
+  // Further than single precision counts voxels: rays end all the same.
+  scene.edit(scene.instances()[instance].grid).grid.set({400'000'000, 21, 43}, stone);
+  const Camera across = towards({150.3, 24.7, 20.1}, {400'000'000, 21, 43}, 1.5);
+  expect_equal(taken(scene, across, options), render_test::taken(scene, across, options), "across");
+  Grid& wide = scene.edit(scene.instances()[instance].grid).grid;
+  wide.set({-1'000'000'000, 0, 0}, stone);
+  const Status refused = renderer_->update(scene);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+  EXPECT_NE(refused.error().message.find("2^29"), std::string::npos) << refused.error().message;
+  EXPECT_EQ(taken_as_is(near, options).pixels_hit, 0) << "after an error it holds nothing";
+  wide.set({-1'000'000'000, 0, 0}, kAir);
+  expect_equal(taken(scene, near, options), render_test::taken(scene, near, options), "island_again");
+}
+
+TEST_F(VulkanUpdate, HundredsOfTypesInOneChunk) {
+  Scene scene;
+  std::mt19937 random(3);
+  for (int i = 0; i < 700; ++i) {
+    add_type(scene, {static_cast<std::uint8_t>(random()), static_cast<std::uint8_t>(random()), 80});
+  }
+  for (const int types : {1, 3, 14, 200, 700}) {
+    Grid grid;
+    grid.fill_box({0, 0, 0}, {63, 9, 63}, 1);
+    grid.edit({{0, 10, 0}, {64, 30, 64}}, [&](IVec3 voxel, VoxelType) {
+      const auto type = static_cast<VoxelType>(1 + random() % static_cast<unsigned>(types));
+      return (voxel.x + voxel.z) % 16 < voxel.y - 8 ? kAir : type;
+    });
+    Scene each;
+    each.types = scene.types;
+    place(each, std::move(grid));
+    const Camera camera = towards({90, 60, 80}, {32, 10, 32});
+    RenderOptions options = sized(80, 60);
+    options.light.occlusion = OcclusionMode::Vertex;
+    expect_equal(taken(each, camera, options), render_test::taken(each, camera, options),
+                 "types_" + std::to_string(types));
+  }
+}
+
+}  // namespace
+}  // namespace quoin

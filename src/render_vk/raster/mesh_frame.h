@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/scene/camera.h>
+
+#include "render_vk/raster/mesh_shader_data.h"
+#include "render_vk/raster/mesh_store.h"
+
+namespace quoin::vulkan {
+
+/// An instance whose meshes are drawn.
+struct MeshInstance {
+  GridHandle grid;
+  glm::dmat3 world_axes{1.0};  ///< as PlacedGrid's
+  DVec3 position{0.0};
+  DVec3 pivot{0.0};
+  double voxel_size = 1.0;
+  bool mirrored = false;
+};
+
+/// A chunk of an instance that is in the picture.
+struct MeshDraw {
+  const StoredMesh* mesh = nullptr;
+  std::uint32_t instance = 0;  ///< index into MeshFrameData::instances
+  Vec3 offset{0.0F};           ///< of the chunk, from where its instance is counted
+  double distance = 0.0;       ///< of its middle, in world units; orthographic: along the view
+  std::uint8_t faces = 0;      ///< the directions, as bits, of which the camera can see any
+  bool mirrored = false;
+};
+
+/// Runs of a blocky chunk's quads, each from one number to before the next.
+using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+/// Those that face the camera, as far as can be told by directions; the transparent ones all, if at all.
+[[nodiscard]] QuadRuns visible_quads(const MeshDraw& draw, bool with_glass);
+
+/// What drawing one picture takes, but for where things lie in memory.
+struct MeshFrameData {
+  ShaderMeshFrame frame;
+  ShaderMeshPush push;  ///< what all draws have in common
+  ShaderMeshPush sky;
+  std::vector<ShaderMeshInstance> instances;
+  std::vector<MeshDraw> draws;  ///< the nearest first
+  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMostOrdered`: then
+  /// chunks are drawn in their order, and the quads of each as they come.
+  std::vector<ShaderGlassQuad> order;
+  std::vector<ShaderGlassDraw> glass;  ///< what `order` names
+  std::size_t glass_quads = 0;
+
+  [[nodiscard]] bool has(std::uint32_t flag) const { return (push.numbers >> kMeshFlagsShift & flag) != 0; }
+  /// Of the surfaces that are drawn.
+  [[nodiscard]] std::int64_t triangles() const;
+};
+
+constexpr std::size_t kMostOrdered = std::size_t{1} << 20;
+
+/// All that is in the world is made relative to the camera here, in double precision; then each instance is counted
+/// from a corner of a chunk near the camera, so that a corner that chunks share is the same number in each of them.
+///
+/// Depth: reversed, 1 at the near plane. It lies at the nearest chunk in the picture, but not nearer than 1/1024 of the
+///        smallest voxel; perspective has no far plane, orthographic pictures' lies behind the last chunk.
+/// `subpixels`: in how many places per pixel and axis a device tells corners apart.
+/// Requires: `check` accepts the camera and the options.
+/// Errors:   InvalidArgument for a camera whose axes lie in one plane.
+/// Cost:     O(chunks of the instances), and sorting those in the picture and the transparent quads.
+[[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,
+                                                    const Camera& camera, const MeshPictureOptions& options,
+                                                    int subpixels);
+
+}  // namespace quoin::vulkan

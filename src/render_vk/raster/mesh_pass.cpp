@@ -1,0 +1,296 @@
+#include "render_vk/raster/mesh_pass.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+namespace quoin::vulkan {
+namespace {
+
+const char* const kDoing = "drawing meshes";
+// Quads that 16-bit indices reach; more of them take several draws.
+constexpr std::uint32_t kQuadsAtOnce = 16'384;
+constexpr VkDeviceSize kAlignment = 32;
+
+VkDeviceSize aligned(VkDeviceSize size) {
+  return (size + kAlignment - 1) / kAlignment * kAlignment;
+}
+
+template <class T>
+VkDeviceSize bytes_of(const std::vector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
+}  // namespace
+
+/// A walk over what is drawn, in one way.
+struct MeshPass::Step {
+  enum class Over : std::uint8_t {
+    Sky,
+    Opaque,  ///< the nearest first
+    All,     ///< transparent quads like others
+    GlassInOrder,
+    GlassByChunk,  ///< the furthest first
+  };
+  Over over;
+  std::uint32_t mode = kDrawSurfaces;
+  VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
+  std::array<VkPipeline, 2> smooth{};  // mirrored: 1
+
+  [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
+};
+
+Result<std::unique_ptr<MeshPass>> MeshPass::create(Device& device, DeviceMemory& memory) {
+  const std::string& name = device.description().name;
+  if (!device.physical().draws_triangles) {
+    return fail(ErrorCode::Unsupported, "vulkan: " + name + ": its queue that computes draws no triangles");
+  }
+  VkFormatProperties depths{};
+  device.api().vkGetPhysicalDeviceFormatProperties(device.physical().handle, kMeshDepth, &depths);
+  if ((depths.optimalTilingFeatures & VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT) == 0) {
+    return fail(ErrorCode::Unsupported, "vulkan: " + name + " lacks depths in single precision");
+  }
+  std::unique_ptr<MeshPass> pass(new MeshPass(device, memory));
+  if (Status opened = pass->open(); !opened) return tl::unexpected(opened.error());
+  return pass;
+}
+
+Status MeshPass::open() {
+  VkPhysicalDeviceProperties properties{};
+  device_->api().vkGetPhysicalDeviceProperties(device_->physical().handle, &properties);
+  const VkPhysicalDeviceLimits& limits = properties.limits;
+  sample_counts_ = limits.framebufferColorSampleCounts & limits.framebufferDepthSampleCounts;
+  largest_edge_ = std::min({limits.maxFramebufferWidth, limits.maxFramebufferHeight, limits.maxImageDimension2D,
+                            limits.maxViewportDimensions[0], limits.maxViewportDimensions[1]});
+  subpixels_ = 1 << std::min(limits.subPixelPrecisionBits, 16U);
+  auto pipelines = MeshPipelines::create(*device_);
+  if (!pipelines) return tl::unexpected(pipelines.error());
+  pipelines_ = std::move(*pipelines);
+  return put_corners();
+}
+
+MeshPass::~MeshPass() {
+  memory_->release(corners_);
+}
+
+std::uint32_t MeshPass::samples_for(int wanted) const {
+  auto samples = static_cast<std::uint32_t>(wanted);
+  while (samples > 1 && (sample_counts_ & samples) == 0) samples /= 2;
+  return samples;
+}
+
+Status MeshPass::put_corners() {
+  std::vector<std::uint16_t> indices;
+  for (std::uint32_t quad = 0; quad < kQuadsAtOnce; ++quad) {
+    for (const std::uint32_t corner : {0, 1, 2, 0, 2, 3}) {
+      indices.push_back(static_cast<std::uint16_t>(4 * quad + corner));
+    }
+  }
+  const auto place = memory_->allocate(bytes_of(indices), kDoing);
+  if (!place) return tl::unexpected(place.error());
+  corners_ = *place;
+  Status done = memory_->write(corners_, std::as_bytes(std::span(indices)));
+  if (done) done = memory_->flush();
+  if (!done) memory_->discard();
+  return done;
+}
+
+Status MeshPass::grow(VkDeviceSize bytes) {
+  if (staging_.size() >= bytes && frame_.size() >= bytes) return {};
+  const VkDeviceSize size = bytes + bytes / 2;
+  for (Buffer* buffer : {&staging_, &frame_}) {
+    const auto where = buffer == &staging_ ? Buffer::Where::Upload : Buffer::Where::Device;
+    *buffer = {};
+    auto made = Buffer::create(*device_, size, where, kDoing);
+    if (!made) return tl::unexpected(made.error());
+    *buffer = std::move(*made);
+  }
+  return {};
+}
+
+// Puts what the shaders read of a picture where it will be copied from, and has the images ready.
+Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
+  constexpr VkDeviceSize kInstances = sizeof(ShaderMeshFrame);
+  const VkDeviceSize draws = kInstances + aligned(bytes_of(data.instances));
+  const VkDeviceSize order = draws + aligned(bytes_of(data.glass));
+  frame_bytes_ = order + aligned(bytes_of(data.order));
+  if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
+  // Room was left for the address to be a multiple, whatever the buffer's is.
+  frame_address_ = aligned(frame_.address());
+  data.frame.draws = frame_address_ + draws;
+  data.frame.order = frame_address_ + order;
+  data.push.frame = data.sky.frame = frame_address_;
+  std::byte* to = staging_.mapped();
+  std::memcpy(to, &data.frame, sizeof data.frame);
+  if (!data.instances.empty()) std::memcpy(to + kInstances, data.instances.data(), bytes_of(data.instances));
+  if (!data.glass.empty()) std::memcpy(to + draws, data.glass.data(), bytes_of(data.glass));
+  if (!data.order.empty()) std::memcpy(to + order, data.order.data(), bytes_of(data.order));
+  if (target_.is_of(size, samples)) return {};
+  target_ = {};
+  const auto pass = pipelines_->render_pass(samples);
+  if (!pass) return tl::unexpected(pass.error());
+  auto target = MeshTarget::create(*device_, *pass, size, samples);
+  if (!target) return tl::unexpected(target.error());
+  target_ = std::move(*target);
+  return {};
+}
+
+std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe) const {
+  if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
+  const bool shows_values = data.has(kMeshShowOcclusion | kMeshShowNormals);
+  // What is solid first, so that less of the sky is to be drawn.
+  std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
+  if (data.glass_quads > 0) {
+    const auto over = data.glass_quads > kMostOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
+    for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
+  }
+  if (wireframe == Wireframe::Over) steps.push_back({Step::Over::All, kDrawEdgesOver});
+  return steps;
+}
+
+Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples) {
+  for (Step& step : steps) {
+    const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
+      const auto found =
+          pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, samples});
+      if (!found) return tl::unexpected(found.error());
+      out = *found;
+      return {};
+    };
+    const bool is_sky = step.over == Step::Over::Sky;
+    Status done = find(is_sky ? MeshWay::What::Sky : MeshWay::What::Blocky, false, step.blocky);
+    if (is_sky || step.is_glass()) {
+      if (!done) return done;
+      continue;
+    }
+    if (done) done = find(MeshWay::What::Smooth, false, step.smooth[0]);
+    if (done) done = find(MeshWay::What::Smooth, true, step.smooth[1]);
+    if (!done) return done;
+  }
+  return {};
+}
+
+Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
+                      const Buffer& colours) {
+  std::vector<Step> steps = steps_for(data, wireframe);
+  Status done = find_pipelines(steps, samples);
+  if (done) done = prepare(data, size, samples);
+  if (!done) return done;
+  return device_->run(kDoing, [&](VkCommandBuffer commands) { record(commands, data, steps, colours); });
+}
+
+void MeshPass::copy_frame(VkCommandBuffer commands) const {
+  const VkBufferCopy all{0, frame_address_ - frame_.address(), frame_bytes_};
+  device_->api().vkCmdCopyBuffer(commands, staging_.handle(), frame_.handle(), 1, &all);
+  // Also before what was uploaded by commands before these.
+  auto barrier = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_INDEX_READ_BIT;
+  device_->api().vkCmdPipelineBarrier(
+      commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
+      VK_PIPELINE_STAGE_VERTEX_INPUT_BIT | VK_PIPELINE_STAGE_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT,
+      0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+void MeshPass::record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
+                      const Buffer& colours) const {
+  const Api& api = device_->api();
+  copy_frame(commands);
+  const VkExtent2D size = target_.size();
+  std::array<VkClearValue, 2> clear{};
+  clear[1].depthStencil = {0.0F, 0};  // depths are reversed
+  auto begin = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
+  begin.renderPass = pipelines_->render_pass(target_.samples()).value();
+  begin.framebuffer = target_.framebuffer();
+  begin.renderArea.extent = size;
+  begin.clearValueCount = clear.size();
+  begin.pClearValues = clear.data();
+  api.vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
+  const VkViewport viewport{0.0F, 0.0F, static_cast<float>(size.width), static_cast<float>(size.height), 0.0F, 1.0F};
+  api.vkCmdSetViewport(commands, 0, 1, &viewport);
+  const VkRect2D all{{0, 0}, size};
+  api.vkCmdSetScissor(commands, 0, 1, &all);
+  for (const Step& step : steps) record_step(commands, data, step);
+  api.vkCmdEndRenderPass(commands);
+  copy_picture(commands, colours);
+}
+
+void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
+  const Api& api = device_->api();
+  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
+  VkPipeline bound = step.blocky;
+  if (step.over == Step::Over::Sky) {
+    push(commands, data.sky);
+    return api.vkCmdDraw(commands, 3, 1, 0, 0);
+  }
+  ShaderMeshPush values = data.push;
+  values.numbers |= step.mode;
+  bind_corners(commands);
+  if (step.over == Step::Over::GlassInOrder) {
+    push(commands, values);
+    return draw_quads(commands, 0, static_cast<std::uint32_t>(data.order.size()));
+  }
+  for (std::size_t i = 0; i < data.draws.size(); ++i) {
+    const MeshDraw& draw = data.draws[step.is_glass() ? data.draws.size() - 1 - i : i];
+    const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
+    if (step.is_glass() && draw.mesh->glass.empty()) continue;
+    const VkPipeline wanted = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
+    if (wanted != bound) {
+      api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
+      if (!is_smooth) bind_corners(commands);
+      bound = wanted;
+    }
+    values.data = draw.mesh->place.address;
+    values.offset = {draw.offset.x, draw.offset.y, draw.offset.z};
+    values.instance = draw.instance;
+    const ShaderMeshInstance& instance = data.instances[draw.instance];
+    values.clip = instance.clip;
+    values.eye = instance.eye;
+    values.room = instance.room;
+    push(commands, values);
+    draw_mesh(commands, draw, step);
+  }
+}
+
+void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const {
+  const StoredMesh& mesh = *draw.mesh;
+  if (mesh.style == SurfaceStyle::Smooth) {
+    device_->api().vkCmdBindIndexBuffer(commands, memory_->buffer_of(mesh.place), mesh.place.offset + mesh.first_index,
+                                        VK_INDEX_TYPE_UINT32);
+    device_->api().vkCmdDrawIndexed(commands, mesh.indices, 1, 0, 0, 0);
+    return;
+  }
+  const std::uint32_t opaque = mesh.opaque.back();
+  const auto all = opaque + static_cast<std::uint32_t>(mesh.glass.size());
+  if (step.is_glass()) return draw_quads(commands, opaque, all);
+  if (step.mode == kDrawEdgesOnly) return draw_quads(commands, 0, all);
+  for (const auto& [first, end] : visible_quads(draw, step.over == Step::Over::All)) draw_quads(commands, first, end);
+}
+
+void MeshPass::draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const {
+  while (first < end) {
+    const std::uint32_t count = std::min(end - first, kQuadsAtOnce);
+    device_->api().vkCmdDrawIndexed(commands, 6 * count, 1, 0, static_cast<std::int32_t>(4 * first), 0);
+    first += count;
+  }
+}
+
+void MeshPass::bind_corners(VkCommandBuffer commands) const {
+  device_->api().vkCmdBindIndexBuffer(commands, memory_->buffer_of(corners_), corners_.offset, VK_INDEX_TYPE_UINT16);
+}
+
+void MeshPass::push(VkCommandBuffer commands, const ShaderMeshPush& values) const {
+  device_->api().vkCmdPushConstants(commands, pipelines_->layout(),
+                                    VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0, sizeof values,
+                                    &values);
+}
+
+void MeshPass::copy_picture(VkCommandBuffer commands, const Buffer& colours) const {
+  VkBufferImageCopy region{};
+  region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+  region.imageExtent = {target_.size().width, target_.size().height, 1};
+  device_->api().vkCmdCopyImageToBuffer(commands, target_.picture(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+                                        colours.handle(), 1, &region);
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "render_vk/raster/mesh_frame.h"
+#include "render_vk/raster/mesh_pipelines.h"
+#include "render_vk/raster/mesh_target.h"
+
+namespace quoin::vulkan {
+
+/// Draws what MeshFrameData lists, and keeps the memory that this takes from picture to picture.
+class MeshPass {
+ public:
+  /// Errors: Unsupported when the device cannot draw meshes at all.
+  [[nodiscard]] static Result<std::unique_ptr<MeshPass>> create(Device& device, DeviceMemory& memory);
+  ~MeshPass();
+  MeshPass(const MeshPass&) = delete;
+  MeshPass& operator=(const MeshPass&) = delete;
+
+  /// The greatest number that the device offers of those up to `wanted`.
+  [[nodiscard]] std::uint32_t samples_for(int wanted) const;
+  /// Of a picture, across and down.
+  [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
+  [[nodiscard]] int subpixels() const { return subpixels_; }
+
+  /// Writes the pixels of `data` into `colours`. `data.push` says where surfaces are.
+  [[nodiscard]] Status draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
+                            const Buffer& colours);
+
+ private:
+  struct Step;
+
+  MeshPass(Device& device, DeviceMemory& memory) : device_(&device), memory_(&memory) {}
+  Status open();
+  Status put_corners();
+  Status prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples);
+  Status grow(VkDeviceSize bytes);
+  [[nodiscard]] std::vector<Step> steps_for(const MeshFrameData& data, Wireframe wireframe) const;
+  Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples);
+  void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
+              const Buffer& colours) const;
+  void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
+  void draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const;
+  void draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const;
+  void bind_corners(VkCommandBuffer commands) const;
+  void push(VkCommandBuffer commands, const ShaderMeshPush& values) const;
+  void copy_frame(VkCommandBuffer commands) const;
+  void copy_picture(VkCommandBuffer commands, const Buffer& colours) const;
+
+  Device* device_;
+  DeviceMemory* memory_;
+  std::unique_ptr<MeshPipelines> pipelines_;
+  MeshTarget target_;
+  Place corners_;  // indices of the triangles of many quads
+  Buffer staging_;
+  Buffer frame_;
+  VkDeviceSize frame_bytes_ = 0;
+  std::uint64_t frame_address_ = 0;
+  std::uint32_t sample_counts_ = 1;
+  std::uint32_t largest_edge_ = 0;
+  int subpixels_ = 16;
+};
+
+}  // namespace quoin::vulkan

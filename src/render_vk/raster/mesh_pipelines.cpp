@@ -1,0 +1,231 @@
+#include "render_vk/raster/mesh_pipelines.h"
+
+#include <span>
+
+#include "render_vk/raster/graphics_pipeline.h"
+#include "render_vk/raster/mesh_shader_data.h"
+
+namespace quoin::vulkan {
+namespace {
+
+constexpr std::uint32_t kSkyVertex[] = {
+#include "sky.vert.inc"
+};
+constexpr std::uint32_t kSkyFragment[] = {
+#include "sky.frag.inc"
+};
+constexpr std::uint32_t kBlockyVertex[] = {
+#include "blocky.vert.inc"
+};
+constexpr std::uint32_t kBlockyFragment[] = {
+#include "blocky.frag.inc"
+};
+constexpr std::uint32_t kSmoothVertex[] = {
+#include "smooth.vert.inc"
+};
+constexpr std::uint32_t kSmoothFragment[] = {
+#include "smooth.frag.inc"
+};
+
+// In the order of MeshWay::What, first the vertices' shader.
+constexpr std::array<std::span<const std::uint32_t>, 6> kCode = {kSkyVertex,      kSkyFragment,  kBlockyVertex,
+                                                                 kBlockyFragment, kSmoothVertex, kSmoothFragment};
+
+const char* const kDoing = "compiling shaders";
+
+VkAttachmentDescription attachment(VkFormat format, std::uint32_t samples, VkAttachmentLoadOp load, bool is_copied,
+                                   VkImageLayout layout) {
+  VkAttachmentDescription made{};
+  made.format = format;
+  made.samples = static_cast<VkSampleCountFlagBits>(samples);
+  made.loadOp = load;
+  made.storeOp = is_copied ? VK_ATTACHMENT_STORE_OP_STORE : VK_ATTACHMENT_STORE_OP_DONT_CARE;
+  made.stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE;
+  made.stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE;
+  made.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  made.finalLayout = is_copied ? VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL : layout;
+  return made;
+}
+
+// After what was done with the images before, and before they are copied.
+std::array<VkSubpassDependency, 2> around_pass() {
+  constexpr VkPipelineStageFlags kDepthStages =
+      VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
+  constexpr VkPipelineStageFlags kColourStage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  constexpr VkAccessFlags kWrites = VK_ACCESS_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_READ_BIT |
+                                    VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT;
+  return {VkSubpassDependency{VK_SUBPASS_EXTERNAL, 0, kColourStage | kDepthStages | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              kColourStage | kDepthStages, kWrites | VK_ACCESS_TRANSFER_READ_BIT, kWrites, 0},
+          VkSubpassDependency{0, VK_SUBPASS_EXTERNAL, kColourStage, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                              VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
+}
+
+bool is_glass(const MeshWay& way) {
+  return way.mode >= kDrawGlass;
+}
+bool is_edges(const MeshWay& way) {
+  return way.mode == kDrawEdgesOver || way.mode == kDrawEdgesOnly;
+}
+
+VkPipelineRasterizationStateCreateInfo rasterization_of(const MeshWay& way) {
+  auto state =
+      info_of<VkPipelineRasterizationStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO);
+  state.polygonMode = is_edges(way) ? VK_POLYGON_MODE_LINE : VK_POLYGON_MODE_FILL;
+  const bool is_culled = way.what == MeshWay::What::Smooth && way.mode != kDrawEdgesOnly;
+  state.cullMode = is_culled ? VK_CULL_MODE_BACK_BIT : VK_CULL_MODE_NONE;
+  state.frontFace = way.mirrored ? VK_FRONT_FACE_CLOCKWISE : VK_FRONT_FACE_COUNTER_CLOCKWISE;
+  state.lineWidth = 1.0F;
+  // Depths are reversed: more is nearer.
+  state.depthBiasEnable = way.mode == kDrawEdgesOver ? VK_TRUE : VK_FALSE;
+  state.depthBiasConstantFactor = 16.0F;
+  state.depthBiasSlopeFactor = 1.0F;
+  return state;
+}
+
+VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
+  auto state =
+      info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
+  const bool is_sky = way.what == MeshWay::What::Sky;
+  state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
+  state.depthWriteEnable = way.mode == kDrawSurfaces && !is_sky ? VK_TRUE : VK_FALSE;
+  // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
+  state.depthCompareOp = VK_COMPARE_OP_GREATER;
+  if (is_sky || way.mode == kDrawEdgesOver) state.depthCompareOp = VK_COMPARE_OP_GREATER_OR_EQUAL;
+  return state;
+}
+
+// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel.
+VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
+  VkPipelineColorBlendAttachmentState state{};
+  state.colorWriteMask =
+      VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
+  if (!is_glass(way)) return state;
+  state.colorWriteMask = VkColorComponentFlags{VK_COLOR_COMPONENT_R_BIT} << (way.mode - kDrawGlass);
+  state.blendEnable = VK_TRUE;
+  state.srcColorBlendFactor = VK_BLEND_FACTOR_ONE;
+  state.dstColorBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
+  state.colorBlendOp = VK_BLEND_OP_ADD;
+  state.srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE;
+  state.dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
+  state.alphaBlendOp = VK_BLEND_OP_ADD;
+  return state;
+}
+
+// The two shaders with what of a way they are made for.
+struct Stages {
+  std::array<VkBool32, 2> values;
+  std::array<VkSpecializationMapEntry, 2> entries;
+  VkSpecializationInfo constants;
+  std::array<VkPipelineShaderStageCreateInfo, 2> all{};
+
+  Stages(const MeshWay& way, const VkShaderModule* shaders)
+      : values{way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE},
+        entries{VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
+                VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}},
+        constants{2, entries.data(), sizeof values, values.data()} {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+      all[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
+      all[i].module = shaders[i];
+      all[i].pName = "main";
+    }
+    if (way.what == MeshWay::What::Blocky) all[0].pSpecializationInfo = &constants;
+  }
+  Stages(const Stages&) = delete;
+  Stages& operator=(const Stages&) = delete;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<MeshPipelines>> MeshPipelines::create(Device& device) {
+  static_assert(kCode.size() == kShaders);
+  const Api& api = device.api();
+  std::unique_ptr<MeshPipelines> made(new MeshPipelines(device));
+  const VkPushConstantRange range{VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0, sizeof(ShaderMeshPush)};
+  auto layout = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  layout.pushConstantRangeCount = 1;
+  layout.pPushConstantRanges = &range;
+  VkResult result = api.vkCreatePipelineLayout(device.handle(), &layout, nullptr, &made->layout_);
+  for (std::size_t i = 0; i < kShaders && result == VK_SUCCESS; ++i) {
+    auto module = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+    module.codeSize = kCode[i].size_bytes();
+    module.pCode = kCode[i].data();
+    result = api.vkCreateShaderModule(device.handle(), &module, nullptr, &made->shaders_[i]);
+  }
+  if (Status status = device.check(result, kDoing); !status) return tl::unexpected(status.error());
+  return made;
+}
+
+MeshPipelines::~MeshPipelines() {
+  const Api& api = device_->api();
+  for (const auto& [way, pipeline] : pipelines_) api.vkDestroyPipeline(device_->handle(), pipeline, nullptr);
+  for (const auto& [samples, pass] : passes_) api.vkDestroyRenderPass(device_->handle(), pass, nullptr);
+  for (const VkShaderModule shader : shaders_) {
+    if (shader != VK_NULL_HANDLE) api.vkDestroyShaderModule(device_->handle(), shader, nullptr);
+  }
+  if (layout_ != VK_NULL_HANDLE) api.vkDestroyPipelineLayout(device_->handle(), layout_, nullptr);
+}
+
+Result<VkRenderPass> MeshPipelines::render_pass(std::uint32_t samples) {
+  if (const auto known = passes_.find(samples); known != passes_.end()) return known->second;
+  VkRenderPass pass = VK_NULL_HANDLE;
+  if (Status status = device_->check(make_pass(samples, pass), kDoing); !status) return tl::unexpected(status.error());
+  passes_[samples] = pass;
+  return pass;
+}
+
+Result<VkPipeline> MeshPipelines::pipeline(const MeshWay& way) {
+  if (const auto known = pipelines_.find(way); known != pipelines_.end()) return known->second;
+  const auto pass = render_pass(way.samples);
+  if (!pass) return tl::unexpected(pass.error());
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  if (Status status = device_->check(make(way, *pass, pipeline), kDoing); !status) {
+    return tl::unexpected(status.error());
+  }
+  pipelines_[way] = pipeline;
+  return pipeline;
+}
+
+VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) const {
+  const bool is_resolved = samples > 1;
+  constexpr VkImageLayout kColourLayout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
+  constexpr VkImageLayout kDepthLayout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
+  // The sky covers what nothing else does.
+  const std::array attachments = {
+      attachment(kMeshColour, samples, VK_ATTACHMENT_LOAD_OP_DONT_CARE, !is_resolved, kColourLayout),
+      attachment(kMeshDepth, samples, VK_ATTACHMENT_LOAD_OP_CLEAR, false, kDepthLayout),
+      attachment(kMeshColour, 1, VK_ATTACHMENT_LOAD_OP_DONT_CARE, true, kColourLayout)};
+  const VkAttachmentReference colour{0, kColourLayout};
+  const VkAttachmentReference depth{1, kDepthLayout};
+  const VkAttachmentReference resolved{2, kColourLayout};
+  VkSubpassDescription subpass{};
+  subpass.pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS;
+  subpass.colorAttachmentCount = 1;
+  subpass.pColorAttachments = &colour;
+  subpass.pDepthStencilAttachment = &depth;
+  subpass.pResolveAttachments = is_resolved ? &resolved : nullptr;
+  const auto dependencies = around_pass();
+  auto info = info_of<VkRenderPassCreateInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO);
+  info.attachmentCount = is_resolved ? 3 : 2;
+  info.pAttachments = attachments.data();
+  info.subpassCount = 1;
+  info.pSubpasses = &subpass;
+  info.dependencyCount = dependencies.size();
+  info.pDependencies = dependencies.data();
+  return device_->api().vkCreateRenderPass(device_->handle(), &info, nullptr, &pass);
+}
+
+VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
+  const Stages stages(way, &shaders_[2 * static_cast<std::size_t>(way.what)]);
+  GraphicsPipelineInfo info;
+  info.pass = pass;
+  info.layout = layout_;
+  info.raster = rasterization_of(way);
+  info.depth = depth_of(way);
+  info.blend = blend_of(way);
+  info.samples = static_cast<VkSampleCountFlagBits>(way.samples);
+  return make_graphics_pipeline(*device_, stages.all, info, pipeline);
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <memory>
+
+#include "render_vk/device/device.h"
+
+namespace quoin::vulkan {
+
+constexpr VkFormat kMeshColour = VK_FORMAT_R8G8B8A8_SRGB;  // so that blending and resolving are linear
+constexpr VkFormat kMeshDepth = VK_FORMAT_D32_SFLOAT;
+
+/// One of the few ways in which meshes are drawn.
+struct MeshWay {
+  enum class What : std::uint8_t { Sky, Blocky, Smooth };
+  What what = What::Sky;
+  /// As ShaderMeshPush: surfaces, edges over them, edges alone, or a channel of glass.
+  std::uint32_t mode = 0;
+  bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
+  bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
+  std::uint32_t samples = 1;
+
+  auto operator<=>(const MeshWay&) const = default;
+};
+
+/// Pipelines and render passes by what they are for, each made when it is first needed.
+class MeshPipelines {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<MeshPipelines>> create(Device& device);
+  ~MeshPipelines();
+  MeshPipelines(const MeshPipelines&) = delete;
+  MeshPipelines& operator=(const MeshPipelines&) = delete;
+
+  [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
+  /// Attachments: with one sample colour and depth; else these, then the colour that samples are resolved into. What is
+  /// to be read is left ready to be copied from.
+  [[nodiscard]] Result<VkRenderPass> render_pass(std::uint32_t samples);
+  [[nodiscard]] Result<VkPipeline> pipeline(const MeshWay& way);
+
+ private:
+  static constexpr std::size_t kShaders = 6;
+
+  explicit MeshPipelines(Device& device) : device_(&device) {}
+  VkResult make_pass(std::uint32_t samples, VkRenderPass& pass) const;
+  VkResult make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const;
+
+  Device* device_;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  std::array<VkShaderModule, kShaders> shaders_{};
+  std::map<std::uint32_t, VkRenderPass> passes_;
+  std::map<MeshWay, VkPipeline> pipelines_;
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,200 @@
+#include "render_vk/raster/mesh_store.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+namespace quoin::vulkan {
+namespace {
+
+// What is replaced stays until its replacement has arrived; no more of that than this at a time.
+constexpr std::size_t kBatchBytes = std::size_t{32} << 20;
+
+std::uint32_t signed_16(float value) {
+  const float scaled = std::round(std::clamp(value, -1.0F, 1.0F) * 32767.0F);
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(scaled)) & 0xFFFF;
+}
+
+// A unit vector in a word, to 1/20,000: the octahedron's faces folded into a square.
+std::uint32_t octahedral(Vec3 v) {
+  const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+  if (!(size > 0.0F)) return 0;
+  v /= size;
+  const auto fold = [](float a, float b) { return (1.0F - std::abs(b)) * (a >= 0.0F ? 1.0F : -1.0F); };
+  const float x = v.z >= 0.0F ? v.x : fold(v.x, v.y);
+  const float y = v.z >= 0.0F ? v.y : fold(v.y, v.x);
+  return signed_16(x) | signed_16(y) << 16;
+}
+
+void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::uint32_t>& words) {
+  const SmoothChunkMesh& mesh = surface.smooth;
+  const Vec3 position = mesh.positions.data()[i];
+  for (int axis = 0; axis < 3; ++axis) words.push_back(std::bit_cast<std::uint32_t>(position[axis]));
+  words.push_back(octahedral(mesh.normals.data()[i]));
+  const float openness = mesh.openness.size() == 0 ? 1.0F : std::clamp(mesh.openness.data()[i], 0.0F, 1.0F);
+  const LinearRgba16 albedo = surface.albedo[i];
+  words.push_back(albedo[0] | std::uint32_t{albedo[1]} << 16);
+  words.push_back(albedo[2] | static_cast<std::uint32_t>(std::lround(openness * 65535.0F)) << 16);
+  words.push_back(surface.types[i]);
+}
+
+// What a device would read beside the surface's memory.
+Status check(const ChunkSurface& surface) {
+  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  if (surface.style == SurfaceStyle::Blocky) {
+    if (surface.opaque_quads > surface.quads.size()) return refuse("surface: more opaque quads than quads");
+    return {};
+  }
+  const SmoothChunkMesh& mesh = surface.smooth;
+  const std::size_t count = mesh.positions.size();
+  const bool is_whole = mesh.normals.size() == count && surface.albedo.size() == count &&
+                        surface.types.size() == count && (mesh.openness.size() == 0 || mesh.openness.size() == count);
+  if (!is_whole) return refuse("surface: its vertices' arrays are not of one size");
+  if (mesh.indices.size() % 3 != 0) return refuse("surface: its indices are no whole triangles");
+  const bool is_inside =
+      std::all_of(mesh.indices.begin(), mesh.indices.end(), [&](std::uint32_t index) { return index < count; });
+  if (!is_inside) return refuse("surface: an index names no vertex");
+  return {};
+}
+
+void set_directions(std::span<const Quad> opaque, StoredMesh& mesh) {
+  mesh.opaque.back() = static_cast<std::uint32_t>(opaque.size());
+  const auto is_before = [](const Quad& a, const Quad& b) { return a.direction() < b.direction(); };
+  mesh.is_by_direction = std::is_sorted(opaque.begin(), opaque.end(), is_before);
+  if (!mesh.is_by_direction) return;
+  for (std::size_t i = 1; i < 6; ++i) {
+    const auto from = std::partition_point(
+        opaque.begin(), opaque.end(), [=](const Quad& quad) { return static_cast<std::size_t>(quad.direction()) < i; });
+    mesh.opaque[i] = static_cast<std::uint32_t>(from - opaque.begin());
+  }
+}
+
+}  // namespace
+
+MeshStore::~MeshStore() {
+  clear();
+}
+
+void MeshStore::clear() {
+  for (auto& [handle, grid] : grids_) {
+    for (auto& [at, mesh] : grid.chunks) memory_->release(mesh.place);
+  }
+  grids_.clear();
+  chunks_ = bytes_ = 0;
+  triangles_ = 0;
+}
+
+Status MeshStore::put(std::span<const SurfaceUpdate> surfaces) {
+  for (const SurfaceUpdate& update : surfaces) {
+    if (update.surface == nullptr) continue;
+    if (Status right = check(*update.surface); !right) return right;
+  }
+  std::vector<Change> changes;
+  std::size_t bytes = 0;
+  Status done;
+  for (const SurfaceUpdate& update : surfaces) {
+    Change& change = changes.emplace_back(Change{update.grid, update.chunk, {}});
+    if (update.surface != nullptr) done = upload(*update.surface, change.mesh);
+    if (!done) break;
+    bytes += change.mesh.place.size;
+    if (bytes < kBatchBytes) continue;
+    if (done = finish(changes); !done) return done;
+    bytes = 0;
+  }
+  if (done) return finish(changes);
+  memory_->discard();
+  for (Change& change : changes) memory_->release(change.mesh.place);
+  return done;
+}
+
+Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
+  mesh.style = surface.style;
+  std::vector<std::uint32_t> words;
+  std::span<const std::byte> bytes;
+  if (surface.style == SurfaceStyle::Blocky) {
+    const std::span<const Quad> quads(surface.quads);
+    set_directions(quads.first(surface.opaque_quads), mesh);
+    const auto glass = quads.subspan(surface.opaque_quads);
+    mesh.glass.assign(glass.begin(), glass.end());
+    bytes = std::as_bytes(quads);
+  } else {
+    const SmoothChunkMesh& smooth = surface.smooth;
+    mesh.indices = static_cast<std::uint32_t>(smooth.indices.size());
+    words.reserve(kVertexWords * smooth.positions.size() + smooth.indices.size());
+    if (mesh.indices != 0) {
+      for (std::size_t i = 0; i < smooth.positions.size(); ++i) append_vertex(surface, i, words);
+    }
+    mesh.first_index = words.size() * sizeof(std::uint32_t);
+    words.insert(words.end(), smooth.indices.begin(), smooth.indices.end());
+    bytes = std::as_bytes(std::span(words));
+  }
+  if (bytes.empty()) return {};
+  const auto place = memory_->allocate(bytes.size(), "uploading meshes");
+  if (!place) return tl::unexpected(place.error());
+  mesh.place = *place;
+  return memory_->write(mesh.place, bytes);
+}
+
+// Has the new surfaces take the old ones' places, or leaves the old ones.
+Status MeshStore::finish(std::vector<Change>& changes) {
+  Status done = memory_->flush();
+  for (Change& change : changes) {
+    if (done) {
+      replace(change);
+    } else {
+      memory_->release(change.mesh.place);
+    }
+  }
+  changes.clear();
+  return done;
+}
+
+void MeshStore::replace(Change& change) {
+  if (change.mesh.place.size == 0) {
+    const auto grid = grids_.find(change.grid);
+    if (grid == grids_.end()) return;
+    const auto old = grid->second.chunks.find(change.chunk);
+    if (old == grid->second.chunks.end()) return;
+    give_back(old->second);
+    grid->second.chunks.erase(old);
+    grid->second.bounds_known = false;
+    if (grid->second.chunks.empty()) grids_.erase(grid);
+    return;
+  }
+  StoredGrid& grid = grids_[change.grid];
+  const auto [at, is_new] = grid.chunks.try_emplace(change.chunk);
+  if (is_new) {
+    grid.bounds_known = false;
+  } else {
+    give_back(at->second);
+  }
+  at->second = std::move(change.mesh);
+  ++chunks_;
+  triangles_ += at->second.triangles();
+  bytes_ += at->second.place.size;
+}
+
+void MeshStore::give_back(StoredMesh& mesh) {
+  --chunks_;
+  triangles_ -= mesh.triangles();
+  bytes_ -= mesh.place.size;
+  memory_->release(mesh.place);
+}
+
+const MeshStore::StoredGrid* MeshStore::find(GridHandle handle) {
+  const auto found = grids_.find(handle);
+  if (found == grids_.end()) return nullptr;
+  StoredGrid& grid = found->second;
+  if (!grid.bounds_known) {
+    grid.low = grid.high = grid.chunks.begin()->first;
+    for (const auto& [at, mesh] : grid.chunks) {
+      grid.low = glm::min(grid.low, at);
+      grid.high = glm::max(grid.high, at);
+    }
+    grid.bounds_known = true;
+  }
+  return &grid;
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <quoin/live/live_meshes.h>
+
+#include "render_vk/device/memory.h"
+
+namespace quoin::vulkan {
+
+/// The surface of a chunk in device memory.
+struct StoredMesh {
+  SurfaceStyle style = SurfaceStyle::Blocky;
+  Place place;
+  /// Blocky: where each direction's opaque quads begin and the last one's end; then come the transparent ones.
+  std::array<std::uint32_t, 7> opaque{};
+  bool is_by_direction = true;  ///< false: only the first and the last of these mean something
+  /// Smooth: of how many, and where they begin in `place`.
+  std::uint32_t indices = 0;
+  VkDeviceSize first_index = 0;
+  std::vector<Quad> glass;  ///< the transparent quads, which are put in order for each picture
+
+  [[nodiscard]] std::int64_t triangles() const {
+    return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
+  }
+};
+
+/// Surfaces of chunks in device memory: 8 bytes a quad, or 28 a vertex and 4 an index.
+class MeshStore {
+ public:
+  static constexpr std::size_t kVertexWords = 7;
+
+  struct ByPlace {
+    bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
+  };
+  struct StoredGrid {
+    std::map<IVec3, StoredMesh, ByPlace> chunks;
+    IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
+    IVec3 high{0};
+    bool bounds_known = false;
+  };
+
+  explicit MeshStore(DeviceMemory& memory) : memory_(&memory) {}
+  ~MeshStore();
+  MeshStore(const MeshStore&) = delete;
+  MeshStore& operator=(const MeshStore&) = delete;
+
+  /// As VulkanMeshRenderer::put.
+  [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
+  void clear();
+
+  /// Null when nothing of the grid is there. Its bounds are known then.
+  [[nodiscard]] const StoredGrid* find(GridHandle grid);
+
+  [[nodiscard]] std::size_t chunks() const { return chunks_; }
+  [[nodiscard]] std::int64_t triangles() const { return triangles_; }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+ private:
+  struct Change {
+    GridHandle grid;
+    IVec3 chunk{0};
+    StoredMesh mesh;  // of no size: nothing is there any more
+  };
+
+  Status upload(const ChunkSurface& surface, StoredMesh& mesh);
+  Status finish(std::vector<Change>& changes);
+  void replace(Change& change);
+  void give_back(StoredMesh& mesh);
+
+  DeviceMemory* memory_;
+  std::map<GridHandle, StoredGrid> grids_;
+  std::size_t chunks_ = 0;
+  std::int64_t triangles_ = 0;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace quoin::vulkan

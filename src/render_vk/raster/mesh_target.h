@@ -1,0 +1,43 @@
+#pragma once
+
+#include "render_vk/raster/attachment.h"
+
+namespace quoin::vulkan {
+
+/// The images of a picture of meshes while it is drawn.
+class MeshTarget {
+ public:
+  MeshTarget() = default;
+  /// `pass`: of MeshPipelines, for that many samples. Errors: LimitExceeded.
+  [[nodiscard]] static Result<MeshTarget> create(const Device& device, VkRenderPass pass, VkExtent2D size,
+                                                 std::uint32_t samples);
+  MeshTarget(MeshTarget&& other) noexcept { swap(other); }
+  MeshTarget& operator=(MeshTarget&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~MeshTarget();
+
+  [[nodiscard]] bool is_of(VkExtent2D size, std::uint32_t samples) const {
+    return framebuffer_ != VK_NULL_HANDLE && size_.width == size.width && size_.height == size.height &&
+           samples_ == samples;
+  }
+  [[nodiscard]] VkExtent2D size() const { return size_; }
+  [[nodiscard]] std::uint32_t samples() const { return samples_; }
+  [[nodiscard]] VkFramebuffer framebuffer() const { return framebuffer_; }
+  /// With one sample a pixel, once all is drawn.
+  [[nodiscard]] VkImage picture() const { return samples_ > 1 ? resolved_.image() : colour_.image(); }
+
+ private:
+  void swap(MeshTarget& other) noexcept;
+
+  const Device* device_ = nullptr;
+  VkExtent2D size_{};
+  std::uint32_t samples_ = 0;
+  Attachment colour_;
+  Attachment depth_;
+  Attachment resolved_;  // with several samples
+  VkFramebuffer framebuffer_ = VK_NULL_HANDLE;
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,166 @@
+// What is transparent, drawn from back to front.
+
+#include <algorithm>
+#include <cmath>
+
+#include "render_vk/raster/mesh_for_tests.h"
+#include "tests/golden_views.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::place;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::blocky_surface;
+using vulkan_test::blocky_surfaces;
+using vulkan_test::mesh_options;
+using vulkan_test::without_shadows;
+
+class VulkanMeshGlass : public vulkan_test::VulkanMeshTest {};
+
+struct Types {
+  VoxelType wall, blue, red, glowing;
+};
+
+Types add_types(Scene& scene) {
+  return {add_type(scene, {200, 180, 150}), add_type(scene, {60, 140, 230, 90}, Visibility::Transparent),
+          add_type(scene, {220, 40, 30, 150}, Visibility::Transparent),
+          add_type(scene, {255, 220, 120, 100}, Visibility::Transparent, 0.5F)};
+}
+
+// Towards -Z, whose every ray goes straight through a pane.
+Camera straight(DVec3 position, double view_height) {
+  Camera camera;
+  camera.position = position;
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = view_height;
+  return camera;
+}
+
+// A wall with panes before it, the furthest first, one voxel thick each and 40 voxels apart: in chunks of their own.
+Scene panes(const std::vector<VoxelType Types::*>& panes) {
+  Scene scene;
+  const Types types = add_types(scene);
+  Grid grid;
+  grid.fill_box({0, 0, -5}, {39, 39, -1}, types.wall);
+  grid.fill_box({0, 20, 0}, {39, 20, 0}, types.wall);
+  int z = 10;
+  for (const auto type : panes) {
+    grid.fill_box({4, 4, z}, {35, 35, z}, types.*type);
+    z += 70;
+  }
+  place(scene, std::move(grid));
+  return scene;
+}
+
+TEST_F(VulkanMeshGlass, PanesOfOneVoxelAreThoseOfTheProcessor) {
+  RenderOptions options = without_shadows(sized(120, 120));
+  const Camera camera = straight({20.03, 20.02, 500}, 44);
+  for (const bool is_lit : {true, false}) {
+    options.light.lit = is_lit;
+    const std::string name = is_lit ? "lit" : "unlit";
+    const auto expect_same = [&](const std::vector<VoxelType Types::*>& types, const std::string& which) {
+      compare(panes(types), camera, options, which + name);
+    };
+    expect_same({&Types::blue}, "pane_");
+    expect_same({&Types::blue, &Types::red}, "blue_red_");
+    expect_same({&Types::red, &Types::blue}, "red_blue_");
+    expect_same({&Types::glowing, &Types::red, &Types::glowing}, "glowing_");
+  }
+}
+
+TEST_F(VulkanMeshGlass, OrderIsThatOfTheCameraAndNotOfChunksOrInstances) {
+  Scene scene;
+  const Types types = add_types(scene);
+  const auto pane = [&](VoxelType type, double z) {
+    Grid grid;
+    grid.fill_box({0, 0, 0}, {19, 19, 0}, type);
+    place(scene, std::move(grid), {0, 0, z});
+  };
+  pane(types.red, 10);
+  pane(types.blue, 0);
+  pane(types.glowing, 5);
+  const RenderOptions options = without_shadows(sized(80, 80));
+  compare(scene, straight({10.03, 10.02, 50}, 26), options, "panes_before");
+  Camera behind = straight({10.03, 10.02, -50}, 26);
+  behind.forward = {0, 0, 1};
+  behind.right = {-1, 0, 0};
+  compare(scene, behind, options, "panes_behind");
+  compare(scene, towards({12, 11, 400}, {10, 10, 5}, 0.06), options, "panes_perspective");
+}
+
+TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
+  Scene scene;
+  const Types types = add_types(scene);
+  Grid grid;
+  grid.fill_box({0, 0, 0}, {19, 19, 0}, types.red);
+  grid.fill_box({0, 0, 10}, {9, 19, 10}, types.wall);
+  place(scene, std::move(grid));
+  compare(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
+}
+
+// Waters of any depth are not the processor's, which counts their voxels; all else is.
+TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
+  Scene scene = golden::terrain_scene();
+  const golden::GoldenView& view = golden::kViews[0];
+  const Camera camera = golden::camera_for(view);
+  const RenderOptions options = without_shadows(golden::options_for(view));
+  put(scene, blocky_surfaces(scene));
+  const Image image = drawn(camera, mesh_options(options));
+  const Picture cpu = render_test::taken(scene, camera, options);
+  // Of another colour, water tells where it is.
+  for (std::size_t type = 1; type < scene.types.size(); ++type) {
+    VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
+    if (properties.visibility != Visibility::Transparent) continue;
+    properties.colour = {255, 0, 255, properties.colour.a};
+    scene.types.replace(static_cast<VoxelType>(type), properties);
+  }
+  const Picture marked = render_test::taken(scene, camera, options);
+  int waters = 0;
+  Picture mesh;
+  mesh.colour = image;
+  mesh.depth = cpu.depth;
+  for (std::size_t i = 0; i < cpu.colour.rgb.size(); i += 3) {
+    const auto at = [&](const Picture& picture) {
+      return std::vector(&picture.colour.rgb[i], &picture.colour.rgb[i] + 3);
+    };
+    if (at(cpu) == at(marked)) continue;
+    ++waters;
+    std::copy_n(&cpu.colour.rgb[i], 3, &mesh.colour.rgb[i]);
+  }
+  EXPECT_GT(waters, 1000);
+  expect_like(mesh.colour, cpu, "beside_water");
+  if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+    EXPECT_TRUE(write_png(image, QUOIN_BINARY_DIR "/mesh_water.vulkan.png"));
+  }
+}
+
+TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
+  const Scene shown = panes({&Types::red, &Types::blue, &Types::glowing});
+  const MeshPictureOptions options = mesh_options(without_shadows(sized(120, 120)));
+  const Camera camera = straight({20.03, 20.02, 500}, 44);
+  std::vector<SurfaceUpdate> surfaces = blocky_surfaces(shown);
+  put(shown, surfaces);
+  const Image sorted = drawn(camera, options);
+  EXPECT_LT(meshes_->facts().drawn_triangles, 1000);
+  // A million quads that look the other way.
+  Grid back;
+  constexpr VoxelType kRed = 3;  // the third that was added
+  back.set({30, 30, 30}, kRed);
+  const auto surface = blocky_surface(back, shown.types, {0, 0, 0});
+  ASSERT_EQ(surface->opaque_quads, 0U);
+  const auto away = std::find_if(surface->quads.begin(), surface->quads.end(),
+                                 [](const Quad& quad) { return quad.direction() == Direction::NegZ; });
+  ASSERT_NE(away, surface->quads.end());
+  surface->quads = QuadBuffer((1 << 20) + 1, Quad(*away));
+  surfaces.push_back({surfaces[0].grid, {0, 0, 3}, surface});
+  put(shown, surfaces);
+  const Image by_chunk = drawn(camera, options);
+  EXPECT_GT(meshes_->facts().drawn_triangles, 1 << 21);
+  EXPECT_EQ(by_chunk.rgb, sorted.rgb);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,279 @@
+#include <quoin/render_vk/vulkan_window.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "render_vk/march/device_picture.h"
+#include "render_vk/march/renderer_impl.h"
+#include "render_vk/window/swapchain.h"
+#include "render_vk/window/window_pipelines.h"
+
+namespace quoin {
+namespace {
+
+using vulkan::Buffer;
+using vulkan::info_of;
+using vulkan::WindowPush;
+
+static_assert(sizeof(OverlayVertex) == 20, "what window_overlay.vert reads");
+
+const char* const kDoing = "showing a picture";
+constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
+
+VkRect2D within(const PixelRect& rect, VkExtent2D window) {
+  const auto clamped = [](std::int64_t value, std::uint32_t most) {
+    return static_cast<int>(std::clamp<std::int64_t>(value, 0, most));
+  };
+  const int left = clamped(rect.x, window.width);
+  const int top = clamped(rect.y, window.height);
+  const int right = clamped(std::int64_t{rect.x} + std::max(rect.width, 0), window.width);
+  const int bottom = clamped(std::int64_t{rect.y} + std::max(rect.height, 0), window.height);
+  return {{left, top}, {static_cast<std::uint32_t>(right - left), static_cast<std::uint32_t>(bottom - top)}};
+}
+
+glm::vec2 as_vector(VkExtent2D size) {
+  return {static_cast<float>(size.width), static_cast<float>(size.height)};
+}
+
+}  // namespace
+
+struct VulkanWindow::Impl {
+  explicit Impl(vulkan::Device& of_device, bool with_vsync) : device(&of_device), vsync(with_vsync) {}
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  VkResult make_objects();
+  Status fit(int width, int height);
+  Status write(const Overlay& overlay);
+  Status put(Buffer& buffer, std::span<const std::byte> bytes) const;
+  VkResult record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place, const Overlay& overlay);
+  void draw_picture(const VulkanPicture::Impl& picture, const PixelRect& place) const;
+  void draw_overlay(const Overlay& overlay) const;
+  void let_pictures_be_read() const;
+  VkResult show(std::uint32_t image);
+  VkResult wait();
+
+  vulkan::Device* device;
+  bool vsync;
+  std::unique_ptr<vulkan::WindowPipelines> pipelines;
+  std::unique_ptr<vulkan::Swapchain> swapchain;  // null until there is a size
+  bool is_stale = true;
+  VkCommandPool pool = VK_NULL_HANDLE;
+  VkCommandBuffer commands = VK_NULL_HANDLE;
+  VkFence done = VK_NULL_HANDLE;
+  VkSemaphore handed = VK_NULL_HANDLE;
+  Buffer vertices;
+  Buffer indices;
+  Buffer font;
+  glm::ivec2 font_size{0};
+};
+
+VkResult VulkanWindow::Impl::make_objects() {
+  const vulkan::Api& api = device->api();
+  auto pool_info = info_of<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+  pool_info.queueFamilyIndex = device->physical().queue_family;
+  VkResult result = api.vkCreateCommandPool(device->handle(), &pool_info, nullptr, &pool);
+  if (result != VK_SUCCESS) return result;
+  auto buffer = info_of<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+  buffer.commandPool = pool;
+  buffer.commandBufferCount = 1;
+  result = api.vkAllocateCommandBuffers(device->handle(), &buffer, &commands);
+  if (result != VK_SUCCESS) return result;
+  const auto fence = info_of<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
+  result = api.vkCreateFence(device->handle(), &fence, nullptr, &done);
+  if (result != VK_SUCCESS) return result;
+  const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
+  return api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed);
+}
+
+VulkanWindow::Impl::~Impl() {
+  const vulkan::Api& api = device->api();
+  api.vkDeviceWaitIdle(device->handle());
+  swapchain.reset();
+  if (handed != VK_NULL_HANDLE) api.vkDestroySemaphore(device->handle(), handed, nullptr);
+  if (done != VK_NULL_HANDLE) api.vkDestroyFence(device->handle(), done, nullptr);
+  if (pool != VK_NULL_HANDLE) api.vkDestroyCommandPool(device->handle(), pool, nullptr);
+}
+
+// Until the last frame is drawn.
+VkResult VulkanWindow::Impl::wait() {
+  const vulkan::Api& api = device->api();
+  const VkResult result =
+      api.vkWaitForFences(device->handle(), 1, &done, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
+  return result == VK_SUCCESS ? api.vkResetFences(device->handle(), 1, &done) : result;
+}
+
+Status VulkanWindow::Impl::fit(int width, int height) {
+  const VkExtent2D now = swapchain ? swapchain->extent() : VkExtent2D{};
+  if (!is_stale && now.width == static_cast<std::uint32_t>(width) && now.height == static_cast<std::uint32_t>(height)) {
+    return {};
+  }
+  // What is still being shown must not go; resizing is rare enough to wait for all.
+  device->api().vkDeviceWaitIdle(device->handle());
+  const std::unique_ptr<vulkan::Swapchain> old = std::move(swapchain);
+  auto made = vulkan::Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
+  if (!made) return tl::unexpected(made.error());
+  swapchain = std::move(*made);
+  is_stale = false;
+  return {};
+}
+
+Status VulkanWindow::Impl::put(Buffer& buffer, std::span<const std::byte> bytes) const {
+  if (bytes.empty()) return {};
+  if (buffer.size() < bytes.size()) {
+    auto made = Buffer::create(*device, bytes.size() * 3 / 2, Buffer::Where::Upload, kDoing);
+    if (!made) return tl::unexpected(made.error());
+    buffer = std::move(*made);
+  }
+  std::memcpy(buffer.mapped(), bytes.data(), bytes.size());
+  return {};
+}
+
+Status VulkanWindow::Impl::write(const Overlay& overlay) {
+  Status written = put(vertices, std::as_bytes(overlay.vertices));
+  return written ? put(indices, std::as_bytes(overlay.indices)) : written;
+}
+
+void VulkanWindow::Impl::draw_picture(const VulkanPicture::Impl& picture, const PixelRect& place) const {
+  WindowPush push;
+  push.data = picture.colours.address();
+  push.source = {picture.width, picture.height};
+  push.origin = {static_cast<float>(place.x), static_cast<float>(place.y)};
+  push.scale = glm::vec2(push.source) / glm::vec2(static_cast<float>(place.width), static_cast<float>(place.height));
+  pipelines->bind_picture(commands, push);
+  const VkRect2D scissor = within(place, swapchain->extent());
+  device->api().vkCmdSetScissor(commands, 0, 1, &scissor);
+  device->api().vkCmdDraw(commands, 3, 1, 0, 0);
+}
+
+void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
+  WindowPush push;
+  push.data = vertices.address();
+  push.font = font.address();
+  push.source = font_size;
+  push.window = as_vector(swapchain->extent());
+  pipelines->bind_overlay(commands, push);
+  device->api().vkCmdBindIndexBuffer(commands, indices.handle(), 0, VK_INDEX_TYPE_UINT16);
+  for (const OverlayDraw& draw : overlay.draws) {
+    const VkRect2D scissor = within(draw.clip, swapchain->extent());
+    if (scissor.extent.width == 0 || scissor.extent.height == 0) continue;
+    device->api().vkCmdSetScissor(commands, 0, 1, &scissor);
+    device->api().vkCmdDrawIndexed(commands, draw.index_count, 1, draw.first_index,
+                                   static_cast<std::int32_t>(draw.first_vertex), 0);
+  }
+}
+
+// What commands before these wrote, is seen by shaders that draw the window.
+void VulkanWindow::Impl::let_pictures_be_read() const {
+  auto barrier = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
+  device->api().vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                                     VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place,
+                                    const Overlay& overlay) {
+  const vulkan::Api& api = device->api();
+  auto begin = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
+  if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &begin);
+  if (result != VK_SUCCESS) return result;
+  let_pictures_be_read();
+  const VkExtent2D size = swapchain->extent();
+  auto pass = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
+  const VkClearValue ground{kGround};
+  pass.renderPass = pipelines->pass();
+  pass.framebuffer = swapchain->framebuffer(image);
+  pass.renderArea = {{0, 0}, size};
+  pass.clearValueCount = 1;
+  pass.pClearValues = &ground;
+  api.vkCmdBeginRenderPass(commands, &pass, VK_SUBPASS_CONTENTS_INLINE);
+  const glm::vec2 all = as_vector(size);
+  const VkViewport viewport{0.0F, 0.0F, all.x, all.y, 0.0F, 1.0F};
+  api.vkCmdSetViewport(commands, 0, 1, &viewport);
+  const bool is_seen = picture != nullptr && picture->samples() > 0 && place.width > 0 && place.height > 0;
+  if (is_seen) draw_picture(picture->impl(), place);
+  const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
+  if (has_overlay) draw_overlay(overlay);
+  api.vkCmdEndRenderPass(commands);
+  return api.vkEndCommandBuffer(commands);
+}
+
+VkResult VulkanWindow::Impl::show(std::uint32_t image) {
+  const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
+  const VkSemaphore drawn = swapchain->drawn(image);
+  auto submit = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+  submit.waitSemaphoreCount = submit.commandBufferCount = submit.signalSemaphoreCount = 1;
+  submit.pWaitSemaphores = &handed;
+  submit.pWaitDstStageMask = &stage;
+  submit.pCommandBuffers = &commands;
+  submit.pSignalSemaphores = &drawn;
+  if (const VkResult result = device->api().vkQueueSubmit(device->queue(), 1, &submit, done); result != VK_SUCCESS) {
+    return result;
+  }
+  const VkSwapchainKHR chain = swapchain->handle();
+  auto present = info_of<VkPresentInfoKHR>(VK_STRUCTURE_TYPE_PRESENT_INFO_KHR);
+  present.waitSemaphoreCount = present.swapchainCount = 1;
+  present.pWaitSemaphores = &drawn;
+  present.pSwapchains = &chain;
+  present.pImageIndices = &image;
+  const VkResult shown = device->api().vkQueuePresentKHR(device->queue(), &present);
+  // Nobody else knows of these commands: what they read could be given back while they run.
+  const VkResult waited = wait();
+  return waited == VK_SUCCESS ? shown : waited;
+}
+
+VulkanWindow::VulkanWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VulkanWindow::VulkanWindow(VulkanWindow&&) noexcept = default;
+VulkanWindow& VulkanWindow::operator=(VulkanWindow&&) noexcept = default;
+VulkanWindow::~VulkanWindow() = default;
+
+Result<VulkanWindow> VulkanWindow::create(VulkanRenderer& renderer, bool vsync) {
+  vulkan::Device& device = *renderer.impl().device;
+  if (device.surface() == VK_NULL_HANDLE) {
+    return fail(ErrorCode::InvalidArgument, "vulkan: the renderer was created without a window");
+  }
+  auto impl = std::make_unique<Impl>(device, vsync);
+  auto pipelines = vulkan::WindowPipelines::create(device);
+  if (!pipelines) return tl::unexpected(pipelines.error());
+  impl->pipelines = std::move(*pipelines);
+  if (Status made = device.check(impl->make_objects(), "opening a window"); !made) return tl::unexpected(made.error());
+  return VulkanWindow(std::move(impl));
+}
+
+Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
+  const Status put = impl_->put(impl_->font, std::as_bytes(opacity));
+  impl_->font_size = put ? glm::ivec2(width, height) : glm::ivec2(0);
+  return put;
+}
+
+Status VulkanWindow::present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
+                             const Overlay& overlay) {
+  if (width <= 0 || height <= 0) return {};
+  Impl& window = *impl_;
+  const vulkan::Api& api = window.device->api();
+  if (Status written = window.write(overlay); !written) return written;
+  constexpr int kTries = 3;  // the size may change under one's hands
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    if (Status fits = window.fit(width, height); !fits || !window.swapchain) return fits;
+    std::uint32_t image = 0;
+    VkResult result =
+        api.vkAcquireNextImageKHR(window.device->handle(), window.swapchain->handle(),
+                                  std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &image);
+    window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
+    if (window.is_stale) continue;
+    if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kDoing);
+    result = window.record(image, picture, place, overlay);
+    if (result == VK_SUCCESS) result = window.show(image);
+    window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
+    return window.is_stale ? Status{} : window.device->check(result, kDoing);
+  }
+  return {};  // another frame will fit
+}
+
+}  // namespace quoin

@@ -1,0 +1,114 @@
+#pragma once
+
+// What queries of a scene share: the way into a grid's space, and boxes against voxels.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <quoin/core/vec.h>
+#include <quoin/scene/scene_query.h>
+
+#include "scene/instance_axes.h"
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin {
+
+// What queries may see of a tracer.
+class SceneQuery {
+ public:
+  static const InstanceTree& instances(const SceneTracer& tracer) { return tracer.impl_->instances; }
+};
+
+// A length below which two shapes touch rather than overlap, in voxels.
+inline constexpr double kTouch = 1e-9;
+
+// Into the space of a placed grid's voxels.
+struct ToGrid {
+  explicit ToGrid(const PlacedGrid& placed)
+      : axes(glm::transpose(placed.world_axes) / placed.voxel_size), position(placed.position), pivot(placed.pivot) {}
+  // The difference of two far positions is taken first: it is small, and mostly exact.
+  [[nodiscard]] DVec3 point(DVec3 in_world) const { return axes * (in_world - position) + pivot; }
+
+  glm::dmat3 axes;
+  DVec3 position;
+  DVec3 pivot;
+};
+
+// The whole voxels that a shape's bounds touch, within the grid's own.
+inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
+  IBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.min[axis] =
+        static_cast<int>(std::clamp(std::floor(bounds.min[axis]), double(tight.min[axis]), double(tight.max[axis])));
+    box.max[axis] =
+        static_cast<int>(std::clamp(std::ceil(bounds.max[axis]), double(tight.min[axis]), double(tight.max[axis])));
+  }
+  return box;
+}
+
+/// Whether a box is one: finite, and larger than nothing.
+inline bool is_box(const OrientedBox& box) {
+  const DVec3 half = box.half_size;
+  const DQuat& q = box.rotation;
+  return is_finite(box.centre) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) && is_finite(half) && half.x > 0.0 &&
+         half.y > 0.0 && half.z > 0.0;
+}
+
+/// A box's half edges in the world, as columns.
+inline glm::dmat3 half_axes_of(const OrientedBox& box) {
+  glm::dmat3 half_axes = glm::mat3_cast(unit_rotation(box.rotation));
+  for (int axis = 0; axis < 3; ++axis) half_axes[axis] *= box.half_size[axis];
+  return half_axes;
+}
+
+/// Whether a moving body is stopped by voxels of a type; one that is not registered counts.
+inline bool collides(const VoxelRegistry& types, VoxelType type) {
+  return type != kAir && (type >= types.size() || types[type].collides);
+}
+
+/// The directions that can part a box from a voxel: the voxel's three, then the box's three and the nine products of
+/// both; those of parallel edges are 0.
+///
+/// Source: S. Gottschalk, M. Lin, D. Manocha, "OBBTree" (1996).
+using SeparatingAxes = std::array<DVec3, 15>;
+
+inline SeparatingAxes separating_axes(const glm::dmat3& half_axes) {
+  SeparatingAxes axes{};
+  std::size_t next = 3;
+  for (int i = 0; i < 3; ++i) {
+    axes.at(static_cast<std::size_t>(i))[i] = 1.0;
+    axes.at(next++) = glm::cross(half_axes[(i + 1) % 3], half_axes[(i + 2) % 3]);
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      DVec3 unit(0.0);
+      unit[axis] = 1.0;
+      const DVec3 product = glm::cross(half_axes[i], unit);
+      // Nearly parallel edges have no direction of their own worth trusting.
+      axes.at(next++) = glm::length(product) > 1e-6 * glm::length(half_axes[i]) ? product : DVec3(0.0);
+    }
+  }
+  for (DVec3& axis : axes) {
+    const double length = glm::length(axis);
+    axis = length > 0.0 ? axis / length : DVec3(0.0);
+  }
+  return axes;
+}
+
+/// How far a box reaches from its centre along each of the world's axes.
+inline DVec3 reach_of_axes(const glm::dmat3& half_axes) {
+  return glm::abs(half_axes[0]) + glm::abs(half_axes[1]) + glm::abs(half_axes[2]);
+}
+
+/// How far apart the centres of a box and a voxel are along an axis when the two touch.
+inline double reach_along(DVec3 axis, const glm::dmat3& half_axes) {
+  double reach = 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
+  for (int i = 0; i < 3; ++i) reach += std::abs(glm::dot(half_axes[i], axis));
+  return reach;
+}
+
+}  // namespace quoin

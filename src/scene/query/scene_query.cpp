@@ -1,0 +1,156 @@
+#include <quoin/scene/scene_query.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "scene/query/query_support.h"
+
+namespace quoin {
+
+namespace {
+
+std::optional<RayHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
+  std::optional<RayHit> hit = first_hit(*placed.opaque, ray, max_t);
+  if (placed.transparent == nullptr) return hit;
+  const std::optional<RayHit> clear = first_hit(*placed.transparent, ray, hit ? hit->t : max_t);
+  return clear && (!hit || clear->t < hit->t) ? clear : hit;
+}
+
+// What overlap queries ask of a shape in a grid's space.
+class SphereInGrid {
+ public:
+  SphereInGrid(DVec3 centre, double radius) : centre_(centre), radius_(radius) {}
+  [[nodiscard]] DBox bounds() const { return {centre_ - radius_, centre_ + radius_}; }
+  [[nodiscard]] bool meets(IVec3 voxel) const {
+    const DVec3 nearest = glm::clamp(centre_, DVec3(voxel), DVec3(voxel + 1));
+    return glm::length(nearest - centre_) < radius_ - kTouch;
+  }
+
+ private:
+  DVec3 centre_;
+  double radius_;
+};
+
+class BoxInGrid {
+ public:
+  // `half_axes`: the box's half edges.
+  BoxInGrid(DVec3 centre, const glm::dmat3& half_axes)
+      : centre_(centre), half_axes_(half_axes), separators_(separating_axes(half_axes)) {}
+  [[nodiscard]] DBox bounds() const {
+    const DVec3 reach = reach_of_axes(half_axes_);
+    return {centre_ - reach, centre_ + reach};
+  }
+  [[nodiscard]] bool meets(IVec3 voxel) const {
+    const DVec3 between = DVec3(voxel) + 0.5 - centre_;
+    return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
+      if (axis == DVec3(0.0)) return true;  // of parallel edges: the other axes decide
+      return std::abs(glm::dot(between, axis)) < reach_along(axis, half_axes_) - kTouch;
+    });
+  }
+
+ private:
+  DVec3 centre_;
+  glm::dmat3 half_axes_;
+  SeparatingAxes separators_;
+};
+
+template <class Shape>
+std::optional<IVec3> first_overlap(const Grid& grid, const VoxelRegistry& types, const Shape& shape) {
+  const IBox box = voxels_within(shape.bounds(), grid.bounds());
+  GridReader reader(grid);
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      for (int x = box.min.x; x < box.max.x; ++x) {
+        const IVec3 voxel(x, y, z);
+        if (collides(types, reader.get(voxel)) && shape.meets(voxel)) return voxel;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+// `shape_of(placed)` is the shape in that grid's space.
+template <class ShapeOf>
+std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegistry& types, const DBox& bounds,
+                                      ShapeOf shape_of) {
+  std::vector<std::size_t> near;
+  SceneQuery::instances(tracer).visit_box(bounds, [&](std::size_t i) { near.push_back(i); });
+  std::sort(near.begin(), near.end());
+  std::vector<SceneOverlap> found;
+  for (const std::size_t i : near) {
+    const PlacedGrid& placed = tracer.placed()[i];
+    const auto voxel = first_overlap(*placed.voxels, types, shape_of(placed));
+    if (voxel) found.push_back({placed.instance, *voxel});
+  }
+  return found;
+}
+
+}  // namespace
+
+std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world, double max_distance) {
+  const Ray& ray = ray_in_world;
+  if (!is_finite(ray.origin) || !is_finite(ray.direction) || ray.direction == DVec3(0.0) || !(max_distance >= 0.0)) {
+    return std::nullopt;
+  }
+  double max_t = max_distance;
+  std::optional<RayHit> best;
+  std::size_t best_placed = 0;
+  SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
+    const PlacedGrid& placed = tracer.placed()[i];
+    const ToGrid to_grid(placed);
+    const auto hit = first_of_grid(placed, {to_grid.point(ray.origin), to_grid.axes * ray.direction}, max_t);
+    if (hit && (!best || hit->t < best->t || (hit->t == best->t && i < best_placed))) {
+      best = hit;
+      best_placed = i;
+      max_t = hit->t;
+    }
+    return true;
+  });
+  if (!best) return std::nullopt;
+  const PlacedGrid& placed = tracer.placed()[best_placed];
+  return SceneHit{placed.instance,    best->voxel, placed.voxels->get(best->voxel),
+                  best->face,         best->t,     ray.origin + best->t * ray.direction,
+                  best->starts_inside};
+}
+
+std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, double x, double y, int width,
+                             int height) {
+  return first_hit(tracer, ray_through(camera, x, y, width, height));
+}
+
+std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x, double y, int width,
+                                       int height, float depth) {
+  if (!(depth >= 0.0F) || std::isinf(depth)) return std::nullopt;
+  // Half a unit in a float's last place, twice over.
+  const double room = double{depth} * 0x1p-23 + 1e-6;
+  Ray ray = ray_through(camera, x, y, width, height);
+  const double begin = std::max(double{depth} - room, 0.0);
+  ray.origin += begin * ray.direction;
+  auto hit = first_hit(tracer, ray, double{depth} + room - begin);
+  if (hit) hit->distance += begin;
+  return hit;
+}
+
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre, double radius) {
+  if (!is_finite(centre) || !std::isfinite(radius) || radius <= 0.0) return {};
+  return overlaps_of(tracer, types, {centre - radius, centre + radius}, [&](const PlacedGrid& placed) {
+    return SphereInGrid(ToGrid(placed).point(centre), radius / placed.voxel_size);
+  });
+}
+
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box) {
+  if (!is_box(box)) return {};
+  const glm::dmat3 half_axes = half_axes_of(box);
+  const DBox bounds = BoxInGrid(box.centre, half_axes).bounds();
+  return overlaps_of(tracer, types, bounds, [&](const PlacedGrid& placed) {
+    const ToGrid to_grid(placed);
+    return BoxInGrid(to_grid.point(box.centre), to_grid.axes * half_axes);
+  });
+}
+
+}  // namespace quoin

@@ -1,0 +1,96 @@
+#include "scene/tracer/coarse_grids.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <quoin/scene/scene_tracer.h>
+
+namespace quoin {
+namespace {
+
+// Whether the voxels of a grid halved that often fill as much as those of the full one, but for an
+// eighth.
+bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
+  const auto cells = std::ldexp(static_cast<double>(coarse.voxel_count()), 3 * halvings);
+  const auto voxels = static_cast<double>(full.voxel_count());
+  return std::abs(cells - voxels) <= 0.125 * voxels;
+}
+
+}  // namespace
+
+void CoarseLevel::put_in(PlacedGrid& placed) const {
+  const double cell = std::ldexp(1.0, halvings);
+  placed.voxels = voxels;
+  placed.opaque = &trees.opaque();
+  placed.transparent = trees.transparent();
+  placed.pivot = placed.grid->pivot / cell;
+  placed.voxel_size *= cell;
+  placed.halvings = halvings;
+}
+
+void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
+  ChangeCursor now = followed;
+  const GridChanges changes = grid.changes_since(now);
+  followed = {};  // stays so when memory runs out
+  if (changes.all) {
+    *this = {};
+  } else if (!changes.empty()) {
+    renew(grid, types, threads);
+  }
+  followed = now;
+  for (int level = static_cast<int>(levels.size()) + 1; level <= halvings && !is_coarsest; ++level) {
+    pyramid.update(grid, types, level, threads);
+    is_coarsest = !take_level(grid, types, level);
+  }
+}
+
+// Brings what there is up to date with an edit.
+void CoarseGrids::Entry::renew(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+  const int most = pyramid.levels();
+  pyramid.update(grid, types, most, threads);
+  is_coarsest = false;
+  for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
+}
+
+// Puts a level of the pyramid among those that are like the grid; false, and none from there on, when it is not.
+bool CoarseGrids::Entry::take_level(const Grid& grid, const VoxelRegistry& types, int halvings) {
+  const auto index = static_cast<std::size_t>(halvings - 1);
+  if (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid)) {
+    levels.resize(std::min(levels.size(), index));
+    return false;
+  }
+  if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
+  CoarseLevel& level = *levels[index];
+  level.voxels = &pyramid.level(halvings);
+  level.halvings = halvings;
+  if (level.trees.update(*level.voxels, types)) level.tight = level.voxels->bounds();
+  return true;
+}
+
+const CoarseLevel* CoarseGrids::Lock::find(GridHandle grid, int halvings) const {
+  const auto found = grids_->entries_.find(grid);
+  if (halvings <= 0 || found == grids_->entries_.end() || found->second.levels.empty()) return nullptr;
+  const auto& levels = found->second.levels;
+  return levels[std::min(static_cast<std::size_t>(halvings), levels.size()) - 1].get();
+}
+
+CoarseGrids::Lock CoarseGrids::make(const Scene& scene, std::span<const SelectedInstance> selected, Threads threads) {
+  Lock lock(*this);
+  std::map<GridHandle, int> wanted;
+  for (const SelectedInstance& choice : selected) {
+    if (choice.halvings <= 0) continue;
+    int& most = wanted[scene.instances()[choice.instance].grid];
+    most = std::max(most, choice.halvings);
+  }
+  std::vector<std::pair<GridHandle, int>> tasks(wanted.begin(), wanted.end());
+  for (const auto& [grid, halvings] : tasks) entries_[grid];
+  const Threads inner = tasks.size() > 1 ? Threads{1} : threads;
+  parallel_for(tasks.size(), threads, [&](std::size_t i) {
+    const auto& [handle, halvings] = tasks[i];
+    entries_.find(handle)->second.make(scene.grids()[handle].grid, scene.types, halvings, inner);
+  });
+  return lock;
+}
+
+}  // namespace quoin

@@ -1,0 +1,59 @@
+#include <quoin/scene/scene_tracer.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin {
+
+SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
+  impl_->scene = &scene;
+  impl_->hidden = hidden;
+  impl_->update(threads);
+}
+
+bool SceneTracer::update(Threads threads) {
+  return impl_->update(threads);
+}
+
+SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
+  auto detailed = std::make_unique<Impl>();
+  detailed->scene = impl_->scene;
+  detailed->hidden = impl_->hidden;
+  detailed->placed = impl_->placed;
+  detailed->has_transparent = impl_->has_transparent;
+  std::vector<InstanceTree::Change> halved;
+  const CoarseGrids::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
+  auto next = detailed->placed.begin();
+  for (const SelectedInstance& choice : selected) {
+    next = std::lower_bound(next, detailed->placed.end(), choice.instance,
+                            [](const PlacedGrid& placed, InstanceHandle handle) { return placed.instance < handle; });
+    if (next == detailed->placed.end()) break;
+    if (next->instance != choice.instance) continue;
+    next->detail = choice.detail;
+    const GridHandle grid = impl_->scene->instances()[choice.instance].grid;
+    const CoarseLevel* level = levels.find(grid, choice.halvings);
+    if (level == nullptr) continue;
+    level->put_in(*next);
+    halved.push_back({static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});
+  }
+  detailed->instances = impl_->instances;
+  detailed->instances.change(halved);
+  return SceneTracer(std::move(detailed));
+}
+
+SceneTracer::SceneTracer(SceneTracer&&) noexcept = default;
+SceneTracer& SceneTracer::operator=(SceneTracer&&) noexcept = default;
+SceneTracer::~SceneTracer() = default;
+
+const std::vector<PlacedGrid>& SceneTracer::placed() const {
+  return impl_->placed;
+}
+bool SceneTracer::has_transparent() const {
+  return impl_->has_transparent;
+}
+
+}  // namespace quoin

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <quoin/scene/scene_tracer.h>
+
+#include "scene/tracer/coarse_grids.h"
+#include "scene/tracer/instance_tree.h"
+#include "scene/tracer/kept_trees.h"
+
+namespace quoin {
+
+/// A grid of the scene, as it was when it was last looked at.
+struct TracedGrid {
+  GridHandle handle;
+  const SceneGrid* grid = nullptr;
+  DVec3 pivot{0.0};
+  IBox tight;
+  bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
+  bool is_placed = false;      ///< by an instance that is traced
+  std::uint64_t shape = 0;     ///< another number whenever pivot or bounds have changed, and of every other grid
+  KeptTrees trees;             ///< up to date while it is placed
+};
+
+/// The box around a placed grid whose voxels lie within `tight`, with room for rounding.
+[[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
+
+struct SceneTracer::Impl {
+  // What a placed grid was read from, to be compared with what its instance is now.
+  struct Source {
+    InstanceHandle instance;
+    TracedGrid* grid = nullptr;
+    std::uint64_t shape = 0;
+    DVec3 position{0.0};
+    DQuat rotation{1.0, 0.0, 0.0, 0.0};
+    double voxel_size = 1.0;
+    bool mirrored = false;
+
+    [[nodiscard]] bool is_of(const Instance& now, const TracedGrid& its_grid) const {
+      return grid == &its_grid && shape == its_grid.shape && position == now.position && rotation == now.rotation &&
+             voxel_size == now.voxel_size && mirrored == now.mirrored;
+    }
+  };
+
+  const Scene* scene = nullptr;
+  bool hidden = false;
+  ChangeCursor followed_types;
+  ChangeCursor followed_scene;
+  std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null where none was seen
+  std::vector<PlacedGrid> placed;
+  std::vector<Source> sources;  // of `placed`
+  InstanceTree instances;       // of `placed`, in the world
+  bool has_transparent = false;
+  CoarseGrids coarse;  // those of `with_detail`
+
+  bool update(Threads threads);
+
+ private:
+  std::uint64_t shapes = 0;      // that were given out
+  bool has_other_trees = false;  // than those that `placed` names
+
+  void look_at_types(const TypeChanges& changes);
+  [[nodiscard]] bool look_at_grids(const SceneChanges& changes);
+  [[nodiscard]] bool look_at(GridHandle handle);
+  [[nodiscard]] bool move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved);
+  [[nodiscard]] bool move_instances(const SceneChanges& changes);
+  [[nodiscard]] TracedGrid* grid_to_place(const Instance& instance) const;
+  void place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid);
+  [[nodiscard]] bool move_all_instances();
+  void place_instances();
+  void update_trees(const SceneChanges& changes, Threads threads);
+};
+
+}  // namespace quoin

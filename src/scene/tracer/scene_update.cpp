@@ -1,0 +1,255 @@
+// Brings a tracer up to date with its scene.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "scene/instance_axes.h"
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin {
+namespace {
+
+bool is_seen_through_otherwise(const TypeChange& change) {
+  return change.visibility;
+}
+
+bool has_type_of(const Grid& grid, const std::vector<VoxelType>& ascending) {
+  const std::vector<VoxelType> types = grid.types();
+  return std::any_of(types.begin(), types.end(),
+                     [&](VoxelType type) { return std::binary_search(ascending.begin(), ascending.end(), type); });
+}
+
+}  // namespace
+
+DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight) {
+  const DVec3 low = (DVec3(tight.min) - placed.pivot) * placed.voxel_size;
+  const DVec3 high = (DVec3(tight.max) - placed.pivot) * placed.voxel_size;
+  DBox box{DVec3(0.0), DVec3(0.0)};
+  for (int axis = 0; axis < 3; ++axis) {
+    const DVec3 a = placed.world_axes[axis] * low[axis];
+    const DVec3 b = placed.world_axes[axis] * high[axis];
+    box = {box.min + glm::min(a, b), box.max + glm::max(a, b)};
+  }
+  box = {box.min + placed.position, box.max + placed.position};
+  const DVec3 room = (box.max - box.min) * 1e-6 + (glm::abs(box.min) + glm::abs(box.max)) * 1e-15;
+  return {box.min - room, box.max + room};
+}
+
+bool SceneTracer::Impl::update(Threads threads) {
+  ChangeCursor types_now = followed_types;
+  ChangeCursor scene_now = followed_scene;
+  const TypeChanges types = scene->types.changes_since(types_now);
+  SceneChanges changes = scene->changes_since(scene_now);
+  followed_types = followed_scene = {};  // stay so when memory runs out
+  look_at_types(types);
+  // Trees that were forgotten are made again wherever they are.
+  changes.all |= types.all || std::any_of(types.items.begin(), types.items.end(), is_seen_through_otherwise);
+  const bool are_shapes_same = look_at_grids(changes);
+  const bool are_placed = changes.all || !are_shapes_same ? move_all_instances() : move_instances(changes);
+  if (!are_placed) {
+    place_instances();
+    changes.all = true;
+  }
+  update_trees(changes, threads);
+  followed_types = types_now;
+  followed_scene = scene_now;
+  return std::exchange(has_other_trees, false);
+}
+
+// Forgets what was made of types that were not seen through and now are, or the other way around.
+void SceneTracer::Impl::look_at_types(const TypeChanges& changes) {
+  std::vector<VoxelType> changed;
+  for (const TypeChange& change : changes.items) {
+    if (is_seen_through_otherwise(change)) changed.push_back(change.type);
+  }
+  if (!changes.all && changed.empty()) return;
+  for (const auto& each : grids) {
+    if (each == nullptr) continue;
+    // Edited meanwhile, it may have lost the last voxel of such a type.
+    const SceneGrid* grid = scene->grids().find(each->handle);
+    if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
+        has_type_of(grid->grid, changed)) {
+      each->trees.forget();
+    }
+  }
+  coarse.forget([](GridHandle) { return true; });
+}
+
+// False when a grid has other bounds or another pivot than before, came or went.
+bool SceneTracer::Impl::look_at_grids(const SceneChanges& changes) {
+  const auto is_gone = [&](GridHandle handle) { return scene->grids().find(handle) == nullptr; };
+  if (changes.all) {
+    for (auto& each : grids) {
+      if (each != nullptr && is_gone(each->handle)) each.reset();
+    }
+    coarse.forget(is_gone);
+    scene->grids().for_each([&](GridHandle handle, const SceneGrid&) { (void)look_at(handle); });
+    return false;
+  }
+  bool is_same = true;
+  bool has_gone = false;
+  for (const GridHandle handle : changes.grids) {
+    if (!is_gone(handle)) {
+      is_same &= look_at(handle);
+      continue;
+    }
+    has_gone = true;
+    is_same = false;
+    if (handle.index >= grids.size() || grids[handle.index] == nullptr) continue;
+    if (grids[handle.index]->handle == handle) grids[handle.index].reset();
+  }
+  if (has_gone) coarse.forget(is_gone);
+  return is_same;
+}
+
+// False when it is placed otherwise than before.
+bool SceneTracer::Impl::look_at(GridHandle handle) {
+  const SceneGrid& grid = scene->grids()[handle];
+  if (handle.index >= grids.size()) grids.resize(handle.index + std::size_t{1});
+  auto& known = grids[handle.index];
+  if (known == nullptr || known->handle != handle) {
+    known = std::make_unique<TracedGrid>();
+    known->handle = handle;
+  }
+  has_other_trees |= known->grid != &grid;
+  const bool is_new = std::exchange(known->grid, &grid) == nullptr;
+  const IBox tight = grid.grid.bounds();
+  // What is not a number differs from itself, and is another each time.
+  if (!is_new && tight == known->tight && known->pivot == grid.pivot) return true;
+  known->shape = ++shapes;
+  known->pivot = grid.pivot;
+  known->tight = tight;
+  known->can_be_placed = !tight.empty() && is_finite(grid.pivot);
+  return false;
+}
+
+// The grid of an instance that is to be traced where it has a place; null for any other.
+TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
+  if ((!instance.visible && !hidden) || instance.grid.index >= grids.size()) return nullptr;
+  TracedGrid* grid = grids[instance.grid.index].get();
+  if (grid == nullptr || grid->handle != instance.grid || !grid->can_be_placed) return nullptr;
+  return grid;
+}
+
+void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid) {
+  placed[i].instance = handle;
+  placed[i].grid = grid.grid;
+  placed[i].voxels = &grid.grid->grid;
+  placed[i].opaque = &grid.trees.opaque();
+  placed[i].transparent = grid.trees.transparent();
+  placed[i].pivot = grid.pivot;
+  placed[i].world_axes = world_axes(instance);
+  placed[i].position = instance.position;
+  placed[i].voxel_size = instance.voxel_size;
+  sources[i] = {handle,           &grid, grid.shape, instance.position, instance.rotation, instance.voxel_size,
+                instance.mirrored};
+}
+
+// Places an instance anew if it was moved; false when it is to be traced and was not, or the other way round.
+bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved) {
+  const auto found = std::lower_bound(sources.begin(), sources.end(), handle,
+                                      [](const Source& each, InstanceHandle key) { return each.instance < key; });
+  const bool was_placed = found != sources.end() && found->instance == handle;
+  const Instance* instance = scene->instances().find(handle);
+  TracedGrid* grid = instance == nullptr ? nullptr : grid_to_place(*instance);
+  const bool is_placed = grid != nullptr && has_place(*instance);
+  if (is_placed != was_placed) return false;
+  if (!is_placed || found->is_of(*instance, *grid)) return true;
+  // Of another grid: that grid's trees may not be there.
+  if (found->grid != grid) return false;
+  const auto i = static_cast<std::size_t>(found - sources.begin());
+  place(i, handle, *instance, *grid);
+  moved.push_back({i, bounds_in_world(placed[i], grid->tight)});
+  return true;
+}
+
+bool SceneTracer::Impl::move_instances(const SceneChanges& changes) {
+  std::vector<InstanceTree::Change> moved;
+  for (const InstanceHandle handle : changes.instances) {
+    if (!move_instance(handle, moved)) return false;
+  }
+  instances.change(moved);
+  return true;
+}
+
+// Likewise all; false, with some of it done, when other instances are to be traced than were.
+bool SceneTracer::Impl::move_all_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
+  std::vector<InstanceTree::Change> moved;
+  std::size_t next = 0;
+  bool is_same = true;
+  scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    if (!is_same) return;
+    TracedGrid* grid = grid_to_place(instance);
+    if (grid == nullptr) return;
+    const bool is_next = next < sources.size() && sources[next].instance == handle;
+    const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
+    if (has_moved && !has_place(instance)) return;
+    is_same = is_next;
+    if (!is_same) return;
+    grid->is_placed = true;
+    if (has_moved) {
+      place(next, handle, instance, *grid);
+      moved.push_back({next, bounds_in_world(placed[next], grid->tight)});
+    }
+    ++next;
+  });
+  if (!is_same || next != placed.size()) return false;
+  instances.change(moved);
+  return true;
+}
+
+// Places all that is to be traced.
+void SceneTracer::Impl::place_instances() {
+  for (const auto& each : grids) {
+    if (each != nullptr) each->is_placed = false;
+  }
+  std::vector<DBox> boxes;
+  placed.clear();
+  sources.clear();
+  scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    TracedGrid* grid = grid_to_place(instance);
+    if (grid == nullptr || !has_place(instance)) return;
+    grid->is_placed = true;
+    placed.emplace_back();
+    sources.emplace_back();
+    place(placed.size() - 1, handle, instance, *grid);
+    boxes.push_back(bounds_in_world(placed.back(), grid->tight));
+  });
+  instances = InstanceTree(std::move(boxes));
+}
+
+void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads threads) {
+  std::vector<TracedGrid*> used;
+  const auto use = [&](TracedGrid* grid) {
+    if (grid != nullptr && grid->is_placed) used.push_back(grid);
+  };
+  if (changes.all) {
+    for (const auto& each : grids) use(each.get());
+  }
+  for (const GridHandle handle : changes.grids) {
+    if (!changes.all && handle.index < grids.size()) use(grids[handle.index].get());
+  }
+  std::vector<std::uint8_t> is_other(used.size());
+  parallel_for(used.size(), threads, [&](std::size_t i) {
+    is_other[i] = static_cast<std::uint8_t>(used[i]->trees.update(used[i]->grid->grid, scene->types));
+  });
+  has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
+  if (!changes.all && !has_other_trees) return;
+  has_transparent = std::any_of(grids.begin(), grids.end(), [](const auto& grid) {
+    return grid != nullptr && grid->is_placed && grid->trees.transparent() != nullptr;
+  });
+  if (!has_other_trees) return;
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const TracedGrid& grid = *sources[i].grid;
+    placed[i].grid = grid.grid;
+    placed[i].voxels = &grid.grid->grid;
+    placed[i].opaque = &grid.trees.opaque();
+    placed[i].transparent = grid.trees.transparent();
+  }
+}
+
+}  // namespace quoin

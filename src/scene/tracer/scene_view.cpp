@@ -1,0 +1,252 @@
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <functional>
+#include <new>
+#include <type_traits>
+
+#include <glm/matrix.hpp>
+
+#include "scene/tracer/packet_tree.h"
+#include "scene/tracer/scene_tracer_impl.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kLanes = RayPacket::kSize;
+
+// Room for something that is written before it is read: to clear packets first takes longer than to fill them.
+template <class T>
+class RoomFor {
+ public:
+  RoomFor() {}  // NOLINT: left as it is
+  [[nodiscard]] T& operator*() { return *std::launder(reinterpret_cast<T*>(bytes_)); }
+
+ private:
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+  alignas(T) std::byte bytes_[sizeof(T)];
+};
+
+// The lanes of a packet, once they are asked for.
+class LanesWhenNeeded {
+ public:
+  LanesWhenNeeded(const RayPacket& rays, const PacketBounds& bounds) : rays_(rays), bounds_(bounds) {}
+  [[nodiscard]] PacketLanes& operator*() {
+    if (!is_made_) new (&*lanes_) PacketLanes(rays_, bounds_);
+    is_made_ = true;
+    return *lanes_;
+  }
+
+ private:
+  const RayPacket& rays_;
+  const PacketBounds& bounds_;
+  RoomFor<PacketLanes> lanes_;
+  bool is_made_ = false;
+};
+
+// Moves points and directions from one space to another.
+struct Affine {
+  glm::dmat3 axes{1.0};
+  DVec3 offset{0.0};
+  [[nodiscard]] DVec3 point(DVec3 p) const { return axes * p + offset; }
+};
+
+void turn(const glm::dmat3& axes, const RayPacket::Lanes<double> (&from)[3], DVec3 offset, RayPacket::Lanes<double>& x,
+          RayPacket::Lanes<double>& y, RayPacket::Lanes<double>& z) {
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const double fx = from[0][i];
+    const double fy = from[1][i];
+    const double fz = from[2][i];
+    x[i] = axes[0].x * fx + axes[1].x * fy + axes[2].x * fz + offset.x;
+    y[i] = axes[0].y * fx + axes[1].y * fy + axes[2].y * fz + offset.y;
+    z[i] = axes[0].z * fx + axes[1].z * fy + axes[2].z * fz + offset.z;
+  }
+}
+
+void move(const Affine& by, const RayPacket& from, RayPacket& to) {
+  turn(by.axes, {from.origin_x, from.origin_y, from.origin_z}, by.offset, to.origin_x, to.origin_y, to.origin_z);
+  turn(by.axes, {from.direction_x, from.direction_y, from.direction_z}, DVec3(0.0), to.direction_x, to.direction_y,
+       to.direction_z);
+  to.max_t = from.max_t;
+  to.active = from.active;
+}
+
+// How far the rays that count go at most.
+double farthest(const RayPacket& rays) {
+  double max_t = 0.0;
+  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+    max_t = std::max(max_t, rays.max_t[static_cast<std::size_t>(std::countr_zero(left))]);
+  }
+  return max_t;
+}
+
+}  // namespace
+
+struct SceneView::Impl {
+  const SceneTracer* tracer = nullptr;
+  std::vector<Affine> grid_from_view;
+  std::vector<Affine> view_from_grid;
+  DVec3 origin{0.0};
+  PacketTree instances;                 // in view space
+  PacketTree seen;                      // of these, those that `first_hits` meets, where not all
+  std::vector<bool> left_to_impostors;  // none: sees all
+  bool is_alone = false;                // there is one instance
+  [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }
+
+  void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
+    for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const auto i = static_cast<std::size_t>(lane);
+      const std::uint32_t bit = 1U << lane;
+      const auto index = static_cast<std::int32_t>(placed);
+      if ((hits.grids.hit & bit) != 0) {
+        if (found.t[i] > hits.grids.t[i]) continue;
+        if (found.t[i] == hits.grids.t[i] && index > hits.placed[i]) continue;
+      }
+      hits.grids.hit |= bit;
+      hits.grids.starts_inside = (hits.grids.starts_inside & ~bit) | (found.starts_inside & bit);
+      hits.grids.x[i] = found.x[i], hits.grids.y[i] = found.y[i], hits.grids.z[i] = found.z[i];
+      hits.grids.t[i] = found.t[i];
+      hits.grids.face[i] = found.face[i];
+      hits.placed[i] = index;
+      rays.max_t[i] = found.t[i];
+    }
+  }
+};
+
+SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_unique<Impl>()) {
+  impl_->tracer = &tracer;
+  for (const PlacedGrid& placed : tracer.placed()) {
+    // The difference of two far positions is taken first: it is small, and mostly exact.
+    const DVec3 position = placed.position - origin;
+    const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
+    impl_->grid_from_view.push_back({grid_axes, placed.pivot - grid_axes * position});
+    const glm::dmat3 view_axes = placed.world_axes * placed.voxel_size;
+    impl_->view_from_grid.push_back({view_axes, position - view_axes * placed.pivot});
+  }
+  impl_->origin = origin;
+  impl_->instances = PacketTree(tracer.impl_->instances, origin);
+  impl_->is_alone = tracer.placed().size() == 1;
+}
+
+SceneView::SceneView(SceneView&&) noexcept = default;
+SceneView& SceneView::operator=(SceneView&&) noexcept = default;
+SceneView::~SceneView() = default;
+
+const SceneTracer& SceneView::tracer() const {
+  return *impl_->tracer;
+}
+
+void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
+  if (placed.empty()) return;
+  impl_->left_to_impostors.resize(impl_->tracer->placed().size());
+  for (const std::int32_t i : placed) impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
+  impl_->seen = PacketTree(impl_->tracer->impl_->instances, impl_->origin, impl_->left_to_impostors);
+}
+
+void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
+  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  hits.grids.hit = hits.grids.starts_inside = 0;
+  if (impl_->is_alone && impl_->sees_all()) {
+    move(impl_->grid_from_view[0], rays_in_view, rays);
+    quoin::first_hits(*placed[0].opaque, rays, hits.grids);
+    hits.placed.fill(0);
+    return;
+  }
+  RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
+  PacketBounds bounds(left);
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<PacketHits> room_for_hits;
+  PacketHits& found = *room_for_hits;
+  const PacketTree& seen = impl_->sees_all() ? impl_->instances : impl_->seen;
+  seen.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
+    if (near == 0) return true;
+    move(impl_->grid_from_view[i], left, rays);
+    rays.active = near;
+    quoin::first_hits(*placed[i].opaque, rays, found);
+    if (found.hit == 0) return true;
+    impl_->take_nearer(i, found, left, hits);
+    for (std::uint32_t each = found.hit; each != 0; each &= each - 1) {
+      const int lane = std::countr_zero(each);
+      (*lanes).set_reach(lane, left.max_t[static_cast<std::size_t>(lane)]);
+    }
+    if (hits.grids.hit == left.active) bounds.set_reach(farthest(left));
+    return true;
+  });
+}
+
+std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
+  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
+  const auto own = static_cast<std::size_t>(home);
+  std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid);
+  if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
+  RoomFor<RayPacket> room_in_view;
+  RayPacket& in_view = *room_in_view;
+  move(impl_->view_from_grid[own], rays_in_grid, in_view);
+  in_view.active &= ~blocked;
+  const PacketBounds bounds(in_view);
+  LanesWhenNeeded lanes(in_view, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+    if (i == own) return true;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & in_view.active;
+    if (near == 0) return true;
+    move(impl_->grid_from_view[i], in_view, rays);
+    rays.active = near;
+    const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays);
+    blocked |= found;
+    in_view.active &= ~found;
+    return in_view.active != 0;
+  });
+  return blocked;
+}
+
+std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
+  if (rays_in_view.active == 0 || !impl_->tracer->has_transparent()) return 0;
+  RayPacket left = rays_in_view;
+  const PacketBounds bounds(left);
+  LanesWhenNeeded lanes(left, bounds);
+  RoomFor<RayPacket> room_for_rays;
+  RayPacket& rays = *room_for_rays;
+  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
+    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
+    if (tree == nullptr) return true;
+    const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
+    if (near == 0) return true;
+    move(impl_->grid_from_view[i], left, rays);
+    rays.active = near;
+    left.active &= ~quoin::any_hits(*tree, rays);
+    return left.active != 0;
+  });
+  return rays_in_view.active & ~left.active;
+}
+
+void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
+                                  const std::function<bool(const TransparentSpan&)>& visit) const {
+  RayPacket alone;
+  alone.set(0, ray_in_view, max_t);
+  impl_->instances.visit(PacketBounds(alone), [&](std::size_t i, const FourBoxes&, std::size_t) {
+    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
+    if (tree == nullptr) return true;
+    const Affine& to_grid = impl_->grid_from_view[i];
+    const Ray ray{to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction};
+    visit_hits(*tree, ray, max_t, [&](const VoxelSpan& span) { return visit({span, static_cast<std::int32_t>(i)}); });
+    return true;
+  });
+}
+
+DVec3 SceneView::grid_from_view(std::int32_t placed, DVec3 point_in_view) const {
+  return impl_->grid_from_view[static_cast<std::size_t>(placed)].point(point_in_view);
+}
+
+RayPacket SceneView::view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const {
+  RayPacket rays;
+  move(impl_->view_from_grid[static_cast<std::size_t>(placed)], rays_in_grid, rays);
+  return rays;
+}
+
+}  // namespace quoin
