@@ -12,7 +12,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/terrain/terrain.h>
 
-#include "io/glb_for_tests.h"
+#include "io/gltf/glb_for_tests.h"
 #include "tests/golden_for_tests.h"
 #include "tests/golden_views.h"
 

@@ -64,7 +64,7 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 
 /// Volumes are not drawn. Files that cannot be read fail later, in the words of the reader.
 Status check_input(const std::filesystem::path& path) {
-  const auto format = recognise_file(path);
+  const auto format = detect_format(path);
   if (!format || !*format || !format_info(**format).is_volume) return {};
   return fail(ErrorCode::Unsupported,
               "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
@@ -191,7 +191,7 @@ void add_render_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("render", "Draw a picture, with sun, shadows and ambient occlusion");
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
-  command->footer("Reads " + readable_endings() +
+  command->footer("Reads " + readable_extensions() +
                   ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 4\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40");

@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
-#include <quoin/io/gltf.h>
+#include <quoin/io/mesh_file.h>
 
 namespace quoin::viewer {
 
@@ -38,9 +38,9 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
     if (!progress) return {};
     return [&progress, offset](double fraction) { return progress(offset + 0.5 * fraction); };
   };
-  const auto meshes = mesh_scene(scene, {}, false, {}, half(0.0));
+  const auto meshes = mesh_scene(scene, {}, {}, half(0.0));
   if (!meshes) return tl::unexpected<Error>(meshes.error());
-  const auto written = write_glb(scene, *meshes, path, half(0.5));
+  const auto written = write_mesh(*meshes, path, {.format = FileFormat::Glb}, half(0.5));
   if (!written) return tl::unexpected<Error>(written.error());
   return {};
 }
