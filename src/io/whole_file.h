@@ -34,11 +34,9 @@ template <class Read>
 /// CannotWrite; they name the file.
 [[nodiscard]] inline Result<std::uint64_t> write_whole(const std::filesystem::path& path,
                                                        Result<std::vector<std::byte>> bytes) {
-  const auto written = std::move(bytes).and_then([&](const std::vector<std::byte>& made) -> Result<std::uint64_t> {
-    if (auto done = write_file(path, made); !done) return done.error();
-    return made.size();
-  });
-  return with_path(written, path);
+  if (!bytes) return with_path(Result<std::uint64_t>(bytes.error()), path);
+  if (auto done = write_file(path, *bytes); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  return bytes->size();
 }
 
 }  // namespace quoin

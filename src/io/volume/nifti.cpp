@@ -317,7 +317,9 @@ Status read_data_place(const Fields& fields, bool is_pair, VolumeHeader& header)
   if (header.data_at == fields.header_bytes()) return {};
   if (header.data_at != 0) return bad("vox_offset is " + std::to_string(header.data_at) + ", within the header", at);
   header.data_at = least;
-  header.volume.warnings.push_back("vox_offset is 0; the values are taken from byte " + std::to_string(least));
+  // Two statements: in one, GCC 12 warns of what it makes of the sum.
+  std::string& warning = header.volume.warnings.emplace_back("vox_offset is 0; the values are taken from byte ");
+  warning += std::to_string(least);
   return {};
 }
 
