@@ -1,8 +1,9 @@
+#include <quoin/core/assert.h>
+
 #include "io/material_palette.h"
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -126,7 +127,7 @@ void MaterialPalette::make_materials(const Usage& used) {
 
 std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) const {
   const auto found = by_class_and_band_.find({surface, band_of(surface, type)});
-  assert(found != by_class_and_band_.end());
+  QUOIN_ASSERT(found != by_class_and_band_.end(), "a class and type that the meshes have");
   return found->second;
 }
 

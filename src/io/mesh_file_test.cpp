@@ -7,8 +7,10 @@
 #include <functional>
 #include <limits>
 
+#include "core/death_for_tests.h"
 #include "core/srgb.h"
 #include "io/gltf/gltf_for_tests.h"
+#include "io/gltf/gltf_layout.h"
 #include "io/mesh_file_for_tests.h"
 
 namespace quoin {
@@ -440,6 +442,22 @@ TEST(MeshFiles, a_ball_in_a_volume_is_one_and_lies_where_the_volume_says) {
       EXPECT_NEAR(glm::length(in_voxels - DVec3(40, 15, 13)), 10.0, 0.06);
     }
   }
+}
+
+TEST(MeshMistakes, singular_transforms_are_found) {
+  QUOIN_EXPECT_MISTAKE((void)VertexTransform(glm::dmat4(0.0), DVec3(0.0)), "not singular");
+}
+
+TEST(MeshMistakes, layouts_of_unsound_meshes_are_found) {
+  SceneMeshes meshes;
+  meshes.placements.emplace_back();
+  QUOIN_EXPECT_MISTAKE((void)lay_out_gltf(meshes), "sound meshes");
+}
+
+TEST(MeshMistakes, materials_of_types_without_a_triangle_are_found) {
+  const SceneMeshes meshes;
+  const MaterialPalette palette(meshes);
+  QUOIN_EXPECT_MISTAKE((void)palette.material_of(SurfaceClass::Opaque, 0), "that the meshes have");
 }
 
 }  // namespace

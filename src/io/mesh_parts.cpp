@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/mesh_parts.h"
 
 #include <algorithm>
@@ -165,6 +167,7 @@ VertexTransform::VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot)
       translation_(world_from_part[3]),
       pivot_(pivot),
       mirrors_(glm::determinant(linear_) < 0.0) {
+  QUOIN_ASSERT(glm::determinant(linear_) != 0.0, "a linear part that is not singular");
   // Scaled to about 1, so that squares neither vanish nor overflow.
   double largest = 0.0;
   for (int column = 0; column < 3; ++column) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include <quoin/core/assert.h>
 #include <quoin/mesh/occlusion.h>
 
 #include "io/gltf/gltf_layout.h"
@@ -77,6 +78,7 @@ void write_primitive(const GltfLayout& layout, const VertexTransform& transform,
 ///
 /// Requires: the writer stands at a multiple of four.
 void write_buffer(const GltfLayout& layout, BlockWriter& out) {
+  QUOIN_ASSERT(out.bytes() % 4 == 0);
   for (const GltfMesh& mesh : layout.meshes) {
     for (const GltfPrimitive& primitive : mesh.primitives) write_primitive(layout, mesh.transform, primitive, out);
   }

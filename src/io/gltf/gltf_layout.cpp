@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/gltf/gltf_layout.h"
 
 #include <algorithm>
@@ -173,6 +175,7 @@ class MeshLayout {
 }  // namespace
 
 Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes) {
+  QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
   GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
   for (const MeshPlacement& placement : meshes.placements) {

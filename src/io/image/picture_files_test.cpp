@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 
+#include "core/death_for_tests.h"
 #include "io/gltf/glb_for_tests.h"
 #include "io/image/png.h"
 
@@ -148,6 +149,10 @@ TEST_F(PictureFiles, ImpossiblePicturesAndPathsAreErrors) {
   ASSERT_TRUE(write_file(file("a.png"), bytes_of("no picture")));
   EXPECT_EQ(read_png(file("a.png")).error().path, file("a.png").string());
   EXPECT_EQ(read_pfm(file("a.png")).error().path, file("a.png").string());
+}
+
+TEST(PngMistakes, pixels_that_are_not_what_the_sizes_say_are_found) {
+  QUOIN_EXPECT_MISTAKE((void)encode_png({2, 2, 3, {}}), "as many bytes of pixels as the sizes say");
 }
 
 }  // namespace

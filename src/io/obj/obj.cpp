@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <quoin/mesh/occlusion.h>
@@ -58,12 +59,8 @@ class ObjLines {
  public:
   explicit ObjLines(BlockWriter& out) : out_(out) {}
 
-  /// Rounded to a millionth.
-  void number(double value);
-  /// What `number` writes.
+  /// `value` rounded to a millionth.
   [[nodiscard]] static std::string text_of(double value);
-  /// Rounded to that many significant digits.
-  void number(double value, int digits);
   /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth.
   void triple(std::string_view keyword, const DVec3& v, int digits = 0);
   /// "o NAME" and a line's end: the name as one word, told apart from those before by a number; "object" for an empty
@@ -75,31 +72,20 @@ class ObjLines {
   std::set<std::string> names_;
 };
 
-void ObjLines::number(double value) {
-  char* room = out_.room(kMostDigits);
-  out_.advance(write_number(value, room));
-}
-
 std::string ObjLines::text_of(double value) {
   std::array<char, kMostDigits> room{};
   return {room.data(), write_number(value, room.data())};
 }
 
-void ObjLines::number(double value, int digits) {
-  char* room = out_.room(kMostDigits);
-  out_.advance(std::to_chars(room, room + kMostDigits, value + 0.0, std::chars_format::general, digits).ptr);
-}
-
 void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
-  out_.put_text(keyword);
+  char* at = out_.room(keyword.size() + 3 * (1 + kMostDigits));
+  at = std::copy(keyword.begin(), keyword.end(), at);
   for (int axis = 0; axis < 3; ++axis) {
-    out_.put(' ');
-    if (digits == 0) {
-      number(v[axis]);
-    } else {
-      number(v[axis], digits);
-    }
+    *at++ = ' ';
+    at = digits == 0 ? write_number(v[axis], at)
+                     : std::to_chars(at, at + kMostDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
   }
+  out_.advance(at);
 }
 
 void ObjLines::object(const std::string& name) {
@@ -202,7 +188,9 @@ class ObjText {
       }
       write_vertices(view, transform);
       out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
-      write_faces(view, transform.mirrors());
+      write_faces(view, transform.mirrors(), [&view = view](std::uint32_t corner) {
+        return std::pair(static_cast<std::uint64_t>(view.directions[corner]), view.types[corner]);
+      });
       vertices_ += view.positions.size();
     }
     if (!is_smooth) normals_ += kDirections.size();
@@ -223,29 +211,26 @@ class ObjText {
     }
   }
 
-  void write_faces(const MeshView& view, bool turned) {
+  /// `normal_and_texture(corner)`: the number of its normal among those of the object, and its texture or 0.
+  template <class Numbers>
+  void write_faces(const MeshView& view, bool turned, Numbers normal_and_texture) {
+    constexpr std::size_t kMostOfCorner = 64;
     for (std::size_t i = 0; i < view.indices.size() && !out_.failed(); i += 3) {
-      out_.put('f');
+      char* at = out_.room(2 + 3 * kMostOfCorner);
+      *at++ = 'f';
       for (const std::uint32_t corner : corners_of(view, i, turned)) {
-        write_corner(vertices_ + corner + 1, view.types[corner],
-                     normals_ + static_cast<std::uint64_t>(view.directions[corner]) + 1);
+        const auto [normal, texture] = normal_and_texture(corner);
+        char* const end = at + kMostOfCorner;
+        *at++ = ' ';
+        at = std::to_chars(at, end, vertices_ + corner + 1).ptr;
+        *at++ = '/';
+        if (texture != 0) at = std::to_chars(at, end, texture).ptr;
+        *at++ = '/';
+        at = std::to_chars(at, end, normals_ + normal + 1).ptr;
       }
-      out_.put('\n');
+      *at++ = '\n';
+      out_.advance(at);
     }
-  }
-
-  /// " vertex/texture/normal"; without a texture where that is 0.
-  void write_corner(std::uint64_t vertex, VoxelType texture, std::uint64_t normal) {
-    constexpr std::size_t kMost = 64;
-    char* text = out_.room(kMost);
-    char* const end = text + kMost;
-    *text++ = ' ';
-    text = std::to_chars(text, end, vertex).ptr;
-    *text++ = '/';
-    if (texture != 0) text = std::to_chars(text, end, texture).ptr;
-    *text++ = '/';
-    text = std::to_chars(text, end, normal).ptr;
-    out_.advance(text);
   }
 
   /// Vertices with colours, normals and triangles of a smooth surface.
@@ -262,13 +247,8 @@ class ObjText {
       lines_.triple("vn", transform.normal(view.normals[i]));
       out_.put('\n');
     }
-    for (std::size_t i = 0; i < view.indices.size() && !out_.failed(); i += 3) {
-      out_.put('f');
-      for (const std::uint32_t corner : corners_of(view, i, transform.mirrors())) {
-        write_corner(vertices_ + corner + 1, 0, normals_ + corner + 1);
-      }
-      out_.put('\n');
-    }
+    write_faces(view, transform.mirrors(),
+                [](std::uint32_t corner) { return std::pair(std::uint64_t{corner}, VoxelType{0}); });
     vertices_ += view.positions.size();
     normals_ += view.positions.size();
   }

@@ -1,5 +1,7 @@
 #include "io/volume/byte_stream.h"
 
+#include <quoin/core/assert.h>
+
 #include <zlib.h>
 
 #include <algorithm>
@@ -40,6 +42,7 @@ struct ByteStream::Inflater {
 
 ByteStream::ByteStream(std::span<const std::byte> file, std::size_t begin, Compression compression)
     : file_(file), begin_(begin), position_(begin) {
+  QUOIN_ASSERT(begin <= file.size(), "the stream begins in the file");
   if (compression == Compression::Gzip) inflater_ = std::make_unique<Inflater>();
 }
 

@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/volume/header.h"
 
 #include <algorithm>
@@ -37,6 +39,7 @@ std::string text_of_size(IVec3 size) {
 
 Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions& options,
                 std::optional<std::uint64_t> byte_offset, Volume& volume) {
+  QUOIN_ASSERT(std::ranges::all_of(extents, [](std::int64_t extent) { return extent > 0; }), "positive extents");
   std::int64_t room = std::min<std::int64_t>(options.max_values, std::numeric_limits<std::int64_t>::max() / 8);
   std::string text;
   for (const std::int64_t extent : extents) {

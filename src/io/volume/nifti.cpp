@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/volume/header.h"
 
 #include <algorithm>
@@ -343,6 +345,7 @@ bool is_header(std::span<const std::byte> bytes) {
 }
 
 Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options) {
+  QUOIN_ASSERT(is_header(bytes), "a header begins here");
   const Kind kind = kind_of(bytes).value();
   const Fields fields(bytes, kind.is_second, kind.order);
   if (bytes.size() < fields.header_bytes()) return bad("the header is cut off", bytes.size());

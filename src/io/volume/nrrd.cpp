@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
@@ -446,6 +447,7 @@ bool is_header(std::span<const std::byte> bytes) {
 }
 
 Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options) {
+  QUOIN_ASSERT(is_header(bytes), "a header begins here");
   const std::string_view text = text_of(bytes.first(std::min(bytes.size(), kMostHeaderBytes)));
   if (text[kMagic.size()] < '1' || text[kMagic.size()] > '5') {
     return unsupported("a NRRD of version " + std::string(1, text[kMagic.size()]) + "; 1 to 5 are read", 0);

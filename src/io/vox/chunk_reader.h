@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include <quoin/core/assert.h>
+
 #include "io/text.h"
 #include "io/vox/chunks.h"
 
@@ -19,7 +21,9 @@ class ByteReader {
  public:
   /// Reads `bytes[begin, end)`. Requires: begin <= end <= bytes.size().
   ByteReader(std::span<const std::byte> bytes, std::size_t begin, std::size_t end)
-      : bytes_(bytes), position_(begin), end_(end) {}
+      : bytes_(bytes), position_(begin), end_(end) {
+    QUOIN_ASSERT(begin <= end && end <= bytes.size(), "a stretch of the bytes");
+  }
   explicit ByteReader(std::span<const std::byte> bytes) : ByteReader(bytes, 0, bytes.size()) {}
 
   [[nodiscard]] bool failed() const { return failed_; }

@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/vox/materials.h"
 
 #include <algorithm>
@@ -127,6 +129,7 @@ std::array<std::uint8_t, kColours> types_by_colour_index(const Document& documen
 
 Status register_palette(const Document& document, const std::array<std::uint8_t, kColours>& type_of,
                         VoxelRegistry& types) {
+  QUOIN_ASSERT(types.size() == 1, "types hold air only");
   const std::array<Rgba8, kColours> fallback = default_palette();
   std::array<std::size_t, kColours> colour_index_of_type{};
   for (std::size_t i = 0; i < kColours; ++i) colour_index_of_type[type_of[i]] = i;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
+#include "io/vox/chunk_reader.h"
 #include "io/vox/for_tests.h"
 #include "io/vox/materials.h"
 
@@ -283,6 +285,17 @@ TEST(VoxRead, FewSomeAndManyVoxelsInAChunkAreAllPlacedTheSame) {
       ASSERT_EQ(grid_at(loaded, 0).grid.get({v[0], v[2], edge - 1 - v[1]}), v[3]);
     }
   }
+}
+
+TEST(VoxMistakes, a_reader_of_bytes_that_are_not_there_is_found) {
+  const std::vector<std::byte> bytes(4);
+  QUOIN_EXPECT_MISTAKE((void)ByteReader(bytes, 0, 5), "a stretch of the bytes");
+}
+
+TEST(VoxMistakes, a_registry_with_types_is_found) {
+  VoxelRegistry types;
+  ASSERT_TRUE(types.add({}));
+  QUOIN_EXPECT_MISTAKE((void)vox::register_palette({}, {}, types), "types hold air only");
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <quoin/core/assert.h>
+
 #include "io/vox/write.h"
 
 #include <algorithm>
@@ -161,6 +163,7 @@ std::vector<Piece> cut_into_pieces(const SceneGrid& grid) {
 
 void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
                   std::span<const std::size_t> starts, std::span<std::byte> out) {
+  QUOIN_ASSERT(pieces.size() == starts.size(), "a place for every piece");
   Cursors cursors(pieces, starts);
   visit_voxels(grid, [&](IVec3 voxel, VoxelType type) {
     const std::size_t number = cursors.piece_of(voxel);

@@ -5,10 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "io/vox/for_tests.h"
 #include "io/vox/materials.h"
 #include "io/vox/orientation.h"
 #include "io/vox/read.h"
+#include "io/vox/write.h"
 
 namespace quoin {
 namespace {
@@ -295,6 +297,11 @@ TEST(VoxWrite, VoxelsAreVisitedInTheOrderOfTheGrid) {
 TEST(VoxWrite, TheSameSceneGivesTheSameBytes) {
   std::vector<std::string> warnings;
   EXPECT_EQ(*write_vox(random_scene(7), warnings), *write_vox(random_scene(7), warnings));
+}
+
+TEST(VoxMistakes, pieces_without_a_place_in_the_file_are_found) {
+  const std::vector<vox::Piece> pieces(1);
+  QUOIN_EXPECT_MISTAKE(vox::write_voxels({}, {}, pieces, {}, {}), "a place for every piece");
 }
 
 }  // namespace
