@@ -14,8 +14,7 @@ namespace quoin {
 /// Writes a scene as Wavefront OBJ with its materials (MTL) and palette (PNG) beside it; answers the size of all.
 ///
 /// Files:     for NAME.obj also NAME.mtl, NAME_palette.png and, where a voxel emits light, NAME_emissive.png, beside
-/// it.
-///            They replace what is there.
+///            it. They replace what is there.
 /// Space:     world units, baked: an object per drawn instance, since OBJ knows neither transforms nor sharing.
 ///            Coordinates are rounded to a millionth of a unit.
 /// Occlusion: where the meshes have it, as grey after the coordinates of a vertex ("v x y z r g b"), an extension that

@@ -33,8 +33,7 @@ struct SmoothScene {
 /// Types:  every voxel that is not air is solid and opaque.
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_smooth_mesh and simplify_smooth_mesh; InvalidArgument when a drawn instance's transform is
-/// not
-///         finite or its voxel size not positive; Cancelled.
+///         not finite or its voxel size not positive; Cancelled.
 [[nodiscard]] Result<SmoothScene> smooth_scene(const Scene& scene, const SmoothSceneOptions& options,
                                                Threads threads = {}, const Progress& progress = {});
 
