@@ -61,3 +61,4 @@
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
+#include <quoin/version.h>
