@@ -23,8 +23,8 @@ const std::map<std::string, int> kLevels = {{"core", 0},  {"grid", 1},      {"me
                                             {"store", 5}, {"render_vk", 6}, {"stream", 6}};
 constexpr int kAppsLevel = 7;
 
-// Private headers that layers above use too, and which. A new line is a decision: the alternative is a public header, or
-// a function where the data is. What core has is for all.
+// Private headers that layers above use too, and which. A new line is a decision: the alternative is a public header,
+// or a function where the data is. What core has is for all.
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_difference.h", {"live"}},
     {"grid/chunk/packed_row.h", {"mesh", "trace"}},

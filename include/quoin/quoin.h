@@ -33,6 +33,7 @@
 #include <quoin/io/volume_field.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/occlusion.h>
@@ -50,7 +51,6 @@
 #include <quoin/render_vk/vulkan_window.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
-#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
