@@ -1,10 +1,14 @@
-// A folder includes only folders above it, and never a sibling on its own level.
+// A folder includes only folders above it, and never a sibling on its own level; what of a layer is private stays there
+// but for what is listed here; rooms do not lean on each other in a circle.
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <optional>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,6 +22,41 @@ const std::map<std::string, int> kLevels = {{"core", 0},  {"grid", 1},      {"me
                                             {"scene", 3}, {"light", 4},     {"live", 4},  {"render", 5}, {"io", 5},
                                             {"store", 5}, {"render_vk", 6}, {"stream", 6}};
 constexpr int kAppsLevel = 7;
+
+// Private headers that layers above use too, and which. A new line is a decision: the alternative is a public header,
+// or a function where the data is. What core has is for all.
+const std::map<std::string, std::set<std::string>> kLentHeaders = {
+    {"grid/chunk/chunk_difference.h", {"live"}},
+    {"grid/chunk/packed_row.h", {"mesh", "trace"}},
+    {"grid/chunk_order.h", {"live", "mesh"}},
+    {"grid/coordinate_hash.h", {"live", "trace"}},
+    {"grid/density/stored_density.h", {"io", "terrain"}},
+    {"grid/long_box.h", {"live"}},
+    {"light/corner_light.h", {"render"}},
+    {"light/glass.h", {"render"}},
+    {"light/light_model.h", {"render_vk"}},
+    {"light/lighting.h", {"render"}},
+    {"light/occlusion_directions.h", {"render", "render_vk"}},
+    {"light/sky.h", {"render", "render_vk"}},
+    {"light/surfaces.h", {"render_vk"}},
+    {"mesh/smooth/material.h", {"live"}},
+    {"render/camera_rays.h", {"render_vk"}},
+    {"render/impostor/far.h", {"render_vk"}},
+    {"render/impostor/screen.h", {"render_vk"}},
+    {"render/picture_detail.h", {"render_vk"}},
+    {"render/picture_request.h", {"render_vk"}},
+    {"scene/frustum.h", {"render_vk"}},
+    {"scene/instance_axes.h", {"io", "live", "render_vk"}},
+    {"scene/tracer/coarse_grids.h", {"render_vk"}},
+    {"scene/tracer/instance_tree.h", {"render_vk"}},
+    {"scene/tracer/kept_trees.h", {"render_vk"}},
+    {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
+    {"trace/tree_view.h", {"render", "render_vk"}},
+};
+
+// A folder with more files is several rooms in one.
+constexpr int kMostFiles = 32;
+const std::map<std::string, int> kLargerFolders = {{"src/io", 121}, {"apps/viewer/window", 33}};
 
 // Why a file of `folder` may not include `path`, if so. Paths are as written: <quoin/grid/grid.h> or "grid/x.h".
 std::optional<std::string> breach(const std::string& folder, int level, const std::string& path) {
@@ -37,15 +76,85 @@ bool is_test(const fs::path& file) {
   return std::regex_search(file.stem().string(), std::regex("_(test|bench|fuzz|oracle)$"));
 }
 
-std::vector<std::string> includes_of(const fs::path& file) {
-  static const std::regex pattern(R"re(^\s*#\s*include\s*[<"]([^>"]+)[>"])re");
-  std::vector<std::string> found;
+// Tests, and what they share: they may look into any layer.
+bool is_for_tests(const fs::path& file) {
+  return is_test(file) || std::regex_search(file.stem().string(), std::regex("_(fixture|for_tests|support)$"));
+}
+
+struct Include {
+  std::string path;
+  bool quoted = false;
+};
+
+struct Source {
+  fs::path file;
+  fs::path place;  // from the top: grid/chunk/chunk.cpp
+  std::vector<Include> includes;
+  [[nodiscard]] std::string layer() const { return place.begin()->string(); }
+};
+
+std::vector<Include> includes_of(const fs::path& file) {
+  static const std::regex pattern(R"re(^\s*#\s*include\s*([<"])([^>"]+)[>"])re");
+  std::vector<Include> found;
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
     std::smatch match;
-    if (std::regex_search(line, match, pattern)) found.push_back(match[1]);
+    if (std::regex_search(line, match, pattern)) found.push_back({match[2], match[1] == "\""});
   }
   return found;
+}
+
+// All sources below a folder of the repository, tests too.
+std::vector<Source> sources_of(const std::string& top) {
+  std::vector<Source> found;
+  const fs::path root = fs::path(QUOIN_SOURCE_DIR) / top;
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    const std::string kind = entry.path().extension().string();
+    if (kind != ".h" && kind != ".cpp" && kind != ".inl") continue;
+    found.push_back({entry.path(), entry.path().lexically_relative(root), includes_of(entry.path())});
+  }
+  return found;
+}
+
+// Why a file of a layer may not include another's private header, if so.
+std::optional<std::string> trespass(const std::string& layer, const Include& include) {
+  if (!include.quoted) return std::nullopt;
+  const std::string owner = fs::path(include.path).begin()->string();
+  if (owner == layer || owner == "core" || !kLevels.contains(owner)) return std::nullopt;
+  const auto lent = kLentHeaders.find(include.path);
+  if (lent != kLentHeaders.end() && lent->second.contains(layer)) return std::nullopt;
+  return include.path + " is private to " + owner + ", and not lent to " + layer;
+}
+
+// The room of a file or an include within its layer: "chunk" of grid/chunk/chunk.h, "" of what the layer's rooms share.
+std::string room_of(const fs::path& place) {
+  const std::string room = place.parent_path().lexically_relative(*place.begin()).generic_string();
+  return room == "." ? "" : room;
+}
+
+using Graph = std::map<std::string, std::set<std::string>>;
+
+// A way round from a node to itself, if there is one.
+std::vector<std::string> circle_in(const Graph& graph) {
+  std::set<std::string> done;
+  std::vector<std::string> path;
+  const std::function<bool(const std::string&)> visit = [&](const std::string& node) {
+    const bool again = std::find(path.begin(), path.end(), node) != path.end();
+    path.push_back(node);
+    if (again) return true;
+    if (!done.contains(node) && graph.contains(node)) {
+      for (const std::string& next : graph.at(node)) {
+        if (visit(next)) return true;
+      }
+    }
+    done.insert(node);
+    path.pop_back();
+    return false;
+  };
+  for (const auto& [node, next] : graph) {
+    if (visit(node)) return path;
+  }
+  return {};
 }
 
 TEST(Layers, AWrongIncludeIsABreach) {
@@ -61,24 +170,107 @@ TEST(Layers, AWrongIncludeIsABreach) {
 TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
   int files = 0;
   for (const char* top : {"src", "include/quoin", "apps"}) {
-    for (const auto& entry : fs::recursive_directory_iterator(fs::path(QUOIN_SOURCE_DIR) / top)) {
-      if (!entry.is_regular_file() || is_test(entry.path())) continue;
-      const fs::path root = fs::path(QUOIN_SOURCE_DIR) / top;
-      const std::string folder = entry.path().lexically_relative(root).begin()->string();
+    for (const Source& source : sources_of(top)) {
+      if (is_test(source.file)) continue;
       const bool is_app = std::string(top) == "apps";
-      const auto level = kLevels.find(folder);
-      const bool is_root_header = entry.path().parent_path() == root;
+      const auto level = kLevels.find(source.layer());
+      const bool is_root_header = !source.place.has_parent_path();
       if (!is_app && !is_root_header) {
-        ASSERT_NE(level, kLevels.end()) << entry.path() << " lies in no layer";
+        ASSERT_NE(level, kLevels.end()) << source.file << " lies in no layer";
       }
-      for (const std::string& path : includes_of(entry.path())) {
-        const auto problem = breach(folder, is_app || is_root_header ? kAppsLevel : level->second, path);
-        EXPECT_FALSE(problem.has_value()) << entry.path() << ": " << problem.value_or("");
+      for (const Include& include : source.includes) {
+        const auto problem =
+            breach(source.layer(), is_app || is_root_header ? kAppsLevel : level->second, include.path);
+        EXPECT_FALSE(problem.has_value()) << source.file << ": " << problem.value_or("");
       }
       ++files;
     }
   }
   EXPECT_GT(files, 40);
+}
+
+TEST(Layers, APrivateHeaderThatIsNotLentIsATrespass) {
+  EXPECT_TRUE(trespass("io", {"grid/chunk/packed_row.h", true}).has_value());
+  EXPECT_TRUE(trespass("mesh", {"grid/grid_impl.h", true}).has_value());
+  EXPECT_FALSE(trespass("mesh", {"grid/chunk/packed_row.h", true}).has_value());
+  EXPECT_FALSE(trespass("grid", {"grid/grid_impl.h", true}).has_value());
+  EXPECT_FALSE(trespass("mesh", {"core/srgb.h", true}).has_value());
+  EXPECT_FALSE(trespass("mesh", {"quoin/grid/grid.h", false}).has_value());
+}
+
+TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
+  for (const Source& source : sources_of("src")) {
+    if (is_for_tests(source.file)) continue;
+    for (const Include& include : source.includes) {
+      const auto problem = trespass(source.layer(), include);
+      EXPECT_FALSE(problem.has_value()) << source.file << ": " << problem.value_or("");
+    }
+  }
+  for (const auto& [header, layers] : kLentHeaders) {
+    EXPECT_TRUE(fs::exists(fs::path(QUOIN_SOURCE_DIR) / "src" / header)) << header << " is lent, and not there";
+  }
+}
+
+TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
+  for (const Source& source : sources_of("include/quoin")) {
+    for (const Include& include : source.includes) {
+      EXPECT_FALSE(include.quoted) << source.file << " includes \"" << include.path << "\"";
+    }
+  }
+}
+
+// So that the folder of whatever a file leans on can be read in the file. What is generated has no folder.
+TEST(Layers, PrivateHeadersAreNamedByTheirFullPath) {
+  const fs::path root = QUOIN_SOURCE_DIR;
+  for (const Source& source : sources_of("src")) {
+    for (const Include& include : source.includes) {
+      if (!include.quoted || fs::path(include.path).extension() == ".inc") continue;
+      EXPECT_TRUE(fs::exists(root / "src" / include.path) ||
+                  (is_for_tests(source.file) && fs::exists(root / include.path)))
+          << source.file << " includes \"" << include.path << "\"";
+    }
+  }
+}
+
+TEST(Layers, ACircleOfRoomsIsFound) {
+  EXPECT_EQ(circle_in({{"a", {"b"}}, {"b", {"c"}}, {"c", {"a"}}}).size(), 4);
+  EXPECT_TRUE(circle_in({{"a", {"b", "c"}}, {"b", {"d"}}, {"c", {"d"}}}).empty());
+  EXPECT_EQ(room_of("grid/chunk/chunk.cpp"), "chunk");
+  EXPECT_EQ(room_of("grid/grid.cpp"), "");
+}
+
+// Any room may use what its layer's rooms share, and that may use the rooms.
+TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
+  std::map<std::string, Graph> layers;
+  for (const Source& source : sources_of("src")) {
+    const std::string room = room_of(source.place);
+    if (is_for_tests(source.file) || room.empty()) continue;
+    for (const Include& include : source.includes) {
+      if (!include.quoted || *fs::path(include.path).begin() != source.layer()) continue;
+      const std::string other = room_of(include.path);
+      if (!other.empty() && other != room) layers[source.layer()][room].insert(other);
+    }
+  }
+  EXPECT_FALSE(layers.empty());
+  for (const auto& [layer, rooms] : layers) {
+    std::string way;
+    for (const std::string& room : circle_in(rooms)) way += (way.empty() ? "" : " -> ") + room;
+    EXPECT_EQ(way, "") << "in " << layer;
+  }
+}
+
+TEST(Layers, NoFolderHoldsMoreFilesThanARoomShould) {
+  std::map<std::string, int> files;
+  const fs::path root = QUOIN_SOURCE_DIR;
+  for (const char* top : {"src", "include/quoin", "apps", "examples"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      if (entry.is_regular_file()) ++files[entry.path().parent_path().lexically_relative(root).generic_string()];
+    }
+  }
+  for (const auto& [folder, count] : files) {
+    const auto larger = kLargerFolders.find(folder);
+    EXPECT_LE(count, larger == kLargerFolders.end() ? kMostFiles : larger->second) << folder;
+  }
 }
 
 }  // namespace

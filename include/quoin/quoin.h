@@ -28,6 +28,7 @@
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/mesh_view.h>
@@ -46,7 +47,6 @@
 #include <quoin/render_vk/vulkan_window.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
-#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
@@ -58,3 +58,4 @@
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
+#include <quoin/version.h>

@@ -16,8 +16,7 @@ namespace quoin {
 
 /// The chunks of a grid by their coordinates, in a tree that its copies share.
 ///
-///                root                     A node of level n stands for a cube of 4^(n+1) chunks along each edge and
-///                has
+///                root                     A node of level n stands for a cube of 4^(n+1) chunks an edge and has
 ///           2: [ . . x . x . ]            64 places. A node of level 0 holds the entries themselves. Levels at which
 ///                  |     |                there is but one child are left out, so chunks far apart cost a node each.
 ///           0: [ e . e ] |                A node's `prefix` are the coordinates of its cube in cubes of its size.

@@ -28,8 +28,8 @@ struct DensitySample {
 ///            kept, however small the value; NaN counts as far air, infinities as +-band.
 /// Materials: that of an air sample has no effect on any mesh. Far air has none: it reads as kAir.
 /// Edits:     a chunk that is all far air is dropped. When an edit throws (bad_alloc, or what a callback threw), what
-/// it
-///            did until then stays done and booked. `changes_since` tells any number of consumers what edits changed.
+///            it did until then stays done and booked. `changes_since` tells any number of consumers what edits
+///            changed.
 /// Sharing, threads and moving: as Grid.
 class DensityGrid {
  public:

@@ -23,8 +23,7 @@ namespace quoin {
 ///           (bad_alloc, or what a callback threw), what it did until then stays done and booked. `changes_since` tells
 ///           any number of consumers what edits changed.
 /// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
-/// chunk
-///           at a time.
+///           chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
 ///           its own: it may be read and destroyed on another thread while this one is edited.
 /// Moving:   a grid that was moved from may only be assigned to or destroyed.

@@ -51,8 +51,7 @@ struct FormatInfo {
 ///
 /// The content decides; the name only helps to say what is wrong with a file that is of no known format.
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; `path` is
-/// set
-///         in all.
+///         set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The same of bytes. Errors: Unsupported also for scene files, whose other files only a path finds.

@@ -37,10 +37,9 @@ struct SceneFile {
 
 /// Reads the text of a scene file (JSON, UTF-8).
 ///
-/// Errors: BadFormat, with the byte offset where it is no JSON, else with the place in it ("instances[3].rotation:
-/// ...");
-///         unknown keys are refused; Unsupported for a later version; LimitExceeded beyond 64 MiB, 32 levels of
-///         nesting, 65,536 files or 4,194,304 instances.
+/// Errors: BadFormat, with the byte offset where it is no JSON, else with the place in it
+///         ("instances[3].rotation: ..."); unknown keys are refused; Unsupported for a later version; LimitExceeded
+///         beyond 64 MiB, 32 levels of nesting, 65,536 files or 4,194,304 instances.
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
 
 /// Reads a scene file and everything that it names. Each file is read once, however often it is placed; its own

@@ -52,9 +52,9 @@ struct LiveMeshOptions {
 
 /// The meshes of a scene's chunks, kept up to date by worker threads while the scene is edited.
 ///
-/// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only when
-/// an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was removed
-/// meanwhile are dropped.
+/// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only
+/// when an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was
+/// removed meanwhile are dropped.
 /// Threads: all calls come from one thread.
 class LiveMeshes {
  public:

@@ -105,9 +105,8 @@ class SmoothMesher {
   /// Replaces `out` by the surface of the centre chunk.
   ///
   /// Owned:    the quads around the crossed lattice edges that start at a sample of the chunk; the vertices are those
-  /// of
-  ///           cells -1 to 63, so that neighbours' meshes repeat the vertices of their common cells, bit for bit, and
-  ///           no triangle.
+  ///           of cells -1 to 63, so that neighbours' meshes repeat the vertices of their common cells, bit for bit,
+  ///           and no triangle.
   /// Quads:    split along the shorter diagonal (to 1/64 of a cell).
   /// Normals:  the gradient of the trilinear field at the vertex; (0, 1, 0) where that is 0.
   /// Order:    z, then the quads across x, y and z edges; the same bytes on every machine and instruction set.

@@ -57,8 +57,8 @@ struct SceneChanges {
 ///
 /// Axes:      right-handed, +Y up, one world unit a voxel unless an instance says otherwise.
 /// Addresses: a grid stays where it is until it is removed, also when the scene is moved: a reference to it may be
-/// kept. Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, but for edits
-/// of
+///            kept.
+/// Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, but for edits of
 ///            different grids, which may happen at once. A snapshot is a scene of its own.
 /// Moving:    a scene that was moved from may only be assigned to or destroyed.
 class Scene {

@@ -1,0 +1,25 @@
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <quoin/version.h>
+
+#include "tests/tool_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using VersionOfTool = ToolTest;
+
+TEST(Version, IsItsThreeNumbers) {
+  EXPECT_EQ(version(), std::to_string(QUOIN_VERSION_MAJOR) + "." + std::to_string(QUOIN_VERSION_MINOR) + "." +
+                           std::to_string(QUOIN_VERSION_PATCH));
+}
+
+// The build takes it from the header, for the tool, for what files say of their maker and for packages.
+TEST_F(VersionOfTool, IsThatOfTheHeader) {
+  EXPECT_EQ(run("--version").out, "quoin " + std::string(version()) + "\n");
+}
+
+}  // namespace
+}  // namespace quoin
