@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <memory>
 #include <mutex>
@@ -23,15 +24,22 @@ namespace {
 // they were; where something else changed, the boxes of all chunks are kept from then on.
 class KeptBounds {
  public:
-  KeptBounds() = default;
+  KeptBounds() : is_wanted_(std::make_shared<std::atomic<bool>>(false)) {}
   // Copies keep no boxes until they need them.
-  KeptBounds(const KeptBounds& other) {
+  KeptBounds(const KeptBounds& other) : is_wanted_(other.is_wanted_) {
     const std::lock_guard lock(other.mutex_);
     cursor_ = other.cursor_;
     box_ = other.box_;
   }
 
+  // Before a copy is made: where bounds are asked of copies they go on from here, instead of each from the last time that
+  // this was asked.
+  void prepare(const ChangeJournal<VoxelRecord>& journal, const ChunkTable& entries) {
+    if (is_wanted_->load(std::memory_order_relaxed)) update(journal, entries);
+  }
+
   IBox update(const ChangeJournal<VoxelRecord>& journal, const ChunkTable& entries) {
+    is_wanted_->store(true, std::memory_order_relaxed);
     const std::lock_guard lock(mutex_);
     bool is_within_all = true;
     ChangeCursor now = cursor_;
@@ -77,6 +85,7 @@ class KeptBounds {
     return true;
   }
 
+  std::shared_ptr<std::atomic<bool>> is_wanted_;  // of this grid or of a copy
   mutable std::mutex mutex_;
   ChangeCursor cursor_;
   IBox box_;
@@ -156,6 +165,7 @@ Grid& Grid::operator=(Grid&&) noexcept = default;
 Grid::~Grid() = default;
 
 Grid Grid::snapshot() const {
+  impl_->bounds.prepare(impl_->journal, impl_->entries);
   return Grid(std::make_unique<Impl>(*impl_));
 }
 
