@@ -52,8 +52,8 @@ int main() {
   const auto before = look(tree, *camera);
   if (!before) return 1;
   grid.set(before->voxel, quoin::kAir);
-  // The same list says which meshes to make anew.
-  tree.update(grid, types, quoin::chunks_to_mesh(grid, grid.changes_since(followed)));
+  // The same changes say which meshes to make anew.
+  tree.update(grid, types, grid.changes_since(followed));
   const auto after = look(tree, *camera);
   std::printf("%d of 16 rays hit\n", count_hits(tree, *camera));
   return after && after->t > before->t ? 0 : 1;

@@ -16,7 +16,7 @@ quoin::Result<quoin::Scene> make_staircase() {
   properties.name = "stone";
   properties.colour = {150, 140, 128, 255};
   const auto stone = scene.types.add(properties);
-  if (!stone) return tl::unexpected<quoin::Error>(stone.error());
+  if (!stone) return stone.error();
   quoin::SceneGrid stairs;
   for (int step = 0; step < 12; ++step) stairs.grid.fill_box({0, 0, -2 * step}, {9, step, -2 * step - 1}, *stone);
   quoin::Instance placed;
@@ -33,9 +33,9 @@ quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
   const quoin::CpuRenderer renderer(scene);
   const quoin::Camera camera = quoin::frame_scene(scene, quoin::View::Iso, 320.0 / 240.0);
   const auto picture = renderer.render(camera, options);
-  if (!picture) return tl::unexpected<quoin::Error>(picture.error());
+  if (!picture) return picture.error();
   const auto size = quoin::write_png(picture->colour, path);
-  if (!size) return tl::unexpected<quoin::Error>(size.error());
+  if (!size) return size.error();
   return {};
 }
 
@@ -44,7 +44,7 @@ quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
 int main(int argc, char** argv) {
   const auto scene = make_staircase();
   const quoin::Status status =
-      scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : tl::unexpected<quoin::Error>(scene.error());
+      scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : scene.error();
   if (!status) std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
   return status ? 0 : 1;
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include <quoin/io/smooth_files.h>
+#include <quoin/io/mesh_file.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/terrain/smooth_terrain.h>
 
@@ -33,11 +33,12 @@ int main() {
   };
   auto mesh = quoin::build_smooth_mesh(*field, registry, options);
   if (!mesh) return fail(mesh.error());
-  quoin::SmoothPart part{"terrain", std::move(*mesh), {}, {}};
-  part.placements.emplace_back();
-  const auto bytes = quoin::write_smooth_glb({&part, 1}, "smooth_terrain.glb");
+  quoin::SceneMeshes meshes;
+  meshes.parts = {{"terrain", {quoin::view_of(*mesh)}}};
+  meshes.placements = {{}};
+  const auto bytes = quoin::write_mesh(meshes, "smooth_terrain.glb");
   if (!bytes) return fail(bytes.error());
-  std::printf("%zu vertices, %zu triangles: smooth_terrain.glb, %llu bytes\n", part.mesh.positions.size(),
-              part.mesh.indices.size() / 3, static_cast<unsigned long long>(*bytes));
-  return part.mesh.indices.empty() ? 1 : 0;
+  std::printf("%zu vertices, %zu triangles: smooth_terrain.glb, %llu bytes\n", mesh->positions.size(),
+              mesh->indices.size() / 3, static_cast<unsigned long long>(*bytes));
+  return mesh->indices.empty() ? 1 : 0;
 }

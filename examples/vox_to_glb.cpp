@@ -14,7 +14,7 @@ quoin::Status write_sample(const std::string& path) {
   brick.name = "brick";
   brick.colour = {170, 74, 60, 255};
   const auto type = scene.types.add(brick);
-  if (!type) return tl::unexpected<quoin::Error>(type.error());
+  if (!type) return type.error();
   quoin::SceneGrid stairs;
   stairs.name = "stairs";
   for (int step = 0; step < 8; ++step) stairs.grid.fill_box({0, 0, step}, {5, step, step}, *type);
@@ -22,19 +22,19 @@ quoin::Status write_sample(const std::string& path) {
   placed.grid = scene.add_grid(std::move(stairs));
   scene.add_instance(placed);
   std::vector<std::string> warnings;
-  const auto bytes = quoin::write_vox(scene, warnings);
-  if (!bytes) return tl::unexpected<quoin::Error>(bytes.error());
-  return quoin::write_file(path, *bytes);
+  const auto bytes = quoin::write_vox(scene, path, warnings);
+  if (!bytes) return bytes.error();
+  return {};
 }
 
 quoin::Status convert(const std::string& in, const std::string& out) {
   const auto loaded = quoin::load_scene(in, {});
-  if (!loaded) return tl::unexpected<quoin::Error>(loaded.error());
-  const auto meshes = quoin::mesh_scene(loaded->scene, {});
-  if (!meshes) return tl::unexpected<quoin::Error>(meshes.error());
-  const auto size = quoin::write_glb(loaded->scene, *meshes, out);
-  if (!size) return tl::unexpected<quoin::Error>(size.error());
-  std::printf("%lld quads, %llu bytes\n", static_cast<long long>(meshes->quads),
+  if (!loaded) return loaded.error();
+  const auto meshes = quoin::mesh_scene(loaded->scene);
+  if (!meshes) return meshes.error();
+  const auto size = quoin::write_mesh(*meshes, out);
+  if (!size) return size.error();
+  std::printf("%lld quads, %llu bytes\n", static_cast<long long>(meshes->stats.quads),
               static_cast<unsigned long long>(*size));
   return {};
 }

@@ -13,7 +13,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "io/glb_for_tests.h"
+#include "io/gltf/glb_for_tests.h"
 #include "tests/golden_for_tests.h"
 #include "tests/golden_views.h"
 

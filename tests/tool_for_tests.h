@@ -15,7 +15,7 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/glb_for_tests.h"
+#include "io/gltf/glb_for_tests.h"
 
 /// What the tests of the tool share.
 namespace quoin {

@@ -10,8 +10,8 @@
 
 #include <quoin/mesh/simplify.h>
 
-#include "io/smooth_files_fixture.h"
-#include "io/volume_test_support.h"
+#include "io/mesh_file_for_tests.h"
+#include "io/volume/for_tests.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {

@@ -156,7 +156,7 @@ quoin::Result<Palette> add_palette(quoin::VoxelRegistry& types) {
     }
     if (entry.slot == &Palette::lamp) properties.emission = 1.0F;
     const auto type = types.add(properties);
-    if (!type) return tl::unexpected<quoin::Error>(type.error());
+    if (!type) return type.error();
     p.*entry.slot = *type;
   }
   return p;

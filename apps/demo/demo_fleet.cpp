@@ -33,10 +33,10 @@ class Random {
 
 quoin::Status add_terrain(quoin::Scene& scene) {
   const auto types = quoin::add_terrain_types(scene.types);
-  if (!types) return tl::unexpected<quoin::Error>(types.error());
+  if (!types) return types.error();
   constexpr int kUnits = 24;
   auto grid = quoin::generate_terrain({.seed = 42, .size = {kUnits, 4, kUnits}}, *types);
-  if (!grid) return tl::unexpected<quoin::Error>(grid.error());
+  if (!grid) return grid.error();
   quoin::SceneGrid terrain;
   terrain.name = "terrain";
   terrain.grid = std::move(*grid);
@@ -80,10 +80,10 @@ quoin::Status draw(int count, char** files) {
   quoin::Scene scene;
   if (const auto added = add_terrain(scene); !added) return added;
   const auto ships = demo::add_ships(scene);
-  if (!ships) return tl::unexpected<quoin::Error>(ships.error());
+  if (!ships) return ships.error();
   add_fleet(scene, *ships);
   const auto camera = quoin::look_at({0, 30, 60}, {0, -10, -400}, std::numbers::pi / 4);
-  if (!camera) return tl::unexpected<quoin::Error>(camera.error());
+  if (!camera) return camera.error();
   const quoin::CpuRenderer renderer(scene);
   quoin::RenderOptions options;
   options.samples = 4;
@@ -93,9 +93,9 @@ quoin::Status draw(int count, char** files) {
   for (int i = 0; i < count; ++i) {
     options.detail_colours = i == 1;
     const auto picture = renderer.render(*camera, options);
-    if (!picture) return tl::unexpected<quoin::Error>(picture.error());
+    if (!picture) return picture.error();
     const auto written = quoin::write_png(picture->colour, files[i]);
-    if (!written) return tl::unexpected<quoin::Error>(written.error());
+    if (!written) return written.error();
   }
   return {};
 }

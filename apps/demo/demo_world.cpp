@@ -39,7 +39,7 @@ quoin::Instance instance(std::string name, quoin::GridHandle grid, quoin::DVec3 
 quoin::Result<quoin::Scene> make_scene() {
   quoin::Scene scene;
   const auto palette = demo::add_palette(scene.types);
-  if (!palette) return tl::unexpected<quoin::Error>(palette.error());
+  if (!palette) return palette.error();
   constexpr int kHalf = demo::kIslandEdge / 2;
   const auto island = add_grid(scene, "island", demo::make_island(*palette), {kHalf, 0, kHalf});
   scene.add_instance(instance("island", island, {0, 0, 0}));
@@ -74,8 +74,8 @@ int main(int argc, char** argv) {
   }
   const auto scene = make_scene();
   std::vector<std::string> warnings;
-  const auto bytes = scene ? quoin::write_vox(*scene, warnings) : tl::unexpected<quoin::Error>(scene.error());
-  const auto written = bytes ? quoin::write_file(argv[1], *bytes) : tl::unexpected<quoin::Error>(bytes.error());
+  const auto bytes = scene ? quoin::write_vox(*scene, warnings) : scene.error();
+  const auto written = bytes ? quoin::write_file(argv[1], *bytes) : bytes.error();
   if (!written) {
     std::fprintf(stderr, "quoin_demo_world: %s\n", quoin::to_string(written.error()).c_str());
     return 1;

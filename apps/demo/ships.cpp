@@ -35,7 +35,7 @@ quoin::Result<Paint> add_paint(quoin::Scene& scene, Rgba8 stripe) {
                                                {&paint.window, Rgba8{255, 226, 150, 255}, 0.6F},
                                                {&paint.engine, Rgba8{110, 200, 255, 255}, 0.8F}}) {
     const auto added = add_type(scene, colour, emission);
-    if (!added) return tl::unexpected<quoin::Error>(added.error());
+    if (!added) return added.error();
     *type = *added;
   }
   return paint;
@@ -157,7 +157,7 @@ quoin::Result<std::vector<quoin::GridHandle>> add_ships(quoin::Scene& scene) {
                                {"cruiser", cruiser, {44, 96, 190, 255}},
                                {"carrier", carrier, {40, 150, 120, 255}}}) {
     const auto paint = add_paint(scene, design.stripe);
-    if (!paint) return tl::unexpected<quoin::Error>(paint.error());
+    if (!paint) return paint.error();
     quoin::SceneGrid grid;
     grid.name = design.name;
     grid.grid = design.make(*paint);

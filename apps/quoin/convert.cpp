@@ -4,10 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include <quoin/io/file.h>
-#include <quoin/io/gltf.h>
-#include <quoin/io/obj.h>
-#include <quoin/io/ply.h>
+#include <quoin/io/mesh_file.h>
 
 #include "interrupt.h"
 #include "output.h"
@@ -20,92 +17,50 @@ namespace quoin::tool {
 
 namespace {
 
-Result<std::uint64_t> write_meshes(const Scene& scene, const SceneMeshes& meshes, const FormatInfo& format,
-                                   const std::filesystem::path& path, const Progress& progress) {
-  switch (format.format) {
-    case FileFormat::Glb:
-      return write_glb(scene, meshes, path, progress);
-    case FileFormat::Gltf:
-      return write_gltf(scene, meshes, path, progress);
-    case FileFormat::Obj:
-      return write_obj(scene, meshes, path, progress);
-    case FileFormat::Ply:
-      return write_ply(scene, meshes, path, progress);
-    case FileFormat::Vox:
-    case FileFormat::Scene:
-    case FileFormat::Nifti:
-    case FileFormat::Nrrd:
-      break;
+/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
+Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
+  for (const auto& file : files) {
+    std::error_code missing;
+    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
+    return fail(ErrorCode::InvalidArgument,
+                "the input, which " + options.output.string() + " would replace with its companion of this name",
+                file.string());
   }
-  return fail(ErrorCode::Unsupported, "not a mesh format", path.string());
+  return {};
 }
 
-std::vector<std::filesystem::path> files_of(const SceneMeshes& meshes, const FormatInfo& format,
-                                            const std::filesystem::path& path) {
-  if (format.format == FileFormat::Gltf) return gltf_files(meshes, path);
-  if (format.format == FileFormat::Obj) return obj_files(meshes, path);
-  return {path};
-}
-
-Result<std::uint64_t> write_voxels(const Scene& scene, const std::filesystem::path& path,
-                                   std::vector<std::string>& warnings) {
-  auto bytes = write_vox(scene, warnings);
-  if (!bytes) {
-    if (bytes.error().path.empty()) bytes.error().path = path.string();
-    return tl::unexpected<Error>(bytes.error());
-  }
-  if (auto written = write_file(path, *bytes); !written) return tl::unexpected<Error>(written.error());
-  return bytes->size();
-}
-
-void count(const SceneMeshes& meshes, Outcome& outcome) {
-  outcome.faces_visible = meshes.faces_visible;
-  outcome.faces_total = meshes.faces_total;
-  outcome.quads = meshes.quads;
-  outcome.triangles = meshes.triangles;
-  outcome.vertices = meshes.vertices;
-}
-
-/// Meshes the scene and writes it, filling in `outcome`.
-Status mesh_and_write(const Scene& scene, const ConvertOptions& options, const FormatInfo& format, Outcome& outcome) {
+/// Meshes the scene blockily and writes it, filling in `outcome`.
+Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar;
-  const std::string mesher = options.mesher.empty() ? "greedy" : options.mesher;
-  const BlockyMeshOptions mesh_options{mesher == "greedy", !options.occlusion_off, options.watertight};
-  auto meshes =
-      mesh_scene(scene, mesh_options, options.common.load.hidden, options.common.threads, bar.listener("meshing"));
-  if (!meshes) return tl::unexpected<Error>(meshes.error());
-  count(*meshes, outcome);
-  outcome.mesher = mesher;
+  outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
+  const bool hidden = options.common.load.hidden;
+  const auto meshes =
+      mesh_scene(scene, {{outcome.mesher == "greedy", !options.occlusion_off, options.watertight}, hidden},
+                 options.common.threads, bar.listener("meshing"));
+  if (!meshes) return meshes.error();
   outcome.seconds.mesh = watch.lap();
-  warn_of_left_out(scene, meshes->hidden, outcome.warnings);
-  if (outcome.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
-  outcome.files = files_of(*meshes, format, options.output);
-  if (auto sound = check_companions(outcome.files, options); !sound) return sound;
-  const auto bytes = write_meshes(scene, *meshes, format, options.output, bar.listener("writing"));
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  outcome.bytes = *bytes;
-  outcome.seconds.write = watch.lap();
-  return {};
+  warn_of_left_out(scene, hidden, outcome.warnings);
+  return write_meshes(*meshes, options, bar, outcome);
 }
 
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
   auto loaded = load_scene(options.common.input, options.common.load);
-  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  if (!loaded) return loaded.error();
   Outcome outcome;
   outcome.voxels = loaded->scene.voxel_count();
   outcome.warnings = std::move(loaded->warnings);
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   if (format.is_mesh) {
-    const auto mesh = options.mesher == "smooth" ? convert_smoothly : mesh_and_write;
-    if (auto done = mesh(loaded->scene, options, format, outcome); !done) return tl::unexpected<Error>(done.error());
+    const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
+    if (auto done = convert(loaded->scene, options, outcome); !done) return done.error();
     return outcome;
   }
   outcome.files = {options.output};
-  const auto bytes = write_voxels(loaded->scene, options.output, outcome.warnings);
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
+  const auto bytes = write_vox(loaded->scene, options.output, outcome.warnings);
+  if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
   return outcome;
@@ -118,12 +73,12 @@ Json outcome_json(const Outcome& outcome) {
       {"voxels", outcome.voxels},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.faces_visible},
-      {"faces_total", outcome.faces_total},
-      {"quads", outcome.quads},
-      {"triangles", outcome.triangles},
-      {"vertices", outcome.vertices},
-      {"simplify_error", outcome.simplify_error},
+      {"faces_visible", outcome.meshes.faces_visible},
+      {"faces_total", outcome.meshes.faces_total},
+      {"quads", outcome.meshes.quads},
+      {"triangles", outcome.meshes.triangles},
+      {"vertices", outcome.meshes.vertices},
+      {"simplify_error", outcome.meshes.simplify_error},
       {"bytes", outcome.bytes},
       {"files", files},
       {"seconds", {{"read", outcome.seconds.read}, {"mesh", outcome.seconds.mesh}, {"write", outcome.seconds.write}}},
@@ -131,11 +86,12 @@ Json outcome_json(const Outcome& outcome) {
 }
 
 std::string mesh_text(const Outcome& outcome) {
-  const std::string size =
-      with_thousands(outcome.triangles) + " triangles, " + with_thousands(outcome.vertices) + " vertices\n";
+  const std::string size = with_thousands(outcome.meshes.triangles) + " triangles, " +
+                           with_thousands(outcome.meshes.vertices) + " vertices\n";
   if (outcome.mesher == "smooth") return "Mesh: " + size;
-  return "Faces: " + with_thousands(outcome.faces_visible) + " visible of " + with_thousands(outcome.faces_total) +
-         " total\nMesh: " + with_thousands(outcome.quads) + " quads, " + size;
+  return "Faces: " + with_thousands(outcome.meshes.faces_visible) + " visible of " +
+         with_thousands(outcome.meshes.faces_total) + " total\nMesh: " + with_thousands(outcome.meshes.quads) +
+         " quads, " + size;
 }
 
 std::string outcome_text(const Outcome& outcome) {
@@ -145,8 +101,8 @@ std::string outcome_text(const Outcome& outcome) {
             (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
   }
   if (!outcome.mesher.empty()) text += mesh_text(outcome);
-  if (outcome.simplify_error > 0)
-    text += "Simplified: off by " + digits_for_people(outcome.simplify_error) + " voxels\n";
+  if (outcome.meshes.simplify_error > 0)
+    text += "Simplified: off by " + digits_for_people(outcome.meshes.simplify_error) + " voxels\n";
   const double seconds = outcome.seconds.read + outcome.seconds.mesh + outcome.seconds.write;
   text += "Wrote ";
   for (const auto& file : outcome.files) text += file.string() + ", ";
@@ -167,15 +123,15 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
 /// Whether the input is read by read_volume. Errors: CannotRead.
 Result<bool> holds_volume(const ConvertOptions& options) {
   if (options.raw) return true;
-  const auto format = recognise_file(options.common.input);
-  if (!format) return tl::unexpected<Error>(format.error());
+  const auto format = detect_format(options.common.input);
+  if (!format) return format.error();
   return *format && format_info(**format).is_volume;
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
   if (is_volume && !format.is_mesh) {
     return fail(ErrorCode::Unsupported,
-                "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.ending),
+                "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.extension),
                 options.common.input.string());
   }
   return is_volume ? convert_volume(options, format) : convert_scene(options, format);
@@ -280,14 +236,18 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 
 }  // namespace
 
-Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
-  for (const auto& file : files) {
-    std::error_code missing;
-    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
-    return fail(ErrorCode::InvalidArgument,
-                "the input, which " + options.output.string() + " would replace with its companion of this name",
-                file.string());
-  }
+Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
+  Stopwatch watch;
+  outcome.meshes = meshes.stats;
+  if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
+  const auto files = mesh_files(meshes, options.output);
+  if (!files) return files.error();
+  outcome.files = *files;
+  if (auto sound = check_companions(outcome.files, options); !sound) return sound;
+  const auto bytes = write_mesh(meshes, options.output, {}, bar.listener("writing"));
+  if (!bytes) return bytes.error();
+  outcome.bytes = *bytes;
+  outcome.seconds.write = watch.lap();
   return {};
 }
 
@@ -296,11 +256,13 @@ void add_convert_command(CLI::App& app, int& status) {
   const auto options = std::make_shared<ConvertOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, options->common);
-  command->add_option("OUT", options->output, "File to write: " + writable_endings())->required()->check(file_name());
+  command->add_option("OUT", options->output, "File to write: " + writable_extensions())
+      ->required()
+      ->check(file_name());
   add_mesh_options(*command, *options);
   add_volume_options(*command, *texts);
   command->footer(
-      "Reads " + readable_endings() + "; writes " + writable_endings() +
+      "Reads " + readable_extensions() + "; writes " + writable_extensions() +
       ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
       "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"

@@ -6,10 +6,11 @@
 #include <vector>
 
 #include <quoin/io/formats.h>
-#include <quoin/io/scene_meshes.h>
 #include <quoin/io/volume.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include "commands.h"
+#include "progress_bar.h"
 
 namespace quoin::tool {
 
@@ -37,26 +38,21 @@ struct Outcome {
   bool is_volume = false;
   std::int64_t voxels = 0;  ///< of a volume: solid samples
   std::string mesher;       ///< empty: nothing was meshed
-  std::int64_t faces_visible = 0;
-  std::int64_t faces_total = 0;
-  std::int64_t quads = 0;
-  std::int64_t triangles = 0;
-  std::int64_t vertices = 0;
+  MeshStats meshes;
   std::optional<double> iso;  ///< of volumes
   bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
-  double simplify_error = 0;  ///< reached
   std::uint64_t bytes = 0;
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   Seconds seconds;
   std::vector<std::string> warnings;
 };
 
-/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
-[[nodiscard]] Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options);
+/// Writes what has been meshed, filling in `outcome`.
+[[nodiscard]] Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
+                                  Outcome& outcome);
 
 /// Meshes a scene smoothly and writes it, filling in `outcome`.
-[[nodiscard]] Status convert_smoothly(const Scene& scene, const ConvertOptions& options, const FormatInfo& format,
-                                      Outcome& outcome);
+[[nodiscard]] Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome);
 
 /// Reads a volume, meshes it and writes it.
 [[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);

@@ -1,12 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <span>
 
 #include <glm/gtc/matrix_transform.hpp>
-
-#include <quoin/io/smooth_files.h>
-#include <quoin/io/smooth_scene.h>
 
 #include "convert.h"
 #include "interrupt.h"
@@ -27,47 +23,6 @@ SmoothMeshOptions mesh_options(const ConvertOptions& options) {
 std::optional<float> simplify_error(const ConvertOptions& options) {
   if (!options.simplify) return std::nullopt;
   return static_cast<float>(*options.simplify);
-}
-
-Result<std::uint64_t> write_parts(std::span<const SmoothPart> parts, const FormatInfo& format,
-                                  const ConvertOptions& options, const Progress& progress) {
-  const SmoothFileOptions file{!options.occlusion_off};
-  switch (format.format) {
-    case FileFormat::Glb:
-      return write_smooth_glb(parts, options.output, file, progress);
-    case FileFormat::Gltf:
-      return write_smooth_gltf(parts, options.output, file, progress);
-    case FileFormat::Obj:
-      return write_smooth_obj(parts, options.output, file, progress);
-    case FileFormat::Ply:
-      return write_ply(parts, options.output, file, progress);
-    case FileFormat::Vox:
-    case FileFormat::Scene:
-    case FileFormat::Nifti:
-    case FileFormat::Nrrd:
-      break;
-  }
-  return fail(ErrorCode::Unsupported, "not a mesh format", options.output.string());
-}
-
-/// Counts and writes what has been meshed.
-Status finish(std::span<const SmoothPart> parts, const ConvertOptions& options, const FormatInfo& format,
-              ProgressBar& bar, Outcome& outcome) {
-  Stopwatch watch;
-  outcome.mesher = "smooth";
-  for (const SmoothPart& part : parts) {
-    outcome.triangles += static_cast<std::int64_t>(part.mesh.indices.size() / 3);
-    outcome.vertices += static_cast<std::int64_t>(part.mesh.positions.size());
-  }
-  if (outcome.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
-  const bool is_gltf = format.format == FileFormat::Gltf;
-  outcome.files = is_gltf ? smooth_gltf_files(parts, options.output) : std::vector{options.output};
-  if (auto sound = check_companions(outcome.files, options); !sound) return sound;
-  const auto bytes = write_parts(parts, format, options, bar.listener("writing"));
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  outcome.bytes = *bytes;
-  outcome.seconds.write = watch.lap();
-  return {};
 }
 
 /// The smooth mesher knows neither glass nor light.
@@ -92,56 +47,54 @@ Result<Volume> read_input(const ConvertOptions& options) {
 }
 
 /// Puts a volume into the file's unit: glTF's is the metre, the others have none.
-void scale_to(const FormatInfo& format, const std::string& unit, SmoothPart& part) {
+void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& meshes) {
   if (format.format != FileFormat::Glb && format.format != FileFormat::Gltf) return;
   const double metres = metres_of_unit(unit).value_or(1.0);
-  for (SmoothPlacement& placement : part.placements) {
-    placement.world_from_mesh = glm::scale(glm::dmat4(1.0), DVec3(metres)) * placement.world_from_mesh;
+  for (MeshPlacement& placement : meshes.placements) {
+    placement.world_from_part = glm::scale(glm::dmat4(1.0), DVec3(metres)) * placement.matrix();
   }
 }
 
 }  // namespace
 
-Status convert_smoothly(const Scene& scene, const ConvertOptions& options, const FormatInfo& format, Outcome& outcome) {
+Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar;
   const bool hidden = options.common.load.hidden;
-  const auto smooth = smooth_scene(scene, {mesh_options(options), simplify_error(options), hidden},
-                                   options.common.threads, bar.listener("meshing"));
-  if (!smooth) return tl::unexpected<Error>(smooth.error());
-  outcome.simplify_error = smooth->simplify_error;
+  const auto meshes = mesh_scene_smoothly(scene, {mesh_options(options), simplify_error(options), hidden},
+                                          options.common.threads, bar.listener("meshing"));
+  if (!meshes) return meshes.error();
+  outcome.mesher = "smooth";
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, hidden, outcome.warnings);
   warn_of_looks(scene, hidden, outcome.warnings);
-  return finish(smooth->parts, options, format, bar, outcome);
+  return write_meshes(*meshes, options, bar, outcome);
 }
 
 Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
   auto volume = read_input(options);
-  if (!volume) return tl::unexpected<Error>(volume.error());
+  if (!volume) return volume.error();
   Outcome outcome;
   outcome.is_volume = true;
+  outcome.mesher = "smooth";
   outcome.warnings = volume->warnings;
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   ProgressBar bar;
   outcome.is_iso_found = !options.iso && volume->min < volume->max;
   outcome.iso = options.iso ? *options.iso : static_cast<double>(volume_threshold(*volume));
-  SmoothVolumeOptions wanted;
+  VolumeMeshOptions wanted;
   wanted.iso = static_cast<float>(*outcome.iso);
   wanted.mesh = mesh_options(options);
   wanted.simplify_error = simplify_error(options);
-  auto smooth = smooth_volume(*volume, wanted, options.common.threads, bar.listener("meshing"));
-  if (!smooth) return tl::unexpected<Error>(smooth.error());
-  outcome.voxels = smooth->solid_samples;
-  outcome.simplify_error = smooth->simplify_error;
+  auto meshes = mesh_volume(*volume, wanted, options.common.threads, bar.listener("meshing"));
+  if (!meshes) return meshes.error();
+  outcome.voxels = meshes->stats.solid_samples;
   outcome.seconds.mesh = watch.lap();
-  scale_to(format, volume->units, smooth->part);
+  scale_to(format, volume->units, *meshes);
   volume->values = {};
-  if (auto done = finish({&smooth->part, 1}, options, format, bar, outcome); !done) {
-    return tl::unexpected<Error>(done.error());
-  }
+  if (auto done = write_meshes(*meshes, options, bar, outcome); !done) return done.error();
   return outcome;
 }
 

@@ -73,14 +73,14 @@ Scene scene_of(Grid grid, VoxelRegistry types, IVec3 size) {
 
 Result<Outcome> generate(const GenerateOptions& options) {
   Stopwatch watch;
-  if (auto writable = check_outputs({options.output}); !writable) return tl::unexpected<Error>(writable.error());
+  if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
   ProgressBar bar;
   VoxelRegistry types;
   const auto materials = add_terrain_types(types);
-  if (!materials) return tl::unexpected<Error>(materials.error());
+  if (!materials) return materials.error();
   auto grid = generate_terrain(options.terrain, *materials, options.threads, bar.listener("generating"));
-  if (!grid) return tl::unexpected<Error>(grid.error());
+  if (!grid) return grid.error();
   Outcome outcome;
   outcome.voxels = grid->voxel_count();
   outcome.types = grid->types().size();
@@ -89,10 +89,10 @@ Result<Outcome> generate(const GenerateOptions& options) {
   auto bytes = write_vox(scene, outcome.warnings);
   if (!bytes) {
     bytes.error().path = options.output.string();
-    return tl::unexpected<Error>(bytes.error());
+    return bytes.error();
   }
   if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", options.output.string());
-  if (auto written = write_file(options.output, *bytes); !written) return tl::unexpected<Error>(written.error());
+  if (auto written = write_file(options.output, *bytes); !written) return written.error();
   outcome.bytes = bytes->size();
   outcome.seconds_write = watch.lap();
   return outcome;

@@ -141,7 +141,7 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded) {
 
 int run_info(const CommonOptions& options) {
   // Files that cannot be read fail below, in the words of the reader.
-  const auto format = recognise_file(options.input);
+  const auto format = detect_format(options.input);
   if (format && *format && format_info(**format).is_volume) return run_volume_info(options);
   const auto loaded = load_scene(options.input, options.load);
   if (!loaded) {
@@ -160,7 +160,7 @@ void add_info_command(CLI::App& app, int& status) {
       "info", "Say what is in a file: grids, sizes, voxels, types, transforms; of volumes their values");
   const auto options = std::make_shared<CommonOptions>();
   add_common_options(*command, *options);
-  command->footer("Reads " + readable_endings() + ".\nExample: quoin info castle.vox");
+  command->footer("Reads " + readable_extensions() + ".\nExample: quoin info castle.vox");
   command->callback([options, &status] { status = run_info(*options); });
 }
 

@@ -50,13 +50,13 @@ void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& pict
 Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
   if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.output.string());
   const auto png = write_png(outcome.picture.colour, arguments.output);
-  if (!png) return tl::unexpected<Error>(png.error());
+  if (!png) return png.error();
   outcome.files.push_back(arguments.output);
   outcome.bytes = *png;
   if (arguments.depth.empty()) return {};
   if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
   const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
-  if (!pfm) return tl::unexpected<Error>(pfm.error());
+  if (!pfm) return pfm.error();
   outcome.files.push_back(arguments.depth);
   outcome.bytes += *pfm;
   return {};
@@ -64,7 +64,7 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 
 /// Volumes are not drawn. Files that cannot be read fail later, in the words of the reader.
 Status check_input(const std::filesystem::path& path) {
-  const auto format = recognise_file(path);
+  const auto format = detect_format(path);
   if (!format || !*format || !format_info(**format).is_volume) return {};
   return fail(ErrorCode::Unsupported,
               "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
@@ -77,7 +77,7 @@ Status take_picture(Renderer& renderer, const RenderOptions& options, Stopwatch&
   outcome.build = watch.lap();
   ProgressBar bar;
   auto picture = renderer.render(outcome.camera, options, bar.listener("tracing"));
-  if (!picture) return tl::unexpected<Error>(picture.error());
+  if (!picture) return picture.error();
   outcome.picture = std::move(*picture);
   outcome.trace = watch.lap();
   return {};
@@ -94,7 +94,7 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
   VulkanOptions vulkan;
   vulkan.device = arguments.device;
   auto renderer = VulkanRenderer::create(vulkan);
-  if (!renderer) return tl::unexpected<Error>(renderer.error());
+  if (!renderer) return renderer.error();
   outcome.device = renderer->device().name;
   if (auto updated = renderer->update(scene, arguments.common.load.hidden, arguments.common.threads); !updated) {
     return updated;
@@ -106,27 +106,27 @@ Result<Outcome> render(const RenderArguments& arguments) {
   const bool hidden = arguments.common.load.hidden;
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable)
-    return tl::unexpected<Error>(writable.error());
-  if (auto drawable = check_input(arguments.common.input); !drawable) return tl::unexpected<Error>(drawable.error());
+    return writable.error();
+  if (auto drawable = check_input(arguments.common.input); !drawable) return drawable.error();
   auto loaded = load_scene(arguments.common.input, arguments.common.load);
-  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  if (!loaded) return loaded.error();
   const Scene& scene = loaded->scene;
   Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
   outcome.read = watch.lap();
   catch_interrupts();
   const auto camera = camera_for(*loaded, arguments);
-  if (!camera) return tl::unexpected<Error>(camera.error());
+  if (!camera) return camera.error();
   outcome.camera = *camera;
   RenderOptions options = arguments.render;
   if (loaded->sun && !arguments.has_sun) options.light.sun = *loaded->sun;
   const bool is_vulkan = arguments.backend == "vulkan";
   if (auto drawn = (is_vulkan ? draw_by_vulkan : draw_by_cpu)(scene, arguments, options, watch, outcome); !drawn) {
-    return tl::unexpected<Error>(drawn.error());
+    return drawn.error();
   }
   warn_of_left_out(scene, hidden, outcome.warnings);
   warn_of_empty_pictures(scene, hidden, outcome.picture, outcome.warnings);
-  if (auto written = write_outputs(arguments, outcome); !written) return tl::unexpected<Error>(written.error());
+  if (auto written = write_outputs(arguments, outcome); !written) return written.error();
   outcome.write = watch.lap();
   return outcome;
 }
@@ -191,7 +191,7 @@ void add_render_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("render", "Draw a picture, with sun, shadows and ambient occlusion");
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
-  command->footer("Reads " + readable_endings() +
+  command->footer("Reads " + readable_extensions() +
                   ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 4\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40");

@@ -1,6 +1,6 @@
 #include "scene_warnings.h"
 
-#include <quoin/io/scene_meshes.h>
+#include <quoin/scene/scene_meshes.h>
 
 namespace quoin::tool {
 

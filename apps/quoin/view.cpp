@@ -32,10 +32,11 @@ struct ViewArguments {
 /// Fails before a window opens where it is clear that the file cannot be shown.
 Status check_input(const std::filesystem::path& path) {
   if (path.empty()) return {};
-  const auto format = recognise_file(path);
-  if (!format) return tl::unexpected<Error>(format.error());
+  const auto format = detect_format(path);
+  if (!format) return format.error();
   if (!*format) {
-    return fail(ErrorCode::Unsupported, "of no format that is known; there are " + readable_endings(), path.string());
+    return fail(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
+                path.string());
   }
   if (!format_info(**format).is_volume) return {};
   return fail(ErrorCode::Unsupported,

@@ -98,7 +98,7 @@ DeviceBackend::~DeviceBackend() = default;
 Status DeviceBackend::Impl::prepare() {
   if (renderer) return {};
   auto opened = open_device();
-  if (!opened) return tl::unexpected<Error>(opened.error());
+  if (!opened) return opened.error();
   renderer = std::move(*opened);
   picture = std::make_shared<VulkanPicture>(*renderer);
   is_scene_new = true;
@@ -109,7 +109,7 @@ Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
   if (meshes && meshes->style == style) return {};
   meshes.reset();
   auto drawer = VulkanMeshRenderer::create(*renderer);
-  if (!drawer) return tl::unexpected<Error>(drawer.error());
+  if (!drawer) return drawer.error();
   LiveMeshOptions live;
   live.style = style;
   live.hidden = options.cpu.hidden;
@@ -123,20 +123,20 @@ Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
 Result<bool> DeviceBackend::Impl::draw_meshes() {
   const bool is_smooth = request->mode == DrawMode::Smooth;
   if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) {
-    return tl::unexpected<Error>(ready.error());
+    return ready.error();
   }
   const bool is_scene_changed = std::exchange(meshes->is_scene_new, false);
   bool is_new = std::exchange(is_request_new, false) || is_scene_changed;
   if (is_scene_changed) {
     if (Status taken = meshes->renderer.update(*scene, options.cpu.hidden); !taken) {
-      return tl::unexpected(taken.error());
+      return taken.error();
     }
   }
   if (is_scene_changed || meshes->live.pending() > 0) meshes->live.update(*scene, request->camera.position);
   const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
   if (!surfaces.empty()) {
     is_new = true;
-    if (Status put = meshes->renderer.put(surfaces); !put) return tl::unexpected(put.error());
+    if (Status put = meshes->renderer.put(surfaces); !put) return put.error();
   }
   const bool was_settled = std::exchange(is_settled, meshes->live.pending() == 0);
   if (!is_new && was_settled == is_settled) return false;
@@ -149,7 +149,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   wanted.wireframe = request->wireframe;
   divisor = 1;
   if (Status drawn = meshes->renderer.draw(*picture, request->camera, wanted); !drawn) {
-    return tl::unexpected(drawn.error());
+    return drawn.error();
   }
   return true;
 }
@@ -157,7 +157,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
 // Answers whether there is another picture.
 Result<bool> DeviceBackend::Impl::draw() {
   try {
-    if (Status ready = prepare(); !ready) return tl::unexpected<Error>(ready.error());
+    if (Status ready = prepare(); !ready) return ready.error();
     return request->mode == DrawMode::Rays ? draw_rays() : draw_meshes();
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::LimitExceeded, "out of memory");
@@ -208,12 +208,12 @@ Result<bool> DeviceBackend::Impl::draw_rays() {
   if (std::exchange(is_scene_new, false)) {
     is_request_new = true;
     if (Status taken = renderer->update(*scene, options.cpu.hidden, options.cpu.threads); !taken) {
-      return tl::unexpected(taken.error());
+      return taken.error();
     }
   }
   if (is_request_new) is_settled = false;
   if (is_settled) return false;
-  if (Status drawn = draw_stage(); !drawn) return tl::unexpected(drawn.error());
+  if (Status drawn = draw_stage(); !drawn) return drawn.error();
   return true;
 }
 

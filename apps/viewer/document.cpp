@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
-#include <quoin/io/gltf.h>
+#include <quoin/io/mesh_file.h>
 
 namespace quoin::viewer {
 
@@ -28,7 +28,7 @@ Status write_as_vox(const Scene& scene, const std::filesystem::path& path, std::
   auto bytes = write_vox(scene, warnings);
   if (!bytes) {
     if (bytes.error().path.empty()) bytes.error().path = path.string();
-    return tl::unexpected<Error>(bytes.error());
+    return bytes.error();
   }
   return write_file(path, *bytes);
 }
@@ -38,10 +38,10 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
     if (!progress) return {};
     return [&progress, offset](double fraction) { return progress(offset + 0.5 * fraction); };
   };
-  const auto meshes = mesh_scene(scene, {}, false, {}, half(0.0));
-  if (!meshes) return tl::unexpected<Error>(meshes.error());
-  const auto written = write_glb(scene, *meshes, path, half(0.5));
-  if (!written) return tl::unexpected<Error>(written.error());
+  const auto meshes = mesh_scene(scene, {}, {}, half(0.0));
+  if (!meshes) return meshes.error();
+  const auto written = write_mesh(*meshes, path, {.format = FileFormat::Glb}, half(0.5));
+  if (!written) return written.error();
   return {};
 }
 
@@ -63,7 +63,7 @@ Document::Document(LoadedScene loaded, std::filesystem::path path)
 
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options) {
   auto loaded = load_scene(path, options);
-  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  if (!loaded) return loaded.error();
   return std::make_unique<Document>(std::move(*loaded), path);
 }
 
@@ -149,7 +149,7 @@ Result<VoxelType> Document::type_of_colour(Rgba8 colour) {
 Status Document::write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                        const Progress& progress) const {
   const auto format = format_to_write(path);
-  if (!format) return tl::unexpected<Error>(format.error());
+  if (!format) return format.error();
   if (*format == FileFormat::Vox) return write_as_vox(loaded_.scene, path, warnings);
   return write_as_glb(loaded_.scene, path, progress);
 }

@@ -56,7 +56,7 @@ class Document {
   [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour);
 
   /// Writes .vox or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings; those
-  /// of write_vox, mesh_scene and write_glb; Cancelled.
+  /// of write_vox, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
   /// What was written is what the state `state` held: not dirty while it is in force. A .vox becomes the document's

@@ -20,7 +20,7 @@ Loader::Loader(std::filesystem::path path, LoadOptions options, MakeBackend make
     try {
       work(options, make);
     } catch (const std::bad_alloc&) {
-      result_ = tl::unexpected<Error>(out_of_memory(path_));
+      result_ = out_of_memory(path_);
     }
     is_done_ = true;
     if (!is_abandoned_ && done) done();
@@ -40,7 +40,7 @@ void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
   };
   auto document = Document::open(path_, watched);
   if (!document) {
-    result_ = tl::unexpected<Error>(document.error());
+    result_ = document.error();
     return;
   }
   is_read_ = true;
@@ -78,7 +78,7 @@ Saver::Saver(const Document& document, std::filesystem::path path, std::function
         return !is_cancelled_;
       });
     } catch (const std::bad_alloc&) {
-      status_ = tl::unexpected<Error>(out_of_memory(path_));
+      status_ = out_of_memory(path_);
     }
     is_done_ = true;
     if (done) done();

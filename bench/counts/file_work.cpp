@@ -5,9 +5,8 @@
 
 #include <unistd.h>
 
-#include <quoin/io/gltf.h>
+#include <quoin/io/mesh_file.h>
 #include <quoin/io/picture_files.h>
-#include <quoin/io/scene_meshes.h>
 #include <quoin/io/vox.h>
 #include <quoin/terrain/terrain.h>
 
@@ -50,7 +49,7 @@ std::vector<Counted> file_work() {
   const std::string stem = "quoin_counts_" + std::to_string(::getpid());
   std::vector<std::string> warnings;
   const auto bytes = write_vox(*scene, warnings);
-  const auto meshes = mesh_scene(*scene, {}, false, {1});
+  const auto meshes = mesh_scene(*scene, {}, {1});
   if (!bytes || !meshes) give_up("preparing files");
   const auto file = std::make_shared<std::vector<std::byte>>(*bytes);
   const auto meshed = std::make_shared<SceneMeshes>(*meshes);
@@ -67,12 +66,12 @@ std::vector<Counted> file_work() {
            }},
           {"files/mesh_scene",
            [=] {
-             if (!mesh_scene(*scene, {}, false, {1})) give_up("meshing");
+             if (!mesh_scene(*scene, {}, {1})) give_up("meshing");
            }},
           {"files/write_glb",
            [=] {
              const auto path = folder / (stem + ".glb");
-             const bool is_written = write_glb(*scene, *meshed, path).has_value();
+             const bool is_written = write_mesh(*meshed, path).has_value();
              std::filesystem::remove(path);
              if (!is_written) give_up("writing .glb");
            }},

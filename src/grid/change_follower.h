@@ -14,6 +14,7 @@ class ChangeFollower {
   template <class AnyGrid>
   explicit ChangeFollower(const AnyGrid& grid) : cursor_(grid.cursor()) {}
 
+  [[nodiscard]] GridChanges changes(const Grid& grid) { return grid.changes_since(cursor_); }
   /// The chunks to be meshed since the last time.
   std::vector<IVec3> take(const Grid& grid) { return chunks_to_mesh(grid, grid.changes_since(cursor_)); }
   std::vector<IVec3> take(const DensityGrid& grid, int reach) {

@@ -28,13 +28,19 @@ class ChunkBoxes {
     if (is_counted_) count(box, 1);
   }
 
-  /// The box around all. Cost: O(chunks) the first time.
+  /// The box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second: until then nothing is counted,
+  /// for those who never change.
   [[nodiscard]] IBox bounds() {
+    IBox around;
+    if (!was_asked_) {
+      was_asked_ = true;
+      for (const auto& [chunk, box] : boxes_) around = unite(around, box);
+      return around;
+    }
     if (!is_counted_) {
       is_counted_ = true;
       for (const auto& [chunk, box] : boxes_) count(box, 1);
     }
-    IBox around;
     for (int axis = 0; axis < 3 && !boxes_.empty(); ++axis) {
       const auto i = static_cast<std::size_t>(axis);
       around.min[axis] = mins_[i].begin()->first;
@@ -61,6 +67,7 @@ class ChunkBoxes {
   }
 
   tsl::robin_map<IVec3, IBox, CoordinateHash> boxes_;
+  bool was_asked_ = false;
   bool is_counted_ = false;
   std::array<std::map<int, int>, 3> mins_;  // chunks whose boxes begin there
   std::array<std::map<int, int>, 3> maxs_;  // and end

@@ -24,7 +24,7 @@ Status BlockWriter::finish() {
 }
 
 void BlockWriter::flush() {
-  if (status_) status_ = file_.write(std::span(block_).first(used_));
+  if (status_) status_ = sink_(std::span(block_).first(used_));
   written_ += used_;
   used_ = 0;
   if (!status_ || !progress_) return;

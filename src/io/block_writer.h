@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -10,17 +11,18 @@
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/io/file.h>
 
 namespace quoin {
 
-/// Gathers small values into blocks of a mebibyte on their way to a file. After an error it swallows what follows;
-/// `finish` tells.
+/// Gathers small values into blocks of a mebibyte on their way to a file or to memory. After an error it swallows what
+/// follows; `finish` tells.
 class BlockWriter {
  public:
+  using Sink = std::function<Status(std::span<const std::byte>)>;
+
   /// `expected_bytes` is what progress is measured against; 0 when unknown.
-  BlockWriter(AtomicFile& file, const Progress& progress, std::uint64_t expected_bytes)
-      : file_(file), progress_(progress), expected_bytes_(expected_bytes) {
+  BlockWriter(Sink sink, const Progress& progress, std::uint64_t expected_bytes)
+      : sink_(std::move(sink)), progress_(progress), expected_bytes_(expected_bytes) {
     block_.resize(kBlockBytes);
   }
 
@@ -49,7 +51,7 @@ class BlockWriter {
   /// Whether what follows is swallowed; long loops ask, to end early.
   [[nodiscard]] bool failed() const { return !status_.has_value(); }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
-  /// Errors: the file's first; Cancelled.
+  /// Errors: the sink's first; Cancelled.
   [[nodiscard]] Status finish();
 
  private:
@@ -57,7 +59,7 @@ class BlockWriter {
 
   void flush();
 
-  AtomicFile& file_;
+  Sink sink_;
   const Progress& progress_;
   std::uint64_t expected_bytes_;
   std::vector<std::byte> block_;

@@ -26,11 +26,11 @@ std::string reason(int error_number) {
   return std::generic_category().message(error_number);
 }
 
-tl::unexpected<Error> cannot_read(std::string message, const std::filesystem::path& path) {
+Error cannot_read(std::string message, const std::filesystem::path& path) {
   return fail(ErrorCode::CannotRead, std::move(message), path.string());
 }
 
-tl::unexpected<Error> cannot_write(std::string message, const std::filesystem::path& path) {
+Error cannot_write(std::string message, const std::filesystem::path& path) {
   return fail(ErrorCode::CannotWrite, std::move(message), path.string());
 }
 
@@ -130,7 +130,7 @@ Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
   std::optional<mode_t> mode;
   if (Status status = check_replaceable(file.path_, mode); !status) {
     status.error().path = path.string();
-    return tl::unexpected(status.error());
+    return status.error();
   }
   constexpr unsigned kAttempts = 100;
   for (unsigned attempt = 0; attempt < kAttempts && file.descriptor_ < 0; ++attempt) {
@@ -207,7 +207,7 @@ Status AtomicFile::commit() {
 
 Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   Result<AtomicFile> file = AtomicFile::create(path);
-  if (!file) return tl::unexpected(file.error());
+  if (!file) return file.error();
   if (Status status = file->write(bytes); !status) return status;
   return file->commit();
 }

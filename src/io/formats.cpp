@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <array>
 
-#include <quoin/io/file.h>
 #include <quoin/io/scene_file.h>
 
-#include "io/byte_stream.h"
-#include "io/nifti.h"
-#include "io/nrrd.h"
+#include "io/volume/byte_stream.h"
+#include "io/volume/header.h"
+#include "io/whole_file.h"
 
 namespace quoin {
 
@@ -30,24 +29,24 @@ bool begins_with(std::span<const std::byte> bytes, std::string_view text) {
                                                    [](char c, std::byte b) { return static_cast<std::byte>(c) == b; });
 }
 
-std::string lower_case_ending(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  for (char& c : ending) {
+std::string lower_case_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
-  return ending;
+  return extension;
 }
 
-std::string endings(bool FormatInfo::*ability) {
+std::string extensions_with(bool FormatInfo::*ability) {
   std::vector<std::string_view> sorted;
   for (const FormatInfo& info : kFormats) {
-    if (info.*ability) sorted.push_back(info.ending);
+    if (info.*ability) sorted.push_back(info.extension);
   }
   std::sort(sorted.begin(), sorted.end());
   std::string list;
-  for (const std::string_view ending : sorted) {
+  for (const std::string_view extension : sorted) {
     if (!list.empty()) list += ", ";
-    list += ending;
+    list += extension;
   }
   return list;
 }
@@ -58,22 +57,25 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "version https://git-lfs.github.com/spec/")) {
     return {ErrorCode::BadFormat, "a Git LFS pointer, not the file itself (git lfs pull fetches it)", {}, 0};
   }
-  return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_endings() + ")", {}, {}};
+  return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
 
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                const LoadOptions& options) {
-  const auto format = recognise(bytes);
+  const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options);
+  if (format == FileFormat::Scene) {
+    return fail(ErrorCode::Unsupported, "a scene file, whose other files only a path finds");
+  }
   if (format && format_info(*format).is_volume) {
     return fail(ErrorCode::Unsupported,
                 "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
   }
   const Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
-  const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_ending(path) == ".vox";
+  const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
   if (named_vox) return read_vox(bytes, options);
-  return tl::unexpected<Error>(error);
+  return error;
 }
 
 }  // namespace
@@ -82,19 +84,19 @@ std::span<const FormatInfo> file_formats() {
   return kFormats;
 }
 
-std::string readable_endings() {
-  return endings(&FormatInfo::readable);
+std::string readable_extensions() {
+  return extensions_with(&FormatInfo::readable);
 }
 
-std::string writable_endings() {
-  return endings(&FormatInfo::writable);
+std::string writable_extensions() {
+  return extensions_with(&FormatInfo::writable);
 }
 
 const FormatInfo& format_info(FileFormat format) {
   return *std::find_if(kFormats.begin(), kFormats.end(), [&](const FormatInfo& info) { return info.format == format; });
 }
 
-std::optional<FileFormat> recognise(std::span<const std::byte> bytes) {
+std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_scene_file(bytes)) return FileFormat::Scene;
   const auto first = first_bytes(bytes, nifti::kMostHeaderBytes);
@@ -103,28 +105,31 @@ std::optional<FileFormat> recognise(std::span<const std::byte> bytes) {
   return std::nullopt;
 }
 
-Result<std::optional<FileFormat>> recognise_file(const std::filesystem::path& path) {
+Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  return recognise(*bytes);
+  if (!bytes) return bytes.error();
+  return detect_format(*bytes);
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
-  const std::string ending = lower_case_ending(path);
+  const std::string extension = lower_case_extension(path);
   for (const FormatInfo& info : kFormats) {
-    if (info.writable && info.ending == ending) return info;
+    if (info.writable && info.extension == extension) return info;
   }
-  return fail(ErrorCode::Unsupported, "the name must end in one of " + writable_endings(), path.string());
+  return fail(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
+}
+
+Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options) {
+  return read_bytes({}, bytes, options);
 }
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options) {
-  auto bytes = read_file(path);
-  if (bytes && recognise(*bytes) == FileFormat::Scene) return read_scene_file(path, options);
-  auto loaded = bytes ? read_bytes(path, *bytes, options) : Result<LoadedScene>(tl::unexpected<Error>(bytes.error()));
-  if (!loaded && loaded.error().path.empty()) loaded.error().path = path.string();
-  return loaded;
+  const auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options);
+  return with_path(read_bytes(path, *bytes, options), path);
 }
 
 }  // namespace quoin

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "io/glb_for_tests.h"
+#include "io/gltf/glb_for_tests.h"
 
 namespace quoin {
 
@@ -22,10 +22,10 @@ Error error_of(const TestFolder& folder, const std::string& name, const std::str
 }
 
 TEST(Formats, content_decides_what_a_file_is) {
-  EXPECT_EQ(recognise(bytes_of("VOX \x96")), FileFormat::Vox);
-  EXPECT_EQ(recognise(bytes_of("VOX")), std::nullopt);
-  EXPECT_EQ(recognise(bytes_of("glTF")), std::nullopt) << "written, not read";
-  EXPECT_EQ(recognise({}), std::nullopt);
+  EXPECT_EQ(detect_format(bytes_of("VOX \x96")), FileFormat::Vox);
+  EXPECT_EQ(detect_format(bytes_of("VOX")), std::nullopt);
+  EXPECT_EQ(detect_format(bytes_of("glTF")), std::nullopt) << "written, not read";
+  EXPECT_EQ(detect_format(std::span<const std::byte>()), std::nullopt);
 }
 
 TEST(Formats, names_decide_what_is_written) {

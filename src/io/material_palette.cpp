@@ -1,8 +1,9 @@
+#include <quoin/core/assert.h>
+
 #include "io/material_palette.h"
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -13,6 +14,15 @@ namespace {
 
 bool emits(SurfaceClass surface) {
   return surface == SurfaceClass::Emissive || surface == SurfaceClass::EmissiveTransparent;
+}
+
+/// Appends vertex `from` of `source`; returns its index in `target`.
+std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriangles& target) {
+  target.positions.push_back(source.positions[from]);
+  target.directions.push_back(source.directions[from]);
+  if (!source.levels.empty()) target.levels.push_back(source.levels[from]);
+  target.types.push_back(source.types[from]);
+  return static_cast<std::uint32_t>(target.positions.size() - 1);
 }
 
 /// What the file can say: finite and not negative.
@@ -55,14 +65,15 @@ const char* material_name(SurfaceClass surface) {
 
 }  // namespace
 
-MaterialPalette::MaterialPalette(const VoxelRegistry& types, const SceneMeshes& meshes) : types_(types) {
-  const auto rows = static_cast<std::uint32_t>((types.size() + kPaletteWidth - 1) / kPaletteWidth);
+MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.types) {
+  const auto rows = static_cast<std::uint32_t>((types_.size() + kPaletteWidth - 1) / kPaletteWidth);
   rows_ = std::bit_ceil(std::max(rows, 1U));
   Usage used;
-  for (std::size_t surface = 0; surface < kSurfaceClasses; ++surface) {
-    used[surface].resize(types.size());
-    for (const GridMesh& grid : meshes.grids) {
-      for (const VoxelType type : grid.mesh.surfaces[surface].types) used[surface][type] = true;
+  for (auto& types : used) types.resize(types_.size());
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      if (view.has_albedo()) continue;
+      for (const VoxelType type : view.types) used[static_cast<std::size_t>(view.surface)][type] = true;
     }
   }
   find_bands(used);
@@ -116,7 +127,7 @@ void MaterialPalette::make_materials(const Usage& used) {
 
 std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) const {
   const auto found = by_class_and_band_.find({surface, band_of(surface, type)});
-  assert(found != by_class_and_band_.end());
+  QUOIN_ASSERT(found != by_class_and_band_.end(), "a class and type that the meshes have");
   return found->second;
 }
 
@@ -171,6 +182,35 @@ PngImage MaterialPalette::emissive() const {
     texel[2] = scaled_in_linear_light(properties.colour.b, factor);
   }
   return image;
+}
+
+MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& palette) {
+  for (const MeshView& view : part.surfaces) {
+    if (!view.indices.empty()) add(view, palette);
+  }
+}
+
+void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette) {
+  if (view.has_albedo()) return surfaces_.push_back({view, palette.materials().size()});
+  std::map<std::size_t, BlockyTriangles*> by_material;
+  if (emits(view.surface)) {
+    for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
+  }
+  if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});
+  for (auto& [material, triangles] : by_material) {
+    triangles = owned_.emplace_back(std::make_unique<BlockyTriangles>()).get();
+  }
+  // A triangle lies in one face, so its three vertices have one type and move together.
+  std::vector<std::uint32_t> moved_to(view.positions.size());
+  for (std::size_t i = 0; i < view.positions.size(); ++i) {
+    moved_to[i] = copy_vertex(view, i, *by_material.at(palette.material_of(view.surface, view.types[i])));
+  }
+  for (const std::uint32_t index : view.indices) {
+    by_material.at(palette.material_of(view.surface, view.types[index]))->indices.push_back(moved_to[index]);
+  }
+  for (const auto& [material, triangles] : by_material) {
+    surfaces_.push_back({view_of(*triangles, view.surface), material});
+  }
 }
 
 }  // namespace quoin

@@ -4,15 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/io/scene_meshes.h>
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/scene/scene_meshes.h>
 
-#include "io/png.h"
+#include "io/image/png.h"
 
 namespace quoin {
 
@@ -40,8 +40,9 @@ struct SurfaceMaterial {
 /// strength, or with strengths more than twice apart, has its colours unscaled.
 class MaterialPalette {
  public:
-  /// Only types that the meshes use get materials; all registered types get texels.
-  MaterialPalette(const VoxelRegistry& types, const SceneMeshes& meshes);
+  /// Only types that blocks of the meshes use get materials; all registered types get texels.
+  /// Requires: the meshes are sound, and their types outlive this.
+  explicit MaterialPalette(const SceneMeshes& meshes);
 
   [[nodiscard]] const std::vector<SurfaceMaterial>& materials() const { return materials_; }
   /// Requires: the meshes have a triangle of this class and type.
@@ -74,6 +75,28 @@ class MaterialPalette {
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_band_;
+};
+
+/// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied; smooth ones have
+/// the material after the palette's last.
+///
+/// Requires: the part's arrays outlive this.
+class MaterialSurfaces {
+ public:
+  struct Surface {
+    MeshView view;
+    std::size_t material = 0;
+  };
+
+  MaterialSurfaces(const MeshPart& part, const MaterialPalette& palette);
+
+  [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; }
+
+ private:
+  void add(const MeshView& view, const MaterialPalette& palette);
+
+  std::vector<Surface> surfaces_;
+  std::vector<std::unique_ptr<BlockyTriangles>> owned_;
 };
 
 }  // namespace quoin

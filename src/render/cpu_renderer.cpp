@@ -103,7 +103,7 @@ void CpuRenderer::update(Threads threads) {
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
                                     const Progress& progress) const {
-  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  if (const Status status = check(camera, options); !status) return status.error();
   QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,

@@ -8,7 +8,7 @@
 namespace quoin {
 namespace {
 
-tl::unexpected<Error> refusal() {
+Error refusal() {
   return fail(ErrorCode::Unsupported, "vulkan: this build is without it: " QUOIN_VULKAN_MISSING);
 }
 

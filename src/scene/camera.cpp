@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
 
 #include "scene/framing.h"
 
@@ -82,6 +83,7 @@ Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
 }
 
 Ray ray_through(const Camera& camera, double x, double y, int width, int height) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
   const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height;
   const double pixel = picture_height / height;
@@ -98,7 +100,7 @@ std::optional<View> view_of_name(std::string_view name) {
 }
 
 Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
-  assert(aspect > 0.0 && std::isfinite(aspect));
+  QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
   Camera camera;
   camera.vertical_fov = kFramingFov;
   turn(camera, kViews[static_cast<std::size_t>(view)].forward);
@@ -111,7 +113,7 @@ Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
 }
 
 Camera frame_view(const DBox& bounds, View view, double aspect) {
-  assert(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)));
+  QUOIN_ASSERT(bounds.empty() || (is_finite(bounds.min) && is_finite(bounds.max)), "finite bounds");
   const DBox box = box_to_frame(bounds);
   const DVec3 half = 0.5 * (box.max - box.min);
   return frame(

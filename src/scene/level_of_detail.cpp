@@ -7,6 +7,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "scene/frustum.h"
 #include "scene/instance_axes.h"
 
@@ -200,6 +202,7 @@ DetailSelector::~DetailSelector() = default;
 
 void DetailSelector::select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
                             std::vector<SelectedInstance>& out) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
   out.clear();
   impl_->look_at_grids(scene);
   const Frustum frustum(camera, width, height);

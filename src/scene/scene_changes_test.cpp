@@ -10,8 +10,6 @@
 
 #include <gtest/gtest.h>
 
-#include "core/death_for_tests.h"
-
 namespace quoin {
 namespace {
 
@@ -173,13 +171,6 @@ TEST(SceneChanges, ASnapshotStaysAsItWas) {
   EXPECT_EQ(copy.instances().size(), 1U);
   EXPECT_EQ(copy.types[stone].name, "stone");
   EXPECT_EQ(scene.voxel_count(), 0);
-}
-
-TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
-  Scene scene;
-  const GridHandle gone = scene.add_grid({});
-  scene.remove_grid(gone);
-  QUOIN_EXPECT_MISTAKE(scene.edit(gone).name = "x", "the handle names an element");
 }
 
 }  // namespace

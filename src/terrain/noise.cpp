@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+
+#include <quoin/core/assert.h>
 
 namespace quoin {
 namespace {
@@ -16,6 +19,8 @@ struct Lattice {
     in_cell = x - static_cast<double>(cell);
   }
 };
+
+constexpr double kWidest = 1 << 30;
 
 double fade(double t) {
   return t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
@@ -86,6 +91,7 @@ double corner3(std::uint32_t seed, std::int32_t x, std::int32_t y, std::int32_t 
 }  // namespace
 
 double noise2(std::uint32_t seed, double x, double y) {
+  QUOIN_ASSERT(std::abs(x) < kWidest && std::abs(y) < kWidest, "|x|, |y| < 2^30");
   const Lattice lx(x);
   const Lattice ly(y);
   const double u = fade(lx.in_cell);
@@ -97,6 +103,7 @@ double noise2(std::uint32_t seed, double x, double y) {
 }
 
 double noise3(std::uint32_t seed, double x, double y, double z) {
+  QUOIN_ASSERT(std::abs(x) < kWidest && std::abs(y) < kWidest && std::abs(z) < kWidest, "|x|, |y|, |z| < 2^30");
   // A turn by 60 degrees about (1, 1, 1): all nine entries are thirds.
   constexpr double kThird = 1.0 / 3.0;
   const Lattice lx((2.0 * x - y + 2.0 * z) * kThird);

@@ -59,7 +59,7 @@ DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, 
 
 Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                             Threads threads, const Progress& progress) {
-  if (auto sound = check(options); !sound) return tl::unexpected<Error>(sound.error());
+  if (auto sound = check(options); !sound) return sound.error();
   const terrain::Landform land = landform_of(options);
   const IBox chunks = chunks_of(options);
   const auto across = static_cast<std::size_t>(options.size.x);

@@ -106,7 +106,7 @@ Result<TerrainTypes> add_terrain_types(VoxelRegistry& types) {
   };
   for (const auto& [id, properties] : wanted) {
     const auto added = types.find_or_add(properties);
-    if (!added) return tl::unexpected<Error>(added.error());
+    if (!added) return added.error();
     *id = *added;
   }
   return all;
@@ -120,7 +120,7 @@ Chunk generate_terrain_chunk(const TerrainOptions& options, const TerrainTypes& 
 
 Result<Grid> generate_terrain(const TerrainOptions& options, const TerrainTypes& types, Threads threads,
                               const Progress& progress) {
-  if (auto sound = check(options); !sound) return tl::unexpected<Error>(sound.error());
+  if (auto sound = check(options); !sound) return sound.error();
   const terrain::Landform land(options);
   const IBox chunks = chunks_of(world_box(options));
   const auto across = static_cast<std::size_t>(chunks.size().x);

@@ -5,6 +5,7 @@
 
 #include <tsl/robin_map.h>
 
+#include "grid/chunk_boxes.h"
 #include "grid/coordinate_hash.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
@@ -87,7 +88,7 @@ struct OccupancyTree::Impl {
   std::vector<Node> bricks = std::vector<Node>(2);                 // 0: empty, 1: full
   std::vector<std::uint32_t> free_chunks;
   std::vector<std::uint32_t> free_bricks;
-  tsl::robin_map<IVec3, IBox, CoordinateHash> chunk_bounds;  // occupied voxels of each chunk, in grid coordinates
+  ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
   IBox bounds;
   FlatTables flat;  // no chunks: none
   std::vector<trace::FlatChunk> flat_nodes;
@@ -197,7 +198,7 @@ struct OccupancyTree::Impl {
   // Returns which bricks changed.
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
     const auto drop = [&] {
-      chunk_bounds.erase(chunk);
+      chunk_boxes.put(chunk, {});
       remove(chunk);
       return kAll;
     };
@@ -207,7 +208,7 @@ struct OccupancyTree::Impl {
     IBox box;
     const std::uint64_t changed = fill(find_or_create(chunk), rows, box);
     if (box.empty()) return drop();
-    chunk_bounds[chunk] = {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge};
+    chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
   }
 
@@ -291,7 +292,7 @@ struct OccupancyTree::Impl {
         {0, chunk_nodes.data()});
     known_nodes = chunk_nodes.data();
     flat_chunks = chunks;
-    for (const auto& [chunk, box] : chunk_bounds) flatten(chunk, kAll);
+    for (const auto& [chunk, box] : chunk_boxes) flatten(chunk, kAll);
   }
 
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
@@ -303,12 +304,8 @@ struct OccupancyTree::Impl {
   [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
 
   void renew_tables(std::span<const Changed> changed) {
-    bounds = {};
-    IBox chunks;
-    for (const auto& [chunk, box] : chunk_bounds) {
-      bounds = unite(bounds, box);
-      chunks = unite(chunks, {chunk, chunk + 1});
-    }
+    bounds = chunk_boxes.bounds();
+    const IBox chunks = bounds.empty() ? IBox{} : IBox{chunk_of(bounds.min), chunk_of(bounds.max - 1) + 1};
     // As a tree built from scratch would have it.
     if (!can_be_flat(chunks)) {
       flat = {};
@@ -319,7 +316,7 @@ struct OccupancyTree::Impl {
     if (!(chunks == flat_chunks)) return make_flat(chunks);
     if (chunk_nodes.data() != known_nodes) {
       known_nodes = chunk_nodes.data();
-      for (const auto& [chunk, box] : chunk_bounds) name_node(chunk);
+      for (const auto& [chunk, box] : chunk_boxes) name_node(chunk);
     }
     for (const auto& [chunk, changed_bricks] : changed) {
       if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
@@ -327,14 +324,15 @@ struct OccupancyTree::Impl {
   }
 };
 
-OccupancyTree::OccupancyTree() : impl_(std::make_unique<Impl>()) {}
+OccupancyTree::OccupancyTree(Occupancy which) : impl_(std::make_unique<Impl>()) {
+  impl_->which = which;
+}
 OccupancyTree::OccupancyTree(OccupancyTree&&) noexcept = default;
 OccupancyTree& OccupancyTree::operator=(OccupancyTree&&) noexcept = default;
 OccupancyTree::~OccupancyTree() = default;
 
 OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types, Occupancy which) {
-  OccupancyTree tree;
-  tree.impl_->which = which;
+  OccupancyTree tree(which);
   for (const IVec3 chunk : grid.chunks()) tree.impl_->put(grid.find_chunk(chunk), types, chunk);
   tree.impl_->chunk_nodes.shrink_to_fit();
   tree.impl_->bricks.shrink_to_fit();
@@ -343,10 +341,16 @@ OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types,
   return tree;
 }
 
-void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks) {
+void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
+  if (changes.all) {
+    *this = build(grid, types, impl_->which);
+    return;
+  }
   std::vector<Impl::Changed> changed;
-  changed.reserve(chunks.size());
-  for (const IVec3 chunk : chunks) changed.push_back({chunk, impl_->put(grid.find_chunk(chunk), types, chunk)});
+  changed.reserve(changes.items.size());
+  for (const ChunkChange& each : changes.items) {
+    changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk)});
+  }
   impl_->finish(changed);
   view_ = impl_->kernel_view();
 }
@@ -369,7 +373,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
-         impl_->chunk_bounds.bucket_count() * (sizeof(IVec3) + sizeof(IBox)) +
+         impl_->chunk_boxes.bytes() +
          impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }

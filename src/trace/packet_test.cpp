@@ -282,7 +282,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
     } else {
       grid.set({near(reach), near(reach), near(reach)}, type);
     }
-    tree.update(grid, types, follower.take(grid));
+    tree.update(grid, types, follower.changes(grid));
     const OccupancyTree fresh = OccupancyTree::build(grid, types);
     ASSERT_EQ(tree.bounds(), fresh.bounds());
     for (int i = 0; i < 200; ++i) {

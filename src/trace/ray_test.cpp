@@ -229,7 +229,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     } else {
       grid.set({near(), near(), near()}, static_cast<VoxelType>(random() % 6));
     }
-    const std::vector<IVec3> dirty = follower.take(grid);
+    const GridChanges dirty = follower.changes(grid);
     for (OccupancyTree& tree : trees) {
       tree.update(grid, types, dirty);
     }
@@ -243,7 +243,7 @@ TEST(OccupancyTree, HoldsTheTypesAskedForAndFollowsEdits) {
     EXPECT_EQ(trees[0].bounds(), grid.bounds());
   }
   grid.clear();
-  trees[0].update(grid, types, follower.take(grid));
+  trees[0].update(grid, types, follower.changes(grid));
   EXPECT_TRUE(trees[0].bounds().empty());
 }
 

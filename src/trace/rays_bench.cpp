@@ -147,7 +147,7 @@ void update(benchmark::State& state) {
     state.PauseTiming();
     grid.fill_box(corner, corner + size, is_solid ? VoxelType{1} : kAir);
     is_solid = !is_solid;
-    const std::vector<IVec3> dirty = chunks_to_mesh(grid, grid.changes_since(cursor));
+    const GridChanges dirty = grid.changes_since(cursor);
     state.ResumeTiming();
     tree.update(grid, ray_workload().types, dirty);
   }

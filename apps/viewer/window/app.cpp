@@ -262,7 +262,7 @@ Result<std::shared_ptr<VulkanRenderer>> App::open_device() {
   VulkanOptions options;
   options.device = options_.device;
   auto made = VulkanRenderer::create(options);
-  if (!made) return tl::unexpected<Error>(made.error());
+  if (!made) return made.error();
   renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
   return renderer_;
 }
@@ -290,7 +290,7 @@ void App::stand_in(const Error& why) {
 }
 
 void App::end_with(const Error& error) {
-  status_ = tl::unexpected<Error>(error);
+  status_ = error;
   is_running_ = false;
 }
 

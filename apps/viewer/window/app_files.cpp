@@ -161,7 +161,7 @@ void App::save_screenshot() {
 void App::write_screenshot(const std::filesystem::path& path) {
   const ViewFrame& shown = state_.picture;
   const auto image = shown.on_device ? shown.on_device->read() : Result<Image>(shown.colour);
-  const auto written = image ? write_png(*image, path) : tl::unexpected<Error>(image.error());
+  const auto written = image ? write_png(*image, path) : image.error();
   if (!written) {
     state_.tell(written.error());
     if (!options_.screenshot.empty()) end_with(written.error());

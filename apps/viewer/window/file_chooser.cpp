@@ -27,7 +27,7 @@ std::string lower(std::string text) {
 bool is_readable_name(const std::string& name) {
   const std::string ending = lower(std::filesystem::path(name).extension().string());
   return std::any_of(file_formats().begin(), file_formats().end(), [&](const FormatInfo& format) {
-    return format.readable && !format.is_volume && format.ending == ending;
+    return format.readable && !format.is_volume && format.extension == ending;
   });
 }
 

@@ -34,7 +34,7 @@ class SdlScreen final : public Screen {
   bool has_vsync_ = false;
 };
 
-tl::unexpected<Error> cannot(const std::string& what) {
+Error cannot(const std::string& what) {
   return fail(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
 }
 
@@ -69,7 +69,7 @@ Status SdlScreen::set_font(int width, int height, std::span<const std::uint8_t> 
 Status SdlScreen::set_picture(const ViewFrame& frame) {
   if (!frame.on_device) return set_image(frame.colour);
   const auto read = frame.on_device->read();
-  if (!read) return tl::unexpected<Error>(read.error());
+  if (!read) return read.error();
   return set_image(*read);
 }
 
@@ -131,7 +131,7 @@ void SdlScreen::draw(const ImDrawList& list, const ImDrawCmd& command, const ImD
 
 Result<std::unique_ptr<Screen>> open_sdl_screen(int width, int height) {
   auto screen = std::make_unique<SdlScreen>();
-  if (Status opened = screen->open(width, height); !opened) return tl::unexpected<Error>(opened.error());
+  if (Status opened = screen->open(width, height); !opened) return opened.error();
   return screen;
 }
 

@@ -22,7 +22,7 @@ Status check_device(const std::string& device) {
   VulkanOptions options;
   options.device = device;
   const auto made = VulkanRenderer::create(options);
-  return made ? Status{} : tl::unexpected<Error>(made.error());
+  return made ? Status{} : made.error();
 }
 
 Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int width, int height) {
@@ -32,7 +32,7 @@ Result<std::unique_ptr<Screen>> open_screen(const ViewerOptions& options, int wi
     // A card that does not reach this display is no reason not to start; a device of that name is the user's wish.
     if (screen || !options.device.empty()) return screen;
   }
-  if (Status there = check_device(options.device); !there) return tl::unexpected<Error>(there.error());
+  if (Status there = check_device(options.device); !there) return there.error();
   return open_sdl_screen(width, height);
 }
 
@@ -42,11 +42,11 @@ Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_
   const std::filesystem::path path = options.is_bare ? std::filesystem::path() : settings_path();
   Settings settings = path.empty() ? Settings{} : read_settings(path);
   auto video = SdlVideo::start();
-  if (!video) return tl::unexpected<Error>(video.error());
+  if (!video) return video.error();
   const bool has_size = options.width > 0 && options.height > 0;
   auto screen =
       open_screen(options, has_size ? options.width : settings.width, has_size ? options.height : settings.height);
-  if (!screen) return tl::unexpected<Error>(screen.error());
+  if (!screen) return screen.error();
   App app(options, std::move(settings), std::move(*screen));
   if (Status status = app.run(is_interrupted); !status) return status;
   if (path.empty()) return {};

@@ -58,10 +58,10 @@ Status VulkanScreen::open(int width, int height, const std::string& device) {
     return number;
   };
   auto made = VulkanRenderer::create(options);
-  if (!made) return tl::unexpected<Error>(made.error());
+  if (!made) return made.error();
   renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
   auto shown = VulkanWindow::create(*renderer_);
-  if (!shown) return tl::unexpected<Error>(shown.error());
+  if (!shown) return shown.error();
   shown_in_ = std::make_unique<VulkanWindow>(std::move(*shown));
   return {};
 }
@@ -128,9 +128,9 @@ Status VulkanScreen::show(const SDL_Rect& place, const ImDrawData& gui) {
 
 Result<std::unique_ptr<Screen>> open_vulkan_screen(int width, int height, const std::string& device) {
   // SDL says less clearly that there is no driver.
-  if (const auto devices = vulkan_devices(); !devices) return tl::unexpected<Error>(devices.error());
+  if (const auto devices = vulkan_devices(); !devices) return devices.error();
   auto screen = std::make_unique<VulkanScreen>();
-  if (Status opened = screen->open(width, height, device); !opened) return tl::unexpected<Error>(opened.error());
+  if (Status opened = screen->open(width, height, device); !opened) return opened.error();
   return screen;
 }
 

@@ -30,15 +30,21 @@ struct Error {
 /// "castle.vox: byte 1204: chunk SIZE claims 4294967295 x 40 x 40 voxels"; parts that are absent are left out.
 [[nodiscard]] std::string to_string(const Error& error);
 
-/// A value, or why there is none. Used for outside data only; a programmer's mistake asserts.
+/// A value, or why there is none: a tl::expected that an Error becomes by itself, so that who calls hands it on by
+/// `return loaded.error();`. Used for outside data only; a programmer's mistake asserts.
 template <class T>
-using Result = tl::expected<T, Error>;
+class [[nodiscard]] Result : public tl::expected<T, Error> {
+ public:
+  using tl::expected<T, Error>::expected;
+  Result(const Error& error) : tl::expected<T, Error>(tl::unexpect, error) {}
+  Result(Error&& error) : tl::expected<T, Error>(tl::unexpect, std::move(error)) {}
+};
 
 using Status = Result<void>;
 
-[[nodiscard]] inline tl::unexpected<Error> fail(ErrorCode code, std::string message, std::string path = {},
-                                                std::optional<std::uint64_t> byte_offset = std::nullopt) {
-  return tl::unexpected<Error>(Error{code, std::move(message), std::move(path), byte_offset});
+[[nodiscard]] inline Error fail(ErrorCode code, std::string message, std::string path = {},
+                                std::optional<std::uint64_t> byte_offset = std::nullopt) {
+  return Error{code, std::move(message), std::move(path), byte_offset};
 }
 
 }  // namespace quoin

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
@@ -53,20 +54,21 @@ class Chunk {
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] VoxelType get(int x, int y, int z) const {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     return mixed_ == nullptr ? uniform_ : mixed_->type(x, y, z);
   }
   [[nodiscard]] VoxelType get(IVec3 local) const { return get(local.x, local.y, local.z); }
 
-  /// Sets the voxels of one row whose bits are set in `mask`; answers which of them had another type before.
+  /// Sets the voxels of one row whose bits are set in `mask`; returns which of them had another type before.
   std::uint64_t set_row(int y, int z, std::uint64_t mask, VoxelType type);
-  /// Sets the 64 voxels of one row; answers which of them had another type before.
+  /// Sets the 64 voxels of one row; returns which of them had another type before.
   std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
     return write_row(y, z, ~std::uint64_t{0}, types);
   }
-  /// Sets those of the 64 voxels of one row whose bits are set in `mask`; answers which had another type before.
+  /// Sets those of the 64 voxels of one row whose bits are set in `mask`; returns which had another type before.
   std::uint64_t write_row(int y, int z, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
   void read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const;
-  /// True when the voxel had another type before. Requires: 0 <= x, y, z < 64.
+  /// Returns true when the voxel had another type before. Requires: 0 <= x, y, z < 64.
   bool set(int x, int y, int z, VoxelType type);
   bool set(IVec3 local, VoxelType type) { return set(local.x, local.y, local.z, type); }
   /// Makes the whole chunk one type.

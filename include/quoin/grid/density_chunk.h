@@ -33,6 +33,7 @@ class DensityChunk {
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] Half get(int x, int y, int z) const {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     if (mixed_ == nullptr) return uniform_;
     const std::uint32_t slab = mixed_->slabs[Chunk::slab_index(y, z)];
     if ((slab & kUniformSlab) != 0) return static_cast<Half>(slab);

@@ -19,7 +19,7 @@ enum class FileFormat : std::uint8_t { Vox, Scene, Nifti, Nrrd, Glb, Gltf, Obj, 
 struct FormatInfo {
   FileFormat format;
   std::string_view name;         ///< as in `quoin info`: "vox"
-  std::string_view ending;       ///< ".vox"
+  std::string_view extension;    ///< ".vox"
   std::string_view description;  ///< for a person
   bool readable;
   bool writable;
@@ -30,22 +30,21 @@ struct FormatInfo {
 /// All formats, those that can be read first.
 [[nodiscard]] std::span<const FormatInfo> file_formats();
 
-/// The endings of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .ply, .vox".
-[[nodiscard]] std::string readable_endings();
-[[nodiscard]] std::string writable_endings();
+/// The extensions of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .ply, .vox".
+[[nodiscard]] std::string readable_extensions();
+[[nodiscard]] std::string writable_extensions();
 
 /// What is known of a format.
 [[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
-/// Recognises a readable format by what the file begins with, within gzip too; nothing when it is none of them.
-[[nodiscard]] std::optional<FileFormat> recognise(std::span<const std::byte> bytes);
+/// Returns the readable format that bytes are of, by what they begin with, within gzip too; nothing when it is none.
+[[nodiscard]] std::optional<FileFormat> detect_format(std::span<const std::byte> bytes);
+/// The same of a file, of which only the beginning is read. Errors: CannotRead.
+[[nodiscard]] Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path);
 
-/// As `recognise`, of a file, of which only the beginning is read. Errors: CannotRead.
-[[nodiscard]] Result<std::optional<FileFormat>> recognise_file(const std::filesystem::path& path);
-
-/// The format that a file of this name is written in, by its ending in any case.
+/// Returns the format that a file of this name is written in, by its extension in any case.
 ///
-/// Errors: Unsupported, naming the endings there are.
+/// Errors: Unsupported, naming the extensions there are.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
 /// Reads a file of any readable format that holds voxels.
@@ -54,5 +53,8 @@ struct FormatInfo {
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; `path` is
 ///         set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
+
+/// The same of bytes. Errors: Unsupported also for scene files, whose other files only a path finds.
+[[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {});
 
 }  // namespace quoin

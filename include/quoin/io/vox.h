@@ -27,7 +27,7 @@ struct LoadedScene {
 struct LoadOptions {
   bool hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
   int frame = 0;        ///< which animation frame to take
-  Progress progress{};  ///< told after every model; what then answers false is Cancelled
+  Progress progress{};  ///< told after every model; once it returns false, the work is Cancelled
 };
 
 /// MagicaVoxel's format, versions 150 and 200.
@@ -47,6 +47,8 @@ struct LoadOptions {
 ///          voxels would take far more memory than the file has bytes. Memory stays within a multiple of the input's
 ///          size.
 [[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {});
+/// The same of a file. Errors: also CannotRead; they name the file.
+[[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// The scene as a .vox file of version 150; the same scene gives the same bytes.
 ///
@@ -58,5 +60,9 @@ struct LoadOptions {
 /// Errors:   Unsupported when a transform is not one of the 48 axis-aligned ones or a voxel size is not 1;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
+/// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the
+/// file.
+[[nodiscard]] Result<std::uint64_t> write_vox(const Scene& scene, const std::filesystem::path& path,
+                                              std::vector<std::string>& warnings);
 
 }  // namespace quoin

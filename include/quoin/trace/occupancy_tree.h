@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
@@ -31,7 +30,8 @@ enum class Occupancy : std::uint8_t {
 /// Threads: any number may read at once; an update needs the tree to itself.
 class OccupancyTree {
  public:
-  OccupancyTree();
+  /// Of nothing.
+  explicit OccupancyTree(Occupancy which = Occupancy::NonAir);
   OccupancyTree(OccupancyTree&&) noexcept;
   OccupancyTree& operator=(OccupancyTree&&) noexcept;
   ~OccupancyTree();
@@ -39,12 +39,11 @@ class OccupancyTree {
   /// From the grid's own storage. Cost: 5 to 20 microseconds a chunk that is not uniform.
   static OccupancyTree build(const Grid& grid, const VoxelRegistry& types, Occupancy which = Occupancy::NonAir);
 
-  /// Takes over what an edit changed, in place; `chunks` are those that it touched (Grid::take_dirty names them).
+  /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///
-  /// Cost: 5 to 20 microseconds a chunk, all of which is read while only bricks that differ are written, and a look at
-  ///       the bounds of every other; when the box of chunks around everything grows or shrinks, the flat tables anew
-  ///       besides.
-  void update(const Grid& grid, const VoxelRegistry& types, std::span<const IVec3> chunks);
+  /// Cost: 5 to 20 microseconds a chunk that changed, all of which is read while only bricks that differ are written;
+  ///       when the box of chunks around everything grows or shrinks, the flat tables anew besides.
+  void update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
 
   /// The smallest box around the occupied voxels, to the voxel.
   [[nodiscard]] IBox bounds() const;

@@ -164,7 +164,7 @@ class Builder {
         steps_(progress, 2 * chunks_.size()) {}
 
   Result<SmoothMesh> build(const VoxelRegistry& types) {
-    if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return tl::unexpected(levels.error());
+    if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return levels.error();
     const SurfaceMaterials materials(types);
     Workspaces workspaces;
     parallel_for(chunks_.size(), threads_, [&](std::size_t i) {

@@ -75,7 +75,7 @@ void world(benchmark::State& state) {
   SmoothTerrainOptions terrain;
   terrain.size = {4, 2, 4};
   const auto field =
-      materials ? generate_smooth_terrain(terrain, *materials) : tl::unexpected<Error>(materials.error());
+      materials ? generate_smooth_terrain(terrain, *materials) : materials.error();
   if (!field) {
     std::fprintf(stderr, "smooth benchmark: %s\n", to_string(field.error()).c_str());
     std::exit(1);

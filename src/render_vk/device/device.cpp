@@ -6,12 +6,12 @@ namespace quoin::vulkan {
 
 Result<std::unique_ptr<Device>> Device::create(const VulkanOptions& options) {
   auto instance = VulkanInstance::create(options.on_validation_message, options.surface);
-  if (!instance) return tl::unexpected(instance.error());
+  if (!instance) return instance.error();
   const auto physical = (*instance)->choose(options.device);
-  if (!physical) return tl::unexpected(physical.error());
+  if (!physical) return physical.error();
   std::unique_ptr<Device> device(new Device());
   device->instance_ = std::move(*instance);
-  if (Status opened = device->open(*physical); !opened) return tl::unexpected(opened.error());
+  if (Status opened = device->open(*physical); !opened) return opened.error();
   return device;
 }
 

@@ -34,7 +34,7 @@ class Device {
   /// Nothing on success.
   [[nodiscard]] Status check(VkResult result, const std::string& doing) const {
     if (result == VK_SUCCESS) return {};
-    return tl::unexpected<Error>(error_of(result, doing));
+    return error_of(result, doing);
   }
 
   /// Has the commands that `record` records run, and waits for them. What they write is then seen by the processor

@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
-tl::unexpected<Error> refuse(std::string message) {
+Error refuse(std::string message) {
   return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
@@ -138,10 +138,10 @@ bool is_number(const std::string& text) {
 
 Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener, const VulkanSurface& window) {
   auto api = Api::load();
-  if (!api) return tl::unexpected(api.error());
+  if (!api) return api.error();
   std::unique_ptr<VulkanInstance> instance(new VulkanInstance(*api, std::move(listener)));
-  if (Status opened = instance->open(window); !opened) return tl::unexpected(opened.error());
-  if (Status listed = instance->list_devices(); !listed) return tl::unexpected(listed.error());
+  if (Status opened = instance->open(window); !opened) return opened.error();
+  if (Status listed = instance->list_devices(); !listed) return listed.error();
   return instance;
 }
 

@@ -71,7 +71,7 @@ Result<Buffer> Buffer::create(const Device& device, VkDeviceSize size, Where whe
     result = api.vkMapMemory(device.handle(), buffer.memory_, 0, VK_WHOLE_SIZE, 0, &mapped);
     buffer.mapped_ = static_cast<std::byte*>(mapped);
   }
-  if (Status status = device.check(result, doing); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, doing); !status) return status.error();
   const VkBufferDeviceAddressInfo address{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr, buffer.handle_};
   buffer.address_ = api.vkGetBufferDeviceAddress(device.handle(), &address);
   return buffer;
@@ -113,7 +113,7 @@ Result<Place> DeviceMemory::allocate(VkDeviceSize wanted, const std::string& doi
   // Room for the address to be a multiple, whatever the buffer's is.
   const VkDeviceSize bytes = std::max(size, block_bytes_ / kAlignment * kAlignment);
   auto buffer = Buffer::create(*device_, bytes + kAlignment, Buffer::Where::Device, doing);
-  if (!buffer) return tl::unexpected(buffer.error());
+  if (!buffer) return buffer.error();
   auto block = std::make_unique<Block>();
   block->free[(kAlignment - buffer->address() % kAlignment) % kAlignment] = bytes;
   block->buffer = std::move(*buffer);
@@ -149,7 +149,7 @@ Status DeviceMemory::write(const Place& place, std::span<const std::byte> bytes,
   written_ += bytes.size();
   if (staging_.handle() == VK_NULL_HANDLE && !bytes.empty()) {
     auto staging = Buffer::create(*device_, kStagingBytes, Buffer::Where::Upload, "uploading");
-    if (!staging) return tl::unexpected(staging.error());
+    if (!staging) return staging.error();
     staging_ = std::move(*staging);
   }
   while (!bytes.empty()) {

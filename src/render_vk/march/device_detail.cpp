@@ -57,7 +57,7 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
   if (done) done = memory_->flush();
   if (!done) {
     clear();
-    return tl::unexpected(done.error());
+    return done.error();
   }
   drop_unused(most_bytes);
   impostors_.drop_unused(most_bytes);

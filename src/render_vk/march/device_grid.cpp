@@ -71,7 +71,7 @@ Status DeviceGrid::put_chunk(DeviceMemory& memory, const Grid& grid, const Occup
   memory.release(entry.place);
   ChunkRecord record = pack_chunk(opaque, transparent, *voxels, chunk);
   const auto place = memory.allocate(record.words.size() * 4, "uploading voxels");
-  if (!place) return tl::unexpected(place.error());
+  if (!place) return place.error();
   entry.place = *place;
   record.move_to(place->address);
   entry.opaque = record.opaque;
@@ -90,7 +90,7 @@ Status DeviceGrid::put_top(DeviceMemory& memory, DeviceTree& tree, Node DeviceCh
     memory.release(tree.place);
     // Half as much again, so that a growing world does not move each time.
     const auto place = memory.allocate(bytes + bytes / 2, "uploading voxels");
-    if (!place) return tl::unexpected(place.error());
+    if (!place) return place.error();
     tree.place = *place;
     tree.top.nodes.clear();
     top = build_top_tree(std::move(chunks), tree.place.address);

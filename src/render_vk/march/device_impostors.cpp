@@ -109,7 +109,7 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   const auto of_levels = std::as_bytes(std::span(all));
   const auto of_faces = std::as_bytes(std::span(faces));
   const auto place = memory_->allocate(of_levels.size() + of_faces.size(), "uploading impostors");
-  if (!place) return tl::unexpected(place.error());
+  if (!place) return place.error();
   entry.place = *place;
   for (ShaderFarLevel& level : entry.levels) level.faces += place->address;
   entry.faces = place->address + of_levels.size();

@@ -27,7 +27,7 @@ Status VulkanPicture::Impl::resize(int new_width, int new_height) {
   const VkDeviceSize bytes =
       VkDeviceSize{4} * static_cast<VkDeviceSize>(new_width) * static_cast<VkDeviceSize>(new_height);
   auto made = vulkan::Buffer::create(*device, bytes, vulkan::Buffer::Where::Device, kDoing);
-  if (!made) return tl::unexpected(made.error());
+  if (!made) return made.error();
   colours = std::move(*made);
   width = new_width;
   height = new_height;
@@ -39,7 +39,7 @@ Status VulkanPicture::Impl::begin_sums() {
   rays = 0;
   if (sums.handle() != VK_NULL_HANDLE) return {};
   auto made = vulkan::Buffer::create(*device, colours.size() * 4, vulkan::Buffer::Where::Device, kDoing);
-  if (!made) return tl::unexpected(made.error());
+  if (!made) return made.error();
   sums = std::move(*made);
   return {};
 }
@@ -65,12 +65,12 @@ Result<Image> VulkanPicture::read() const {
   vulkan::Device& device = *impl_->device;
   auto landing =
       vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Read, "reading a picture");
-  if (!landing) return tl::unexpected(landing.error());
+  if (!landing) return landing.error();
   const Status done = device.run("reading a picture", [&](VkCommandBuffer commands) {
     const VkBufferCopy all{0, 0, landing->size()};
     device.api().vkCmdCopyBuffer(commands, impl_->colours.handle(), landing->handle(), 1, &all);
   });
-  if (!done) return tl::unexpected(done.error());
+  if (!done) return done.error();
   Image image;
   image.width = impl_->width;
   image.height = impl_->height;
@@ -90,7 +90,7 @@ Status VulkanPicture::write(const Image& image) {
   if (Status sized = impl_->resize(image.width, image.height); !sized) return sized;
   vulkan::Device& device = *impl_->device;
   auto staging = vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Upload, kDoing);
-  if (!staging) return tl::unexpected(staging.error());
+  if (!staging) return staging.error();
   for (std::size_t i = 0; i < pixels; ++i) std::memcpy(staging->mapped() + 4 * i, image.rgb.data() + 3 * i, 3);
   Status done = device.run("uploading a picture", [&](VkCommandBuffer commands) {
     const VkBufferCopy all{0, 0, staging->size()};

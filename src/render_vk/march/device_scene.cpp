@@ -176,7 +176,7 @@ Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> 
   if (bytes.size() > place.size || place.size == 0) {
     memory.release(place);
     const auto larger = memory.allocate(bytes.size(), "uploading the scene");
-    if (!larger) return tl::unexpected(larger.error());
+    if (!larger) return larger.error();
     place = *larger;
   }
   return memory.write(place, bytes);

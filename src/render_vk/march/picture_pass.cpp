@@ -47,7 +47,7 @@ PicturePass::~PicturePass() {
 
 Status PicturePass::reserve(std::size_t bytes, std::uint64_t& address) {
   const auto place = memory_->allocate(bytes, kDoing);
-  if (!place) return tl::unexpected(place.error());
+  if (!place) return place.error();
   places_.push_back(*place);
   address = place->address;
   return {};
@@ -104,7 +104,7 @@ Status PicturePass::make_tile_buffers(const RenderOptions& options) {
   for (Buffer* buffer : {&output_, &results_}) {
     const auto where = buffer == &output_ ? Buffer::Where::Device : Buffer::Where::Read;
     auto made = Buffer::create(*device_, bytes, where, kDoing);
-    if (!made) return tl::unexpected(made.error());
+    if (!made) return made.error();
     *buffer = std::move(*made);
   }
   frame_.counters = output_.address();
@@ -251,7 +251,7 @@ Status PicturePass::begin(const Camera& camera, const RenderOptions& options) {
 
 Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
   Status done = begin(camera, options);
-  if (!done) return tl::unexpected(done.error());
+  if (!done) return done.error();
   Picture picture = empty_picture(options);
   const std::vector<Tile> tiles = tiles_of(options);
   const double all = static_cast<double>(tiles.size()) * options.samples;
@@ -266,7 +266,7 @@ Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& o
   }
   ShaderCounters counters;
   if (done) done = read_counters(counters);
-  if (!done) return tl::unexpected(done.error());
+  if (!done) return done.error();
   picture.rays = rays_in(counters);
   picture.pixels_hit = counters.hits;
   return picture;

@@ -50,7 +50,7 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   for (std::size_t pass = 0; pass < kPassCount && result == VK_SUCCESS; ++pass) {
     result = made->make(static_cast<Pass>(pass));
   }
-  if (Status status = device.check(result, "compiling shaders"); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 

@@ -19,7 +19,7 @@ class Subject {
     if (!options.detail || impl.voxels == nullptr) return subject;
     const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.hidden, camera, options);
     auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
-    if (!placed) return tl::unexpected(placed.error());
+    if (!placed) return placed.error();
     subject.detailed_ = std::move(*placed);
     return subject;
   }
@@ -37,7 +37,7 @@ class Subject {
 
 Result<std::vector<VulkanDevice>> vulkan_devices() {
   const auto instance = vulkan::VulkanInstance::create({});
-  if (!instance) return tl::unexpected(instance.error());
+  if (!instance) return instance.error();
   std::vector<VulkanDevice> devices;
   for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
   return devices;
@@ -50,9 +50,9 @@ VulkanRenderer::~VulkanRenderer() = default;
 
 Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions& options) {
   auto device = vulkan::Device::create(options);
-  if (!device) return tl::unexpected(device.error());
+  if (!device) return device.error();
   auto pipelines = vulkan::Pipelines::create(**device);
-  if (!pipelines) return tl::unexpected(pipelines.error());
+  if (!pipelines) return pipelines.error();
   return VulkanRenderer(std::make_unique<Impl>(std::move(*device), std::move(*pipelines), options.block_bytes));
 }
 
@@ -73,9 +73,9 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 }
 
 Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
-  if (const Status status = check(camera, options); !status) return tl::unexpected(status.error());
+  if (const Status status = check(camera, options); !status) return status.error();
   const auto subject = Subject::of(*impl_, camera, options);
-  if (!subject) return tl::unexpected(subject.error());
+  if (!subject) return subject.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
   return pass.render(camera, options, progress);
 }
@@ -94,7 +94,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
     return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
   const auto subject = Subject::of(*impl_, camera, options);
-  if (!subject) return tl::unexpected(subject.error());
+  if (!subject) return subject.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
   return pass.draw(target, camera, options, progress);
 }

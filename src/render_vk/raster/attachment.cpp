@@ -47,7 +47,7 @@ Result<Attachment> Attachment::create(const Device& device, const Kind& kind, Vk
     view.subresourceRange = {kind.aspect, 0, 1, 0, 1};
     result = api.vkCreateImageView(device.handle(), &view, nullptr, &made.view_);
   }
-  if (Status status = device.check(result, doing); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, doing); !status) return status.error();
   return made;
 }
 

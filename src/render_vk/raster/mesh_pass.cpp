@@ -51,7 +51,7 @@ Result<std::unique_ptr<MeshPass>> MeshPass::create(Device& device, DeviceMemory&
     return fail(ErrorCode::Unsupported, "vulkan: " + name + " lacks depths in single precision");
   }
   std::unique_ptr<MeshPass> pass(new MeshPass(device, memory));
-  if (Status opened = pass->open(); !opened) return tl::unexpected(opened.error());
+  if (Status opened = pass->open(); !opened) return opened.error();
   return pass;
 }
 
@@ -64,7 +64,7 @@ Status MeshPass::open() {
                             limits.maxViewportDimensions[0], limits.maxViewportDimensions[1]});
   subpixels_ = 1 << std::min(limits.subPixelPrecisionBits, 16U);
   auto pipelines = MeshPipelines::create(*device_);
-  if (!pipelines) return tl::unexpected(pipelines.error());
+  if (!pipelines) return pipelines.error();
   pipelines_ = std::move(*pipelines);
   return put_corners();
 }
@@ -87,7 +87,7 @@ Status MeshPass::put_corners() {
     }
   }
   const auto place = memory_->allocate(bytes_of(indices), kDoing);
-  if (!place) return tl::unexpected(place.error());
+  if (!place) return place.error();
   corners_ = *place;
   Status done = memory_->write(corners_, std::as_bytes(std::span(indices)));
   if (done) done = memory_->flush();
@@ -102,7 +102,7 @@ Status MeshPass::grow(VkDeviceSize bytes) {
     const auto where = buffer == &staging_ ? Buffer::Where::Upload : Buffer::Where::Device;
     *buffer = {};
     auto made = Buffer::create(*device_, size, where, kDoing);
-    if (!made) return tl::unexpected(made.error());
+    if (!made) return made.error();
     *buffer = std::move(*made);
   }
   return {};
@@ -128,9 +128,9 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
   if (target_.is_of(size, samples)) return {};
   target_ = {};
   const auto pass = pipelines_->render_pass(samples);
-  if (!pass) return tl::unexpected(pass.error());
+  if (!pass) return pass.error();
   auto target = MeshTarget::create(*device_, *pass, size, samples);
-  if (!target) return tl::unexpected(target.error());
+  if (!target) return target.error();
   target_ = std::move(*target);
   return {};
 }
@@ -153,7 +153,7 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples)
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
       const auto found =
           pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, samples});
-      if (!found) return tl::unexpected(found.error());
+      if (!found) return found.error();
       out = *found;
       return {};
     };

@@ -153,7 +153,7 @@ Result<std::unique_ptr<MeshPipelines>> MeshPipelines::create(Device& device) {
     module.pCode = kCode[i].data();
     result = api.vkCreateShaderModule(device.handle(), &module, nullptr, &made->shaders_[i]);
   }
-  if (Status status = device.check(result, kDoing); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, kDoing); !status) return status.error();
   return made;
 }
 
@@ -170,7 +170,7 @@ MeshPipelines::~MeshPipelines() {
 Result<VkRenderPass> MeshPipelines::render_pass(std::uint32_t samples) {
   if (const auto known = passes_.find(samples); known != passes_.end()) return known->second;
   VkRenderPass pass = VK_NULL_HANDLE;
-  if (Status status = device_->check(make_pass(samples, pass), kDoing); !status) return tl::unexpected(status.error());
+  if (Status status = device_->check(make_pass(samples, pass), kDoing); !status) return status.error();
   passes_[samples] = pass;
   return pass;
 }
@@ -178,10 +178,10 @@ Result<VkRenderPass> MeshPipelines::render_pass(std::uint32_t samples) {
 Result<VkPipeline> MeshPipelines::pipeline(const MeshWay& way) {
   if (const auto known = pipelines_.find(way); known != pipelines_.end()) return known->second;
   const auto pass = render_pass(way.samples);
-  if (!pass) return tl::unexpected(pass.error());
+  if (!pass) return pass.error();
   VkPipeline pipeline = VK_NULL_HANDLE;
   if (Status status = device_->check(make(way, *pass, pipeline), kDoing); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   pipelines_[way] = pipeline;
   return pipeline;

@@ -131,7 +131,7 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
   }
   if (bytes.empty()) return {};
   const auto place = memory_->allocate(bytes.size(), "uploading meshes");
-  if (!place) return tl::unexpected(place.error());
+  if (!place) return place.error();
   mesh.place = *place;
   return memory_->write(mesh.place, bytes);
 }

@@ -20,14 +20,14 @@ Result<MeshTarget> MeshTarget::create(const Device& device, VkRenderPass pass, V
   made.samples_ = samples;
   const auto add = [&](Attachment& to, const Attachment::Kind& kind, std::uint32_t count) -> Status {
     auto image = Attachment::create(device, kind, size, count, doing);
-    if (!image) return tl::unexpected(image.error());
+    if (!image) return image.error();
     to = std::move(*image);
     return {};
   };
   Status done = add(made.colour_, drawn, samples);
   if (done) done = add(made.depth_, depths, samples);
   if (done && samples > 1) done = add(made.resolved_, copied, 1);
-  if (!done) return tl::unexpected(done.error());
+  if (!done) return done.error();
   const std::array views = {made.colour_.view(), made.depth_.view(), made.resolved_.view()};
   auto info = info_of<VkFramebufferCreateInfo>(VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO);
   info.renderPass = pass;
@@ -37,7 +37,7 @@ Result<MeshTarget> MeshTarget::create(const Device& device, VkRenderPass pass, V
   info.height = size.height;
   info.layers = 1;
   const VkResult result = device.api().vkCreateFramebuffer(device.handle(), &info, nullptr, &made.framebuffer_);
-  if (Status status = device.check(result, doing); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, doing); !status) return status.error();
   return made;
 }
 

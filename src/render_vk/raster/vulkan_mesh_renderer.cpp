@@ -80,7 +80,7 @@ VulkanMeshRenderer::~VulkanMeshRenderer() = default;
 Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) {
   VulkanRenderer::Impl& shared = renderer.impl();
   auto pass = vulkan::MeshPass::create(*shared.device, shared.memory);
-  if (!pass) return tl::unexpected(pass.error());
+  if (!pass) return pass.error();
   return VulkanMeshRenderer(std::make_unique<Impl>(shared, std::move(*pass)));
 }
 
@@ -117,7 +117,7 @@ Status VulkanMeshRenderer::Impl::upload_surfaces(const std::vector<Vec4>& table)
   if (bytes.size() > surfaces.size) {
     memory->release(surfaces);
     const auto larger = memory->allocate(bytes.size(), "uploading the types");
-    if (!larger) return tl::unexpected(larger.error());
+    if (!larger) return larger.error();
     surfaces = *larger;
   }
   if (Status done = memory->write(surfaces, bytes); !done) return done;
@@ -151,7 +151,7 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   // Nothing was updated yet, or that failed: then there are no types either.
   if (impl_->surface_table.empty()) impl_->instances.clear();
   auto data = vulkan::make_mesh_frame(impl_->store, impl_->instances, camera, options, impl_->pass->subpixels());
-  if (!data) return tl::unexpected(data.error());
+  if (!data) return data.error();
   data->push.surfaces = impl_->surfaces.address;
   const std::size_t types = std::max<std::size_t>(impl_->surface_table.size() / 3, 1);
   data->push.numbers |= static_cast<std::uint32_t>(types - 1) << vulkan::kMeshLastSurfaceShift;

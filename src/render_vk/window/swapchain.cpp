@@ -43,7 +43,7 @@ Result<std::unique_ptr<Swapchain>> Swapchain::create(Device& device, VkRenderPas
   std::unique_ptr<Swapchain> made(new Swapchain(device));
   const VkExtent2D wanted{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
   const VkResult result = made->open(pass, wanted, vsync, old == nullptr ? VK_NULL_HANDLE : old->handle());
-  if (Status status = device.check(result, kDoing); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, kDoing); !status) return status.error();
   if (made->handle() == VK_NULL_HANDLE) made.reset();
   return made;
 }

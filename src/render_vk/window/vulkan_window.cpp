@@ -115,7 +115,7 @@ Status VulkanWindow::Impl::fit(int width, int height) {
   device->api().vkDeviceWaitIdle(device->handle());
   const std::unique_ptr<vulkan::Swapchain> old = std::move(swapchain);
   auto made = vulkan::Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
-  if (!made) return tl::unexpected(made.error());
+  if (!made) return made.error();
   swapchain = std::move(*made);
   is_stale = false;
   return {};
@@ -125,7 +125,7 @@ Status VulkanWindow::Impl::put(Buffer& buffer, std::span<const std::byte> bytes)
   if (bytes.empty()) return {};
   if (buffer.size() < bytes.size()) {
     auto made = Buffer::create(*device, bytes.size() * 3 / 2, Buffer::Where::Upload, kDoing);
-    if (!made) return tl::unexpected(made.error());
+    if (!made) return made.error();
     buffer = std::move(*made);
   }
   std::memcpy(buffer.mapped(), bytes.data(), bytes.size());
@@ -240,9 +240,9 @@ Result<VulkanWindow> VulkanWindow::create(VulkanRenderer& renderer, bool vsync) 
   }
   auto impl = std::make_unique<Impl>(device, vsync);
   auto pipelines = vulkan::WindowPipelines::create(device);
-  if (!pipelines) return tl::unexpected(pipelines.error());
+  if (!pipelines) return pipelines.error();
   impl->pipelines = std::move(*pipelines);
-  if (Status made = device.check(impl->make_objects(), "opening a window"); !made) return tl::unexpected(made.error());
+  if (Status made = device.check(impl->make_objects(), "opening a window"); !made) return made.error();
   return VulkanWindow(std::move(impl));
 }
 

@@ -24,7 +24,7 @@ constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_ST
 
 Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(Device& device) {
   const auto format = Swapchain::format_of(device);
-  if (!format) return tl::unexpected(format.error());
+  if (!format) return format.error();
   std::unique_ptr<WindowPipelines> made(new WindowPipelines(device));
   VkResult result = made->make_pass(format->format);
   if (result == VK_SUCCESS) result = made->make_layout();
@@ -42,7 +42,7 @@ Result<std::unique_ptr<WindowPipelines>> WindowPipelines::create(Device& device)
   if (result == VK_SUCCESS) {
     result = make_graphics_pipeline(device, kOverlayVertex, kOverlayFragment, info, made->overlay_);
   }
-  if (Status status = device.check(result, "compiling shaders"); !status) return tl::unexpected(status.error());
+  if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 

@@ -19,29 +19,24 @@ bool KeptTrees::update(const Grid& grid, const VoxelRegistry& types) {
   const GridChanges changes = grid.changes_since(now);
   if (changes.empty()) return false;
   followed_ = {};  // stays so when memory runs out
-  std::vector<IVec3> changed;
-  if (changes.all) {
-    opaque_ = OccupancyTree::build(grid, types, Occupancy::Opaque);
-    transparent_.reset();
-    changed = grid.chunks();
-  } else {
-    for (const ChunkChange& change : changes.items) changed.push_back(change.chunk);
-    opaque_.update(grid, types, changed);
-  }
-  update_transparent(grid, types, changed);
+  if (changes.all) transparent_.reset();
+  opaque_.update(grid, types, changes);
+  update_transparent(grid, types, changes);
   followed_ = now;
   return true;
 }
 
-void KeptTrees::update_transparent(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& changed) {
+void KeptTrees::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (transparent_) {
-    transparent_->update(grid, types, changed);
+    transparent_->update(grid, types, changes);
     if (transparent_->bounds().empty()) transparent_.reset();
     return;
   }
-  const bool has_transparent = std::any_of(changed.begin(), changed.end(), [&](IVec3 chunk) {
-    return has_transparent_types(grid.find_chunk(chunk), types);
-  });
+  const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
+  const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();
+  const bool has_transparent = std::any_of(present.begin(), present.end(), holds_some) ||
+                               std::any_of(changes.items.begin(), changes.items.end(),
+                                           [&](const ChunkChange& change) { return holds_some(change.chunk); });
   if (has_transparent) transparent_.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
 }
 

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <vector>
-
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/trace/occupancy_tree.h>
@@ -26,10 +24,10 @@ class KeptTrees {
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
 
  private:
-  void update_transparent(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& changed);
+  void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
 
   ChangeCursor followed_;
-  OccupancyTree opaque_;
+  OccupancyTree opaque_{Occupancy::Opaque};
   std::optional<OccupancyTree> transparent_;
 };
 

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
+
+namespace quoin {
+
+/// How a file stores one value.
+enum class ScalarType : std::uint8_t {
+  UInt8,
+  Int8,
+  UInt16,
+  Int16,
+  UInt32,
+  Int32,
+  UInt64,
+  Int64,
+  Float32,
+  Float64,
+};
+
+/// "uint8", "float64".
+[[nodiscard]] std::string_view name_of(ScalarType type);
+/// 1, 2, 4 or 8.
+[[nodiscard]] std::size_t bytes_of(ScalarType type);
+
+/// Samples of a scalar on a regular lattice: a CT scan, a simulation.
+struct Volume {
+  IVec3 size{0};              ///< samples along i, j and k, the axes in which the file stores them
+  std::vector<float> values;  ///< sample (i, j, k) at i + size.x * (j + size.y * k), scaled as the file says
+  DVec3 spacing{1.0};         ///< distance of neighbours along i, j and k, in `units`
+
+  /// Where sample (i, j, k) lies in Quoin's axes, in `units`; a rotation, shear and scale with the file's origin.
+  ///
+  /// The body that was scanned is turned, never mirrored. Many files store it mirrored (from right to left): the
+  /// determinant is negative then, and what is meshed in (i, j, k) needs its triangles turned round.
+  glm::dmat4 world_from_voxel{1.0};
+
+  float min = 0.0F;  ///< the smallest and largest finite value; both 0 when there is none
+  float max = 0.0F;
+  std::int64_t nan_count = 0;
+  std::int64_t infinite_count = 0;  ///< of either sign, values too large for a float among them
+
+  std::string format;                   ///< "nifti", "nrrd" or "raw"
+  ScalarType type = ScalarType::UInt8;  ///< as stored
+  std::string units;                    ///< "mm"; empty where the file does not say
+  std::string name;
+  std::vector<std::string> warnings;  ///< one line each
+};
+
+/// How many metres a unit of length has: "m", "cm", "mm", "um" and "nm", also spelt out; nothing for others.
+[[nodiscard]] std::optional<double> metres_of_unit(std::string_view unit);
+
+/// A value between the two groups into which the finite values part best: the one that leaves the least variance within
+/// the groups, by a histogram of 1,024 bins; amid the gap where there is one. The value itself where all are the same.
+///
+/// Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms" (1979).
+[[nodiscard]] float volume_threshold(const Volume& volume);
+
+struct VolumeFieldOptions {
+  float iso = 0.0F;        ///< what has a greater value is solid
+  VoxelType material = 1;  ///< of all that is solid
+};
+
+/// The density whose surface is where a volume has the value `iso`.
+///
+/// Space:     sample (i, j, k) is the volume's; beyond the volume is far air, so that what it cuts off is closed there.
+/// Density:   (iso - value) / slope within a band of 8, where `slope` is the median steepness of the volume where
+///            the surface crosses its edges, so that densities are about distances in samples; where nothing is
+///            crossed, the slope is that which takes the volume's range, or 1 where that is 0, to 8. The value `iso`
+///            itself is air.
+/// Values:    NaN is air; infinities are far air and deep solid.
+/// Order:     the same densities at any thread count.
+/// Errors:    InvalidArgument when `iso` is NaN, a size is not positive or there are not as many values as the size
+///            says; Cancelled. A volume that never crosses `iso` gives an empty or a solid field.
+/// Memory:    2 bytes a sample near the surface or where the volume is within the band, none where it is far from it.
+[[nodiscard]] Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOptions& options,
+                                                    Threads threads = {}, const Progress& progress = {});
+
+}  // namespace quoin

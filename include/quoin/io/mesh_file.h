@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/io/formats.h>
+#include <quoin/scene/scene_meshes.h>
+
+namespace quoin {
+
+struct MeshFileOptions {
+  std::optional<FileFormat> format{};  ///< of the mesh formats; without, that of the path's extension
+  bool occlusion = true;               ///< without, the meshes' occlusion is left out
+};
+
+/// Writes meshes as a file; returns the size of all that was written.
+///
+///            auto meshes = mesh_scene(scene);
+///            auto bytes = write_mesh(*meshes, "castle.glb");
+///
+/// GLB, glTF: version 2.0. Quoin's axes are glTF's (+Y up, the front towards +Z); one world unit is a metre. A node per
+///            placement carries translation, rotation and positive scale; vertices are relative to the part's pivot.
+///            Placements share the part's mesh, mirrored ones a second, reflected mesh, those that shear one that is
+///            sheared, since nodes cannot. `.gltf` is the same as text, with a file of the same name ending in ".bin"
+///            beside it (none when nothing is drawn).
+///            Blocks have a palette texture, 256 texels wide, with one texel a voxel type (nearest, clamped), and one
+///            with roughness (green) and metalness (blue); occlusion is grey in COLOR_0. Materials are opaque,
+///            transparent (blended, alpha in the palette), and emissive: texture times emissiveFactor times
+///            KHR_materials_emissive_strength; strengths within a factor of two share a material and are scaled in the
+///            texture, so that its 8 bits cost them at most one more bit.
+///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times openness, and one rough,
+///            opaque material.
+/// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
+///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
+///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Smooth meshes: nine
+///            digits, sRGB colours after the coordinates, no materials.
+/// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
+///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
+///            emission are lost.
+/// Left out:  parts without a triangle (their placements are glTF nodes without a mesh) or a placement.
+/// Order:     the same bytes on every run.
+/// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
+///            copy of surfaces whose emission takes several materials.
+/// Errors:    Unsupported for a format that is none of meshes; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of
+///            GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine
+///            or singular, when a vertex comes to lie beyond the range of floats, or when a mesh contradicts itself
+///            (arrays of different lengths, indices of no vertex, types that are not registered, numbers that are not
+///            finite). Files appear whole or not at all.
+/// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength; Alias/Wavefront's
+///            OBJ and MTL.
+[[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                               const MeshFileOptions& options = {}, const Progress& progress = {});
+
+/// The same as bytes, for formats that are one file: GLB, PLY and OBJ of smooth meshes.
+///
+/// Errors: also Unsupported for what takes several files.
+[[nodiscard]] Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format,
+                                                        const MeshFileOptions& options = {},
+                                                        const Progress& progress = {});
+
+/// The files that write_mesh writes or replaces, `path` first. Errors: Unsupported.
+[[nodiscard]] Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
+                                                                    const std::filesystem::path& path,
+                                                                    const MeshFileOptions& options = {});
+
+}  // namespace quoin

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/volume.h>
+#include <quoin/mesh/mesh_view.h>
+#include <quoin/scene/scene.h>
+
+namespace quoin {
+
+/// What makes a body no other than bigger, turned, moved and perhaps mirrored.
+struct Similarity {
+  DVec3 position{0.0};
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length but 0
+  double scale = 1.0;                  ///< positive
+  bool mirrored = false;               ///< x is negated before the rotation
+};
+
+/// One place of a part in the world.
+struct MeshPlacement {
+  std::size_t part = 0;  ///< index into SceneMeshes::parts
+  std::string name;      ///< empty: that of the part
+  /// Takes points of the part, relative to its pivot, to the world. A matrix must be affine; a negative determinant
+  /// mirrors.
+  std::variant<Similarity, glm::dmat4> world_from_part{Similarity{}};
+
+  [[nodiscard]] glm::dmat4 matrix() const;
+};
+
+/// A body that is placed as one, any number of times.
+struct MeshPart {
+  std::string name;
+  std::vector<MeshView> surfaces{};     ///< all of one kind; may be none
+  DVec3 pivot{0.0};                     ///< the point that placements take to their translation
+  std::shared_ptr<const void> owner{};  ///< of the arrays that `surfaces` shows; null where someone else keeps them
+};
+
+/// A part that owns its mesh. Surfaces without a triangle are left out.
+[[nodiscard]] MeshPart mesh_part(std::string name, BlockyMesh mesh, const DVec3& pivot = DVec3(0.0));
+[[nodiscard]] MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot = DVec3(0.0));
+
+/// What was counted while meshing; a part that is placed several times counts once.
+struct MeshStats {
+  std::int64_t faces_visible = 0;  ///< of blocks
+  std::int64_t faces_total = 0;    ///< likewise
+  std::int64_t quads = 0;          ///< likewise
+  std::int64_t triangles = 0;
+  std::int64_t vertices = 0;
+  std::int64_t solid_samples = 0;  ///< of a volume
+  float simplify_error = 0.0F;     ///< the largest that was reached, in voxels or samples
+};
+
+/// Meshes and where they stand: what files of meshes are written from, whoever made them.
+struct SceneMeshes {
+  std::vector<MeshPart> parts;
+  std::vector<MeshPlacement> placements;
+  VoxelRegistry types;  ///< the materials of blocks
+  MeshStats stats;
+};
+
+/// Whether an instance is drawn: its grid exists, and it is visible or hidden ones are asked for.
+[[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, bool hidden);
+
+struct BlockySceneOptions {
+  BlockyMeshOptions mesh{};
+  bool hidden = false;  ///< whether instances that are not visible count as drawn
+};
+
+/// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
+/// grids' handles, a placement per drawn instance in that of theirs.
+///
+/// Order:  the same bytes at any thread count.
+/// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
+///         size not positive; Cancelled when `progress` says so.
+[[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {});
+
+struct SmoothSceneOptions {
+  SmoothMeshOptions mesh{};
+  std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
+  bool hidden = false;                    ///< whether instances that are not visible count as drawn
+};
+
+/// Likewise, with smooth surfaces around the voxels, as field_from_grid and build_smooth_mesh make them. Placements are
+/// in the order of their parts; grids without a surface are left out.
+///
+/// Types:  every voxel that is not air is solid and opaque.
+/// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.
+[[nodiscard]] Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options = {},
+                                                      Threads threads = {}, const Progress& progress = {});
+
+struct VolumeMeshOptions {
+  float iso = 0.0F;  ///< solid where values are above
+  SmoothMeshOptions mesh{};
+  std::optional<float> simplify_error{};  ///< in samples
+  Rgba8 colour{180, 176, 168, 255};
+};
+
+/// The surface of a volume, as field_from_volume and build_smooth_mesh find it: one part, named as the volume and
+/// placed where it says, in its units; none when there is no surface. Errors: theirs, and those of
+/// simplify_smooth_mesh.
+[[nodiscard]] Result<SceneMeshes> mesh_volume(const Volume& volume, const VolumeMeshOptions& options = {},
+                                              Threads threads = {}, const Progress& progress = {});
+
+}  // namespace quoin

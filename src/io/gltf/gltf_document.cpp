@@ -1,0 +1,187 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "io/gltf/gltf_layout.h"
+
+namespace quoin {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// glTF 2.0's numbers for what it borrows from OpenGL.
+constexpr int kUnsignedByte = 5121;
+constexpr int kUnsignedShort = 5123;
+constexpr int kUnsignedInt = 5125;
+constexpr int kFloat = 5126;
+constexpr int kArrayBuffer = 34962;
+constexpr int kElementArrayBuffer = 34963;
+constexpr int kNearest = 9728;
+constexpr int kClampToEdge = 33071;
+
+constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+
+Json json_from(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+/// Adding zero turns -0 into 0.
+Json json_from(const DVec3& v) {
+  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
+}
+/// In glTF's order: x, y, z, w.
+Json json_from(const DQuat& q) {
+  return {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0};
+}
+
+/// Collects buffer views and accessors, which refer to each other by number.
+struct Arrays {
+  Json views = Json::array();
+  Json accessors = Json::array();
+
+  /// `target` 0: none. Returns the view's number.
+  std::size_t add_view(const GltfView& view, int target) {
+    Json entry = {{"buffer", 0}, {"byteOffset", view.offset}, {"byteLength", view.bytes}};
+    if (target != 0) entry["target"] = target;
+    views.push_back(std::move(entry));
+    return views.size() - 1;
+  }
+
+  /// A view and the accessor of all of it; returns the accessor's number.
+  std::size_t add(const GltfView& view, int target, int component, const char* type, std::uint64_t count) {
+    accessors.push_back(
+        {{"bufferView", add_view(view, target)}, {"componentType", component}, {"count", count}, {"type", type}});
+    return accessors.size() - 1;
+  }
+};
+
+Json attributes_json(const GltfPrimitive& primitive, Arrays& arrays) {
+  const std::uint64_t vertices = primitive.view.positions.size();
+  Json attributes;
+  attributes["POSITION"] = arrays.add(primitive.positions, kArrayBuffer, kFloat, "VEC3", vertices);
+  arrays.accessors.back()["min"] = json_from(primitive.min);
+  arrays.accessors.back()["max"] = json_from(primitive.max);
+  attributes["NORMAL"] = arrays.add(primitive.normals, kArrayBuffer, kFloat, "VEC3", vertices);
+  if (primitive.texture_coordinates.bytes > 0) {
+    attributes["TEXCOORD_0"] = arrays.add(primitive.texture_coordinates, kArrayBuffer, kFloat, "VEC2", vertices);
+  }
+  if (primitive.colours.bytes > 0) {
+    const int component = primitive.view.has_albedo() ? kUnsignedShort : kUnsignedByte;
+    attributes["COLOR_0"] = arrays.add(primitive.colours, kArrayBuffer, component, "VEC4", vertices);
+    arrays.accessors.back()["normalized"] = true;
+  }
+  return attributes;
+}
+
+Json primitive_json(const GltfPrimitive& primitive, Arrays& arrays) {
+  Json attributes = attributes_json(primitive, arrays);
+  const std::size_t indices =
+      arrays.add(primitive.indices, kElementArrayBuffer, primitive.wide_indices ? kUnsignedInt : kUnsignedShort,
+                 "SCALAR", primitive.view.indices.size());
+  return {{"attributes", std::move(attributes)}, {"indices", indices}, {"material", primitive.material}};
+}
+
+Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
+  Json meshes = Json::array();
+  for (const GltfMesh& mesh : layout.meshes) {
+    Json primitives = Json::array();
+    for (const GltfPrimitive& primitive : mesh.primitives) primitives.push_back(primitive_json(primitive, arrays));
+    Json entry = Json::object();
+    if (!mesh.name.empty()) entry["name"] = mesh.name;
+    entry["primitives"] = std::move(primitives);
+    meshes.push_back(std::move(entry));
+  }
+  return meshes;
+}
+
+/// The factor goes up to 1, the extension beyond it, so that clients without the extension get weak lights right.
+void add_emission(const SurfaceMaterial& material, Json& entry) {
+  const float factor = std::min(material.emission, 1.0F);
+  entry["emissiveTexture"] = {{"index", 2}};
+  entry["emissiveFactor"] = {factor, factor, factor};
+  entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
+}
+
+Json materials_json(const GltfLayout& layout) {
+  Json materials = Json::array();
+  for (const SurfaceMaterial& material : layout.palette.materials()) {
+    Json entry = {{"name", material.name}};
+    entry["pbrMetallicRoughness"] = {{"baseColorTexture", {{"index", 0}}},
+                                     {"metallicFactor", 1.0},
+                                     {"roughnessFactor", 1.0},
+                                     {"metallicRoughnessTexture", {{"index", 1}}}};
+    if (material.is_emissive()) add_emission(material, entry);
+    if (material.is_transparent()) entry["alphaMode"] = "BLEND";
+    materials.push_back(std::move(entry));
+  }
+  if (layout.has_smooth) {
+    materials.push_back(
+        {{"name", "smooth"}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
+  }
+  return materials;
+}
+
+void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
+  document["samplers"] = Json::array(
+      {{{"magFilter", kNearest}, {"minFilter", kNearest}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}});
+  Json images = Json::array();
+  Json textures = Json::array();
+  for (const GltfImage& image : layout.images) {
+    textures.push_back({{"sampler", 0}, {"source", images.size()}});
+    images.push_back({{"name", image.name}, {"mimeType", "image/png"}, {"bufferView", arrays.add_view(image.view, 0)}});
+  }
+  document["textures"] = std::move(textures);
+  document["images"] = std::move(images);
+}
+
+Json node_json(const GltfNode& node) {
+  Json entry = Json::object();
+  if (!node.name.empty()) entry["name"] = node.name;
+  if (node.mesh) entry["mesh"] = *node.mesh;
+  const GltfTransform& transform = node.transform;
+  if (transform.translation != DVec3(0.0)) entry["translation"] = json_from(transform.translation);
+  if (transform.rotation != DQuat(1, 0, 0, 0)) entry["rotation"] = json_from(transform.rotation);
+  if (transform.scale != DVec3(1.0)) entry["scale"] = json_from(transform.scale);
+  if (!node.mesh) entry["extras"] = {{"voxels", 0}};
+  return entry;
+}
+
+void add_nodes(const GltfLayout& layout, Json& document) {
+  Json nodes = Json::array();
+  Json numbers = Json::array();
+  for (const GltfNode& node : layout.nodes) {
+    numbers.push_back(nodes.size());
+    nodes.push_back(node_json(node));
+  }
+  Json scene = Json::object();
+  document["scene"] = 0;
+  if (!nodes.empty()) scene["nodes"] = std::move(numbers);
+  document["scenes"] = Json::array({std::move(scene)});
+  if (!nodes.empty()) document["nodes"] = std::move(nodes);
+}
+
+void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& document) {
+  Arrays arrays;
+  document["meshes"] = meshes_json(layout, arrays);
+  document["materials"] = materials_json(layout);
+  if (!layout.images.empty()) add_textures(layout, arrays, document);
+  document["accessors"] = std::move(arrays.accessors);
+  document["bufferViews"] = std::move(arrays.views);
+  Json buffer = Json::object();
+  if (!buffer_uri.empty()) buffer["uri"] = buffer_uri;
+  buffer["byteLength"] = layout.buffer_bytes;
+  document["buffers"] = Json::array({std::move(buffer)});
+}
+
+}  // namespace
+
+std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri) {
+  Json document;
+  document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
+  if (layout.palette.has_emission()) document["extensionsUsed"] = Json::array({kEmissiveStrength});
+  add_nodes(layout, document);
+  if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace quoin

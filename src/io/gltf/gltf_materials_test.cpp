@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "io/gltf/gltf_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+using Json = nlohmann::json;
+
+using GltfMaterials = Gltf;
+
+TEST_F(GltfMaterials, occlusion_is_linear_grey_with_full_alpha_and_can_be_left_out) {
+  place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
+  const auto meshes = mesh_scene(scene_);
+  const ParsedGlb glb = write(*meshes);
+  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
+  const std::size_t accessor = primitive["attributes"]["COLOR_0"];
+  EXPECT_EQ(glb.document["accessors"][accessor]["componentType"], 5121);
+  EXPECT_EQ(glb.document["accessors"][accessor]["type"], "VEC4");
+  EXPECT_EQ(glb.document["accessors"][accessor]["normalized"], true);
+  const auto colours = glb.array<std::array<std::uint8_t, 4>>(accessor);
+  const auto& levels = meshes->parts[0].surfaces[0].levels;
+  ASSERT_EQ(colours.size(), levels.size());
+  constexpr std::array<std::uint8_t, 4> grey_of_level = {255, 191, 128, 64};
+  std::set<std::uint8_t> seen;
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const std::uint8_t grey = grey_of_level[levels[i]];
+    EXPECT_EQ(colours[i], (std::array<std::uint8_t, 4>{grey, grey, grey, 255}));
+    seen.insert(grey);
+  }
+  EXPECT_GT(seen.size(), 1U) << "the model has inner corners";
+  const ParsedGlb plain = write(BlockyMeshOptions{.merge = true, .occlusion = false, .watertight = false});
+  EXPECT_FALSE(plain.document["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"));
+}
+
+TEST_F(GltfMaterials, every_type_has_its_texel) {
+  SceneGrid grid;
+  grid.name = "ramp";
+  for (int i = 0; i < 600; ++i) {
+    VoxelProperties properties;
+    properties.colour = {static_cast<std::uint8_t>(i % 256), static_cast<std::uint8_t>(i / 256), 77, 255};
+    properties.roughness = static_cast<float>(i) / 600.0F;
+    properties.metalness = 1.0F - properties.roughness;
+    grid.grid.set({2 * i, 0, 0}, *scene_.types.add(properties));
+  }
+  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
+  const auto meshes = mesh_scene(scene_);
+  const ParsedGlb glb = write(*meshes);
+  const PngImage palette = glb.image(0);
+  const PngImage surface = glb.image(1);
+  EXPECT_EQ(palette.width, 256U);
+  EXPECT_EQ(palette.height, 4U) << "601 types need 3 rows, and textures keep to powers of two";
+  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
+  const auto& types = meshes->parts[0].surfaces[0].types;
+  for (std::size_t vertex = 0; vertex < types.size(); vertex += 5) {
+    const VoxelProperties& properties = scene_.types[types[vertex]];
+    EXPECT_EQ(glb.texel(palette, primitive, vertex),
+              (std::array<int, 4>{properties.colour.r, properties.colour.g, 77, 255}));
+    const auto rough = glb.texel(surface, primitive, vertex);
+    EXPECT_NEAR(rough[1], properties.roughness * 255.0F, 0.51F);
+    EXPECT_NEAR(rough[2], properties.metalness * 255.0F, 0.51F);
+  }
+  const Json& sampler = glb.document["samplers"][0];
+  EXPECT_EQ(sampler, Json({{"magFilter", 9728}, {"minFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33071}}));
+  EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["metallicFactor"], 1.0);
+  EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 1.0);
+}
+
+TEST_F(GltfMaterials, transparent_types_blend_with_alpha_in_the_palette) {
+  VoxelProperties glass;
+  glass.colour = {10, 200, 220, 90};
+  glass.visibility = Visibility::Transparent;
+  VoxelProperties stone;
+  stone.colour = {90, 90, 90, 40};
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, *scene_.types.add(glass));
+  grid.grid.set({2, 0, 0}, *scene_.types.add(stone));
+  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
+  const ParsedGlb glb = write();
+  const Json& primitives = glb.document["meshes"][0]["primitives"];
+  ASSERT_EQ(primitives.size(), 2U);
+  const Json& opaque = glb.document["materials"][primitives[0]["material"].get<std::size_t>()];
+  const Json& blended = glb.document["materials"][primitives[1]["material"].get<std::size_t>()];
+  EXPECT_FALSE(opaque.contains("alphaMode"));
+  EXPECT_EQ(blended["alphaMode"], "BLEND");
+  EXPECT_NE(opaque["name"], blended["name"]);
+  const PngImage palette = glb.image(0);
+  EXPECT_EQ(glb.texel(palette, primitives[0], 0), (std::array<int, 4>{90, 90, 90, 255}))
+      << "opaque whatever alpha says";
+  EXPECT_EQ(glb.texel(palette, primitives[1], 0), (std::array<int, 4>{10, 200, 220, 90}));
+}
+
+double linear_from_srgb(int srgb) {
+  const double value = srgb / 255.0;
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+TEST_F(GltfMaterials, emission_comes_out_right_in_linear_light_whatever_the_strengths) {
+  const std::vector<float> strengths = {8.0F, 6.5F, 4.0F, 3.9F, 0.5F, 0.02F, 1000.0F};
+  SceneGrid grid;
+  std::vector<VoxelType> types;
+  for (std::size_t i = 0; i < strengths.size(); ++i) {
+    VoxelProperties lamp;
+    lamp.colour = {250, 180, static_cast<std::uint8_t>(40 + i), 255};
+    lamp.emission = strengths[i];
+    types.push_back(*scene_.types.add(lamp));
+    grid.grid.set({static_cast<int>(2 * i), 0, 0}, types.back());
+  }
+  grid.grid.set({0, 2, 0}, add_type(scene_, "stone", {90, 90, 90, 255}));
+  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
+  const ParsedGlb glb = write();
+  EXPECT_EQ(glb.document["extensionsUsed"], Json({"KHR_materials_emissive_strength"}));
+  std::set<std::string> names;
+  for (const Json& material : glb.document["materials"]) names.insert(material["name"]);
+  EXPECT_EQ(names.size(), glb.document["materials"].size());
+  std::set<int> found;
+  for (const Json& primitive : glb.document["meshes"][0]["primitives"]) {
+    const Json& material = glb.document["materials"][primitive["material"].get<std::size_t>()];
+    if (!material.contains("emissiveTexture")) continue;
+    EXPECT_EQ(material["emissiveTexture"]["index"], 2);
+    const double factor = material["emissiveFactor"][0].get<double>() *
+                          material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"].get<double>();
+    const auto count = glb.vectors(primitive, "POSITION").size();
+    for (std::size_t vertex = 0; vertex < count; vertex += 4) {
+      const auto base = glb.texel(glb.image(0), primitive, vertex);
+      const auto texel = glb.texel(glb.image(2), primitive, vertex);
+      const double expected = strengths[static_cast<std::size_t>(base[2] - 40)];
+      EXPECT_EQ(base[0], 250) << "the base colour is kept";
+      EXPECT_NEAR(factor * linear_from_srgb(texel[0]) / linear_from_srgb(base[0]), expected, expected * 0.01);
+      found.insert(base[2]);
+    }
+  }
+  EXPECT_EQ(found.size(), strengths.size());
+}
+
+TEST_F(GltfMaterials, one_strength_keeps_the_palette_colour_in_the_emissive_texture) {
+  VoxelProperties lamp;
+  lamp.colour = {201, 102, 3, 255};
+  lamp.emission = 0.35F;
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, *scene_.types.add(lamp));
+  place(scene_, scene_.add_grid(std::move(grid)), {0, 0, 0});
+  const ParsedGlb glb = write();
+  const Json& primitive = glb.document["meshes"][0]["primitives"][0];
+  EXPECT_EQ(glb.texel(glb.image(2), primitive, 0), (std::array<int, 4>{201, 102, 3, 255}));
+}
+
+}  // namespace
+
+}  // namespace quoin

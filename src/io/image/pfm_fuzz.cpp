@@ -1,0 +1,15 @@
+#include <quoin/io/picture_files.h>
+
+#include <cstdlib>
+
+/// Any bytes must give a picture of the size that it claims, or an error of one line.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto picture = quoin::read_pfm({reinterpret_cast<const std::byte*>(data), size});
+  if (!picture) {
+    if (quoin::to_string(picture.error()).find('\n') != std::string::npos) std::abort();
+    return 0;
+  }
+  const auto pixels = static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
+  if (picture->values.size() != pixels || 4 * pixels > size) std::abort();
+  return 0;
+}

@@ -1,0 +1,131 @@
+#include "io/image/png.h"
+
+#include <png.h>
+
+#include <csetjmp>
+#include <new>
+
+#include <quoin/core/assert.h>
+#include <quoin/io/picture_files.h>
+
+#include "io/whole_file.h"
+
+namespace quoin {
+
+namespace {
+
+bool try_append(std::vector<std::byte>& out, std::span<const std::byte> bytes) {
+  try {
+    out.insert(out.end(), bytes.begin(), bytes.end());
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  return true;
+}
+
+/// An exception must not cross libpng's frames.
+void append_bytes(png_structp png, png_bytep data, std::size_t size) {
+  auto& out = *static_cast<std::vector<std::byte>*>(png_get_io_ptr(png));
+  if (!try_append(out, std::as_bytes(std::span(data, size)))) png_error(png, "out of memory");
+}
+
+void flush_nothing(png_structp) {}
+
+void stay_silent(png_structp, png_const_charp) {}
+
+[[noreturn]] void jump_back(png_structp png, png_const_charp) {
+  png_longjmp(png, 1);
+}
+
+/// Pictures of voxels are patches of one colour: unfiltered rows take half the time of filtered ones and give a quarter
+/// fewer bytes; level 3 takes 16 ms for 1280 x 720 pixels, level 6 twice that for a tenth less.
+void set_effort(png_structp png, PngEffort effort) {
+  png_set_compression_level(png, effort == PngEffort::Quick ? 3 : 9);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
+}
+
+/// Everything that libpng may jump out of; nothing here needs a destructor.
+bool write_image(png_structp png, png_infop info, const PngImage& image, PngEffort effort,
+                 std::vector<std::byte>& out) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_write_fn(png, &out, append_bytes, flush_nothing);
+  set_effort(png, effort);
+  png_set_IHDR(png, info, image.width, image.height, 8, image.channels == 4 ? PNG_COLOR_TYPE_RGBA : PNG_COLOR_TYPE_RGB,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  for (std::uint32_t y = 0; y < image.height; ++y) {
+    png_write_row(png, image.pixels.data() + std::size_t{y} * image.width * image.channels);
+  }
+  png_write_end(png, info);
+  return true;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effort) {
+  QUOIN_ASSERT(image.width > 0 && image.height > 0 &&
+                   image.pixels.size() == std::size_t{image.width} * image.height * image.channels,
+               "as many bytes of pixels as the sizes say");
+  std::vector<std::byte> out;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, jump_back, stay_silent);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  const bool written = info != nullptr && write_image(png, info, image, effort, out);
+  png_destroy_write_struct(&png, &info);
+  if (!written) return fail(ErrorCode::LimitExceeded, "the picture cannot be encoded as PNG");
+  return out;
+}
+
+Result<PngImage> decode_png(std::span<const std::byte> file) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&header, file.data(), file.size()) == 0) {
+    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+  }
+  if (std::uint64_t{header.width} * header.height > (std::uint64_t{1} << 28)) {
+    png_image_free(&header);
+    return fail(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
+  }
+  // Deflate makes at most 1,032 bytes of one, and a pixel takes a bit or more.
+  if (std::uint64_t{header.width} * header.height > std::uint64_t{8} * 1032 * file.size()) {
+    png_image_free(&header);
+    return fail(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
+  }
+  header.format = PNG_FORMAT_RGBA;
+  PngImage image{header.width, header.height, 4, {}};
+  image.pixels.resize(PNG_IMAGE_SIZE(header));
+  if (png_image_finish_read(&header, nullptr, image.pixels.data(), 0, nullptr) == 0) {
+    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+  }
+  return image;
+}
+
+Result<std::vector<std::byte>> write_png(const Image& picture) {
+  const auto width = static_cast<std::uint32_t>(picture.width);
+  const auto height = static_cast<std::uint32_t>(picture.height);
+  if (picture.width <= 0 || picture.height <= 0 || picture.rgb.size() != std::size_t{3} * width * height) {
+    return fail(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
+  }
+  return encode_png({width, height, 3, picture.rgb}, PngEffort::Quick);
+}
+
+Result<std::uint64_t> write_png(const Image& picture, const std::filesystem::path& path) {
+  return write_whole(path, write_png(picture));
+}
+
+Result<Image> read_png(std::span<const std::byte> bytes) {
+  const auto decoded = decode_png(bytes);
+  if (!decoded) return decoded.error();
+  const std::size_t pixels = decoded->pixels.size() / 4;
+  Image picture{static_cast<int>(decoded->width), static_cast<int>(decoded->height), {}};
+  picture.rgb.resize(3 * pixels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) picture.rgb[3 * i + c] = decoded->pixels[4 * i + c];
+  }
+  return picture;
+}
+
+Result<Image> read_png(const std::filesystem::path& path) {
+  return read_whole(path, [](std::span<const std::byte> bytes) { return read_png(bytes); });
+}
+
+}  // namespace quoin

@@ -1,0 +1,214 @@
+#include <quoin/core/assert.h>
+
+#include "io/mesh_parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <glm/matrix.hpp>
+
+#include "core/srgb.h"
+
+namespace quoin {
+
+namespace {
+
+template <class T>
+bool is_one_a_vertex(std::span<const T> values, const MeshView& view) {
+  return values.size() == view.positions.size();
+}
+
+template <class T>
+bool is_none_or_one_a_vertex(std::span<const T> values, const MeshView& view) {
+  return values.empty() || is_one_a_vertex(values, view);
+}
+
+/// 0 where there is none. Without an early end, so that it is a matter of the memory's speed.
+template <class T>
+T largest_of(std::span<const T> values) {
+  T largest{};
+  for (const T value : values) largest = std::max(largest, value);
+  return largest;
+}
+
+bool all_finite(std::span<const Vec3> points) {
+  Vec3 zero(0.0F);
+  for (const Vec3& point : points) zero += point * 0.0F;  // not 0 once a number is infinite or NaN
+  return zero == Vec3(0.0F);
+}
+
+const char* fault_of_blocks(const MeshView& view, std::size_t types) {
+  const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
+                       is_none_or_one_a_vertex(view.levels, view);
+  if (!has_all) return "arrays of different lengths";
+  if (largest_of(view.types) >= types) return "a type that is not registered";
+  if (largest_of(view.directions) > Direction::NegZ) return "a direction that is none of the six";
+  return largest_of(view.levels) > 3 ? "an occlusion level beyond 3" : nullptr;
+}
+
+const char* fault_of_smooth(const MeshView& view) {
+  const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
+                       is_none_or_one_a_vertex(view.openness, view);
+  if (!has_all) return "arrays of different lengths";
+  if (!all_finite(view.normals)) return "a normal that is not finite";
+  const auto is_no_share = [](float openness) { return !(openness >= 0.0F && openness <= 1.0F); };
+  return std::ranges::any_of(view.openness, is_no_share) ? "an openness beyond 0 to 1" : nullptr;
+}
+
+/// What is wrong with a mesh; null when nothing is.
+const char* fault_of(const MeshView& view, std::size_t types) {
+  if (const char* fault = view.has_albedo() ? fault_of_smooth(view) : fault_of_blocks(view, types)) return fault;
+  if (view.indices.size() % 3 != 0) return "indices that make no whole triangles";
+  if (!view.indices.empty() && largest_of(view.indices) >= view.positions.size()) return "an index of no vertex";
+  return all_finite(view.positions) ? nullptr : "a position that is not finite";
+}
+
+const char* fault_of(const glm::dmat4& matrix) {
+  for (int column = 0; column < 4; ++column) {
+    if (!is_finite(DVec3(matrix[column]))) return "a transform that is not finite";
+    if (matrix[column].w != (column == 3 ? 1.0 : 0.0)) return "a transform that is not affine";
+  }
+  // Against the product of the axes' lengths, so that a small scale is not taken for a singular one.
+  const double lengths = glm::length(DVec3(matrix[0])) * glm::length(DVec3(matrix[1])) * glm::length(DVec3(matrix[2]));
+  const double volume = std::abs(glm::determinant(glm::dmat3(matrix)));
+  const bool is_sound = std::isnormal(lengths) && std::isnormal(volume) && volume > 1e-12 * lengths;
+  return is_sound ? nullptr : "a transform that is singular";
+}
+
+/// Whether floats reach every point of a box once it is moved. Affine images of a box lie between those of its corners.
+bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  for (int i = 0; i < 8; ++i) {
+    const DVec3 corner{(i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y, (i & 4 ? box.max : box.min).z};
+    const DVec3 moved(moved_from_box * glm::dvec4(corner, 1.0));
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(moved[axis]) <= kMost)) return false;
+    }
+  }
+  return true;
+}
+
+/// What is wrong with where a part of these bounds stands.
+const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dmat4& world_from_part) {
+  if (const char* fault = fault_of(world_from_part)) return fault;
+  const DBox from_pivot{bounds.min - pivot, bounds.max - pivot};
+  const bool is_within = bounds.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
+                                            stays_within_floats(from_pivot, world_from_part));
+  return is_within ? nullptr : "a vertex farther away than a float can say";
+}
+
+Status unsound(const MeshPart& part, const char* fault) {
+  return fail(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
+}
+
+/// Adds the bounds of a sound part.
+Status check_part(const MeshPart& part, std::size_t types, std::vector<DBox>& bounds) {
+  if (!is_finite(part.pivot)) return unsound(part, "a pivot that is not finite");
+  DBox& box = bounds.emplace_back();
+  for (const MeshView& view : part.surfaces) {
+    if (view.has_albedo() != part.surfaces.front().has_albedo()) return unsound(part, "surfaces of two kinds");
+    if (const char* fault = fault_of(view, types)) return unsound(part, fault);
+    if (view.positions.empty()) continue;
+    const DBox more = bounds_of(view);
+    box.extend(more.min);
+    box.extend(more.max);
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_meshes(const SceneMeshes& meshes) {
+  std::vector<DBox> bounds;
+  for (const MeshPart& part : meshes.parts) {
+    if (auto sound = check_part(part, meshes.types.size(), bounds); !sound) return sound;
+  }
+  for (const MeshPlacement& placement : meshes.placements) {
+    if (placement.part >= meshes.parts.size()) {
+      return fail(ErrorCode::InvalidArgument, "placement \"" + placement.name + "\" is of a part that is not there");
+    }
+    const MeshPart& part = meshes.parts[placement.part];
+    const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());
+    if (fault != nullptr) return unsound(part, fault);
+  }
+  return {};
+}
+
+DBox bounds_of(const MeshView& view) {
+  DBox box;
+  if (view.positions.empty()) return box;
+  Vec3 min = view.positions.front();
+  Vec3 max = min;
+  for (const Vec3& position : view.positions) {
+    min = glm::min(min, position);
+    max = glm::max(max, position);
+  }
+  return {DVec3(min), DVec3(max)};
+}
+
+std::vector<const MeshPlacement*> placements_by_part(const SceneMeshes& meshes) {
+  std::vector<const MeshPlacement*> placements;
+  placements.reserve(meshes.placements.size());
+  for (const MeshPlacement& placement : meshes.placements) placements.push_back(&placement);
+  std::ranges::stable_sort(placements, {}, &MeshPlacement::part);
+  return placements;
+}
+
+const std::string& name_of(const SceneMeshes& meshes, const MeshPlacement& placement) {
+  return placement.name.empty() ? meshes.parts[placement.part].name : placement.name;
+}
+
+VertexTransform::VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot)
+    : linear_(world_from_part),
+      normal_matrix_(glm::cross(linear_[1], linear_[2]), glm::cross(linear_[2], linear_[0]),
+                     glm::cross(linear_[0], linear_[1])),
+      translation_(world_from_part[3]),
+      pivot_(pivot),
+      mirrors_(glm::determinant(linear_) < 0.0) {
+  QUOIN_ASSERT(glm::determinant(linear_) != 0.0, "a linear part that is not singular");
+  // Scaled to about 1, so that squares neither vanish nor overflow.
+  double largest = 0.0;
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(normal_matrix_[column][row]));
+  }
+  normal_matrix_ /= mirrors_ ? -largest : largest;
+}
+
+DVec3 VertexTransform::normal(Vec3 in_part) const {
+  const DVec3 turned = normal_matrix_ * DVec3(in_part);
+  const double length = glm::length(turned);
+  return length > 0.0 ? turned / length : DVec3(0.0, 1.0, 0.0);
+}
+
+std::array<Vec3, 6> VertexTransform::face_normals() const {
+  std::array<Vec3, 6> normals{};
+  for (const Direction direction : kDirections) {
+    normals[static_cast<std::size_t>(direction)] = Vec3(normal(Vec3(normal_of(direction))));
+  }
+  return normals;
+}
+
+LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
+  const float openness = view.openness.empty() ? 1.0F : view.openness[vertex];
+  LinearRgba16 colour{0, 0, 0, 65'535};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const float light = static_cast<float>(view.albedo[vertex][channel]) * openness;
+    colour[channel] = static_cast<std::uint16_t>(std::lround(light));
+  }
+  return colour;
+}
+
+std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex) {
+  constexpr float kFull = 65'535.0F;  // of LinearRgba16
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  const float openness = view.openness.empty() ? 1.0F : view.openness[vertex];
+  std::array<std::uint8_t, 3> colour{};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    colour[channel] = encode(static_cast<float>(view.albedo[vertex][channel]) / kFull * openness);
+  }
+  return colour;
+}
+
+}  // namespace quoin

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <string>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/scene/scene_meshes.h>
+
+#include "io/block_writer.h"
+
+namespace quoin {
+
+/// One of the files that a mesh is written as; they are all written before the first is put in place, in their order.
+struct MeshFile {
+  std::filesystem::path path;
+  std::uint64_t expected_bytes = 0;  ///< what progress is measured against; 0: too small to tell of
+  std::function<void(BlockWriter&)> write;
+};
+
+/// The files of a mesh, or why it cannot be written. Requires: the meshes are sound, and outlive the files.
+using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path);
+
+[[nodiscard]] PlanMeshFiles plan_glb;
+[[nodiscard]] PlanMeshFiles plan_gltf;
+[[nodiscard]] PlanMeshFiles plan_obj;
+[[nodiscard]] PlanMeshFiles plan_ply;
+
+/// What goes beside `path`.
+[[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
+                                                                 const std::filesystem::path& path);
+[[nodiscard]] std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes,
+                                                                const std::filesystem::path& path);
+
+/// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see mesh_file.h).
+[[nodiscard]] Status check_meshes(const SceneMeshes& meshes);
+
+/// The box of all vertices; empty without one.
+[[nodiscard]] DBox bounds_of(const MeshView& view);
+
+/// The placements, by part, and in their order within a part.
+[[nodiscard]] std::vector<const MeshPlacement*> placements_by_part(const SceneMeshes& meshes);
+
+/// A placement's name, or else its part's.
+[[nodiscard]] const std::string& name_of(const SceneMeshes& meshes, const MeshPlacement& placement);
+
+/// Vertices as one placement, or one shared mesh of a file, has them. Requires: the linear part is not singular.
+class VertexTransform {
+ public:
+  VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot);
+
+  [[nodiscard]] DVec3 position(Vec3 in_part) const { return linear_ * (DVec3(in_part) - pivot_) + translation_; }
+  /// Unit.
+  [[nodiscard]] DVec3 normal(Vec3 in_part) const;
+  /// Of a block's six faces, by Direction.
+  [[nodiscard]] std::array<Vec3, 6> face_normals() const;
+  /// Whether boxes along the axes stay such, each axis its own.
+  [[nodiscard]] bool keeps_axes() const {
+    return linear_ == glm::dmat3(linear_[0].x, 0, 0, 0, linear_[1].y, 0, 0, 0, linear_[2].z);
+  }
+  /// Whether triangles are to be turned round.
+  [[nodiscard]] bool mirrors() const { return mirrors_; }
+
+ private:
+  glm::dmat3 linear_;
+  glm::dmat3 normal_matrix_;  ///< the cofactors: as the inverse transpose, but for size and, when mirrored, sign
+  DVec3 translation_;
+  DVec3 pivot_;
+  bool mirrors_;
+};
+
+/// The corners of the triangle whose indices begin at `i`, in the order in which they are written.
+[[nodiscard]] inline std::array<std::uint32_t, 3> corners_of(const MeshView& view, std::size_t i, bool turned) {
+  const std::uint32_t* at = view.indices.data() + i;
+  return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};
+}
+
+/// The colour of a vertex of a smooth mesh, times its openness: linear light, opaque; sRGB.
+[[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
+[[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);
+
+}  // namespace quoin

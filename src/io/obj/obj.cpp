@@ -1,0 +1,326 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/mesh/occlusion.h>
+
+#include "io/material_palette.h"
+#include "io/mesh_parts.h"
+
+namespace quoin {
+
+namespace {
+
+/// Names in a line-based format: control characters and spaces become '_'.
+std::string one_word(const std::string& name) {
+  std::string word = name;
+  for (char& c : word) {
+    if (static_cast<unsigned char>(c) <= ' ' || c == '\x7F') c = '_';
+  }
+  return word;
+}
+
+constexpr std::size_t kMostDigits = 40;
+
+/// Writes what the corners of voxels are mostly, whole and half numbers, as std::to_chars does; null for other ones.
+/// From 100,000 on that may choose an exponent.
+char* write_halves(double value, char* out) {
+  constexpr double kMost = 99'999.0;
+  if (!(value >= -kMost && value <= kMost)) return nullptr;
+  const auto halves = static_cast<std::int32_t>(value * 2.0);
+  if (static_cast<double>(halves) != value * 2.0) return nullptr;
+  if (halves < 0) *out++ = '-';
+  const auto size = static_cast<std::uint32_t>(halves < 0 ? -halves : halves);
+  out = std::to_chars(out, out + kMostDigits, size / 2).ptr;
+  if (size % 2 != 0) {
+    *out++ = '.';
+    *out++ = '5';
+  }
+  return out;
+}
+
+char* write_number(double value, char* out) {
+  if (char* end = write_halves(value, out)) return end;
+  const double rounded = std::round(value * 1e6) / 1e6 + 0.0;
+  return std::to_chars(out, out + kMostDigits, rounded).ptr;
+}
+
+/// Writes the parts that lines of an OBJ file consist of.
+class ObjLines {
+ public:
+  explicit ObjLines(BlockWriter& out) : out_(out) {}
+
+  /// `value` rounded to a millionth.
+  [[nodiscard]] static std::string text_of(double value);
+  /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth.
+  void triple(std::string_view keyword, const DVec3& v, int digits = 0);
+  /// "o NAME" and a line's end: the name as one word, told apart from those before by a number; "object" for an empty
+  /// one.
+  void object(const std::string& name);
+
+ private:
+  BlockWriter& out_;
+  std::set<std::string> names_;
+};
+
+std::string ObjLines::text_of(double value) {
+  std::array<char, kMostDigits> room{};
+  return {room.data(), write_number(value, room.data())};
+}
+
+void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
+  char* at = out_.room(keyword.size() + 3 * (1 + kMostDigits));
+  at = std::copy(keyword.begin(), keyword.end(), at);
+  for (int axis = 0; axis < 3; ++axis) {
+    *at++ = ' ';
+    at = digits == 0 ? write_number(v[axis], at)
+                     : std::to_chars(at, at + kMostDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
+  }
+  out_.advance(at);
+}
+
+void ObjLines::object(const std::string& name) {
+  std::string word = one_word(name);
+  if (word.empty()) word = "object";
+  std::string unique = word;
+  for (int n = 2; !names_.insert(unique).second; ++n) unique = word + "_" + std::to_string(n);
+  out_.put_text("o " + unique + "\n");
+}
+
+std::string shortest(float value) {
+  std::array<char, 64> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+/// A material's name as OBJ and MTL can say it: without spaces.
+std::string mtl_name(const SurfaceMaterial& material) {
+  std::string name = material.name;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+}
+
+/// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
+std::string mtl_text(const MaterialPalette& palette, const std::string& texture, const std::string& emissive_texture) {
+  std::string text = "# Quoin " QUOIN_VERSION "\n";
+  for (const SurfaceMaterial& material : palette.materials()) {
+    text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+    text.append("map_Kd ").append(texture).append("\n");
+    if (material.is_transparent()) text.append("map_d -imfchan m ").append(texture).append("\n");
+    if (material.is_emissive()) {
+      const std::string strength = shortest(material.emission);
+      text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
+      text.append("\nmap_Ke ").append(emissive_texture).append("\n");
+    }
+  }
+  return text;
+}
+
+/// The names of the files that belong to one OBJ.
+struct ObjNames {
+  std::filesystem::path library;
+  std::filesystem::path palette;
+  std::filesystem::path emissive;
+};
+
+ObjNames names_beside(const std::filesystem::path& path) {
+  const std::string stem = (path.parent_path() / path.stem()).string();
+  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png"};
+}
+
+/// Smooth meshes need no materials.
+bool has_materials(const SceneMeshes& meshes) {
+  return meshes.types.size() > 1;
+}
+
+/// Writes the lines of one OBJ file, counting from 1 as OBJ does across all objects.
+class ObjText {
+ public:
+  ObjText(const SceneMeshes& meshes, const MaterialPalette& palette, BlockWriter& out)
+      : meshes_(meshes), palette_(palette), lines_(out), out_(out) {
+    for (std::uint8_t level = 0; level < greys_.size(); ++level) {
+      std::string grey = " ";
+      grey += ObjLines::text_of(occlusion_brightness(level));
+      greys_[level] = grey + grey + grey;
+    }
+  }
+
+  void write(const std::string& material_file) {
+    out_.put_text("# Quoin " QUOIN_VERSION "\n");
+    if (has_materials(meshes_)) {
+      out_.put_text("mtllib " + material_file + "\n");
+      write_texture_coordinates();
+    }
+    for (const MeshPlacement& placement : meshes_.placements) write_object(placement);
+  }
+
+ private:
+  /// One texture coordinate a type, so that type t is number t.
+  void write_texture_coordinates() {
+    for (std::size_t type = 1; type < meshes_.types.size(); ++type) {
+      const auto centre = palette_.texel_centre(static_cast<VoxelType>(type));
+      // OBJ counts v from the bottom; the centres have few binary digits, so both forms are exact.
+      out_.put_text("vt " + shortest(centre[0]) + " " + shortest(1.0F - centre[1]) + "\n");
+    }
+  }
+
+  void write_object(const MeshPlacement& placement) {
+    const MeshPart& part = meshes_.parts[placement.part];
+    const MaterialSurfaces split(part, palette_);
+    if (split.surfaces().empty()) return;
+    const VertexTransform transform(placement.matrix(), part.pivot);
+    lines_.object(name_of(meshes_, placement));
+    const bool is_smooth = part.surfaces.front().has_albedo();
+    if (!is_smooth) write_face_normals(transform);
+    for (const auto& [view, material] : split.surfaces()) {
+      if (is_smooth) {
+        write_smooth(view, transform);
+        continue;
+      }
+      write_vertices(view, transform);
+      out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
+      write_faces(view, transform.mirrors(), [&view = view](std::uint32_t corner) {
+        return std::pair(static_cast<std::uint64_t>(view.directions[corner]), view.types[corner]);
+      });
+      vertices_ += view.positions.size();
+    }
+    if (!is_smooth) normals_ += kDirections.size();
+  }
+
+  void write_face_normals(const VertexTransform& transform) {
+    for (const Direction direction : kDirections) {
+      lines_.triple("vn", transform.normal(Vec3(normal_of(direction))));
+      out_.put('\n');
+    }
+  }
+
+  void write_vertices(const MeshView& view, const VertexTransform& transform) {
+    for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
+      lines_.triple("v", transform.position(view.positions[i]));
+      if (!view.levels.empty()) out_.put_text(greys_[view.levels[i]]);
+      out_.put('\n');
+    }
+  }
+
+  /// `normal_and_texture(corner)`: the number of its normal among those of the object, and its texture or 0.
+  template <class Numbers>
+  void write_faces(const MeshView& view, bool turned, Numbers normal_and_texture) {
+    constexpr std::size_t kMostOfCorner = 64;
+    for (std::size_t i = 0; i < view.indices.size() && !out_.failed(); i += 3) {
+      char* at = out_.room(2 + 3 * kMostOfCorner);
+      *at++ = 'f';
+      for (const std::uint32_t corner : corners_of(view, i, turned)) {
+        const auto [normal, texture] = normal_and_texture(corner);
+        char* const end = at + kMostOfCorner;
+        *at++ = ' ';
+        at = std::to_chars(at, end, vertices_ + corner + 1).ptr;
+        *at++ = '/';
+        if (texture != 0) at = std::to_chars(at, end, texture).ptr;
+        *at++ = '/';
+        at = std::to_chars(at, end, normals_ + normal + 1).ptr;
+      }
+      *at++ = '\n';
+      out_.advance(at);
+    }
+  }
+
+  /// Vertices with colours, normals and triangles of a smooth surface.
+  void write_smooth(const MeshView& view, const VertexTransform& transform) {
+    constexpr int kFloatDigits = 9;
+    constexpr int kColourDigits = 4;
+    for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
+      lines_.triple("v", transform.position(view.positions[i]), kFloatDigits);
+      const auto colour = srgb_colour(view, i);
+      lines_.triple("", DVec3(colour[0], colour[1], colour[2]) / 255.0, kColourDigits);
+      out_.put('\n');
+    }
+    for (std::size_t i = 0; i < view.normals.size() && !out_.failed(); ++i) {
+      lines_.triple("vn", transform.normal(view.normals[i]));
+      out_.put('\n');
+    }
+    write_faces(view, transform.mirrors(),
+                [](std::uint32_t corner) { return std::pair(std::uint64_t{corner}, VoxelType{0}); });
+    vertices_ += view.positions.size();
+    normals_ += view.positions.size();
+  }
+
+  const SceneMeshes& meshes_;
+  const MaterialPalette& palette_;
+  ObjLines lines_;
+  BlockWriter& out_;
+  std::array<std::string, 4> greys_;  ///< " r g b" by level of occlusion
+  std::uint64_t vertices_ = 0;
+  std::uint64_t normals_ = 0;
+};
+
+/// A guess, for progress only.
+std::uint64_t expected_bytes(const SceneMeshes& meshes) {
+  constexpr std::uint64_t kVertexLine = 24;
+  constexpr std::uint64_t kSmoothVertexLines = 80;
+  constexpr std::uint64_t kFaceLine = 42;
+  std::uint64_t bytes = 1;
+  for (const MeshPlacement& placement : meshes.placements) {
+    for (const MeshView& view : meshes.parts[placement.part].surfaces) {
+      const std::uint64_t vertex = view.has_albedo() ? kSmoothVertexLines : kVertexLine;
+      bytes += view.positions.size() * vertex + view.indices.size() / 3 * kFaceLine;
+    }
+  }
+  return bytes;
+}
+
+/// A picture beside the OBJ.
+Status add_image(const std::filesystem::path& path, const PngImage& image, std::vector<MeshFile>& files) {
+  auto png = encode_png(image);
+  if (!png) return png.error();
+  files.push_back({path, 0, [bytes = std::move(*png)](BlockWriter& out) { out.put(std::span(bytes)); }});
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path) {
+  const auto palette = std::make_shared<const MaterialPalette>(meshes);
+  const ObjNames names = names_beside(path);
+  std::vector<MeshFile> files;
+  if (has_materials(meshes)) {
+    if (auto added = add_image(names.palette, palette->base_colour(), files); !added) {
+      return added.error();
+    }
+    if (palette->has_emission()) {
+      if (auto added = add_image(names.emissive, palette->emissive(), files); !added) {
+        return added.error();
+      }
+    }
+    std::string text = mtl_text(*palette, names.palette.filename().string(), names.emissive.filename().string());
+    files.push_back({names.library, 0, [text = std::move(text)](BlockWriter& out) { out.put_text(text); }});
+  }
+  const auto write = [&meshes, palette, library = names.library.filename().string()](BlockWriter& out) {
+    ObjText(meshes, *palette, out).write(library);
+  };
+  files.push_back({path, expected_bytes(meshes), write});
+  return files;
+}
+
+std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, const std::filesystem::path& path) {
+  if (!has_materials(meshes)) return {};
+  const ObjNames names = names_beside(path);
+  std::vector<std::filesystem::path> files = {names.library, names.palette};
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      const bool emits = view.surface == SurfaceClass::Emissive || view.surface == SurfaceClass::EmissiveTransparent;
+      if (emits && files.back() != names.emissive) files.push_back(names.emissive);
+    }
+  }
+  return files;
+}
+
+}  // namespace quoin

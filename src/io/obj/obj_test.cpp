@@ -1,0 +1,182 @@
+#include <gtest/gtest.h>
+
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "io/gltf/glb_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+/// An OBJ file by its lines; indices count from 0.
+struct ParsedObj {
+  struct Corner {
+    std::size_t position, texture, normal;
+  };
+  std::vector<DVec3> positions;
+  std::vector<double> greys;
+  std::vector<std::array<double, 2>> textures;
+  std::vector<DVec3> normals;
+  std::vector<std::array<Corner, 3>> faces;
+  std::vector<std::string> objects;
+  std::vector<std::string> materials;
+  std::string library;
+};
+
+void parse_line(const std::string& line, ParsedObj& obj) {
+  std::istringstream in(line);
+  std::string keyword;
+  in >> keyword;
+  DVec3 v(0.0);
+  if (keyword == "v" || keyword == "vn") in >> v.x >> v.y >> v.z;
+  if (keyword == "v") obj.positions.push_back(v);
+  if (keyword == "vn") obj.normals.push_back(v);
+  if (double grey = 0; keyword == "v" && in >> grey) obj.greys.push_back(grey);
+  if (keyword == "vt") {
+    in >> v.x >> v.y;
+    obj.textures.push_back({v.x, v.y});
+  }
+  if (keyword == "o") obj.objects.push_back(line.substr(2));
+  if (keyword == "usemtl") obj.materials.push_back(line.substr(7));
+  if (keyword == "mtllib") obj.library = line.substr(7);
+  if (keyword != "f") return;
+  std::array<ParsedObj::Corner, 3> face{};
+  char slash = '/';
+  for (auto& corner : face) {
+    in >> corner.position >> slash >> corner.texture >> slash >> corner.normal;
+    --corner.position, --corner.texture, --corner.normal;
+  }
+  obj.faces.push_back(face);
+}
+
+std::string text_of(const std::filesystem::path& path) {
+  const auto bytes = read_file(path).value_or(std::vector<std::byte>{});
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+ParsedObj parse_obj(const std::filesystem::path& path) {
+  ParsedObj obj;
+  std::istringstream lines(text_of(path));
+  for (std::string line; std::getline(lines, line);) parse_line(line, obj);
+  return obj;
+}
+
+class Obj : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    VoxelProperties stone;
+    stone.colour = {90, 80, 70, 255};
+    VoxelProperties glass;
+    glass.colour = {10, 200, 220, 90};
+    glass.visibility = Visibility::Transparent;
+    VoxelProperties lamp;
+    lamp.colour = {250, 240, 10, 255};
+    lamp.emission = 3.0F;
+    SceneGrid grid;
+    grid.name = "a crane";
+    grid.grid.fill_box({0, 0, 0}, {3, 0, 0}, *scene_.types.add(stone));
+    grid.grid.set({0, 1, 0}, *scene_.types.add(glass));
+    grid.grid.set({3, 1, 0}, *scene_.types.add(lamp));
+    grid.pivot = {2, 1, 0.5};
+    grid_ = scene_.add_grid(std::move(grid));
+  }
+
+  Instance& place(DVec3 position) {
+    Instance instance;
+    instance.grid = grid_;
+    instance.position = position;
+    return scene_.instances()[scene_.add_instance(instance)];
+  }
+
+  ParsedObj write(bool occlusion = true) {
+    meshes_ = *mesh_scene(scene_, {.mesh = {.occlusion = occlusion}});
+    const auto bytes = write_mesh(meshes_, folder_.file("my model.obj"));
+    EXPECT_TRUE(bytes) << to_string(bytes.error());
+    return parse_obj(folder_.file("my model.obj"));
+  }
+
+  Scene scene_;
+  GridHandle grid_;
+  SceneMeshes meshes_;
+  TestFolder folder_{std::string("obj_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(Obj, objects_are_baked_with_outward_windings_mirrored_ones_too) {
+  place({0, 0, 0});
+  Instance& turned = place({100, 5, -7.25});
+  turned.rotation = glm::normalize(DQuat(0.3, 0.5, -0.1, 0.7));
+  turned.mirrored = true;
+  turned.voxel_size = 0.1;
+  const ParsedObj obj = write();
+  EXPECT_EQ(obj.objects, (std::vector<std::string>{"a_crane", "a_crane_2"}));
+  EXPECT_EQ(static_cast<std::int64_t>(obj.faces.size()), 2 * meshes_.stats.triangles);
+  for (const auto& face : obj.faces) {
+    const DVec3 a = obj.positions.at(face[0].position);
+    const DVec3 across = glm::cross(obj.positions.at(face[1].position) - a, obj.positions.at(face[2].position) - a);
+    ASSERT_GT(glm::length(across), 0.0);
+    EXPECT_NEAR(glm::dot(glm::normalize(across), obj.normals.at(face[0].normal)), 1.0, 1e-3);
+  }
+  DBox second;
+  for (std::size_t i = obj.positions.size() / 2; i < obj.positions.size(); ++i) second.extend(obj.positions[i]);
+  const DBox all = scene_.bounds(false);
+  EXPECT_NEAR(second.max.x, all.max.x, 1e-5);
+  EXPECT_NEAR(second.max.y, all.max.y, 1e-5);
+}
+
+TEST_F(Obj, texture_coordinates_meet_the_palette) {
+  place({0, 0, 0});
+  const ParsedObj obj = write();
+  const PngImage palette = *decode_png(*read_file(folder_.file("my model_palette.png")));
+  std::set<std::array<int, 3>> seen;
+  for (const auto& face : obj.faces) {
+    const auto uv = obj.textures.at(face[0].texture);
+    const auto x = static_cast<std::size_t>(uv[0] * palette.width);
+    const auto y = static_cast<std::size_t>((1.0 - uv[1]) * palette.height);
+    const std::uint8_t* texel = palette.pixels.data() + (y * palette.width + x) * 4;
+    seen.insert({texel[0], texel[1], texel[2]});
+  }
+  EXPECT_EQ(seen, (std::set<std::array<int, 3>>{{90, 80, 70}, {10, 200, 220}, {250, 240, 10}}));
+}
+
+TEST_F(Obj, materials_are_in_the_library_beside_it) {
+  place({0, 0, 0});
+  const ParsedObj obj = write();
+  EXPECT_EQ(obj.library, "my model.mtl");
+  const std::string library = text_of(folder_.file("my model.mtl"));
+  ASSERT_EQ(obj.materials.size(), 3U);
+  for (const std::string& name : obj.materials) EXPECT_NE(library.find("newmtl " + name + "\n"), std::string::npos);
+  EXPECT_NE(library.find("map_Kd my model_palette.png\n"), std::string::npos);
+  EXPECT_NE(library.find("Ke 3 3 3\nmap_Ke my model_emissive.png\n"), std::string::npos);
+  EXPECT_TRUE(decode_png(*read_file(folder_.file("my model_emissive.png"))));
+  const auto files = mesh_files(meshes_, folder_.file("my model.obj")).value();
+  EXPECT_EQ(files.front(), folder_.file("my model.obj"));
+  EXPECT_EQ(files.size(), 4U);
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(folder_.count(), 4U);
+}
+
+TEST_F(Obj, occlusion_is_a_colour_of_vertices_only_when_there_is_any) {
+  place({0, 0, 0});
+  const ParsedObj shaded = write();
+  EXPECT_EQ(shaded.greys.size(), shaded.positions.size());
+  EXPECT_EQ(std::set<double>(shaded.greys.begin(), shaded.greys.end()), (std::set<double>{0.75, 1.0}));
+  EXPECT_TRUE(write(false).greys.empty());
+}
+
+TEST_F(Obj, failures_leave_no_file) {
+  place({0, 0, 0});
+  const SceneMeshes meshes = *mesh_scene(scene_);
+  EXPECT_FALSE(write_mesh(meshes, folder_.file("out.obj"), {}, [](double) { return false; }));
+  EXPECT_FALSE(write_mesh(meshes, folder_.file("none/out.obj")));
+  EXPECT_EQ(folder_.count(), 0U);
+}
+
+TEST_F(Obj, an_empty_scene_is_a_file_without_objects) {
+  EXPECT_TRUE(write().objects.empty());
+}
+
+}  // namespace
+
+}  // namespace quoin

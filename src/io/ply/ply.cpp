@@ -1,0 +1,140 @@
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include <quoin/mesh/occlusion.h>
+
+#include "core/srgb.h"
+#include "io/mesh_parts.h"
+
+namespace quoin {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the format written is little-endian");
+
+constexpr std::size_t kVertexBytes = 6 * 4 + 3;  // position and normal as floats, red, green and blue as bytes
+constexpr std::size_t kFaceBytes = 1 + 3 * 4;    // the byte 3 and three int
+constexpr std::size_t kLevels = 4;
+
+using Srgb = std::array<std::uint8_t, 3>;
+
+struct Counts {
+  std::uint64_t vertices = 0;
+  std::uint64_t faces = 0;
+};
+
+std::string header_of(const Counts& counts) {
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin " QUOIN_VERSION "\n";
+  text += "element vertex " + std::to_string(counts.vertices) + "\n";
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) text += "property float " + std::string(name) + "\n";
+  for (const char* name : {"red", "green", "blue"}) text += "property uchar " + std::string(name) + "\n";
+  text += "element face " + std::to_string(counts.faces) + "\n";
+  return text + "property list uchar int vertex_indices\nend_header\n";
+}
+
+/// The colour of every type at every level of occlusion, [type * kLevels + level].
+std::vector<Srgb> colours_of(const VoxelRegistry& types) {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  // By way of 16 bits, as smooth meshes hold their colours.
+  const auto darkened = [&](std::uint8_t byte, std::uint8_t level) {
+    const auto linear = static_cast<std::uint16_t>(std::lround(linear_from_srgb(byte) * 65'535.0F));
+    return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(level));
+  };
+  std::vector<Srgb> colours;
+  colours.reserve(types.size() * kLevels);
+  for (std::size_t type = 0; type < types.size(); ++type) {
+    const Rgba8 colour = types[static_cast<VoxelType>(type)].colour;
+    for (std::uint8_t level = 0; level < kLevels; ++level) {
+      colours.push_back({darkened(colour.r, level), darkened(colour.g, level), darkened(colour.b, level)});
+    }
+  }
+  return colours;
+}
+
+void put_vertex(const Vec3& position, const Vec3& normal, const Srgb& colour, BlockWriter& out) {
+  char* at = out.room(kVertexBytes);
+  std::memcpy(at, &position, sizeof(position));
+  std::memcpy(at + sizeof(position), &normal, sizeof(normal));
+  std::memcpy(at + sizeof(position) + sizeof(normal), colour.data(), colour.size());
+  out.advance(at + kVertexBytes);
+}
+
+void write_vertices(const MeshView& view, const VertexTransform& transform, const std::vector<Srgb>& colours,
+                    BlockWriter& out) {
+  if (view.has_albedo()) {
+    for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
+      put_vertex(Vec3(transform.position(view.positions[i])), Vec3(transform.normal(view.normals[i])),
+                 srgb_colour(view, i), out);
+    }
+    return;
+  }
+  const auto normals = transform.face_normals();
+  const bool has_levels = !view.levels.empty();
+  for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
+    put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
+               colours[view.types[i] * kLevels + (has_levels ? view.levels[i] : 0)], out);
+  }
+}
+
+void write_faces(const MeshView& view, bool turned, std::uint64_t first, BlockWriter& out) {
+  for (std::size_t i = 0; i < view.indices.size() && !out.failed(); i += 3) {
+    const auto [a, b, c] = corners_of(view, i, turned);
+    const std::array corners = {static_cast<std::int32_t>(first + a), static_cast<std::int32_t>(first + b),
+                                static_cast<std::int32_t>(first + c)};
+    char* at = out.room(kFaceBytes);
+    *at = 3;
+    std::memcpy(at + 1, corners.data(), sizeof(corners));
+    out.advance(at + kFaceBytes);
+  }
+}
+
+/// Calls `use(view, transform)` for every surface with a triangle, in every place of its part.
+template <class Use>
+void for_each_surface(const SceneMeshes& meshes, Use use) {
+  for (const MeshPlacement* placement : placements_by_part(meshes)) {
+    const MeshPart& part = meshes.parts[placement->part];
+    const VertexTransform transform(placement->matrix(), part.pivot);
+    for (const MeshView& view : part.surfaces) {
+      if (!view.indices.empty()) use(view, transform);
+    }
+  }
+}
+
+void write_content(const SceneMeshes& meshes, const std::string& header, BlockWriter& out) {
+  const std::vector<Srgb> colours = colours_of(meshes.types);
+  out.put_text(header);
+  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
+    write_vertices(view, transform, colours, out);
+  });
+  std::uint64_t first = 0;
+  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
+    write_faces(view, transform.mirrors(), first, out);
+    first += view.positions.size();
+  });
+}
+
+}  // namespace
+
+Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path) {
+  Counts counts;
+  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform&) {
+    counts.vertices += view.positions.size();
+    counts.faces += view.indices.size() / 3;
+  });
+  constexpr std::uint64_t kMost = 0x7FFF'FFFF;
+  if (counts.vertices > kMost || counts.faces > kMost) {
+    return fail(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(counts.vertices) + " vertices and " +
+                                              std::to_string(counts.faces) +
+                                              " triangles, and a PLY file holds 2147483647 of each");
+  }
+  std::string header = header_of(counts);
+  const std::uint64_t bytes = header.size() + counts.vertices * kVertexBytes + counts.faces * kFaceBytes;
+  return std::vector<MeshFile>{
+      {path, bytes, [&meshes, text = std::move(header)](BlockWriter& out) { write_content(meshes, text, out); }}};
+}
+
+}  // namespace quoin

@@ -1,0 +1,128 @@
+#include <quoin/io/scene_file.h>
+
+#include <array>
+#include <map>
+#include <optional>
+
+#include <quoin/io/formats.h>
+
+#include "io/whole_file.h"
+
+namespace quoin {
+
+namespace {
+
+/// The grid with its types renumbered; itself where none changes.
+Grid with_types(Grid grid, const std::vector<VoxelType>& new_type_of) {
+  const std::vector<VoxelType> used = grid.types();
+  bool is_same = true;
+  for (const VoxelType type : used) is_same = is_same && new_type_of[type] == type;
+  if (is_same) return grid;
+  std::array<VoxelType, kChunkEdge> row{};
+  for (const IVec3 at : grid.chunks()) {
+    Chunk chunk = *grid.find_chunk(at);
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        chunk.read_row(y, z, row);
+        for (VoxelType& type : row) type = new_type_of[type];
+        chunk.write_row(y, z, row);
+      }
+    }
+    chunk.compact();
+    grid.put_chunk(at, std::move(chunk));
+  }
+  return grid;
+}
+
+/// A file that was read, its grids moved into the scene.
+struct Body {
+  std::vector<Instance> instances;
+};
+
+/// Moves the grids of a file's scene into `into`.
+Result<Body> take_over(Scene& from, Scene& into) {
+  std::vector<VoxelType> new_type_of = {kAir};
+  for (std::size_t type = 1; type < from.types.size(); ++type) {
+    const auto added = into.types.find_or_add(from.types[static_cast<VoxelType>(type)]);
+    if (!added) return added.error();
+    new_type_of.push_back(*added);
+  }
+  std::map<GridHandle, GridHandle> new_grid_of;
+  for (const GridHandle handle : from.grids().handles()) {
+    SceneGrid grid = std::move(from.edit(handle));
+    grid.grid = with_types(std::move(grid.grid), new_type_of);
+    new_grid_of[handle] = into.add_grid(std::move(grid));
+  }
+  Body body;
+  for (const InstanceHandle handle : from.instances().handles()) {
+    Instance instance = from.instances()[handle];
+    instance.grid = new_grid_of.at(instance.grid);
+    body.instances.push_back(std::move(instance));
+  }
+  return body;
+}
+
+/// An instance of a body, where a placement puts the body.
+Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool is_alone) {
+  Instance instance = inner;
+  const double side = outer.mirrored ? -1.0 : 1.0;
+  const DVec3 position = inner.position * DVec3(side, 1.0, 1.0);
+  instance.position = outer.position + outer.rotation * (position * outer.scale);
+  // A mirror before a rotation is the mirrored rotation before the mirror.
+  const DQuat& q = inner.rotation;
+  instance.rotation = outer.rotation * DQuat(q.w, q.x, side * q.y, side * q.z);
+  instance.voxel_size = inner.voxel_size * outer.scale;
+  instance.mirrored = inner.mirrored != outer.mirrored;
+  instance.visible = inner.visible && outer.visible;
+  if (is_alone && !outer.name.empty()) {
+    instance.name = outer.name;
+  } else if (!outer.name.empty()) {
+    instance.name = inner.name.empty() ? outer.name : outer.name + "/" + inner.name;
+  }
+  return instance;
+}
+
+Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options) {
+  const auto format = detect_format(path);
+  if (!format) return format.error();
+  if (*format == FileFormat::Scene) {
+    return fail(ErrorCode::Unsupported, "a scene file within a scene file", path.string());
+  }
+  return load_scene(path, options);
+}
+
+}  // namespace
+
+Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options) {
+  const auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
+  if (!file) return file.error();
+  LoadedScene loaded;
+  loaded.format = "scene";
+  loaded.sun = file->sun;
+  loaded.camera = file->camera;
+  std::map<std::string, Body, std::less<>> bodies;
+  LoadOptions of_source = options;
+  for (const SceneFile::Source& source : file->sources) {
+    const double before = static_cast<double>(bodies.size());
+    if (options.progress) {
+      of_source.progress = [&](double share) {
+        return options.progress((before + share) / static_cast<double>(file->sources.size()));
+      };
+    }
+    auto part = load_source(path.parent_path() / source.file, of_source);
+    if (!part) return with_path(std::move(part), path);
+    for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
+    auto body = with_path(take_over(part->scene, loaded.scene), path);
+    if (!body) return body.error();
+    bodies.emplace(source.id, std::move(*body));
+  }
+  for (const SceneFile::Placement& placement : file->placements) {
+    const Body& body = bodies.at(placement.source);
+    for (const Instance& inner : body.instances) {
+      loaded.scene.add_instance(placed(inner, placement, body.instances.size() == 1));
+    }
+  }
+  return loaded;
+}
+
+}  // namespace quoin

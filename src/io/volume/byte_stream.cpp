@@ -1,0 +1,135 @@
+#include "io/volume/byte_stream.h"
+
+#include <quoin/core/assert.h>
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <string>
+
+namespace quoin {
+
+namespace {
+
+// A match of 258 bytes takes two bits at least (RFC 1951).
+constexpr std::uint64_t kMostDeflateRatio = 1032;
+
+// zlib counts in 32 bits.
+constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;
+
+// 15 bits of window, and 16 more for gzip's header and trailer.
+constexpr int kGzipWindow = 15 + 16;
+
+}  // namespace
+
+bool begins_gzip(std::span<const std::byte> bytes) {
+  return bytes.size() >= 2 && bytes[0] == std::byte{0x1F} && bytes[1] == std::byte{0x8B};
+}
+
+struct ByteStream::Inflater {
+  Inflater() {
+    if (inflateInit2(&state, kGzipWindow) != Z_OK) throw std::bad_alloc();
+  }
+  ~Inflater() { inflateEnd(&state); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  z_stream state{};
+  bool is_done = false;
+};
+
+ByteStream::ByteStream(std::span<const std::byte> file, std::size_t begin, Compression compression)
+    : file_(file), begin_(begin), position_(begin) {
+  QUOIN_ASSERT(begin <= file.size(), "the stream begins in the file");
+  if (compression == Compression::Gzip) inflater_ = std::make_unique<Inflater>();
+}
+
+ByteStream::~ByteStream() = default;
+
+std::uint64_t ByteStream::most_bytes() const {
+  const std::uint64_t held = file_.size() - begin_;
+  return inflater_ ? held * kMostDeflateRatio : held;
+}
+
+Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
+  if (!inflater_) {
+    const std::size_t count = std::min(out.size(), file_.size() - position_);
+    if (count > 0) std::memcpy(out.data(), file_.data() + position_, count);
+    position_ += count;
+    return count;
+  }
+  std::size_t filled = 0;
+  while (filled < out.size() && !inflater_->is_done) {
+    const auto count = inflate_some(out.subspan(filled, std::min(out.size() - filled, kMostAtOnce)));
+    if (!count) return count;
+    filled += *count;
+  }
+  return filled;
+}
+
+/// One call of inflate; it may give nothing and still have got ahead.
+Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
+  z_stream& state = inflater_->state;
+  const std::size_t offered = std::min(file_.size() - position_, kMostAtOnce);
+  // zlib reads through this pointer only; its type dates from before const.
+  state.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(file_.data() + position_));
+  state.avail_in = static_cast<uInt>(offered);
+  state.next_out = reinterpret_cast<Bytef*>(out.data());
+  state.avail_out = static_cast<uInt>(out.size());
+  const int outcome = inflate(&state, Z_NO_FLUSH);
+  const std::size_t written = out.size() - state.avail_out;
+  position_ += offered - state.avail_in;
+  if (outcome == Z_MEM_ERROR) throw std::bad_alloc();
+  if (outcome == Z_STREAM_END) {
+    if (auto next = begin_next_member(); !next) return next.error();
+    return written;
+  }
+  if (outcome == Z_BUF_ERROR || (outcome == Z_OK && written == 0 && position_ == file_.size())) {
+    return fail(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
+  }
+  if (outcome == Z_OK) return written;
+  const std::string why = state.msg != nullptr ? std::string(" (") + state.msg + ")" : "";
+  return fail(ErrorCode::BadFormat, "the compressed data are damaged" + why, {}, position_);
+}
+
+Status ByteStream::begin_next_member() {
+  if (!begins_gzip(file_.subspan(position_))) {
+    inflater_->is_done = true;
+    return {};
+  }
+  if (inflateReset(&inflater_->state) == Z_OK) return {};
+  return fail(ErrorCode::BadFormat, "the compressed data are damaged", {}, position_);
+}
+
+Result<std::uint64_t> ByteStream::skip(std::uint64_t count) {
+  if (!inflater_) {
+    const std::uint64_t skipped = std::min<std::uint64_t>(count, file_.size() - position_);
+    position_ += static_cast<std::size_t>(skipped);
+    return skipped;
+  }
+  constexpr std::uint64_t kPiece = 1 << 16;
+  std::vector<std::byte> piece(static_cast<std::size_t>(std::min(count, kPiece)));
+  std::uint64_t skipped = 0;
+  while (skipped < count) {
+    const auto wanted = static_cast<std::size_t>(std::min(count - skipped, kPiece));
+    const auto read_now = read(std::span(piece).first(wanted));
+    if (!read_now) return read_now.error();
+    skipped += *read_now;
+    if (*read_now < wanted) break;
+  }
+  return skipped;
+}
+
+Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most) {
+  const bool is_gzip = begins_gzip(file);
+  ByteStream stream(file, 0, is_gzip ? Compression::Gzip : Compression::None);
+  std::vector<std::byte> bytes(static_cast<std::size_t>(std::min<std::uint64_t>(most, stream.most_bytes())));
+  const auto count = stream.read(bytes);
+  if (!count) return count.error();
+  bytes.resize(*count);
+  return bytes;
+}
+
+}  // namespace quoin

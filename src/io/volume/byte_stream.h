@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// Whether a gzip stream (RFC 1952) begins here.
+[[nodiscard]] bool begins_gzip(std::span<const std::byte> bytes);
+
+enum class Compression : std::uint8_t { None, Gzip };
+
+/// The bytes of a file from some place to its end, in order, decompressed where they are a gzip stream.
+///
+/// Members of gzip that follow each other are one stream, as the standard says; what follows the last is left alone.
+/// Memory is that of zlib's window, whatever the stream holds. Offsets in errors are those of the file.
+class ByteStream {
+ public:
+  /// Requires: `file` outlives the stream, begin <= file.size().
+  ByteStream(std::span<const std::byte> file, std::size_t begin, Compression compression);
+  ~ByteStream();
+  ByteStream(const ByteStream&) = delete;
+  ByteStream& operator=(const ByteStream&) = delete;
+
+  /// Fills `out`, or less of it at the end of the stream; returns how many bytes were read.
+  /// Errors: BadFormat when compressed data are damaged or cut off.
+  [[nodiscard]] Result<std::size_t> read(std::span<std::byte> out);
+  /// As `read`, without keeping the bytes; returns how many there were.
+  [[nodiscard]] Result<std::uint64_t> skip(std::uint64_t count);
+
+  /// The most bytes that the whole stream can give: exact without compression; 1,032 a byte with it, which deflate
+  /// cannot exceed.
+  [[nodiscard]] std::uint64_t most_bytes() const;
+  /// The bytes left in the file itself.
+  [[nodiscard]] std::size_t remaining() const { return file_.size() - position_; }
+  /// Where in the file the next byte comes from.
+  [[nodiscard]] std::size_t position() const { return position_; }
+  [[nodiscard]] bool is_compressed() const { return inflater_ != nullptr; }
+
+ private:
+  struct Inflater;
+  [[nodiscard]] Result<std::size_t> inflate_some(std::span<std::byte> out);
+  [[nodiscard]] Status begin_next_member();
+
+  std::span<const std::byte> file_;
+  std::size_t begin_;
+  std::size_t position_;
+  std::unique_ptr<Inflater> inflater_;
+};
+
+/// The first bytes of a file, decompressed where it is a gzip stream: `most` of them, or all that there are.
+[[nodiscard]] Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most);
+
+}  // namespace quoin

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <span>
+
+#include <quoin/io/volume.h>
+
+#include "io/volume/byte_stream.h"
+
+namespace quoin {
+
+/// What the header of a volume says: all of the volume but its values, and where and how those are stored.
+struct VolumeHeader {
+  Volume volume;
+  std::endian order = std::endian::little;
+  double slope = 1.0;  ///< a value is slope times what is stored, plus intercept
+  double intercept = 0.0;
+
+  std::uint64_t data_at = 0;                         ///< where the values, or their compressed form, begin
+  Compression data_compression = Compression::None;  ///< of the values alone (NRRD's gzip encoding)
+  std::uint64_t skip = 0;                            ///< bytes before the values, once decompressed
+  bool is_data_at_end = false;                       ///< the values are the file's last bytes, wherever they begin
+  bool is_data_elsewhere = false;                    ///< in the other file of a pair
+};
+
+/// The frames in which files give positions.
+enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackHead, RightHanded, LeftHanded };
+
+/// The turn that `read_volume` documents, as a linear map.
+[[nodiscard]] glm::dmat4 quoin_from_space(VolumeSpace space);
+
+/// Sets `size` when it is one that Quoin can hold.
+/// Errors: LimitExceeded. Requires: every extent is positive.
+[[nodiscard]] Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions& options,
+                              std::optional<std::uint64_t> byte_offset, Volume& volume);
+
+/// Whether a file may mean this by a distance: positive, and neither so small nor so large that products overflow.
+[[nodiscard]] inline bool is_distance(double distance) {
+  constexpr double kSmallest = 1e-30;
+  constexpr double kLargest = 1e30;
+  return distance >= kSmallest && distance <= kLargest;
+}
+
+/// "64 x 33 x 32".
+[[nodiscard]] std::string text_of_size(IVec3 size);
+
+/// Reads the values that a header announces into its volume, with their range and counts; warns of what is not finite.
+///
+/// Requires: `stream` stands at the first value; `offset` is what errors about its length give.
+/// Errors:   BadFormat when there are fewer values than `size` says.
+[[nodiscard]] Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset);
+
+}  // namespace quoin
+
+namespace quoin::nifti {
+
+/// How many bytes `read_header` wants at most.
+inline constexpr std::size_t kMostHeaderBytes = 540;
+
+/// Whether a NIfTI-1 or -2 header of either byte order begins here, alone or of a pair.
+[[nodiscard]] bool is_header(std::span<const std::byte> bytes);
+
+/// Reads a header; sources as in read_volume. Requires: is_header(bytes). Offsets in errors count from `bytes`.
+[[nodiscard]] Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options);
+
+}  // namespace quoin::nifti
+
+namespace quoin::nrrd {
+
+/// How many bytes a header may have; one of a few dozen lines has some thousand.
+inline constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
+
+/// Whether a NRRD header begins here.
+[[nodiscard]] bool is_header(std::span<const std::byte> bytes);
+
+/// Reads a header; sources as in read_volume. `bytes` may be the file's first kMostHeaderBytes.
+/// Requires: is_header(bytes). Offsets in errors count from `bytes`.
+[[nodiscard]] Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options);
+
+}  // namespace quoin::nrrd

@@ -1,0 +1,472 @@
+#include "io/volume/header.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+#include "io/text.h"
+
+namespace quoin::nrrd {
+
+namespace {
+
+/// What follows the colon of a field, and where in the file.
+struct Field {
+  std::string_view text;
+  std::size_t at = 0;
+};
+
+/// The fields of a header by their names in lower case without blanks ("spacedirections"), which views `bytes`.
+struct Fields {
+  std::map<std::string, Field, std::less<>> all;
+  std::size_t end = 0;   ///< behind the empty line that ends the header
+  bool has_end = false;  ///< whether there is such a line
+
+  /// Null when the header has no such field.
+  [[nodiscard]] const Field* find(std::string_view name) const;
+};
+
+constexpr std::string_view kBlanks = " \t\r";
+
+char lower(char c) {
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
+std::string key_of(std::string_view text) {
+  std::string key;
+  for (const char c : text) {
+    if (kBlanks.find(c) == std::string_view::npos) key += lower(c);
+  }
+  return key;
+}
+
+Error bad(std::string message, std::size_t at) {
+  return fail(ErrorCode::BadFormat, std::move(message), {}, at);
+}
+
+/// `text`, or as much of it as a message can hold, on one line between quotation marks.
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  // Appended piece by piece: GCC 12 warns of what it makes of operator+ here.
+  std::string shown = "\"";
+  shown.append(printable(text.substr(0, kMost)));
+  if (text.size() > kMost) shown.append("...");
+  return shown.append("\"");
+}
+
+/// `text` without blanks at its ends.
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+Status add_line(std::string_view line, std::size_t at, Fields& fields) {
+  if (line.front() == '#') return {};
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos || colon + 1 == line.size()) {
+    return bad("the line " + quoted(line) + " is no field of a NRRD header", at);
+  }
+  if (line[colon + 1] == '=') return {};
+  const Field field{trimmed(line.substr(colon + 1)), at};
+  if (fields.all.emplace(key_of(line.substr(0, colon)), field).second) return {};
+  return bad("the field " + quoted(line.substr(0, colon)) + " is there twice", at);
+}
+
+const Field* Fields::find(std::string_view name) const {
+  const auto found = all.find(name);
+  return found == all.end() ? nullptr : &found->second;
+}
+
+/// Splits a header into its fields; comments and keys with values of their own are left out.
+/// Errors: BadFormat for lines that are neither, and for fields that are there twice.
+Result<Fields> split_header(std::string_view bytes) {
+  Fields fields;
+  // The first line is the magic number.
+  std::size_t at = bytes.find('\n');
+  while (at != std::string_view::npos && at + 1 < bytes.size()) {
+    const std::size_t begin = at + 1;
+    at = bytes.find('\n', begin);
+    std::string_view line = bytes.substr(begin, at == std::string_view::npos ? at : at - begin);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    if (line.empty()) {
+      fields.has_end = at != std::string_view::npos;
+      fields.end = fields.has_end ? at + 1 : bytes.size();
+      return fields;
+    }
+    if (auto status = add_line(line, begin, fields); !status) return status.error();
+  }
+  fields.end = bytes.size();
+  return fields;
+}
+
+/// The words between blanks.
+std::vector<std::string_view> words_of(std::string_view text) {
+  std::vector<std::string_view> words;
+  for (std::size_t at = text.find_first_not_of(kBlanks); at != std::string_view::npos;) {
+    const std::size_t end = text.find_first_of(kBlanks, at);
+    words.push_back(text.substr(at, end == std::string_view::npos ? end : end - at));
+    at = end == std::string_view::npos ? end : text.find_first_not_of(kBlanks, end);
+  }
+  return words;
+}
+
+/// In lower case, with one blank between words.
+std::string normalised(std::string_view text) {
+  std::string words;
+  for (const std::string_view word : words_of(text)) {
+    if (!words.empty()) words += ' ';
+    for (const char c : word) words += lower(c);
+  }
+  return words;
+}
+
+/// A finite number, "nan" or an infinity, in any case; nothing when `text` is neither.
+std::optional<double> parse_number(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// A list of vectors as "(1,0,0) none (0,0,2.5)": as many numbers as each has, none for "none". Nothing when it is
+/// none.
+std::optional<std::vector<std::vector<double>>> parse_vectors(std::string_view text) {
+  std::vector<std::vector<double>> vectors;
+  for (text = trimmed(text); !text.empty(); text = trimmed(text)) {
+    if (text.starts_with("none")) {
+      vectors.emplace_back();
+      text.remove_prefix(4);
+      continue;
+    }
+    const std::size_t close = text.find(')');
+    if (text.front() != '(' || close == std::string_view::npos) return std::nullopt;
+    std::string_view inner = text.substr(1, close - 1);
+    std::vector<double>& vector = vectors.emplace_back();
+    while (true) {
+      const std::size_t comma = inner.find(',');
+      const auto number = parse_number(trimmed(inner.substr(0, comma)));
+      if (!number) return std::nullopt;
+      vector.push_back(*number);
+      if (comma == std::string_view::npos) break;
+      inner.remove_prefix(comma + 1);
+    }
+    text.remove_prefix(close + 1);
+  }
+  return vectors;
+}
+
+Error bad(std::string message, const Field& field) {
+  return fail(ErrorCode::BadFormat, std::move(message), {}, field.at);
+}
+
+Error unsupported(std::string message, const Field& field) {
+  return fail(ErrorCode::Unsupported, std::move(message), {}, field.at);
+}
+
+Result<VolumeSpace> space_of(const Fields& fields) {
+  if (const Field* dimension = fields.find("spacedimension"); dimension != nullptr && dimension->text != "3") {
+    return unsupported("the space has " + printable(dimension->text) + " dimensions; only 3 are read", *dimension);
+  }
+  const Field* field = fields.find("space");
+  if (field == nullptr) return VolumeSpace::RightHanded;
+  const std::string space = normalised(field->text);
+  if (space == "right-anterior-superior" || space == "ras") return VolumeSpace::RightFrontHead;
+  if (space == "left-anterior-superior" || space == "las") return VolumeSpace::LeftFrontHead;
+  if (space == "left-posterior-superior" || space == "lps") return VolumeSpace::LeftBackHead;
+  if (space == "scanner-xyz" || space == "3d-right-handed") return VolumeSpace::RightHanded;
+  if (space == "3d-left-handed") return VolumeSpace::LeftHanded;
+  return unsupported("the space is \"" + printable(field->text) + "\", which is none of three dimensions", *field);
+}
+
+/// Kinds of axes that are not space.
+bool is_spatial(std::string_view kind) {
+  const std::string name = normalised(kind);
+  return name == "domain" || name == "space" || name == "???" || name == "none";
+}
+
+/// Values of several components, and slices in time, come before space in some files.
+Status check_kinds(const Fields& fields) {
+  const Field* field = fields.find("kinds");
+  if (field == nullptr) return {};
+  const auto kinds = words_of(field->text);
+  for (std::size_t axis = 0; axis < kinds.size() && axis < 3; ++axis) {
+    if (!is_spatial(kinds[axis])) {
+      return unsupported("axis " + std::to_string(axis + 1) + " is of kind \"" + printable(kinds[axis]) +
+                             "\"; the first three must be space",
+                         *field);
+    }
+  }
+  return {};
+}
+
+bool is_vector(const std::vector<double>& numbers) {
+  return numbers.size() == 3 && is_finite({numbers[0], numbers[1], numbers[2]});
+}
+
+Status read_directions(const Field& field, std::size_t dimensions, glm::dmat4& space_from_voxel) {
+  const auto vectors = parse_vectors(field.text);
+  if (!vectors || vectors->size() != dimensions) {
+    return bad("the space directions are not " + std::to_string(dimensions) + " vectors", field);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& v = (*vectors)[static_cast<std::size_t>(axis)];
+    if (v.empty()) {
+      return unsupported("axis " + std::to_string(axis + 1) + " has no direction; the first three must be space",
+                         field);
+    }
+    if (!is_vector(v)) return bad("a space direction is no vector of 3 finite numbers", field);
+    space_from_voxel[axis] = glm::dvec4(v[0], v[1], v[2], 0.0);
+  }
+  const glm::dmat3 turn(space_from_voxel);
+  const double box = glm::length(turn[0]) * glm::length(turn[1]) * glm::length(turn[2]);
+  constexpr double kFlattest = 1e-6;
+  if (std::isfinite(box) && std::abs(glm::determinant(turn)) > kFlattest * box) return {};
+  return bad("the space directions do not span a space", field);
+}
+
+Status read_origin(const Fields& fields, glm::dmat4& space_from_voxel) {
+  const Field* field = fields.find("spaceorigin");
+  if (field == nullptr) return {};
+  const auto vectors = parse_vectors(field->text);
+  if (!vectors || vectors->size() != 1 || !is_vector(vectors->front())) {
+    return bad("the space origin is no vector of 3 finite numbers", *field);
+  }
+  const std::vector<double>& v = vectors->front();
+  space_from_voxel[3] = glm::dvec4(v[0], v[1], v[2], 1.0);
+  return {};
+}
+
+Status read_spacings(const Field& field, std::size_t dimensions, Volume& volume) {
+  const auto words = words_of(field.text);
+  if (words.size() != dimensions) {
+    return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
+  }
+  bool is_amiss = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto number = parse_number(words[static_cast<std::size_t>(axis)]);
+    if (!number) return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
+    const double spacing = std::abs(*number);
+    const bool is_good = is_distance(spacing);
+    volume.spacing[axis] = is_good ? spacing : 1.0;
+    is_amiss |= !is_good;
+  }
+  if (is_amiss) volume.warnings.emplace_back("a spacing is no distance; 1 is taken");
+  return {};
+}
+
+/// "mm" from "\"mm\" \"mm\" \"mm\"".
+std::string units_of(const Fields& fields) {
+  const Field* field = fields.find("spaceunits");
+  if (field == nullptr) field = fields.find("units");
+  if (field == nullptr) return {};
+  const std::size_t open = field->text.find('"');
+  if (open == std::string_view::npos) return {};
+  const std::size_t close = field->text.find('"', open + 1);
+  if (close == std::string_view::npos) return {};
+  return printable(field->text.substr(open + 1, close - open - 1));
+}
+
+Status place(const Fields& fields, std::size_t dimensions, Volume& volume) {
+  if (auto status = check_kinds(fields); !status) return status;
+  const auto space = space_of(fields);
+  if (!space) return space.error();
+  glm::dmat4 space_from_voxel(1.0);
+  if (const Field* directions = fields.find("spacedirections")) {
+    if (auto status = read_directions(*directions, dimensions, space_from_voxel); !status) return status;
+    for (int axis = 0; axis < 3; ++axis) volume.spacing[axis] = glm::length(DVec3(space_from_voxel[axis]));
+  } else {
+    if (const Field* spacings = fields.find("spacings")) {
+      if (auto status = read_spacings(*spacings, dimensions, volume); !status) return status;
+    }
+    for (int axis = 0; axis < 3; ++axis) space_from_voxel[axis][axis] = volume.spacing[axis];
+  }
+  if (auto status = read_origin(fields, space_from_voxel); !status) return status;
+  volume.world_from_voxel = quoin_from_space(*space) * space_from_voxel;
+  volume.units = units_of(fields);
+  return {};
+}
+
+constexpr std::string_view kMagic = "NRRD000";
+constexpr std::int64_t kMostDimensions = 16;
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Error unsupported(std::string message, std::size_t at) {
+  return fail(ErrorCode::Unsupported, std::move(message), {}, at);
+}
+
+/// The names that the format gives each type.
+std::optional<ScalarType> scalar_type(std::string_view name) {
+  using Names = std::pair<std::string_view, ScalarType>;
+  static constexpr std::array<Names, 10> kNames = {{
+      {"|uchar|unsigned char|uint8|uint8_t|", ScalarType::UInt8},
+      {"|signed char|int8|int8_t|", ScalarType::Int8},
+      {"|ushort|unsigned short|unsigned short int|uint16|uint16_t|", ScalarType::UInt16},
+      {"|short|short int|signed short|signed short int|int16|int16_t|", ScalarType::Int16},
+      {"|uint|unsigned int|uint32|uint32_t|", ScalarType::UInt32},
+      {"|int|signed int|int32|int32_t|", ScalarType::Int32},
+      {"|ulonglong|unsigned long long|unsigned long long int|uint64|uint64_t|", ScalarType::UInt64},
+      {"|longlong|long long|long long int|signed long long|signed long long int|int64|int64_t|", ScalarType::Int64},
+      {"|float|", ScalarType::Float32},
+      {"|double|", ScalarType::Float64},
+  }};
+  std::string wanted = "|";
+  wanted.append(normalised(name)).append("|");
+  if (wanted.find('|', 1) != wanted.size() - 1) return std::nullopt;
+  for (const auto& [names, type] : kNames) {
+    if (names.find(wanted) != std::string_view::npos) return type;
+  }
+  return std::nullopt;
+}
+
+Result<Field> required(const Fields& fields, const char* name) {
+  if (const Field* field = fields.find(name)) return *field;
+  return bad(std::string("the header has no field \"") + name + "\"", fields.end);
+}
+
+Status read_type(const Fields& fields, VolumeHeader& header) {
+  const auto type = required(fields, "type");
+  if (!type) return type.error();
+  const auto scalar = scalar_type(type->text);
+  if (!scalar && normalised(type->text) == "block") return unsupported("the values are blocks, not numbers", type->at);
+  if (!scalar) return bad("the type is " + quoted(type->text), type->at);
+  header.volume.type = *scalar;
+  if (bytes_of(*scalar) == 1) return {};
+  const auto endian = required(fields, "endian");
+  if (!endian) return endian.error();
+  const std::string order = normalised(endian->text);
+  if (order != "little" && order != "big") return bad("the endian is " + quoted(endian->text), endian->at);
+  header.order = order == "big" ? std::endian::big : std::endian::little;
+  return {};
+}
+
+Result<std::size_t> read_dimensions(const Fields& fields) {
+  const auto field = required(fields, "dimension");
+  if (!field) return field.error();
+  const auto dimensions = parse_integer(field->text);
+  if (!dimensions || *dimensions < 1 || *dimensions > kMostDimensions) {
+    return bad("the dimension is " + quoted(field->text), field->at);
+  }
+  if (*dimensions >= 3) return static_cast<std::size_t>(*dimensions);
+  return unsupported("it has " + std::to_string(*dimensions) + " dimensions; a volume has 3", field->at);
+}
+
+Status read_sizes(const Fields& fields, std::size_t dimensions, const VolumeOptions& options, Volume& volume) {
+  const auto field = required(fields, "sizes");
+  if (!field) return field.error();
+  const auto words = words_of(field->text);
+  if (words.size() != dimensions) return bad("the sizes are not " + std::to_string(dimensions) + " numbers", field->at);
+  std::array<std::int64_t, 3> extents{};
+  bool has_more = false;
+  for (std::size_t axis = 0; axis < dimensions; ++axis) {
+    const auto extent = parse_integer(words[axis]);
+    if (!extent || *extent < 1) return bad("a size is " + quoted(words[axis]), field->at);
+    if (axis < 3) extents[axis] = *extent;
+    has_more |= axis >= 3 && *extent > 1;
+  }
+  if (has_more) {
+    volume.warnings.push_back("it has " + std::to_string(dimensions) + " dimensions; the first volume is taken");
+  }
+  return set_size(extents, options, field->at, volume);
+}
+
+Status read_encoding(const Fields& fields, VolumeHeader& header) {
+  const auto field = required(fields, "encoding");
+  if (!field) return field.error();
+  const std::string encoding = normalised(field->text);
+  if (encoding == "raw") return {};
+  if (encoding != "gzip" && encoding != "gz") {
+    return unsupported("the encoding is " + quoted(field->text) + "; only raw and gzip are read", field->at);
+  }
+  header.data_compression = Compression::Gzip;
+  return {};
+}
+
+/// A whole number of at least `least`; 0 when the field is not there.
+Result<std::int64_t> read_count(const Fields& fields, const char* name, std::int64_t least) {
+  const Field* field = fields.find(name);
+  if (field == nullptr) return 0;
+  const auto count = parse_integer(field->text);
+  constexpr std::int64_t kMost = std::int64_t{1} << 50;
+  if (count && *count >= least && *count <= kMost) return *count;
+  return bad(std::string("the ") + name + " is " + quoted(field->text), field->at);
+}
+
+Status read_skips(const Fields& fields, std::string_view bytes, VolumeHeader& header) {
+  const auto lines = read_count(fields, "lineskip", 0);
+  if (!lines) return lines.error();
+  const auto skip = read_count(fields, "byteskip", -1);
+  if (!skip) return skip.error();
+  std::size_t at = fields.end;
+  for (std::int64_t line = 0; line < *lines; ++line) {
+    const std::size_t end = bytes.find('\n', at);
+    if (end == std::string_view::npos) return bad("the lines to skip do not end soon enough", at);
+    at = end + 1;
+  }
+  header.data_at = at;
+  header.is_data_at_end = *skip == -1;
+  if (header.is_data_at_end && header.data_compression != Compression::None) {
+    return bad("the byte skip is -1, which only raw data may have", fields.find("byteskip")->at);
+  }
+  header.skip = header.is_data_at_end ? 0 : static_cast<std::uint64_t>(*skip);
+  return {};
+}
+
+Status check_attached(const Fields& fields) {
+  if (const Field* file = fields.find("datafile")) {
+    return unsupported("a detached header, whose values are in a file of their own (" + quoted(file->text) + ")",
+                       file->at);
+  }
+  if (!fields.has_end) return bad("no empty line ends the header", fields.end);
+  return {};
+}
+
+}  // namespace
+
+bool is_header(std::span<const std::byte> bytes) {
+  const std::string_view text = text_of(bytes);
+  return text.size() > kMagic.size() && text.starts_with(kMagic) && text[kMagic.size()] >= '0' &&
+         text[kMagic.size()] <= '9';
+}
+
+Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options) {
+  QUOIN_ASSERT(is_header(bytes), "a header begins here");
+  const std::string_view text = text_of(bytes.first(std::min(bytes.size(), kMostHeaderBytes)));
+  if (text[kMagic.size()] < '1' || text[kMagic.size()] > '5') {
+    return unsupported("a NRRD of version " + std::string(1, text[kMagic.size()]) + "; 1 to 5 are read", 0);
+  }
+  const auto fields = split_header(text);
+  if (!fields) return fields.error();
+  VolumeHeader header;
+  header.volume.format = "nrrd";
+  if (const Field* content = fields->find("content")) header.volume.name = printable(content->text);
+  if (auto status = check_attached(*fields); !status) return status.error();
+  const auto dimensions = read_dimensions(*fields);
+  if (!dimensions) return dimensions.error();
+  Status status = read_sizes(*fields, *dimensions, options, header.volume);
+  if (status) status = read_type(*fields, header);
+  if (status) status = read_encoding(*fields, header);
+  if (status) status = read_skips(*fields, text, header);
+  if (status) status = place(*fields, *dimensions, header.volume);
+  if (!status) return status.error();
+  return header;
+}
+
+}  // namespace quoin::nrrd

@@ -1,0 +1,186 @@
+#include <gtest/gtest.h>
+
+#include <glm/matrix.hpp>
+
+#include "io/volume/for_tests.h"
+
+namespace quoin {
+namespace {
+
+using volume_test::Bytes;
+using volume_test::encode;
+using volume_test::gzipped;
+
+const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
+
+Bytes file_of(const std::string& header, const Bytes& data) {
+  Bytes bytes;
+  volume_test::append_text(bytes, header);
+  bytes.insert(bytes.end(), data.begin(), data.end());
+  return bytes;
+}
+
+/// Three times two times two bytes, with more lines in the header.
+Bytes tiny(const std::string& lines, const Bytes& data = encode(kTwelve, ScalarType::UInt8)) {
+  return file_of("NRRD0004\n# a comment\ntype: uint8\ndimension: 3\nsizes: 3 2 2\nencoding: raw\n" + lines + "\n",
+                 data);
+}
+
+Volume volume_of(const Bytes& bytes) {
+  const auto volume = read_volume(bytes);
+  EXPECT_TRUE(volume) << to_string(volume.error());
+  return volume.value_or(Volume{});
+}
+
+std::string error_of(const Bytes& bytes) {
+  const auto volume = read_volume(bytes);
+  return volume ? "none" : to_string(volume.error());
+}
+
+DVec3 at(const Volume& volume, DVec3 voxel) {
+  return DVec3(volume.world_from_voxel * glm::dvec4(voxel, 1.0));
+}
+
+TEST(Nrrd, EveryTypeByEveryNameInEveryOrderIsRead) {
+  const std::vector<std::pair<ScalarType, std::vector<std::string>>> names = {
+      {ScalarType::UInt8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+      {ScalarType::Int8, {"signed char", "int8", "int8_t"}},
+      {ScalarType::UInt16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+      {ScalarType::Int16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+      {ScalarType::UInt32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {ScalarType::Int32, {"int", "signed int", "int32", "int32_t"}},
+      {ScalarType::UInt64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+      {ScalarType::Int64, {"longlong", "long long", "long long int", "signed long long", "int64", "int64_t"}},
+      {ScalarType::Float32, {"float"}},
+      {ScalarType::Float64, {"double"}}};
+  for (const auto& [type, spellings] : names) {
+    for (const std::string& name : spellings) {
+      for (const std::endian order : {std::endian::little, std::endian::big}) {
+        const std::string endian = order == std::endian::big ? "Big" : "little";
+        const std::string header = "NRRD0001\nType: " + name + "\ndimension: 3\nsizes: 3 2 2\nendian: " + endian;
+        const Bytes data = encode(kTwelve, type, order);
+        const Volume raw = volume_of(file_of(header + "\nencoding: raw\n\n", data));
+        EXPECT_EQ(raw.values, kTwelveFloats) << name;
+        EXPECT_EQ(raw.type, type) << name;
+        EXPECT_EQ(raw.format, "nrrd");
+        EXPECT_EQ(volume_of(file_of(header + "\nencoding: gzip\n\n", gzipped(data))).values, kTwelveFloats);
+      }
+    }
+  }
+  EXPECT_NE(error_of(file_of("NRRD0001\ntype: uint8|uint8_t\n\n", {})), "none");
+}
+
+TEST(Nrrd, TheWholeFileMayBeCompressed) {
+  EXPECT_EQ(volume_of(gzipped(tiny(""))).values, kTwelveFloats);
+}
+
+TEST(Nrrd, LinesMayEndInTwoCharactersAndFieldsInBlanks) {
+  const std::string header =
+      "NRRD0005\r\ntype:  unsigned  char \r\ndimension: 3\r\nkey:=value: x\r\nsizes: 3\t2 2 \r\n"
+      "encoding: raw\r\ncontent: a name\r\n\r\n";
+  const Volume volume = volume_of(file_of(header, encode(kTwelve, ScalarType::UInt8)));
+  EXPECT_EQ(volume.values, kTwelveFloats);
+  EXPECT_EQ(volume.name, "a name");
+}
+
+TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
+  const Volume volume = volume_of(tiny("spacings: 2 0.5 +4\n"));
+  EXPECT_EQ(volume.spacing, DVec3(2, 0.5, 4));
+  EXPECT_EQ(at(volume, {1, 1, 1}), DVec3(2, 4, -0.5));
+  EXPECT_EQ(volume_of(tiny("spacings: 2 nan 4\n")).spacing, DVec3(2, 1, 4));
+}
+
+TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
+  const Volume volume =
+      volume_of(tiny("space: left-posterior-superior\nspace directions: (2,0,0) (0,0,3) ( 0, -4, 0 )\n"
+                     "space origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\"\n"));
+  EXPECT_EQ(volume.spacing, DVec3(2, 3, 4));
+  EXPECT_EQ(volume.units, "mm");
+  EXPECT_EQ(at(volume, {0, 0, 0}), DVec3(10, 30, -20));
+  EXPECT_EQ(at(volume, {1, 0, 0}), DVec3(12, 30, -20));
+  EXPECT_EQ(at(volume, {0, 1, 0}), DVec3(10, 33, -20));
+  EXPECT_EQ(at(volume, {0, 0, 1}), DVec3(10, 30, -16));
+}
+
+/// The same point of a body, said in each space, lies in the same place.
+TEST(Nrrd, TheSameBodyInEverySpaceIsTheSame) {
+  const auto origin = [](const std::string& space, const std::string& vector) {
+    return at(volume_of(tiny("space: " + space + "\nspace origin: (" + vector + ")\n")), {0, 0, 0});
+  };
+  // 1 to the right, 2 to the front, 3 up.
+  const DVec3 expected(-1, 3, 2);
+  EXPECT_EQ(origin("RAS", "1,2,3"), expected);
+  EXPECT_EQ(origin("right-anterior-superior", "1,2,3"), expected);
+  EXPECT_EQ(origin("LAS", "-1,2,3"), expected);
+  EXPECT_EQ(origin("Left-Posterior-Superior", "-1,-2,3"), expected);
+  EXPECT_EQ(origin("3D-right-handed", "1,2,3"), DVec3(1, 3, -2)) << "as .vox";
+  EXPECT_EQ(origin("3D-left-handed", "1,2,3"), DVec3(1, 3, 2));
+  EXPECT_LT(glm::determinant(volume_of(tiny("space: 3D-left-handed\n")).world_from_voxel), 0.0);
+}
+
+TEST(Nrrd, SkipsLeadToTheData) {
+  Bytes data = encode({77, 78, 10, 79, 10, 80}, ScalarType::UInt8);
+  const Bytes values = encode(kTwelve, ScalarType::UInt8);
+  data.insert(data.end(), values.begin(), values.end());
+  EXPECT_EQ(volume_of(tiny("line skip: 2\nbyte skip: 1\n", data)).values, kTwelveFloats);
+  EXPECT_EQ(volume_of(tiny("byteskip: 6\n", data)).values, kTwelveFloats);
+  EXPECT_EQ(volume_of(tiny("byte skip: -1\n", data)).values, kTwelveFloats);
+  EXPECT_NE(error_of(tiny("line skip: 3\n", encode(kTwelve, ScalarType::UInt8))), "none");
+}
+
+TEST(Nrrd, ValuesBeyondThreeDimensionsAreLeftOut) {
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n";
+  Bytes data = encode(kTwelve, ScalarType::UInt8);
+  const Volume volume = volume_of(
+      file_of(header + "sizes: 3 2 2 9\nspace: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1) none\n\n", data));
+  EXPECT_EQ(volume.values, kTwelveFloats);
+  ASSERT_EQ(volume.warnings.size(), 1U);
+  EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nkinds: RGB-color domain domain domain\n\n", data)),
+            "byte 63: axis 1 is of kind \"RGB-color\"; the first three must be space");
+  EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n\n", data)),
+            "byte 63: axis 1 has no direction; the first three must be space");
+}
+
+TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
+  const auto header = [](const std::string& text) { return error_of(file_of("NRRD0004\n" + text, {})); };
+  EXPECT_EQ(header(""), "byte 9: no empty line ends the header");
+  EXPECT_EQ(header("\n"), "byte 10: the header has no field \"dimension\"");
+  EXPECT_EQ(header("dimension\n\n"), "byte 9: the line \"dimension\" is no field of a NRRD header");
+  EXPECT_EQ(header("dimension: 2\ndimension: 2\n\n"), "byte 22: the field \"dimension\" is there twice");
+  EXPECT_EQ(header("dimension: 17\n\n"), "byte 9: the dimension is \"17\"");
+  EXPECT_EQ(header("dimension: 2\n\n"), "byte 9: it has 2 dimensions; a volume has 3");
+  EXPECT_EQ(header("dimension: 3\nsizes: 1 2\n\n"), "byte 22: the sizes are not 3 numbers");
+  EXPECT_EQ(header("dimension: 3\nsizes: 1 -2 3\n\n"), "byte 22: a size is \"-2\"");
+  EXPECT_EQ(header("dimension: 3\nsizes: 4294967296 4294967296 4294967296\n\n"),
+            "byte 22: it claims 4294967296 x 4294967296 x 4294967296 values; at most 1073741824 are read");
+  EXPECT_EQ(header("data file: ../../secret\n"),
+            "byte 9: a detached header, whose values are in a file of their own (\"../../secret\")");
+  EXPECT_EQ(error_of(file_of("NRRD0009\n\n", {})), "byte 0: a NRRD of version 9; 1 to 5 are read");
+  const auto field = [](const std::string& lines) { return error_of(tiny(lines)); };
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0)\n"), "byte 73: the space directions are not 3 vectors");
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (1,1,0)\n"), "byte 73: the space directions do not span a space");
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (0,nan,0)\n"),
+            "byte 73: a space direction is no vector of 3 finite numbers");
+  EXPECT_EQ(field("space origin: (1,2\n"), "byte 73: the space origin is no vector of 3 finite numbers");
+  EXPECT_EQ(field("spacings: 1 2 x\n"), "byte 73: the spacings are not 3 numbers");
+  EXPECT_EQ(field("space: scanner-xyz-time\n"),
+            "byte 73: the space is \"scanner-xyz-time\", which is none of three dimensions");
+  EXPECT_EQ(field("byte skip: -2\n"), "byte 73: the byteskip is \"-2\"");
+  EXPECT_EQ(error_of(tiny("", {})), "byte 74: 3 x 2 x 2 values of uint8 take 12 bytes, but there are 0");
+}
+
+TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
+  const std::string header = "NRRD0004\ndimension: 3\nsizes: 1 1 1\n";
+  EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: ascii\n\n", {})),
+            "byte 47: the encoding is \"ascii\"; only raw and gzip are read");
+  EXPECT_EQ(error_of(file_of(header + "type: block\nencoding: raw\n\n", {})),
+            "byte 35: the values are blocks, not numbers");
+  EXPECT_EQ(error_of(file_of(header + "type: int16\nencoding: raw\n\n", {})),
+            "byte 62: the header has no field \"endian\"");
+  EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: gzip\n\n12345", {})),
+            "byte 63: the encoding is gzip, but the data are not");
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,177 @@
+#include <quoin/io/volume.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "io/text.h"
+#include "io/volume/header.h"
+#include "io/whole_file.h"
+
+namespace quoin {
+
+namespace {
+
+/// What a file begins with, decompressed, and whether it had to be.
+struct Beginning {
+  std::vector<std::byte> bytes;
+  Compression compression = Compression::None;
+};
+
+Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
+  auto first = first_bytes(bytes, std::max(nifti::kMostHeaderBytes, nrrd::kMostHeaderBytes));
+  // Damage farther on shows when the values are read; what came before it may still be a header.
+  if (!first) first = first_bytes(bytes, nifti::kMostHeaderBytes);
+  if (!first) return first.error();
+  return Beginning{std::move(*first), begins_gzip(bytes) ? Compression::Gzip : Compression::None};
+}
+
+Result<VolumeHeader> header_of(const Beginning& beginning, const VolumeOptions& options) {
+  auto header = nifti::is_header(beginning.bytes)  ? nifti::read_header(beginning.bytes, options)
+                : nrrd::is_header(beginning.bytes) ? nrrd::read_header(beginning.bytes, options)
+                                                   : fail(ErrorCode::BadFormat, "neither NIfTI nor NRRD");
+  if (!header && header.error().byte_offset && beginning.compression != Compression::None) {
+    header.error().message += " (counted after decompression)";
+  }
+  return header;
+}
+
+Status skip(ByteStream& stream, std::uint64_t count, std::uint64_t byte_offset) {
+  const auto skipped = stream.skip(count);
+  if (!skipped) return skipped.error();
+  if (*skipped == count) return {};
+  return fail(ErrorCode::BadFormat,
+              "the values begin at byte " + std::to_string(count) + ", but there are " + std::to_string(*skipped), {},
+              byte_offset);
+}
+
+/// Reads a byte more, so that a checksum at the end is looked at.
+Status check_end(ByteStream& stream) {
+  if (!stream.is_compressed()) return {};
+  const auto skipped = stream.skip(1);
+  if (!skipped) return skipped.error();
+  return {};
+}
+
+Result<Volume> read_stream(ByteStream& stream, std::uint64_t skipped, VolumeHeader& header) {
+  if (auto status = skip(stream, skipped, stream.position()); !status) return status.error();
+  const std::size_t begin = stream.position();
+  if (auto status = read_values(stream, header, begin); !status) return status.error();
+  if (auto status = check_end(stream); !status) return status.error();
+  return std::move(header.volume);
+}
+
+/// Skips to values that are the last bytes of a file.
+Result<Volume> read_from_end(std::span<const std::byte> bytes, VolumeHeader& header) {
+  const IVec3 size = header.volume.size;
+  const std::uint64_t taken = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                              static_cast<std::uint64_t>(size.z) * bytes_of(header.volume.type);
+  const std::uint64_t room = bytes.size() - header.data_at;
+  ByteStream stream(bytes, 0, Compression::None);
+  return read_stream(stream, header.data_at + (room > taken ? room - taken : 0), header);
+}
+
+Result<Volume> read_data(std::span<const std::byte> bytes, Compression compression, VolumeHeader& header) {
+  if (header.data_compression == Compression::None) {
+    if (header.is_data_at_end && compression == Compression::None) return read_from_end(bytes, header);
+    ByteStream stream(bytes, 0, compression);
+    return read_stream(stream, header.data_at + header.skip, header);
+  }
+  const auto begin = static_cast<std::size_t>(header.data_at);
+  if (!begins_gzip(bytes.subspan(begin))) {
+    return fail(ErrorCode::BadFormat, "the encoding is gzip, but the data are not", {}, begin);
+  }
+  ByteStream stream(bytes, begin, Compression::Gzip);
+  return read_stream(stream, header.skip, header);
+}
+
+Status check_combination(const VolumeHeader& header, Compression compression) {
+  if (compression == Compression::None) return {};
+  if (header.data_compression == Compression::None && !header.is_data_at_end) return {};
+  return fail(ErrorCode::Unsupported, "a NRRD within gzip whose data are compressed once more or counted from the end");
+}
+
+std::filesystem::path image_beside(const std::filesystem::path& header_path) {
+  std::filesystem::path stem = header_path;
+  if (stem.extension() == ".gz") stem.replace_extension();
+  std::filesystem::path image = stem.replace_extension(".img");
+  std::error_code ignored;
+  if (std::filesystem::exists(image, ignored)) return image;
+  std::filesystem::path compressed = image;
+  compressed += ".gz";
+  return std::filesystem::exists(compressed, ignored) ? compressed : image;
+}
+
+Result<Volume> read_pair(const std::filesystem::path& header_path, VolumeHeader& header) {
+  const std::filesystem::path path = image_beside(header_path);
+  const auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  auto volume = read_data(*bytes, begins_gzip(*bytes) ? Compression::Gzip : Compression::None, header);
+  if (!volume) volume.error().path = path.string();
+  return volume;
+}
+
+/// `path` is empty when it is not known.
+Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::path& path,
+                      const VolumeOptions& options) {
+  const auto beginning = beginning_of(bytes);
+  if (!beginning) return beginning.error();
+  auto header = header_of(*beginning, options);
+  if (!header) return header.error();
+  if (auto status = check_combination(*header, beginning->compression); !status) {
+    return status.error();
+  }
+  if (!header->is_data_elsewhere) return read_data(bytes, beginning->compression, *header);
+  if (!path.empty()) return read_pair(path, *header);
+  return fail(ErrorCode::Unsupported, "the header of a pair, whose values are in a file of their own (.img)");
+}
+
+std::string name_from(std::filesystem::path path) {
+  if (path.extension() == ".gz") path.replace_extension();
+  return printable(path.stem().string());
+}
+
+}  // namespace
+
+Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options) {
+  return decode(bytes, {}, options);
+}
+
+Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options) {
+  return read_whole(path, [&](std::span<const std::byte> bytes) {
+    auto volume = decode(bytes, path, options);
+    if (volume && volume->name.empty()) volume->name = name_from(path);
+    return volume;
+  });
+}
+
+Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options) {
+  if (raw.size.x < 1 || raw.size.y < 1 || raw.size.z < 1) {
+    return fail(ErrorCode::InvalidArgument, "a volume of " + text_of_size(raw.size) + " values");
+  }
+  VolumeHeader header;
+  header.order = raw.order;
+  header.volume.format = "raw";
+  header.volume.type = raw.type;
+  header.volume.world_from_voxel = quoin_from_space(VolumeSpace::RightHanded);
+  if (auto status = set_size({raw.size.x, raw.size.y, raw.size.z}, options, std::nullopt, header.volume); !status) {
+    return status.error();
+  }
+  ByteStream stream(bytes, 0, Compression::None);
+  auto volume = read_stream(stream, 0, header);
+  if (volume && stream.remaining() > 0) {
+    return fail(ErrorCode::BadFormat,
+                "the values end here, but " + std::to_string(stream.remaining()) + " bytes follow; is the size right?",
+                {}, stream.position());
+  }
+  return volume;
+}
+
+Result<Volume> read_raw_volume(const std::filesystem::path& path, const RawVolume& raw, const VolumeOptions& options) {
+  return read_whole(path, [&](std::span<const std::byte> bytes) {
+    auto volume = read_raw_volume(bytes, raw, options);
+    if (volume) volume->name = name_from(path);
+    return volume;
+  });
+}
+
+}  // namespace quoin

@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+
+#include "io/gltf/glb_for_tests.h"
+#include "io/volume/for_tests.h"
+
+namespace quoin {
+namespace {
+
+using volume_test::Bytes;
+using volume_test::encode;
+using volume_test::NiftiFile;
+
+const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
+
+TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
+  const TestFolder folder("raw_volume");
+  ASSERT_TRUE(write_file(folder.file("a.raw"), encode(kTwelve, ScalarType::Int16, std::endian::big)));
+  RawVolume raw{.size = {3, 2, 2}, .type = ScalarType::Int16, .order = std::endian::big};
+  const auto volume = read_raw_volume(folder.file("a.raw"), raw);
+  ASSERT_TRUE(volume) << to_string(volume.error());
+  EXPECT_EQ(volume->values, kTwelveFloats);
+  EXPECT_EQ(volume->name, "a");
+  EXPECT_EQ(volume->format, "raw");
+  EXPECT_EQ(DVec3(volume->world_from_voxel * glm::dvec4(1, 2, 3, 1)), DVec3(1, 3, -2));
+  raw.size = {3, 2, 1};
+  EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().message,
+            "the values end here, but 12 bytes follow; is the size right?");
+  raw.size = {3, 2, 3};
+  EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().code, ErrorCode::BadFormat);
+  raw.size = {3, 0, 2};
+  EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().code, ErrorCode::InvalidArgument);
+  raw.size = {2147483647, 2147483647, 2147483647};
+  EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(read_raw_volume(folder.file("b.raw"), raw).error().code, ErrorCode::CannotRead);
+}
+
+TEST(VolumeFiles, APairIsReadByItsHeader) {
+  const TestFolder folder("volume_pair");
+  NiftiFile file{.vox_offset = 0, .magic = "ni1"};
+  Bytes header = file.bytes({});
+  header.resize(348);
+  ASSERT_TRUE(write_file(folder.file("a.hdr"), header));
+  const auto missing = read_volume(folder.file("a.hdr"));
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().path, folder.file("a.img").string());
+  const Bytes values = encode(kTwelve, ScalarType::UInt8);
+  ASSERT_TRUE(write_file(folder.file("a.img.gz"), volume_test::gzipped(values)));
+  EXPECT_EQ(read_volume(folder.file("a.hdr")).value().values, kTwelveFloats);
+  ASSERT_TRUE(write_file(folder.file("a.img"), values));
+  EXPECT_EQ(read_volume(folder.file("a.hdr")).value().values, kTwelveFloats);
+}
+
+TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
+  const TestFolder folder("volume_content");
+  const Bytes compressed = volume_test::gzipped(NiftiFile{}.bytes(encode(kTwelve, ScalarType::UInt8)));
+  ASSERT_TRUE(write_file(folder.file("scan.dat.gz"), compressed));
+  EXPECT_EQ(detect_format(compressed), FileFormat::Nifti);
+  EXPECT_EQ(detect_format(folder.file("scan.dat.gz")).value(), FileFormat::Nifti);
+  EXPECT_FALSE(detect_format(folder.file("none")));
+  Bytes nrrd;
+  volume_test::append_text(nrrd, "NRRD0004\n");
+  EXPECT_EQ(detect_format(nrrd), FileFormat::Nrrd);
+  const auto volume = read_volume(folder.file("scan.dat.gz"));
+  ASSERT_TRUE(volume);
+  EXPECT_EQ(volume->name, "scan");
+  const auto scene = load_scene(folder.file("scan.dat.gz"));
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, ErrorCode::Unsupported);
+  ASSERT_TRUE(write_file(folder.file("b.nii"), nrrd));
+  EXPECT_EQ(read_volume(folder.file("b.nii")).error().path, folder.file("b.nii").string());
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,376 @@
+#include "io/vox/chunks.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "io/text.h"
+#include "io/vox/chunk_reader.h"
+
+namespace quoin::vox {
+
+namespace {
+
+constexpr std::size_t kFileHeaderBytes = 8;
+constexpr std::size_t kChunkHeaderBytes = 12;
+constexpr std::string_view kMagic = "VOX ";
+constexpr std::string_view kLfsPointer = "version https://git-lfs";
+
+struct ChunkHeader {
+  std::size_t offset = 0;
+  std::string_view id;
+  std::uint64_t content_bytes = 0;
+  std::uint64_t children_bytes = 0;
+};
+
+std::string_view text_of(std::span<const std::byte> bytes, std::size_t count) {
+  return {reinterpret_cast<const char*>(bytes.data()), std::min(count, bytes.size())};
+}
+
+/// SLAB6's .vox: three sizes, that many bytes, and a palette of 768.
+bool is_slab6(std::span<const std::byte> bytes) {
+  constexpr std::uint64_t kPaletteBytes = 768;
+  ByteReader reader(bytes);
+  const std::uint64_t x = reader.u32();
+  const std::uint64_t y = reader.u32();
+  const std::uint64_t z = reader.u32();
+  // Below 2^16 each, so that the product cannot overflow.
+  if (reader.failed() || x == 0 || y == 0 || z == 0 || (x | y | z) >= (1U << 16U)) return false;
+  return bytes.size() == 12 + x * y * z + kPaletteBytes;
+}
+
+Status check_signature(std::span<const std::byte> bytes) {
+  if (bytes.empty()) return fail(ErrorCode::BadFormat, "the file is empty");
+  if (text_of(bytes, 4) == kMagic) return {};
+  if (text_of(bytes, kLfsPointer.size()) == kLfsPointer) {
+    return fail(ErrorCode::Unsupported, "this is a git-LFS pointer, not the file that it stands for");
+  }
+  if (is_slab6(bytes)) {
+    return fail(ErrorCode::Unsupported, "this is SLAB6's .vox format, not MagicaVoxel's of the same name");
+  }
+  return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this one with \"" + printable(text_of(bytes, 4)) + "\"");
+}
+
+/// Reads a header and checks that what it claims lies before `end`.
+Result<ChunkHeader> read_header(std::span<const std::byte> bytes, std::size_t begin, std::size_t end) {
+  ByteReader reader(bytes, begin, end);
+  ChunkHeader header;
+  header.offset = begin;
+  header.id = reader.text(4);
+  header.content_bytes = reader.u32();
+  header.children_bytes = reader.u32();
+  if (reader.failed()) return bad_at(begin, "a chunk's header is cut off");
+  const std::uint64_t claimed = header.content_bytes + header.children_bytes;
+  if (claimed > reader.remaining()) {
+    return bad_at(begin, "chunk " + printable(header.id) + " claims " + std::to_string(claimed) + " bytes, but " +
+                             std::to_string(reader.remaining()) + " are left");
+  }
+  return header;
+}
+
+Status parse_size(ChunkReader& chunk, Document& out) {
+  std::array<std::uint32_t, 3> size{};
+  for (std::uint32_t& edge : size) edge = chunk.u32();
+  if (chunk.failed()) return chunk.too_short();
+  const bool fits = std::ranges::all_of(size, [](std::uint32_t edge) { return edge <= kMaxModelEdge; });
+  if (!fits) {
+    return chunk.error("claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
+                       std::to_string(size[2]) + " voxels");
+  }
+  if (std::ranges::find(size, 0U) != size.end()) {
+    out.warnings.push_back("model " + std::to_string(out.models.size()) + " has no extent on an axis; 1 is taken");
+  }
+  Model model;
+  for (int axis = 0; axis < 3; ++axis) {
+    model.size[axis] = std::max(1, static_cast<int>(size[static_cast<std::size_t>(axis)]));
+  }
+  model.offset = chunk.offset();
+  out.models.push_back(model);
+  return {};
+}
+
+Status parse_voxels(ChunkReader& chunk, Model& model) {
+  const std::uint32_t claimed = chunk.u32();
+  if (chunk.failed()) return chunk.too_short();
+  if (claimed > chunk.remaining() / 4) {
+    return chunk.error("claims " + std::to_string(claimed) + " voxels in " + std::to_string(chunk.remaining()) +
+                       " bytes");
+  }
+  model.voxels = chunk.take(std::size_t{claimed} * 4);
+  return {};
+}
+
+Status parse_palette(ChunkReader& chunk, Document& out) {
+  if (chunk.remaining() < kColours * 4) return chunk.too_short();
+  out.palette = chunk.take(kColours * 4);
+  return {};
+}
+
+Status parse_index_map(ChunkReader& chunk, Document& out) {
+  if (chunk.remaining() < kColours) return chunk.too_short();
+  out.index_map = chunk.take(kColours);
+  return {};
+}
+
+/// Whether the last SIZE still waits for its XYZI.
+struct ModelState {
+  bool has_size = false;
+};
+
+Status parse_chunk(ChunkReader& chunk, ModelState& state, Document& out) {
+  const std::string_view id = chunk.id();
+  if (id == "SIZE") {
+    if (state.has_size) return chunk.error("follows another SIZE, whose XYZI is missing");
+    state.has_size = true;
+    return parse_size(chunk, out);
+  }
+  if (id == "XYZI") {
+    if (!state.has_size) return chunk.error("has no SIZE before it");
+    state.has_size = false;
+    return parse_voxels(chunk, out.models.back());
+  }
+  if (id == "RGBA") return parse_palette(chunk, out);
+  if (id == "IMAP") return parse_index_map(chunk, out);
+  if (id == "MATL") return parse_material(chunk, out);
+  if (id == "MATT") return parse_old_material(chunk, out);
+  if (id == "nTRN") return parse_transform(chunk, out);
+  if (id == "nGRP") return parse_group(chunk, out);
+  if (id == "nSHP") return parse_shape(chunk, out);
+  if (id == "LAYR") return parse_layer(chunk, out);
+  if (id == "META") return parse_animation_range(chunk, out);
+  return {};  // PACK repeats the number of models; cameras, lights and notes have no place in a scene.
+}
+
+Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::size_t end, Document& out) {
+  ModelState state;
+  std::size_t at = begin;
+  while (at < end) {
+    const Result<ChunkHeader> header = read_header(bytes, at, end);
+    if (!header) return header.error();
+    const std::size_t content = at + kChunkHeaderBytes;
+    ChunkReader chunk(bytes, header->id, at, content, content + header->content_bytes);
+    if (Status status = parse_chunk(chunk, state, out); !status) return status;
+    at = content + header->content_bytes + header->children_bytes;
+  }
+  if (state.has_size) return bad_at(out.models.back().offset, "chunk SIZE has no XYZI after it");
+  return {};
+}
+
+}  // namespace
+
+Error bad_at(std::uint64_t offset, std::string message) {
+  return fail(ErrorCode::BadFormat, std::move(message), {}, offset);
+}
+
+std::string_view Dict::get(std::string_view key) const {
+  const auto found =
+      std::find_if(entries.rbegin(), entries.rend(), [&](const auto& entry) { return entry.first == key; });
+  return found == entries.rend() ? std::string_view{} : found->second;
+}
+
+Dict ChunkReader::dict() {
+  constexpr std::size_t kLeastEntryBytes = 8;
+  Dict dict;
+  const std::size_t count = this->count(kLeastEntryBytes);
+  dict.entries.reserve(count);
+  for (std::size_t i = 0; i < count && !failed(); ++i) {
+    const std::string_view key = string();
+    const std::string_view value = string();
+    dict.entries.emplace_back(key, value);
+  }
+  return dict;
+}
+
+Result<Document> parse_document(std::span<const std::byte> bytes) {
+  if (Status status = check_signature(bytes); !status) return status.error();
+  Document document;
+  ByteReader reader(bytes);
+  static_cast<void>(reader.u32());
+  document.version = reader.i32();
+  if (reader.failed()) return bad_at(4, "the version number is cut off");
+  if (document.version != 150 && document.version != 200) {
+    document.warnings.push_back("version " + std::to_string(document.version) + " is unknown; read as 150 and 200 are");
+  }
+  const Result<ChunkHeader> main = read_header(bytes, kFileHeaderBytes, bytes.size());
+  if (!main) return main.error();
+  if (main->id != "MAIN") {
+    return bad_at(kFileHeaderBytes, "the first chunk must be MAIN, not \"" + printable(main->id) + "\"");
+  }
+  const std::size_t begin = kFileHeaderBytes + kChunkHeaderBytes + main->content_bytes;
+  const std::size_t end = begin + main->children_bytes;
+  if (Status status = parse_chunks(bytes, begin, end, document); !status) return status.error();
+  if (end < bytes.size()) {
+    document.warnings.push_back("the last " + std::to_string(bytes.size() - end) + " bytes lie outside MAIN; skipped");
+  }
+  return document;
+}
+
+namespace {
+
+constexpr std::int64_t kMaxInt32 = std::numeric_limits<std::int32_t>::max();
+constexpr std::int64_t kMinInt32 = std::numeric_limits<std::int32_t>::min();
+
+// The least bytes that one of them takes: a frame is an empty DICT, a shape's model an id and an empty DICT.
+constexpr std::size_t kLeastFrameBytes = 4;
+constexpr std::size_t kLeastModelBytes = 8;
+constexpr std::size_t kChildBytes = 4;
+
+std::string quoted(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  std::string out = "\"";
+  out += printable(text.substr(0, kMost));
+  out += '"';
+  return out;
+}
+
+/// `_f`; a key without one takes its place in the list.
+Result<std::int32_t> parse_frame(const ChunkReader& chunk, const Dict& dict, std::size_t place) {
+  const std::string_view text = dict.get("_f");
+  if (text.empty()) return static_cast<std::int32_t>(place);
+  const std::optional<std::int64_t> frame = parse_integer(text);
+  if (!frame.has_value() || *frame < 0 || *frame > kMaxInt32) return chunk.error("has the frame " + quoted(text));
+  return static_cast<std::int32_t>(*frame);
+}
+
+Result<Orientation> parse_orientation(const ChunkReader& chunk, std::string_view text) {
+  if (text.empty()) return Orientation{};
+  const std::optional<std::int64_t> byte = parse_integer(text);
+  std::optional<Orientation> orientation;
+  if (byte.has_value() && *byte >= 0 && *byte <= 255) {
+    orientation = orientation_from_byte(static_cast<std::uint8_t>(*byte));
+  }
+  if (!orientation.has_value()) return chunk.error("has the rotation " + quoted(text));
+  return *orientation;
+}
+
+/// Three integers with blanks between them.
+Result<IVec3> parse_translation(const ChunkReader& chunk, std::string_view text) {
+  IVec3 translation{0};
+  std::string_view rest = text;
+  for (int axis = 0; axis < 3 && !text.empty(); ++axis) {
+    rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+    const std::size_t length = std::min(rest.find(' '), rest.size());
+    const std::optional<std::int64_t> value = parse_integer(rest.substr(0, length));
+    if (!value.has_value() || *value < kMinInt32 || *value > kMaxInt32) {
+      return chunk.error("has the translation " + quoted(text));
+    }
+    translation[axis] = static_cast<int>(*value);
+    rest.remove_prefix(length);
+  }
+  if (rest.find_first_not_of(' ') != std::string_view::npos) {
+    return chunk.error("has the translation " + quoted(text));
+  }
+  return translation;
+}
+
+Result<TransformKey> parse_transform_key(ChunkReader& chunk, std::size_t place) {
+  const Dict dict = chunk.dict();
+  if (chunk.failed()) return chunk.too_short();
+  const Result<std::int32_t> frame = parse_frame(chunk, dict, place);
+  if (!frame) return frame.error();
+  const Result<Orientation> orientation = parse_orientation(chunk, dict.get("_r"));
+  if (!orientation) return orientation.error();
+  const Result<IVec3> translation = parse_translation(chunk, dict.get("_t"));
+  if (!translation) return translation.error();
+  return TransformKey{*frame, *orientation, *translation};
+}
+
+Result<ModelKey> parse_model_key(ChunkReader& chunk, std::size_t place) {
+  const std::uint32_t model = chunk.u32();
+  const Dict dict = chunk.dict();
+  if (chunk.failed()) return chunk.too_short();
+  const Result<std::int32_t> frame = parse_frame(chunk, dict, place);
+  if (!frame) return frame.error();
+  return ModelKey{*frame, model};
+}
+
+/// Reads the `node.key_count` keys of a node, and sorts them by frame.
+template <class Key>
+Status parse_keys(ChunkReader& chunk, Result<Key> (*parse)(ChunkReader&, std::size_t), std::vector<Key>& keys,
+                  Node& node, Document& out) {
+  node.first_key = keys.size();
+  for (std::size_t i = 0; i < node.key_count; ++i) {
+    const Result<Key> key = parse(chunk, i);
+    if (!key) return key.error();
+    out.last_frame = std::max(out.last_frame, key->frame);
+    keys.push_back(*key);
+  }
+  const auto first = keys.begin() + static_cast<std::ptrdiff_t>(node.first_key);
+  std::stable_sort(first, keys.end(), [](const Key& a, const Key& b) { return a.frame < b.frame; });
+  return {};
+}
+
+/// What all nodes begin with: an id and attributes.
+Node parse_node(ChunkReader& chunk, NodeKind kind) {
+  Node node;
+  node.kind = kind;
+  node.offset = chunk.offset();
+  node.id = chunk.i32();
+  const Dict attributes = chunk.dict();
+  node.name = attributes.get("_name");
+  node.hidden = attributes.is_set("_hidden");
+  node.loops = attributes.is_set("_loop");
+  return node;
+}
+
+}  // namespace
+
+Status parse_transform(ChunkReader& chunk, Document& out) {
+  Node node = parse_node(chunk, NodeKind::Transform);
+  const std::int32_t child = chunk.i32();
+  static_cast<void>(chunk.i32());  // reserved
+  node.layer = chunk.i32();
+  node.key_count = chunk.count(kLeastFrameBytes);
+  if (chunk.failed()) return chunk.too_short();
+  node.first_child = out.children.size();
+  node.child_count = 1;
+  out.children.push_back(child);
+  if (Status status = parse_keys(chunk, &parse_transform_key, out.transform_keys, node, out); !status) return status;
+  if (node.key_count == 0) {
+    out.transform_keys.emplace_back();
+    node.key_count = 1;
+  }
+  out.nodes.push_back(node);
+  return {};
+}
+
+Status parse_group(ChunkReader& chunk, Document& out) {
+  Node node = parse_node(chunk, NodeKind::Group);
+  node.first_child = out.children.size();
+  node.child_count = chunk.count(kChildBytes);
+  for (std::size_t i = 0; i < node.child_count; ++i) out.children.push_back(chunk.i32());
+  if (chunk.failed()) return chunk.too_short();
+  out.nodes.push_back(node);
+  return {};
+}
+
+Status parse_shape(ChunkReader& chunk, Document& out) {
+  Node node = parse_node(chunk, NodeKind::Shape);
+  node.key_count = chunk.count(kLeastModelBytes);
+  if (chunk.failed()) return chunk.too_short();
+  if (node.key_count == 0) return chunk.error("has no model");
+  if (Status status = parse_keys(chunk, &parse_model_key, out.model_keys, node, out); !status) return status;
+  out.nodes.push_back(node);
+  return {};
+}
+
+Status parse_layer(ChunkReader& chunk, Document& out) {
+  Layer layer;
+  layer.id = chunk.i32();
+  layer.hidden = chunk.dict().is_set("_hidden");
+  if (chunk.failed()) return chunk.too_short();
+  out.layers.push_back(layer);
+  return {};
+}
+
+Status parse_animation_range(ChunkReader& chunk, Document& out) {
+  const Dict dict = chunk.dict();
+  if (chunk.failed()) return chunk.too_short();
+  const std::string_view range = dict.get("_anim_range");
+  const std::optional<std::int64_t> last = parse_integer(range.substr(range.rfind(' ') + 1));
+  if (last.has_value() && *last > out.last_frame && *last <= kMaxInt32) {
+    out.last_frame = static_cast<std::int32_t>(*last);
+  }
+  return {};
+}
+
+}  // namespace quoin::vox

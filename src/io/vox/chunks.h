@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+#include "io/vox/orientation.h"
+
+/// The parts of a MagicaVoxel file as they stand in it: axes, ids and colour indices are the file's.
+///
+/// Source: MagicaVoxel-file-format-vox.txt and -vox-extension.txt, github.com/ephtracy/voxel-model.
+namespace quoin::vox {
+
+inline constexpr std::size_t kColours = 256;
+/// Voxels along a model's axis: XYZI holds coordinates in a byte each.
+inline constexpr int kMaxModelEdge = 256;
+
+/// Keys and values of a DICT, as they lie in the file.
+struct Dict {
+  std::vector<std::pair<std::string_view, std::string_view>> entries;
+
+  /// The last value of that key; empty when there is none.
+  [[nodiscard]] std::string_view get(std::string_view key) const;
+  [[nodiscard]] bool is_set(std::string_view key) const { return get(key) == "1"; }
+};
+
+/// A SIZE and its XYZI.
+struct Model {
+  IVec3 size{1};
+  std::span<const std::byte> voxels;  ///< x, y, z, colour index: a byte each
+  std::uint64_t offset = 0;           ///< of the SIZE chunk
+};
+
+struct TransformKey {
+  std::int32_t frame = 0;
+  Orientation orientation;
+  IVec3 translation{0};
+};
+
+struct ModelKey {
+  std::int32_t frame = 0;
+  std::uint32_t model = 0;
+};
+
+enum class NodeKind : std::uint8_t { Transform, Group, Shape };
+
+/// An nTRN, nGRP or nSHP chunk.
+struct Node {
+  NodeKind kind = NodeKind::Group;
+  bool hidden = false;
+  bool loops = false;
+  std::int32_t id = 0;
+  std::int32_t layer = -1;
+  std::uint64_t offset = 0;
+  std::string_view name;
+  std::size_t first_child = 0;  ///< in Document::children
+  std::size_t child_count = 0;
+  std::size_t first_key = 0;  ///< in Document::transform_keys or model_keys; never empty for these kinds
+  std::size_t key_count = 0;
+};
+
+struct Layer {
+  std::int32_t id = 0;
+  bool hidden = false;
+};
+
+/// MATL's keys and values, or MATT's under MATL's names.
+using Attributes = std::map<std::string, std::string>;
+
+/// Views point into the file's bytes.
+struct Document {
+  std::int32_t version = 0;
+  std::vector<Model> models;
+  std::span<const std::byte> palette;          ///< RGBA's content: entry i is colour index i + 1; empty without one
+  std::span<const std::byte> index_map;        ///< IMAP's 256 bytes, or empty
+  std::array<Attributes, kColours> materials;  ///< by colour index
+  std::vector<Node> nodes;
+  std::vector<std::int32_t> children;        ///< node ids
+  std::vector<TransformKey> transform_keys;  ///< of one node: by ascending frame
+  std::vector<ModelKey> model_keys;          ///< likewise
+  std::vector<Layer> layers;
+  std::int32_t last_frame = 0;       ///< of the keys and META's range
+  std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is no colour index
+  std::vector<std::string> warnings;
+};
+
+/// Reads all chunks and checks each against the bytes that are there; what nodes refer to is not checked.
+///
+/// Memory: views, plus a small multiple of the file's size.
+/// Errors: Unsupported for formats that share the name; BadFormat with the byte offset.
+[[nodiscard]] Result<Document> parse_document(std::span<const std::byte> bytes);
+
+/// BadFormat at `offset`.
+[[nodiscard]] Error bad_at(std::uint64_t offset, std::string message);
+
+// One chunk's content each; `reader` covers exactly that content.
+class ChunkReader;
+[[nodiscard]] Status parse_transform(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_group(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_shape(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_layer(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_animation_range(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_material(ChunkReader& chunk, Document& out);
+[[nodiscard]] Status parse_old_material(ChunkReader& chunk, Document& out);
+
+}  // namespace quoin::vox

@@ -1,0 +1,280 @@
+#include "io/vox/read.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace quoin::vox {
+
+namespace {
+
+// Ways down the graph that any file may have, and how many more for each byte of it. Real files have one way to a node
+// and 24 bytes or more a node.
+constexpr std::size_t kFreeVisits = 65'536;
+constexpr std::size_t kBytesPerVisit = 4;
+
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+/// Finds nodes by id. Sorted rather than hashed: a hostile choice of ids cannot slow it down.
+class NodeIndex {
+ public:
+  static Result<NodeIndex> build(const Document& document) {
+    NodeIndex index;
+    index.by_id_.reserve(document.nodes.size());
+    for (std::size_t i = 0; i < document.nodes.size(); ++i) index.by_id_.emplace_back(document.nodes[i].id, i);
+    std::ranges::sort(index.by_id_);
+    const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
+    const auto twice = std::adjacent_find(index.by_id_.begin(), index.by_id_.end(), same);
+    if (twice != index.by_id_.end()) {
+      return bad_at(document.nodes[std::next(twice)->second].offset,
+                    "node " + std::to_string(twice->first) + " is there twice");
+    }
+    return index;
+  }
+
+  /// kNone when no node has this id.
+  [[nodiscard]] std::size_t find(std::int32_t id) const {
+    const auto found = std::ranges::lower_bound(by_id_, std::pair{id, std::size_t{0}});
+    return found != by_id_.end() && found->first == id ? found->second : kNone;
+  }
+
+ private:
+  std::vector<std::pair<std::int32_t, std::size_t>> by_id_;
+};
+
+/// The frame that a looping node shows: folded into the range of its keys, which are sorted.
+std::int64_t folded(std::int64_t frame, std::int64_t first, std::int64_t last) {
+  const std::int64_t length = last - first + 1;
+  return first + ((frame - first) % length + length) % length;
+}
+
+/// The last key at or before the frame, or the first of all.
+template <class Key>
+std::size_t key_at(std::span<const Key> keys, std::int64_t frame) {
+  const auto after = std::ranges::upper_bound(keys, frame, {}, &Key::frame);
+  return after == keys.begin() ? 0 : static_cast<std::size_t>(after - keys.begin()) - 1;
+}
+
+template <class Key>
+std::int64_t frame_for(const Node& node, std::span<const Key> keys, int frame) {
+  return node.loops ? folded(frame, keys.front().frame, keys.back().frame) : frame;
+}
+
+struct Motion {
+  Orientation orientation;
+  Offset translation{0, 0, 0};
+};
+
+Motion motion_at(const Document& document, const Node& node, int requested) {
+  const std::span keys = std::span(document.transform_keys).subspan(node.first_key, node.key_count);
+  const std::int64_t frame = frame_for(node, keys, requested);
+  const std::size_t i = key_at(keys, frame);
+  Motion motion{keys[i].orientation, {}};
+  const bool between = i + 1 < keys.size() && frame > keys[i].frame;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::int64_t value = keys[i].translation[axis];
+    if (between) {
+      // Below 2^62: a translation has 32 bits, and the two shares add up to a length of at most 31.
+      const std::int64_t length = std::int64_t{keys[i + 1].frame} - keys[i].frame;
+      const std::int64_t past = frame - keys[i].frame;
+      value = (value * (length - past) + std::int64_t{keys[i + 1].translation[axis]} * past) / length;
+    }
+    motion.translation[static_cast<std::size_t>(axis)] = value;
+  }
+  return motion;
+}
+
+/// A node on the way from the root to where the walk stands, with the sum of the transforms above and at it.
+struct Step {
+  std::size_t node = 0;
+  std::size_t next_child = 0;
+  Motion motion;
+  std::string_view name;  ///< of this node when it is a transform
+  bool hidden = false;
+};
+
+class GraphWalk {
+ public:
+  GraphWalk(const Document& document, int frame, std::size_t file_bytes)
+      : document_(document), frame_(frame), visits_left_(kFreeVisits + file_bytes / kBytesPerVisit) {
+    names_left_ = visits_left_ * kBytesPerVisit;
+  }
+
+  Result<Placements> run();
+
+ private:
+  [[nodiscard]] std::size_t find_root() const;
+  [[nodiscard]] bool is_layer_hidden(std::int32_t id) const;
+  [[nodiscard]] Status check_shapes();
+  Status enter(std::size_t node, const Step& parent);
+  Status place(const Node& node, const Step& parent);
+  Status walk(std::size_t root);
+
+  const Document& document_;
+  int frame_;
+  std::size_t visits_left_;
+  std::size_t names_left_;
+  NodeIndex index_;
+  std::vector<std::int32_t> hidden_layers_;
+  std::vector<bool> is_open_;
+  std::vector<bool> is_seen_;
+  std::vector<Step> way_;
+  Placements out_;
+};
+
+bool GraphWalk::is_layer_hidden(std::int32_t id) const {
+  return std::ranges::binary_search(hidden_layers_, id);
+}
+
+/// MagicaVoxel's root is transform 0; other writers' is the first node that no node refers to. In a graph that is all
+/// cycles the first node serves to find one.
+std::size_t GraphWalk::find_root() const {
+  const std::size_t zero = index_.find(0);
+  if (zero != kNone && document_.nodes[zero].kind == NodeKind::Transform) return zero;
+  std::vector<bool> has_parent(document_.nodes.size());
+  for (const std::int32_t id : document_.children) {
+    const std::size_t child = index_.find(id);
+    if (child != kNone) has_parent[child] = true;
+  }
+  const auto root = std::ranges::find(has_parent, false);
+  return root == has_parent.end() ? 0 : static_cast<std::size_t>(root - has_parent.begin());
+}
+
+/// Every model that a shape shows at any frame must be there.
+Status GraphWalk::check_shapes() {
+  out_.is_model_used.assign(document_.models.size(), false);
+  for (const Node& node : document_.nodes) {
+    if (node.kind != NodeKind::Shape) continue;
+    for (const ModelKey& key : std::span(document_.model_keys).subspan(node.first_key, node.key_count)) {
+      if (key.model >= document_.models.size()) {
+        return bad_at(node.offset, "node " + std::to_string(node.id) + " shows model " + std::to_string(key.model) +
+                                       ", but there are " + std::to_string(document_.models.size()));
+      }
+      out_.is_model_used[key.model] = true;
+    }
+  }
+  return {};
+}
+
+Status GraphWalk::place(const Node& node, const Step& parent) {
+  const std::span keys = std::span(document_.model_keys).subspan(node.first_key, node.key_count);
+  Placement placement;
+  placement.model = keys[key_at(keys, frame_for(node, keys, frame_))].model;
+  placement.hidden = parent.hidden || node.hidden;
+  placement.orientation = parent.motion.orientation;
+  placement.translation = parent.motion.translation;
+  placement.name = parent.name;
+  placement.shape_name = node.name;
+  const std::size_t name_bytes = placement.name.size() + placement.shape_name.size();
+  if (name_bytes > names_left_) {
+    return fail(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {}, node.offset);
+  }
+  names_left_ -= name_bytes;
+  out_.all.push_back(placement);
+  return {};
+}
+
+Status GraphWalk::enter(std::size_t at, const Step& parent) {
+  const Node& node = document_.nodes[at];
+  if (is_open_[at]) return bad_at(node.offset, "node " + std::to_string(node.id) + " is below itself");
+  if (visits_left_ == 0) {
+    return fail(ErrorCode::LimitExceeded, "nodes with several parents multiply beyond the file's size", {},
+                node.offset);
+  }
+  --visits_left_;
+  is_seen_[at] = true;
+  if (node.kind == NodeKind::Shape) return place(node, parent);
+  Step step;
+  step.node = at;
+  step.motion = parent.motion;
+  step.hidden = parent.hidden || node.hidden || is_layer_hidden(node.layer);
+  if (node.kind == NodeKind::Transform) {
+    const Motion motion = motion_at(document_, node, frame_);
+    const Offset moved = step.motion.orientation * motion.translation;
+    for (std::size_t axis = 0; axis < 3; ++axis) step.motion.translation[axis] += moved[axis];
+    step.motion.orientation = step.motion.orientation * motion.orientation;
+    step.name = node.name;
+  }
+  is_open_[at] = true;
+  way_.push_back(step);
+  return {};
+}
+
+Status GraphWalk::walk(std::size_t root) {
+  if (Status status = enter(root, Step{}); !status) return status;
+  while (!way_.empty()) {
+    Step& step = way_.back();
+    const Node& node = document_.nodes[step.node];
+    if (step.next_child == node.child_count) {
+      is_open_[step.node] = false;
+      way_.pop_back();
+      continue;
+    }
+    const std::int32_t id = document_.children[node.first_child + step.next_child++];
+    const std::size_t child = index_.find(id);
+    if (child == kNone) {
+      return bad_at(node.offset, "node " + std::to_string(node.id) + " refers to node " + std::to_string(id) +
+                                     ", which is not there");
+    }
+    // A copy: entering grows the way.
+    const Step parent = step;
+    if (Status status = enter(child, parent); !status) return status;
+  }
+  return {};
+}
+
+Result<Placements> GraphWalk::run() {
+  Result<NodeIndex> index = NodeIndex::build(document_);
+  if (!index) return index.error();
+  index_ = std::move(*index);
+  for (const Layer& layer : document_.layers) {
+    if (layer.hidden) hidden_layers_.push_back(layer.id);
+  }
+  std::ranges::sort(hidden_layers_);
+  if (Status status = check_shapes(); !status) return status.error();
+  is_open_.assign(document_.nodes.size(), false);
+  is_seen_.assign(document_.nodes.size(), false);
+  if (Status status = walk(find_root()); !status) return status.error();
+  const auto apart = std::ranges::count(is_seen_, false);
+  if (apart > 0) out_.warnings.push_back("nodes apart from the scene graph skipped: " + std::to_string(apart));
+  return std::move(out_);
+}
+
+/// Models without a scene graph: one of them is shown, as MagicaVoxel places a model that it loads.
+Result<Placements> place_lone_model(const Document& document, int frame) {
+  Placements out;
+  out.is_model_used.assign(document.models.size(), true);
+  if (document.models.empty()) {
+    out.warnings.emplace_back("the file holds no model");
+    return out;
+  }
+  Placement placement;
+  placement.model = static_cast<std::uint32_t>(frame);
+  placement.translation[2] = document.models[placement.model].size.z / 2;
+  out.all.push_back(placement);
+  return out;
+}
+
+bool is_animated(const Document& document) {
+  if (document.nodes.empty()) return document.models.size() > 1;
+  return std::ranges::any_of(document.nodes, [](const Node& node) { return node.key_count > 1; });
+}
+
+}  // namespace
+
+Result<Placements> place_models(const Document& document, int frame, std::size_t file_bytes) {
+  const std::int64_t from_models = std::max<std::int64_t>(static_cast<std::int64_t>(document.models.size()) - 1, 0);
+  const std::int64_t last_frame = document.nodes.empty() ? from_models : document.last_frame;
+  if (frame < 0 || frame > last_frame) {
+    return fail(ErrorCode::InvalidArgument,
+                "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last_frame));
+  }
+  Result<Placements> placements =
+      document.nodes.empty() ? place_lone_model(document, frame) : GraphWalk(document, frame, file_bytes).run();
+  if (placements && is_animated(document)) {
+    placements->warnings.push_back("animated: frame " + std::to_string(frame) + " of 0 to " +
+                                   std::to_string(last_frame) + " is taken");
+  }
+  return placements;
+}
+
+}  // namespace quoin::vox

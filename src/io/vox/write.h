@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/grid/grid.h>
+#include <quoin/scene/scene.h>
+
+#include "io/vox/chunks.h"
+
+/// What a scene becomes in a .vox file before it is bytes.
+namespace quoin::vox {
+
+/// Which colour index stands for which type.
+struct TypeTable {
+  std::vector<std::uint8_t> index_of_type;         ///< by type; 0 for types that do not occur
+  std::array<VoxelProperties, kColours> by_index;  ///< entry 0 is unused
+};
+
+/// Types keep their ids as colour indices when all types that occur are below 256; else those that occur are numbered
+/// in ascending order. Colour indices without a type get the default palette's colour.
+///
+/// Errors: LimitExceeded when more than 255 types occur.
+[[nodiscard]] Result<TypeTable> make_type_table(const Scene& scene);
+
+/// A model to write, cut from a grid.
+struct Piece {
+  IVec3 min{0};            ///< the grid's voxel that is lowest on each axis
+  IVec3 size{1};           ///< along Quoin's axes, at most 256 each
+  std::size_t voxels = 0;  ///< how many
+};
+
+/// Cuts a grid's declared box into pieces of at most 256 voxels a side, sorted by z, then y, then x; pieces without
+/// voxels are left out unless they are all there is.
+[[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid);
+
+/// Writes the voxels of all pieces of a grid as XYZI has them, each piece's from its place in `starts` on.
+///
+/// Requires: `pieces` were cut from this grid; there is room for four bytes a voxel.
+void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
+                  std::span<const std::size_t> starts, std::span<std::byte> out);
+
+/// The point of the grid that MagicaVoxel's pivot of that piece's model is.
+[[nodiscard]] DVec3 pivot_of(const Piece& piece);
+
+}  // namespace quoin::vox
+
+namespace quoin {
+
+/// Calls `visit(voxel, type)` for every non-air voxel of a chunk whose least corner is `origin`, by z, then y, then x.
+///
+/// Cost: O(rows within the tight bounds + voxels), so that scattered voxels are cheap.
+template <class Visit>
+void visit_voxels(const Chunk& chunk, IVec3 origin, Visit&& visit) {
+  std::array<VoxelType, kChunkEdge> row{};
+  const IBox box = chunk.bounds();
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      std::uint64_t solid = ~chunk.row_mask(y, z, kAir);
+      if (solid == 0) continue;
+      chunk.read_row(y, z, row);
+      for (; solid != 0; solid &= solid - 1) {
+        const int x = std::countr_zero(solid);
+        visit(origin + IVec3{x, y, z}, row[static_cast<std::size_t>(x)]);
+      }
+    }
+  }
+}
+
+/// Calls `visit(voxel, type)` for every non-air voxel, in the order of Grid::for_each.
+template <class Visit>
+void visit_voxels(const Grid& grid, Visit&& visit) {
+  for (const IVec3 coords : grid.chunks()) visit_voxels(*grid.find_chunk(coords), coords * kChunkEdge, visit);
+}
+
+}  // namespace quoin

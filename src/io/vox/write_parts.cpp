@@ -1,0 +1,184 @@
+#include <quoin/core/assert.h>
+
+#include "io/vox/write.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "io/vox/materials.h"
+#include "io/vox/read.h"
+
+namespace quoin::vox {
+
+namespace {
+
+using Cell = std::array<std::int64_t, 3>;
+
+/// Which piece of a box a voxel lies in, counted z, y, x so that pieces sort that way.
+Cell cell_of(IVec3 voxel, IVec3 box_min) {
+  Cell cell{};
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[static_cast<std::size_t>(2 - axis)] = (std::int64_t{voxel[axis]} - box_min[axis]) / kMaxModelEdge;
+  }
+  return cell;
+}
+
+Piece piece_at(const Cell& cell, const IBox& box) {
+  Piece piece;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t begin = box.min[axis] + cell[static_cast<std::size_t>(2 - axis)] * kMaxModelEdge;
+    piece.min[axis] = static_cast<int>(begin);
+    piece.size[axis] = static_cast<int>(std::min<std::int64_t>(kMaxModelEdge, box.max[axis] - begin));
+  }
+  return piece;
+}
+
+/// Ascending.
+std::vector<VoxelType> occurring_types(const Scene& scene) {
+  std::vector<VoxelType> types;
+  for (const GridHandle handle : scene.grids().handles()) {
+    const std::vector<VoxelType> of_grid = scene.grids()[handle].grid.types();
+    types.insert(types.end(), of_grid.begin(), of_grid.end());
+  }
+  std::ranges::sort(types);
+  types.erase(std::unique(types.begin(), types.end()), types.end());
+  return types;
+}
+
+}  // namespace
+
+Result<TypeTable> make_type_table(const Scene& scene) {
+  std::vector<VoxelType> types = occurring_types(scene);
+  const bool keeps_ids = types.empty() || types.back() < kColours;
+  if (keeps_ids) {
+    types.clear();
+    for (std::size_t type = 1; type < kColours; ++type) types.push_back(static_cast<VoxelType>(type));
+  }
+  if (types.size() >= kColours) {
+    return fail(ErrorCode::LimitExceeded,
+                "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
+  }
+  TypeTable table;
+  table.index_of_type.resize(std::size_t{types.back()} + 1);
+  const std::array<Rgba8, kColours> fallback = default_palette();
+  for (std::size_t index = 1; index < kColours; ++index) {
+    VoxelProperties& properties = table.by_index[index];
+    properties.name = default_type_name(static_cast<int>(index));
+    properties.colour = fallback[index];
+    if (index > types.size()) continue;
+    const VoxelType type = types[index - 1];
+    table.index_of_type[type] = static_cast<std::uint8_t>(index);
+    if (type < scene.types.size()) properties = scene.types[type];
+  }
+  return table;
+}
+
+namespace {
+
+bool is_inside(IVec3 voxel, const Piece& piece) {
+  const IVec3 end = piece.min + piece.size;
+  return voxel.x >= piece.min.x && voxel.y >= piece.min.y && voxel.z >= piece.min.z && voxel.x < end.x &&
+         voxel.y < end.y && voxel.z < end.z;
+}
+
+/// The pieces of a box by their places, and the last one that was asked for.
+class PieceMap {
+ public:
+  explicit PieceMap(const IBox& box) : box_(box) {}
+
+  Piece& of(IVec3 voxel) {
+    if (last_ != nullptr && is_inside(voxel, *last_)) return *last_;
+    const Cell cell = cell_of(voxel, box_.min);
+    last_ = &pieces_.try_emplace(cell, piece_at(cell, box_)).first->second;
+    return *last_;
+  }
+
+  void count(const Chunk& chunk, IVec3 origin) {
+    const IBox bounds = chunk.bounds();
+    const IVec3 low = origin + bounds.min;
+    if (cell_of(low, box_.min) == cell_of(origin + bounds.max - 1, box_.min)) {
+      of(low).voxels += static_cast<std::size_t>(chunk.non_air_count());
+    } else {
+      visit_voxels(chunk, origin, [&](IVec3 voxel, VoxelType) { ++of(voxel).voxels; });
+    }
+  }
+
+  std::vector<Piece> take() {
+    if (pieces_.empty()) pieces_.emplace(Cell{}, piece_at(Cell{}, box_));
+    std::vector<Piece> sorted;
+    sorted.reserve(pieces_.size());
+    for (const auto& [cell, piece] : pieces_) sorted.push_back(piece);
+    return sorted;
+  }
+
+ private:
+  IBox box_;
+  std::map<Cell, Piece> pieces_;
+  Piece* last_ = nullptr;
+};
+
+/// Where the next voxel of each piece goes.
+class Cursors {
+ public:
+  Cursors(std::span<const Piece> pieces, std::span<const std::size_t> starts)
+      : pieces_(pieces), next_(starts.begin(), starts.end()) {
+    for (std::size_t i = 0; i < pieces_.size(); ++i) number_of_.emplace(cell(pieces_[i].min), i);
+  }
+
+  /// The piece of a voxel, which is among them.
+  std::size_t piece_of(IVec3 voxel) {
+    if (!is_inside(voxel, pieces_[last_])) last_ = number_of_.find(cell(voxel))->second;
+    return last_;
+  }
+  std::size_t advance(std::size_t piece) { return std::exchange(next_[piece], next_[piece] + 4); }
+
+ private:
+  /// Counted from the first piece, whose place in the box does not matter.
+  [[nodiscard]] Cell cell(IVec3 voxel) const {
+    Cell found{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t offset = std::int64_t{voxel[axis]} - pieces_.front().min[axis];
+      found[static_cast<std::size_t>(axis)] = (offset - (offset < 0 ? kMaxModelEdge - 1 : 0)) / kMaxModelEdge;
+    }
+    return found;
+  }
+
+  std::span<const Piece> pieces_;
+  std::map<Cell, std::size_t> number_of_;
+  std::vector<std::size_t> next_;
+  std::size_t last_ = 0;
+};
+
+}  // namespace
+
+std::vector<Piece> cut_into_pieces(const SceneGrid& grid) {
+  IBox box = grid.declared_box();
+  if (box.empty()) box = {box.min, box.min + 1};
+  PieceMap pieces(box);
+  for (const IVec3 at : grid.grid.chunks()) pieces.count(*grid.grid.find_chunk(at), at * kChunkEdge);
+  return pieces.take();
+}
+
+void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
+                  std::span<const std::size_t> starts, std::span<std::byte> out) {
+  QUOIN_ASSERT(pieces.size() == starts.size(), "a place for every piece");
+  Cursors cursors(pieces, starts);
+  visit_voxels(grid, [&](IVec3 voxel, VoxelType type) {
+    const std::size_t number = cursors.piece_of(voxel);
+    const Piece& piece = pieces[number];
+    const IVec3 local = voxel - piece.min;
+    std::byte* to = out.data() + cursors.advance(number);
+    to[0] = static_cast<std::byte>(local.x);
+    to[1] = static_cast<std::byte>(piece.size.z - 1 - local.z);
+    to[2] = static_cast<std::byte>(local.y);
+    to[3] = static_cast<std::byte>(index_of_type[type]);
+  });
+}
+
+DVec3 pivot_of(const Piece& piece) {
+  return DVec3(piece.min) + pivot_of(IVec3{piece.size.x, piece.size.z, piece.size.y});
+}
+
+}  // namespace quoin::vox

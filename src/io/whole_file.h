@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/io/file.h>
+
+// What reads or writes bytes becomes what reads or writes a file.
+
+namespace quoin {
+
+/// `result`; its error names `path`, unless it names a file already.
+template <class T>
+[[nodiscard]] Result<T> with_path(Result<T> result, const std::filesystem::path& path) {
+  if (!result && result.error().path.empty()) result.error().path = path.string();
+  return result;
+}
+
+/// What `read(bytes)` makes of a file. Errors: also CannotRead; they name the file.
+template <class Read>
+[[nodiscard]] auto read_whole(const std::filesystem::path& path, Read read)
+    -> std::invoke_result_t<Read, std::span<const std::byte>> {
+  const auto bytes = read_file(path);
+  if (!bytes) return bytes.error();
+  return with_path(read(std::span<const std::byte>(*bytes)), path);
+}
+
+/// Writes what was made for it to a file, which appears whole or not at all; returns its size. Errors: also
+/// CannotWrite; they name the file.
+[[nodiscard]] inline Result<std::uint64_t> write_whole(const std::filesystem::path& path,
+                                                       Result<std::vector<std::byte>> bytes) {
+  if (!bytes) return with_path(Result<std::uint64_t>(bytes.error()), path);
+  if (auto done = write_file(path, *bytes); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  return bytes->size();
+}
+
+}  // namespace quoin

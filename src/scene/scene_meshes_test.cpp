@@ -1,0 +1,206 @@
+#include <quoin/scene/scene_meshes.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <quoin/mesh/simplify.h>
+
+namespace quoin {
+
+namespace {
+
+GridHandle add_grid(Scene& scene, int length) {
+  SceneGrid grid;
+  grid.name = std::to_string(length) + " long";
+  VoxelProperties stone;
+  stone.name = "stone";
+  grid.grid.fill_box({0, 0, 0}, {length - 1, 0, 0}, *scene.types.find_or_add(stone));
+  return scene.add_grid(std::move(grid));
+}
+
+void place(Scene& scene, GridHandle grid, bool visible = true) {
+  Instance instance;
+  instance.grid = grid;
+  instance.visible = visible;
+  scene.add_instance(instance);
+}
+
+TEST(SceneMeshes, only_grids_of_drawn_instances_are_meshed_and_each_once) {
+  Scene scene;
+  const GridHandle twice = add_grid(scene, 3);
+  const GridHandle hidden = add_grid(scene, 4);
+  add_grid(scene, 5);
+  place(scene, twice);
+  place(scene, twice);
+  place(scene, hidden, false);
+  const auto meshes = mesh_scene(scene);
+  ASSERT_TRUE(meshes);
+  ASSERT_EQ(meshes->parts.size(), 1U);
+  EXPECT_EQ(meshes->parts[0].name, "3 long");
+  EXPECT_EQ(meshes->placements.size(), 2U);
+  EXPECT_EQ(meshes->stats.faces_total, 18);
+  EXPECT_EQ(meshes->stats.faces_visible, 14);
+  EXPECT_EQ(meshes->stats.quads, 6);
+  EXPECT_EQ(meshes->stats.triangles, 12);
+  EXPECT_EQ(meshes->stats.vertices, 24);
+  const auto all = mesh_scene(scene, {.hidden = true});
+  ASSERT_TRUE(all);
+  EXPECT_EQ(all->stats.faces_total, 18 + 24);
+  EXPECT_EQ(all->parts.size(), 2U) << "none of the grid that is placed nowhere";
+}
+
+TEST(SceneMeshes, instances_of_grids_that_are_gone_are_passed_over) {
+  Scene scene;
+  Instance lost;
+  lost.grid = GridHandle{7, 0};
+  scene.add_instance(lost);
+  const auto meshes = mesh_scene(scene);
+  ASSERT_TRUE(meshes);
+  EXPECT_TRUE(meshes->parts.empty());
+  EXPECT_TRUE(meshes->placements.empty());
+}
+
+TEST(SceneMeshes, progress_never_falls_and_ends_at_one) {
+  Scene scene;
+  for (const int length : {3, 700, 30, 1000}) place(scene, add_grid(scene, length));
+  std::vector<double> told;
+  const auto meshes = mesh_scene(scene, {}, Threads{4}, [&](double fraction) {
+    told.push_back(fraction);
+    return true;
+  });
+  ASSERT_TRUE(meshes);
+  ASSERT_FALSE(told.empty());
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_NEAR(told.back(), 1.0, 1e-9);
+}
+
+TEST(SceneMeshes, a_listener_can_stop_the_work) {
+  Scene scene;
+  for (const int length : {3, 700}) place(scene, add_grid(scene, length));
+  const auto meshes = mesh_scene(scene, {}, {}, [](double) { return false; });
+  ASSERT_FALSE(meshes);
+  EXPECT_EQ(meshes.error().code, ErrorCode::Cancelled);
+}
+
+TEST(SceneMeshes, instances_without_a_place_are_refused) {
+  const auto refuses = [](const std::function<void(Instance&)>& spoil) {
+    Scene scene;
+    place(scene, add_grid(scene, 1));
+    spoil(scene.instances()[scene.instances().handles()[0]]);
+    const auto blocky = mesh_scene(scene);
+    const auto smooth = mesh_scene_smoothly(scene);
+    return !blocky && blocky.error().code == ErrorCode::InvalidArgument && !smooth &&
+           smooth.error().code == ErrorCode::InvalidArgument;
+  };
+  EXPECT_TRUE(refuses([](Instance& i) { i.position.x = std::numeric_limits<double>::quiet_NaN(); }));
+  EXPECT_TRUE(refuses([](Instance& i) { i.voxel_size = -1.0; }));
+  EXPECT_TRUE(refuses([](Instance& i) { i.rotation = DQuat(0, 0, 0, 0); }));
+}
+
+/// An L of voxels with an arm up, that no turn or reflection leaves as it is.
+constexpr std::array kVoxels = {IVec3(0, 0, 0), IVec3(0, 1, 0), IVec3(0, 2, 0), IVec3(1, 0, 0), IVec3(0, 1, 1)};
+
+GridHandle add_asymmetric(Scene& scene) {
+  SceneGrid grid;
+  grid.pivot = {2.0, 2.5, 0.5};
+  for (const IVec3 voxel : kVoxels) grid.grid.set(voxel, *scene.types.find_or_add({}));
+  return scene.add_grid(std::move(grid));
+}
+
+double distance_from_voxels(const Instance& instance, const SceneGrid& grid, DVec3 point) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const IVec3 voxel : kVoxels) {
+    nearest = std::min(nearest, glm::length(world_from_grid(instance, grid, DVec3(voxel) + 0.5) - point));
+  }
+  return nearest;
+}
+
+TEST(SmoothSceneMeshes, surfaces_lie_around_the_voxels_of_every_instance) {
+  Scene scene;
+  const GridHandle grid = add_asymmetric(scene);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  for (int i = 0; i < 6; ++i) {
+    Instance instance;
+    instance.grid = grid;
+    instance.position = 40.0 * DVec3(any(random), any(random), any(random));
+    instance.rotation = glm::normalize(DQuat(any(random), any(random), any(random), any(random)));
+    instance.voxel_size = 1.5 + any(random);
+    instance.mirrored = i % 2 == 1;
+    instance.visible = i != 5;
+    scene.add_instance(instance);
+  }
+  const auto meshes = mesh_scene_smoothly(scene);
+  ASSERT_TRUE(meshes) << to_string(meshes.error());
+  ASSERT_EQ(meshes->parts.size(), 1U);
+  ASSERT_EQ(meshes->placements.size(), 5U) << "the hidden one is left out";
+  const MeshPart& part = meshes->parts[0];
+  ASSERT_TRUE(part.surfaces[0].has_albedo());
+  const auto handles = scene.instances().handles();
+  for (std::size_t i = 0; i < 5; ++i) {
+    const Instance& instance = scene.instances()[handles[i]];
+    for (const Vec3& p : part.surfaces[0].positions) {
+      const DVec3 point(meshes->placements[i].matrix() * glm::dvec4(DVec3(p) - part.pivot, 1.0));
+      // The surface runs between voxel centres.
+      EXPECT_LT(distance_from_voxels(instance, scene.grids()[grid], point), instance.voxel_size);
+    }
+  }
+}
+
+TEST(SmoothSceneMeshes, are_the_same_at_any_thread_count_and_can_be_cancelled) {
+  Scene scene;
+  place(scene, add_asymmetric(scene));
+  place(scene, add_grid(scene, 40));
+  place(scene, scene.add_grid({}));
+  const auto one = mesh_scene_smoothly(scene, {}, Threads{1});
+  double last = 0.0;
+  const auto four = mesh_scene_smoothly(scene, {}, Threads{4}, [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    EXPECT_LE(fraction, 1.0);
+    last = fraction;
+    return true;
+  });
+  ASSERT_TRUE(one && four);
+  ASSERT_EQ(one->parts.size(), 2U) << "the empty one is left out";
+  for (std::size_t i = 0; i < 2; ++i) {
+    const MeshView& a = one->parts[i].surfaces[0];
+    const MeshView& b = four->parts[i].surfaces[0];
+    EXPECT_TRUE(std::ranges::equal(a.positions, b.positions));
+    EXPECT_TRUE(std::ranges::equal(a.indices, b.indices));
+    EXPECT_TRUE(std::ranges::equal(a.openness, b.openness));
+  }
+  const auto cancelled = mesh_scene_smoothly(scene, {}, {}, [](double) { return false; });
+  ASSERT_FALSE(cancelled);
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+}
+
+TEST(VolumeMeshes, simplifying_is_within_the_error_or_refused) {
+  Volume ball;
+  ball.size = {40, 40, 40};
+  for (int i = 0; i < 40 * 40 * 40; ++i) {
+    const DVec3 p(i % 40, i / 40 % 40, i / 1600);
+    ball.values.push_back(static_cast<float>(15.0 - glm::length(p - 20.0)));
+  }
+  ball.min = -20.0F;
+  ball.max = 15.0F;
+  const auto whole = mesh_volume(ball);
+  const auto simple = mesh_volume(ball, {.simplify_error = 0.1F});
+  ASSERT_TRUE(whole);
+  ASSERT_EQ(simple.has_value(), can_simplify());
+  if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
+  EXPECT_LT(simple->stats.triangles, whole->stats.triangles / 2);
+  EXPECT_GT(simple->stats.simplify_error, 0.0F);
+  EXPECT_LE(simple->stats.simplify_error, 0.1F);
+  EXPECT_TRUE(mesh_volume(ball, {.iso = 100.0F})->parts.empty());
+}
+
+}  // namespace
+
+}  // namespace quoin
