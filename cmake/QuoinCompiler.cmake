@@ -7,7 +7,8 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 
 find_program(QUOIN_CCACHE ccache)
 if(QUOIN_CCACHE AND PROJECT_IS_TOP_LEVEL)
-  set(CMAKE_CXX_COMPILER_LAUNCHER "${QUOIN_CCACHE}")
+  # Else it would keep nothing that was compiled with precompiled headers.
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${QUOIN_CCACHE}")
 endif()
 
 # What almost every source includes, parsed once a target: half of what compiling takes. `./dev nightly` builds without,
@@ -18,6 +19,9 @@ function(quoin_precompile target)
     target_precompile_headers(${target} PRIVATE <algorithm> <array> <bit> <cmath> <cstdint> <cstring> <functional>
       <map> <memory> <optional> <random> <span> <string> <utility> <vector> <quoin/core/vec.h> <quoin/core/result.h>
       ${ARGN})
+    if(QUOIN_CCACHE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      target_compile_options(${target} PRIVATE -fpch-preprocess)
+    endif()
   endif()
 endfunction()
 

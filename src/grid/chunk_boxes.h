@@ -28,8 +28,8 @@ class ChunkBoxes {
     if (is_counted_) count(box, 1);
   }
 
-  /// The box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second: until then nothing is counted,
-  /// for those who never change.
+  /// The box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second: until then nothing is
+  /// counted, for those who never change.
   [[nodiscard]] IBox bounds() {
     IBox around;
     if (!was_asked_) {
