@@ -43,8 +43,7 @@ quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
 
 int main(int argc, char** argv) {
   const auto scene = make_staircase();
-  const quoin::Status status =
-      scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : scene.error();
+  const quoin::Status status = scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : scene.error();
   if (!status) std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
   return status ? 0 : 1;
 }

@@ -105,8 +105,7 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
 Result<Outcome> render(const RenderArguments& arguments) {
   const bool hidden = arguments.common.load.hidden;
   Stopwatch watch;
-  if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable)
-    return writable.error();
+  if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
   if (auto drawable = check_input(arguments.common.input); !drawable) return drawable.error();
   auto loaded = load_scene(arguments.common.input, arguments.common.load);
   if (!loaded) return loaded.error();

@@ -9,8 +9,8 @@
 #include <system_error>
 #include <utility>
 
-#include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
 
 namespace quoin::viewer {
 

@@ -52,7 +52,7 @@ TEST(InstructionSets, ATestThatNeedsOneSaysThatItIsMissing) {
 
 TEST(InstructionSetsDeathTest, AnOverrideIsNoWiderThanTheMachine) {
   const InstructionSetOverride over(InstructionSet::Plain);
-  QUOIN_EXPECT_MISTAKE(InstructionSetOverride(InstructionSet::Avx2), "must have the instruction set");
+  QUOIN_EXPECT_MISTAKE(InstructionSetOverride{InstructionSet::Avx2}, "must have the instruction set");
 }
 
 }  // namespace

@@ -11,8 +11,8 @@
 
 #include "core/change_journal.h"
 #include "grid/change_records.h"
-#include "grid/chunk_boxes.h"
 #include "grid/chunk/chunk_difference.h"
+#include "grid/chunk_boxes.h"
 #include "grid/chunk_order.h"
 #include "grid/chunk_table.h"
 #include "grid/long_box.h"

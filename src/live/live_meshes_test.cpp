@@ -47,7 +47,6 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     meshes.finish(editor.scene, editor.eye());
     shown.apply(meshes.take());
     EXPECT_EQ(meshes.pending(), 0U);
-    EXPECT_EQ(meshes.facts().copied_bytes, 0U);
     expect_surfaces(shown, editor.scene, wanted);
     if (HasFailure()) return;
     if (GetParam() == SurfaceStyle::Smooth && seed % 4 != 0) continue;

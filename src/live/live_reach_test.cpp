@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "live/live_densities.h"
 #include "live/live_test_support.h"
 
 namespace quoin {

@@ -195,7 +195,7 @@ struct OneGrid {
     instance.grid = handle = scene.add_grid({});
     placed = scene.add_instance(instance);
   }
-  Grid& grid() { return scene.grids()[handle].grid; }
+  Grid& grid() { return scene.edit(handle).grid; }
 
   Scene scene;
   GridHandle handle;
@@ -231,7 +231,7 @@ class SceneEditor {
         scene.edit(any(scene.grids().handles())).grid.clear();
         return;
       default:
-        return edit_voxels(scene.grids()[any(scene.grids().handles())].grid, which);
+        return edit_voxels(scene.edit(any(scene.grids().handles())).grid, which);
     }
   }
 
@@ -288,7 +288,7 @@ class SceneEditor {
         grid = small_grid();
         return;
       default:
-        std::swap(grid, scene.grids()[any(scene.grids().handles())].grid);
+        std::swap(grid, scene.edit(any(scene.grids().handles())).grid);
         return;
     }
   }

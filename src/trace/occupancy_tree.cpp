@@ -373,8 +373,7 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
-         impl_->chunk_boxes.bytes() +
-         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
+         impl_->chunk_boxes.bytes() + impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 

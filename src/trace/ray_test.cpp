@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "grid/change_follower.h"
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
+#include "grid/change_follower.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
 

@@ -47,8 +47,8 @@ class EditNotice {
  public:
   EditNotice() = default;
   EditNotice(const EditNotice&) {}
-  EditNotice& operator=(const EditNotice&) {
-    give();
+  EditNotice& operator=(const EditNotice& other) {
+    if (this != &other) give();
     return *this;
   }
   ~EditNotice() = default;

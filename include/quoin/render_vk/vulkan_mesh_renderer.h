@@ -6,10 +6,10 @@
 
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
+#include <quoin/live/live_meshes.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
-#include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

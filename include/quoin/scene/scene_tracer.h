@@ -51,15 +51,14 @@ class SceneTracer {
 
   /// Brings it up to date with its scene, whatever happened to that: instances that came, went, moved, turned, showed
   /// or hid; grids that came, went, were edited or replaced; types that became transparent or opaque. Then it is as one
-  /// that was built anew. Grids' dirty chunks (Grid::take_dirty) are left to those who take them. Answers whether grids
-  /// that are traced, or their types' transparency, are other than before: what was made of them is then out of date.
+  /// that was built anew. Returns whether grids that are traced, or their types' transparency, are other than before:
+  /// what was made of them is then out of date.
   ///
-  /// Requires: nothing reads it meanwhile. SceneViews of it and what `with_detail` answered are good no longer.
-  /// Cost:     a glance at every type, grid and instance, some 10 ns each. Of an edited grid that is placed: the
-  ///           versions of its chunks, and OccupancyTree::update for those that changed; of its halved ones only what
-  ///           the edit can have changed, when they are next asked for. For an instance that moved: its transform, and
-  ///           its share of the tree of instances, which is built anew, O(n log n), when instances come or go or have
-  ///           moved far.
+  /// Requires: nothing reads it meanwhile. SceneViews of it and what `with_detail` returned are good no longer.
+  /// Cost:     of what changed: OccupancyTree::update for the chunks of a grid that is placed; of its halved ones only
+  ///           what the edit can have changed, when they are next asked for. For an instance that moved: its transform,
+  ///           and its share of the tree of instances, which is built anew, O(n log n), when instances come or go or
+  ///           have moved far. A look at all instances when the bounds of a grid change.
   ///           A change of a type's transparency: all trees that hold such voxels.
   /// Threads:  grids are updated on several.
   bool update(Threads threads = {});

@@ -6,8 +6,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "grid/halving/chunk_halver.h"
 #include "grid/chunk_order.h"
+#include "grid/halving/chunk_halver.h"
 
 namespace quoin {
 namespace {

@@ -87,7 +87,7 @@ class Obj : public ::testing::Test {
     Instance instance;
     instance.grid = grid_;
     instance.position = position;
-    return scene_.instances()[scene_.add_instance(instance)];
+    return scene_.edit(scene_.add_instance(instance));
   }
 
   ParsedObj write(bool occlusion = true) {

@@ -93,7 +93,7 @@ Scene random_scene(std::uint32_t seed) {
   }
   // Names that the file does not hold come from the first instance that has one.
   for (const InstanceHandle handle : scene.instances().handles()) {
-    std::string& name = scene.grids()[scene.instances()[handle].grid].name;
+    std::string& name = scene.edit(scene.instances()[handle].grid).name;
     if (name.empty()) name = scene.instances()[handle].name;
   }
   return scene;

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "grid/change_follower.h"
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
+#include "grid/change_follower.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {

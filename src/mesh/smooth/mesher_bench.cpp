@@ -74,8 +74,7 @@ void world(benchmark::State& state) {
   const auto materials = add_terrain_types(types);
   SmoothTerrainOptions terrain;
   terrain.size = {4, 2, 4};
-  const auto field =
-      materials ? generate_smooth_terrain(terrain, *materials) : materials.error();
+  const auto field = materials ? generate_smooth_terrain(terrain, *materials) : materials.error();
   if (!field) {
     std::fprintf(stderr, "smooth benchmark: %s\n", to_string(field.error()).c_str());
     std::exit(1);

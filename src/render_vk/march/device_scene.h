@@ -8,8 +8,8 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render_vk/march/device_grid.h"
 #include "render_vk/device/memory.h"
+#include "render_vk/march/device_grid.h"
 #include "scene/tracer/instance_tree.h"
 #include "scene/tracer/kept_trees.h"
 

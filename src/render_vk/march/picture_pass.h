@@ -6,11 +6,11 @@
 #include <quoin/core/progress.h>
 #include <quoin/render/cpu_renderer.h>
 
+#include "render_vk/device/memory.h"
 #include "render_vk/march/device_impostors.h"
 #include "render_vk/march/device_picture.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/march/frame.h"
-#include "render_vk/device/memory.h"
 #include "render_vk/march/pipelines.h"
 
 namespace quoin::vulkan {

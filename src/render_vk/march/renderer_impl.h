@@ -9,9 +9,9 @@
 
 #include "render/picture_detail.h"
 #include "render_vk/device/device.h"
+#include "render_vk/device/memory.h"
 #include "render_vk/march/device_detail.h"
 #include "render_vk/march/device_scene.h"
-#include "render_vk/device/memory.h"
 #include "render_vk/march/pipelines.h"
 
 namespace quoin {

@@ -9,8 +9,8 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "render_vk/march/renderer_impl.h"
 #include "render_vk/device/vulkan_for_tests.h"
+#include "render_vk/march/renderer_impl.h"
 
 namespace quoin::vulkan_test {
 

@@ -8,8 +8,8 @@
 #include "light/surfaces.h"
 #include "render/picture_request.h"
 #include "render_vk/march/device_picture.h"
-#include "render_vk/raster/mesh_pass.h"
 #include "render_vk/march/renderer_impl.h"
+#include "render_vk/raster/mesh_pass.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
