@@ -32,8 +32,8 @@ class KeptBounds {
     box_ = other.box_;
   }
 
-  // Before a copy is made: where bounds are asked of copies they go on from here, instead of each from the last time that
-  // this was asked.
+  // Before a copy is made: where bounds are asked of copies they go on from here, instead of each from the last time
+  // that this was asked.
   void prepare(const ChangeJournal<VoxelRecord>& journal, const ChunkTable& entries) {
     if (is_wanted_->load(std::memory_order_relaxed)) update(journal, entries);
   }

@@ -284,7 +284,7 @@ TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   renderer.expect_as_new("nothing");
   const InstanceHandle first = scene.instances().handles()[0];
   const GridHandle grid = scene.grids().handles()[0];
-  scene.instances()[first].position += DVec3(3, 1, 0);
+  scene.edit(first).position += DVec3(3, 1, 0);
   renderer.expect_as_new("moved");
   scene.edit(grid).grid.fill_sphere({4, 3, 4}, 6.0, 1);
   renderer.expect_as_new("edited");

@@ -254,7 +254,7 @@ TEST(LevelOfDetail, LeavesOutHiddenEmptyAndImpossibleInstances) {
   scene.edit(all[1]).visible = false;
   scene.edit(all[2]).voxel_size = 0.0;
   scene.edit(all[3]).voxel_size = kNan;
-  scene.instances()[all[4]].position.x = kInfinity;
+  scene.edit(all[4]).position.x = kInfinity;
   scene.edit(all[5]).grid = scene.add_grid({});
   std::vector<SelectedInstance> selected(3);
   DetailPolicy policy;

@@ -93,7 +93,7 @@ TEST(SceneMeshes, instances_without_a_place_are_refused) {
   const auto refuses = [](const std::function<void(Instance&)>& spoil) {
     Scene scene;
     place(scene, add_grid(scene, 1));
-    spoil(scene.instances()[scene.instances().handles()[0]]);
+    spoil(scene.edit(scene.instances().handles()[0]));
     const auto blocky = mesh_scene(scene);
     const auto smooth = mesh_scene_smoothly(scene);
     return !blocky && blocky.error().code == ErrorCode::InvalidArgument && !smooth &&

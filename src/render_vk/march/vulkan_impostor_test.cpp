@@ -93,7 +93,7 @@ TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
 TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 5, 260.0);
   const DVec3 away{1e9, -3e8, 5e8};
-  for (const InstanceHandle handle : scene_.instances().handles()) scene_.instances()[handle].position += away;
+  for (const InstanceHandle handle : scene_.instances().handles()) scene_.edit(handle).position += away;
   const RenderOptions options = in_detail(256, 192, 128);
   compare(towards(away + DVec3(-300, 420, -500), away + DVec3(500, 0, 500), 0.9), options, "far_away");
   compare(towards(away + DVec3(-3e5, 4e5, -5e5), away + DVec3(500, 0, 500), 0.004), options, "far_telescope");

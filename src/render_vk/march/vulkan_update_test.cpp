@@ -86,7 +86,7 @@ TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
   then("two");
   const InstanceHandle second = place(scene, tower.snapshot(), {40, 2, 30});
   then("three");
-  scene.instances()[first].position.x += 20.25;
+  scene.edit(first).position.x += 20.25;
   then("moved");
   EXPECT_TRUE(scene.remove_grid(scene.instances()[second].grid));
   then("removed");

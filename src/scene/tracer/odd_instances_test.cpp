@@ -101,7 +101,7 @@ TEST(OddInstances, WhatIsNotFiniteOrHasNoSizeIsLeftOutOfEverything) {
   }
   for (const double size : {0.0, -1.0}) odd.push_back(world.instance()), odd.back().voxel_size = size;
   for (const Instance& instance : odd) world.scene.add_instance(instance);
-  world.scene.grids()[world.scene.add_grid({})].pivot.x = kNan;
+  world.scene.edit(world.scene.add_grid({})).pivot.x = kNan;
   const SceneTracer tracer(world.scene);
   EXPECT_TRUE(tracer.placed().empty());
   EXPECT_TRUE(world.scene.bounds(true).empty());

@@ -131,7 +131,7 @@ class ChangingScene {
     instance.grid = handles[random_() % handles.size()];
     instance.position = vector() * 300.0;
     scene.add_instance(instance);
-    move(scene.instances()[scene.instances().handles().back()]);
+    move(scene.edit(scene.instances().handles().back()));
   }
   void remove_instance() {
     const auto handles = scene.instances().handles();
