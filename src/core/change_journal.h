@@ -13,6 +13,9 @@
 
 namespace quoin {
 
+/// A name for a journal that no other of the process has, of whatever kind.
+[[nodiscard]] std::uint64_t next_journal();
+
 /// The changes of a container in the order in which they happened: what stands behind every `changes_since`.
 ///
 ///   serial    1 2 3 4 5 6 7 8 9
@@ -21,7 +24,8 @@ namespace quoin {
 ///
 /// A key (a chunk, a type, an instance) has the serial of its last record beside it, kept by the container, so that its
 /// next change joins that record as long as nobody has read it. So what a cursor is told is exact, and of a container
-/// that is edited a million times between two frames there are as many records as keys.
+/// that is edited a million times between two frames there are as many records as keys, and one more each time that a
+/// key went and came again.
 ///
 /// A copy (a snapshot's) shares the records up to then and goes by the same name; when it is changed itself, it becomes
 /// a container of its own.
@@ -30,21 +34,13 @@ namespace quoin {
 template <class Record>
 class ChangeJournal {
  public:
-  ChangeJournal() : container_(next_container()) {}
+  ChangeJournal() : container_(next_journal()) {}
   ChangeJournal(const ChangeJournal& other)
       : container_(other.container_), is_copy_(true), first_(other.first_), end_(other.end_), blocks_(other.blocks_) {
     // The records stay as they are from now on, and later ones are kept for who reads only copies.
     other.observe();
     seen_.store(other.seen_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
-  /// Takes the other's name and cursors along, which is of no use afterwards.
-  ChangeJournal(ChangeJournal&& other) noexcept
-      : container_(other.container_),
-        is_copy_(other.is_copy_),
-        first_(other.first_),
-        end_(other.end_),
-        seen_(other.seen_.load(std::memory_order_relaxed)),
-        blocks_(std::move(other.blocks_)) {}
   ChangeJournal& operator=(const ChangeJournal&) = delete;
 
   /// Before anything else of a change: a copy becomes a container of its own.
@@ -97,11 +93,6 @@ class ChangeJournal {
   static constexpr std::size_t kLeast = 8192;  // records that are kept, however small the container
   using Block = std::array<Record, kBlock>;
 
-  static std::uint64_t next_container() {
-    static std::atomic<std::uint64_t> count{0};
-    return count.fetch_add(1, std::memory_order_relaxed) + 1;
-  }
-
   // What is there was read, or may have been.
   void observe() const { seen_.store(end_ - 1, std::memory_order_relaxed); }
 
@@ -138,7 +129,7 @@ class ChangeJournal {
 
   void become_own() {
     is_copy_ = false;
-    container_ = next_container();
+    container_ = next_journal();
     blocks_.clear();
     first_ = end_;
     seen_.store(kNobody, std::memory_order_relaxed);

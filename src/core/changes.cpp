@@ -1,8 +1,16 @@
 #include <quoin/core/changes.h>
 
+#include <atomic>
+
+#include "core/change_journal.h"
 #include "core/edit_notices.h"
 
 namespace quoin {
+
+std::uint64_t next_journal() {
+  static std::atomic<std::uint64_t> count{0};
+  return count.fetch_add(1, std::memory_order_relaxed) + 1;
+}
 
 void EditNotice::give_first() {
   to_->give(index_);

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -164,6 +165,30 @@ TEST(Changes, ASnapshotThatIsEditedIsAnotherGrid) {
   EXPECT_EQ(copy.changes_since(cursor).items.size(), 1U);
   EXPECT_TRUE(grid.changes_since(cursor).all);
   EXPECT_EQ(grid.get({1, 2, 3}), 4);
+}
+
+TEST(Changes, ACursorOfAnotherKindOfContainerIsToldAll) {
+  const Grid grid;
+  const DensityGrid densities;
+  const VoxelRegistry types;
+  for (const ChangeCursor& cursor : {grid.cursor(), densities.cursor(), types.cursor()}) {
+    ChangeCursor one = cursor;
+    ChangeCursor two = cursor;
+    ChangeCursor three = cursor;
+    const int told =
+        int{grid.changes_since(one).all} + int{densities.changes_since(two).all} + int{types.changes_since(three).all};
+    EXPECT_EQ(told, 2) << "but for the container itself";
+  }
+}
+
+TEST(Changes, WhatChangesNothingLeavesASnapshotASnapshot) {
+  Grid grid;
+  grid.set({1, 2, 3}, 4);
+  ChangeCursor cursor = grid.cursor();
+  Grid copy = grid.snapshot();
+  EXPECT_FALSE(copy.set({1, 2, 3}, 4));
+  EXPECT_EQ(copy.fill_box({50, 50, 50}, {60, 60, 60}, kAir), 0);
+  EXPECT_TRUE(copy.changes_since(cursor).empty());
 }
 
 TEST(Changes, ManyEditsOfOneChunkAreOneChange) {

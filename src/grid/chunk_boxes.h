@@ -15,17 +15,22 @@ namespace quoin {
 /// chunks): of each of its six sides it is known how many chunks' boxes end at which coordinate.
 class ChunkBoxes {
  public:
-  /// An empty box takes the chunk away.
+  /// An empty box takes the chunk away. When it throws, the chunk is to be put again; all others are as they were.
   void put(IVec3 chunk, const IBox& box) {
-    const auto found = boxes_.find(chunk);
-    if (found != boxes_.end()) {
-      if (found->second == box) return;
-      if (is_counted_) count(found->second, -1);
-      boxes_.erase(found);
+    try {
+      const auto found = boxes_.find(chunk);
+      if (found != boxes_.end()) {
+        if (found->second == box) return;
+        if (is_counted_) count(found->second, -1);
+        boxes_.erase(found);
+      }
+      if (box.empty()) return;
+      boxes_.emplace(chunk, box);
+      if (is_counted_) count(box, 1);
+    } catch (...) {
+      is_counted_ = false;
+      throw;
     }
-    if (box.empty()) return;
-    boxes_.emplace(chunk, box);
-    if (is_counted_) count(box, 1);
   }
 
   /// The box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second: until then nothing is
@@ -38,8 +43,9 @@ class ChunkBoxes {
       return around;
     }
     if (!is_counted_) {
-      is_counted_ = true;
+      mins_ = maxs_ = {};
       for (const auto& [chunk, box] : boxes_) count(box, 1);
+      is_counted_ = true;
     }
     for (int axis = 0; axis < 3 && !boxes_.empty(); ++axis) {
       const auto i = static_cast<std::size_t>(axis);

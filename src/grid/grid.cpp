@@ -53,8 +53,9 @@ class KeptBounds {
       entries.for_each([&](IVec3 at, const ChunkEntry& entry) { box_ = unite(box_, box_of(at, entry)); });
     } else if (!is_within_all) {
       if (boxes_ == nullptr) {
-        boxes_ = std::make_unique<ChunkBoxes>();
-        entries.for_each([&](IVec3 at, const ChunkEntry& entry) { boxes_->put(at, box_of(at, entry)); });
+        auto made = std::make_unique<ChunkBoxes>();
+        entries.for_each([&](IVec3 at, const ChunkEntry& entry) { made->put(at, box_of(at, entry)); });
+        boxes_ = std::move(made);
       }
       box_ = boxes_->bounds();
     }
@@ -104,6 +105,7 @@ struct Grid::Impl {
     // Before anything that may throw: the storage that was known may be gone.
     entries.voxels_changed(slot);
     if (edit.voxels != 0) {
+      journal.begin_change();
       edit.record.chunk = chunk;
       journal.note(slot.entry->serial, edit.record, entries.size());
     }
@@ -138,7 +140,6 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
-  journal.begin_change();
   std::int64_t changed = 0;
   if (create) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
@@ -176,7 +177,6 @@ VoxelType Grid::get(int x, int y, int z) const {
 bool Grid::set(int x, int y, int z, VoxelType type) {
   const IVec3 at{x >> kChunkShift, y >> kChunkShift, z >> kChunkShift};
   const IVec3 local{x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1)};
-  impl_->journal.begin_change();
   ChunkTable::Slot slot = impl_->entries.find_to_edit(at);
   if (slot.entry == nullptr) {
     if (type == kAir || !is_inside_world(at)) return false;
@@ -186,6 +186,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   try {
     if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
+    edit.add_all();
     impl_->finish_edit(at, slot, edit);
     throw;
   }
@@ -206,7 +207,6 @@ std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelT
   const IVec3 at = chunk_of(row);
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
-  impl_->journal.begin_change();
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
   VoxelEdit edit;
   notice_.give();
@@ -272,7 +272,6 @@ void Grid::put_chunk(IVec3 at, Chunk voxels) {
   const ChunkEntry* present = impl_->entries.find(at);
   if (present == nullptr && voxels.non_air_count() == 0) return;
   if (present != nullptr && present->chunk.shares_storage_with(voxels)) return;
-  impl_->journal.begin_change();
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
   VoxelEdit edit;
   difference_of_types(slot.entry->chunk, voxels, edit);

@@ -154,8 +154,8 @@ class ChunkMaker {
       }
     }
     made.unite_slabs();
-    DensityChunk without_slack(std::as_const(made));  // copied storage has no room to grow
-    return without_slack;
+    made.compact();
+    return made;
   }
 
  private:

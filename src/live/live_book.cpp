@@ -203,7 +203,9 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
       queued.pop_back();
     }
     GridSnapshot& snapshot = snapshots[each.handle];
-    if (snapshot == nullptr) snapshot = std::make_shared<const Grid>(scene.grids()[each.handle].grid.snapshot());
+    const bool is_blocky = options_.style == SurfaceStyle::Blocky;  // smooth jobs have that of their densities
+    if (is_blocky && snapshot == nullptr)
+      snapshot = std::make_shared<const Grid>(scene.grids()[each.handle].grid.snapshot());
     std::unique_ptr<LiveJob> job = each.live->make_job(snapshot, each.chunk, types_);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;

@@ -84,13 +84,14 @@ struct Scene::Book {
   void note(InstanceHandle handle, std::size_t keys) {
     journal.note(serials[handle.index], {Kind::Instance, handle.index, handle.generation}, keys);
   }
-  void collect(const SlotMap<SceneGrid>& grids) {
+  // `keys` are grids and instances: they share a journal.
+  void collect(const SlotMap<SceneGrid>& grids, std::size_t keys) {
     notices.take(noticed);
     for (const std::uint32_t index : noticed) {
       const auto handle = grids.handle_at(index);
       if (!handle.has_value()) continue;
       journal.begin_change();
-      note(*handle, grids.size());
+      note(*handle, keys);
       notices.follow(grids[*handle].grid.notice_, index);
     }
     noticed.clear();
@@ -105,7 +106,7 @@ Scene::~Scene() = default;
 Scene Scene::snapshot() const {
   Scene copy;
   const std::lock_guard lock(book_->mutex);
-  book_->collect(grids_);
+  book_->collect(grids_, grids_.size() + instances_.size());
   copy.types = types;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
     return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas};
@@ -122,7 +123,7 @@ GridHandle Scene::add_grid(SceneGrid grid) {
   book_->journal.begin_change();
   if (handle.index >= book_->grid_serials.size()) book_->grid_serials.resize(handle.index + std::size_t{1});
   book_->grid_serials[handle.index] = 0;  // records of another grid in this slot stay as they are
-  book_->note(handle, grids_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   book_->notices.follow(grids_[handle].grid.notice_, handle.index);
   return handle;
 }
@@ -132,14 +133,14 @@ InstanceHandle Scene::add_instance(Instance instance) {
   book_->journal.begin_change();
   if (handle.index >= book_->serials.size()) book_->serials.resize(handle.index + std::size_t{1});
   book_->serials[handle.index] = 0;
-  book_->note(handle, instances_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   return handle;
 }
 
 bool Scene::remove_grid(GridHandle handle) {
   if (!grids_.remove(handle)) return false;
   book_->journal.begin_change();
-  book_->note(handle, grids_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   for (const InstanceHandle instance : instances_.handles()) {
     if (instances_[instance].grid == handle) remove_instance(instance);
   }
@@ -149,28 +150,28 @@ bool Scene::remove_grid(GridHandle handle) {
 bool Scene::remove_instance(InstanceHandle handle) {
   if (!instances_.remove(handle)) return false;
   book_->journal.begin_change();
-  book_->note(handle, instances_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   return true;
 }
 
 SceneGrid& Scene::edit(GridHandle handle) {
   SceneGrid& grid = grids_[handle];
   book_->journal.begin_change();
-  book_->note(handle, grids_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   return grid;
 }
 
 Instance& Scene::edit(InstanceHandle handle) {
   Instance& instance = instances_[handle];
   book_->journal.begin_change();
-  book_->note(handle, instances_.size());
+  book_->note(handle, grids_.size() + instances_.size());
   return instance;
 }
 
 SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   SceneChanges changes;
   const std::lock_guard lock(book_->mutex);
-  book_->collect(grids_);
+  book_->collect(grids_, grids_.size() + instances_.size());
   changes.all = !book_->journal.visit_since(cursor, [&](const SceneRecord& record) {
     if (record.kind == Kind::Grid) {
       changes.grids.push_back({record.index, record.generation});

@@ -102,6 +102,27 @@ TEST(SceneChanges, EveryConsumerIsToldWhatChangedSinceItsOwnLastTime) {
   }
 }
 
+TEST(SceneChanges, ABusySceneIsToldWhatChangedFrameByFrame) {
+  Scene scene;
+  std::vector<GridHandle> grids;
+  for (int i = 0; i < 50; ++i) grids.push_back(scene.add_grid({}));
+  std::vector<InstanceHandle> instances;
+  for (int i = 0; i < 12'000; ++i) {
+    Instance instance;
+    instance.grid = grids[static_cast<std::size_t>(i) % grids.size()];
+    instances.push_back(scene.add_instance(instance));
+  }
+  ChangeCursor cursor = scene.cursor();
+  for (int frame = 0; frame < 4; ++frame) {
+    for (const InstanceHandle each : instances) scene.edit(each).position.x += 1.0;
+    for (const GridHandle each : grids) scene.edit(each).grid.set({frame, 0, 0}, 1);
+    const SceneChanges changes = scene.changes_since(cursor);
+    EXPECT_FALSE(changes.all);
+    EXPECT_EQ(changes.instances.size(), instances.size());
+    EXPECT_EQ(changes.grids.size(), grids.size());
+  }
+}
+
 TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
   Scene scene;
   const GridHandle first = scene.add_grid({});

@@ -50,8 +50,8 @@ class ColumnOfChunks {
     const IBox part = intersect({world_.min - origin, world_.max - origin}, {IVec3{0}, IVec3{kChunkEdge}});
     Chunk chunk = terrain::make_ground(land_, columns_, types, at, part, options_.caves);
     terrain::draw_plants(plants_, types, at, chunk);
-    Chunk without_slack(std::as_const(chunk));  // copied storage has no room to grow; a third of the memory otherwise
-    return without_slack;
+    chunk.compact();  // a third of the memory is room to grow
+    return chunk;
   }
 
  private:

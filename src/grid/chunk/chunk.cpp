@@ -211,7 +211,6 @@ std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const
   constexpr int kFewTypes = 6;
   const std::uint64_t air = row_mask(y, z, kAir);
   std::uint64_t changed = 0;
-  std::uint64_t became_air = 0;
   std::uint64_t left = mask;
   std::uint32_t index = 0;
   for (int i = 0; i < kFewTypes && left != 0; ++i) {
@@ -221,11 +220,11 @@ std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const
     left &= ~same;
     if (others == 0) continue;
     index = replace(y, z, others, type);
+    // At once: what comes next may throw.
+    count_change(y, z, type == kAir ? others : 0, others & air);
     changed |= others;
-    if (type == kAir) became_air = others;
   }
   if (changed != 0) {
-    count_change(y, z, became_air, changed & air);
     after_writing(y, z, index, static_cast<std::uint32_t>(std::popcount(changed)));
   }
   for (; left != 0; left &= left - 1) {

@@ -113,8 +113,8 @@ void renumber_row(const std::uint64_t* from, int from_bits, const std::vector<st
 }  // namespace
 
 void Chunk::make_mixed() {
-  mixed_ = make_ref<Mixed>();
-  Mixed& m = *mixed_;
+  Ref<Mixed> made = make_ref<Mixed>();
+  Mixed& m = *made;
   m.palette.push_back(uniform_);
   m.counts.push_back(kChunkVoxels);
   m.used = 1;
@@ -123,6 +123,7 @@ void Chunk::make_mixed() {
     m.non_air = kChunkVoxels;
     for (auto& axis : m.layer_counts) axis.fill(kChunkEdge * kChunkEdge);
   }
+  mixed_ = std::move(made);
 }
 
 // The palette index of a type, adding it where it is new; may widen the voxels.

@@ -139,7 +139,14 @@ struct ImpostorCache::Impl {
       const std::lock_guard lock(mutex);
       origin = origin_of(grid->grid);
     }
-    put(handle, origin, std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
+    try {
+      put(handle, origin, std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
+    } catch (...) {
+      // It may be asked for again.
+      const std::lock_guard lock(mutex);
+      if (const auto entry = entries.find(handle); entry != entries.end()) entry->second.is_waiting = false;
+      throw;
+    }
   }
 };
 
@@ -157,8 +164,8 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
   Entry& entry = impl_->entries[grid];
   entry.last_use = impl_->round;
   if ((entry.impostor == nullptr || !impl_->is_current(entry, named->grid)) && !entry.is_waiting) {
-    entry.is_waiting = true;
     impl_->waiting.push_back(grid);
+    entry.is_waiting = true;
   }
   return entry.impostor;
 }

@@ -31,12 +31,6 @@ bool can_be_traced(const Instance& instance, const SceneGrid* grid, bool hidden)
          !grid->grid.bounds().empty();
 }
 
-bool has_other_pivot(const Placement& placement, const SceneGrid& grid, const Scene& scene, GridHandle handle) {
-  return std::any_of(placement.placed.begin(), placement.placed.end(), [&](const DevicePlaced& each) {
-    return scene.instances()[each.placed.instance].grid == handle && each.placed.pivot != grid.pivot;
-  });
-}
-
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
   PlacedGrid placed;
   placed.instance = handle;
@@ -83,19 +77,24 @@ bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed) {
 // Lists the instances and keeps, of the known grids, those that are among them.
 void DeviceScene::place(const Scene& scene, bool hidden) {
   placement_.placed.clear();
+  for (auto& [handle, grid] : grids_) grid.is_used = false;
   std::vector<DBox> boxes;
-  std::map<GridHandle, KnownGrid> kept;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
     if (!can_be_traced(instance, grid, hidden)) return;
-    if (const auto known = grids_.find(instance.grid); known != grids_.end()) kept.insert(grids_.extract(known));
-    const IBox bounds = grid->grid.bounds();
-    kept[instance.grid].bounds = bounds;
+    KnownGrid& known = grids_[instance.grid];
+    known.is_used = true;
+    known.bounds = grid->grid.bounds();
+    known.pivot = grid->pivot;
     placement_.placed.push_back({placed_as(instance, *grid, handle)});
-    boxes.push_back(bounds_in_world(placement_.placed.back().placed, bounds));
+    boxes.push_back(bounds_in_world(placement_.placed.back().placed, known.bounds));
   });
-  for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
-  grids_ = std::move(kept);
+  for (auto each = grids_.begin(); each != grids_.end();) {
+    const auto known = each++;
+    if (known->second.is_used) continue;
+    known->second.voxels.release(*memory_);
+    grids_.erase(known);
+  }
   std::int32_t index = 0;
   for (auto& [handle, known] : grids_) known.index = index++;
   placement_.instances = InstanceTree(std::move(boxes));
@@ -111,8 +110,8 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, bool hidd
     const auto known = grids_.find(handle);
     const SceneGrid* grid = scene.grids().find(handle);
     // One that was empty may now be placed, and whose pivot moved is placed elsewhere.
-    places |= known == grids_.end() || grid == nullptr || !(grid->grid.bounds() == known->second.bounds);
-    places |= known != grids_.end() && grid != nullptr && has_other_pivot(placement_, *grid, scene, handle);
+    places |= known == grids_.end() || grid == nullptr || !(grid->grid.bounds() == known->second.bounds) ||
+              grid->pivot != known->second.pivot;
     if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
   }
   if (!places) return changed;

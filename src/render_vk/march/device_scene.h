@@ -64,6 +64,8 @@ class DeviceScene {
  private:
   struct KnownGrid {
     IBox bounds;
+    DVec3 pivot{0.0};
+    bool is_used = false;  // by an instance
     KeptTrees trees;
     DeviceGrid voxels;
     std::int32_t index = 0;

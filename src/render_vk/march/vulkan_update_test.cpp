@@ -100,6 +100,10 @@ TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
   then("glass_now");
   scene.edit(scene.instances()[first].grid).grid = tower.snapshot();
   then("assigned");
+  const GridHandle grid = scene.instances()[first].grid;
+  scene.remove_instance(first);
+  scene.edit(grid).grid.set({3, 3, 3}, kAir);
+  then("removed_and_edited");
 }
 
 TEST_F(VulkanUpdate, AnotherSceneWithTheSameHandlesAndVersions) {

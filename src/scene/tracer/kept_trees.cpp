@@ -26,18 +26,19 @@ bool KeptTrees::update(const Grid& grid, const VoxelRegistry& types) {
   return true;
 }
 
+// Where there was no tree, there was no transparent voxel but in what changed.
 void KeptTrees::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
-  if (transparent_) {
-    transparent_->update(grid, types, changes);
-    if (transparent_->bounds().empty()) transparent_.reset();
-    return;
+  if (!transparent_) {
+    const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
+    const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();
+    const bool has_transparent = std::any_of(present.begin(), present.end(), holds_some) ||
+                                 std::any_of(changes.items.begin(), changes.items.end(),
+                                             [&](const ChunkChange& change) { return holds_some(change.chunk); });
+    if (!has_transparent) return;
+    transparent_.emplace(Occupancy::Transparent);
   }
-  const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
-  const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();
-  const bool has_transparent = std::any_of(present.begin(), present.end(), holds_some) ||
-                               std::any_of(changes.items.begin(), changes.items.end(),
-                                           [&](const ChunkChange& change) { return holds_some(change.chunk); });
-  if (has_transparent) transparent_.emplace(OccupancyTree::build(grid, types, Occupancy::Transparent));
+  transparent_->update(grid, types, changes);
+  if (transparent_->bounds().empty()) transparent_.reset();
 }
 
 }  // namespace quoin

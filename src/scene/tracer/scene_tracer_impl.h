@@ -60,6 +60,7 @@ struct SceneTracer::Impl {
  private:
   std::uint64_t shapes = 0;      // that were given out
   bool has_other_trees = false;  // than those that `placed` names
+  bool is_unfinished = false;    // an update was broken off
 
   void look_at_types(const TypeChanges& changes);
   [[nodiscard]] bool look_at_grids(const SceneChanges& changes);

@@ -42,11 +42,13 @@ bool SceneTracer::Impl::update(Threads threads) {
   const TypeChanges types = scene->types.changes_since(types_now);
   SceneChanges changes = scene->changes_since(scene_now);
   followed_types = followed_scene = {};  // stay so when memory runs out
+  const bool was_unfinished = std::exchange(is_unfinished, true);
   look_at_types(types);
   // Trees that were forgotten are made again wherever they are.
   changes.all |= types.all || std::any_of(types.items.begin(), types.items.end(), is_seen_through_otherwise);
   const bool are_shapes_same = look_at_grids(changes);
-  const bool are_placed = changes.all || !are_shapes_same ? move_all_instances() : move_instances(changes);
+  const bool moves_all = changes.all || !are_shapes_same;
+  const bool are_placed = !was_unfinished && (moves_all ? move_all_instances() : move_instances(changes));
   if (!are_placed) {
     place_instances();
     changes.all = true;
@@ -54,6 +56,7 @@ bool SceneTracer::Impl::update(Threads threads) {
   update_trees(changes, threads);
   followed_types = types_now;
   followed_scene = scene_now;
+  is_unfinished = false;
   return std::exchange(has_other_trees, false);
 }
 
@@ -188,7 +191,8 @@ bool SceneTracer::Impl::move_all_instances() {
     const bool is_next = next < sources.size() && sources[next].instance == handle;
     const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
     if (has_moved && !has_place(instance)) return;
-    is_same = is_next;
+    // Of another grid: that grid's trees may not be there.
+    is_same = is_next && (!has_moved || sources[next].grid == grid);
     if (!is_same) return;
     grid->is_placed = true;
     if (has_moved) {

@@ -297,6 +297,19 @@ TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
   EXPECT_TRUE(first->is_occupied({70, 20, 0}));
 }
 
+// An instance takes a grid that nobody showed while the bounds of another grid change.
+TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
+  TwoCubes world;
+  const GridHandle hidden = world.add_cube();
+  SceneTracer tracer(world.scene);
+  world.scene.edit(world.near).grid = hidden;
+  const GridHandle other = world.scene.instances()[world.scene.instances().handles()[1]].grid;
+  world.scene.edit(other).grid.set({5, 40, 5}, 1);
+  tracer.update();
+  EXPECT_EQ(tracer.placed()[0].opaque->bounds(), world.scene.grids()[hidden].grid.bounds());
+  EXPECT_EQ(tracer.placed()[1].opaque->bounds(), world.scene.grids()[other].grid.bounds());
+}
+
 TEST(SceneUpdate, OthersWhoFollowTheGridMissNothing) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
