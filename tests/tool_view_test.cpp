@@ -10,16 +10,17 @@ namespace {
 class ToolView : public ToolTest {
  protected:
   /// Whether the viewer was built.
-  [[nodiscard]] bool is_built() {
+  [[nodiscard]] bool is_built() { return without_display("view tiny.vox").err.find("no viewer") == std::string::npos; }
+  ToolRun without_display(const std::string& arguments) {
     std::string command = kNoDisplay;
-    command += "view tiny.vox";  // of a sum GCC 12 warns without reason
-    return shell(command).err.find("no viewer") == std::string::npos;
+    command += arguments;  // of a sum GCC 12 warns without reason
+    return shell(command);
   }
   static constexpr const char* kNoDisplay = "unset DISPLAY WAYLAND_DISPLAY SDL_VIDEODRIVER; '" QUOIN_TOOL "' ";
 };
 
 TEST_F(ToolView, WithoutADisplayItSaysSo) {
-  const ToolRun result = shell(std::string(kNoDisplay) + "view tiny.vox");
+  const ToolRun result = without_display("view tiny.vox");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);
   const bool says_why = result.err.find("no display") != std::string::npos ||
@@ -31,7 +32,7 @@ TEST_F(ToolView, FilesThatCannotBeShownFailBeforeAWindowOpens) {
   if (!is_built()) GTEST_SKIP() << "the viewer is not built";
   std::ofstream(folder_.file("text.txt")) << "no voxels here";
   for (const char* file : {"absent.vox", "text.txt", "."}) {
-    const ToolRun result = shell(std::string(kNoDisplay) + "view " + file);
+    const ToolRun result = without_display(std::string("view ") + file);
     EXPECT_EQ(result.status, 1) << file;
     expect_one_error_line(result);
     EXPECT_EQ(result.err.find("display"), std::string::npos) << result.err;

@@ -69,7 +69,8 @@ class ChunkBoxes {
   }
   static void count(std::map<int, int>& ends, int at, int by) {
     const auto found = ends.try_emplace(at, 0).first;
-    if ((found->second += by) == 0) ends.erase(found);
+    found->second += by;
+    if (found->second == 0) ends.erase(found);
   }
 
   tsl::robin_map<IVec3, IBox, CoordinateHash> boxes_;

@@ -129,10 +129,10 @@ class ChunkTrie {
     void operator delete(Node* node, std::destroying_delete_t) {
       if (node->level == 0) {
         static_cast<Leaf*>(node)->~Leaf();
-        ::operator delete(node, sizeof(Leaf));
+        ::operator delete(node);
       } else {
         static_cast<Inner*>(node)->~Inner();
-        ::operator delete(node, sizeof(Inner));
+        ::operator delete(node);
       }
     }
     int level;

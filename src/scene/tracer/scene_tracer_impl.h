@@ -57,7 +57,6 @@ struct SceneTracer::Impl {
 
   bool update(Threads threads);
 
- private:
   std::uint64_t shapes = 0;      // that were given out
   bool has_other_trees = false;  // than those that `placed` names
   bool is_unfinished = false;    // an update was broken off
