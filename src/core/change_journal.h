@@ -74,6 +74,22 @@ class ChangeJournal {
     return is_known;
   }
 
+  /// What every `changes_since` returns: the changes since the cursor, each key once, in the order of `less(a, b)`, which
+  /// compares records by their keys. Records tell of a change by `change()`.
+  template <class Change, class Less>
+  [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
+    std::vector<Record> records;
+    Changes<Change> changes;
+    changes.all = !visit_since(cursor, [&](const Record& record) { records.push_back(record); });
+    std::stable_sort(records.begin(), records.end(), less);
+    for (std::size_t i = 0; i < records.size();) {
+      Record united = records[i];
+      for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
+      changes.items.push_back(united.change());
+    }
+    return changes;
+  }
+
   /// What `visit_since` does to a cursor.
   [[nodiscard]] ChangeCursor present() const {
     ChangeCursor cursor;
@@ -143,20 +159,5 @@ class ChangeJournal {
       kNobody};                                 // the last serial that a cursor may have read; kNobody: none asked
   std::vector<std::shared_ptr<Block>> blocks_;  // [serial / kBlock - first_ / kBlock]
 };
-
-/// Sorts changes and merges those that are of the same: `less(a, b)`, `merge(into, later)`.
-template <class Change, class Less, class Merge>
-void unite_changes(std::vector<Change>& changes, Less&& less, Merge&& merge) {
-  std::stable_sort(changes.begin(), changes.end(), less);
-  std::size_t kept = 0;
-  for (std::size_t i = 1; i < changes.size(); ++i) {
-    if (!less(changes[kept], changes[i])) {
-      merge(changes[kept], changes[i]);
-    } else if (++kept != i) {
-      changes[kept] = changes[i];
-    }
-  }
-  if (!changes.empty()) changes.resize(kept + 1);
-}
 
 }  // namespace quoin

@@ -18,7 +18,7 @@ inline void sort_and_unite(std::vector<IVec3>& chunks) {
   chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
 }
 
-/// Changes likewise, by their chunks.
+/// Records of changes likewise, by their chunks.
 inline constexpr auto by_chunk = [](const auto& a, const auto& b) { return by_zyx(a.chunk, b.chunk); };
 
 }  // namespace quoin

@@ -327,14 +327,7 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
-  GridChanges changes;
-  changes.all =
-      !impl_->journal.visit_since(cursor, [&](const VoxelRecord& record) { changes.items.push_back(record.change()); });
-  unite_changes(changes.items, by_chunk, [](ChunkChange& into, const ChunkChange& other) {
-    into.box = unite(into.box, other.box);
-    into.neighbours |= other.neighbours;
-  });
-  return changes;
+  return impl_->journal.changes_since<ChunkChange>(cursor, by_chunk);
 }
 
 bool Grid::has_changed_since(const ChangeCursor& cursor) const {

@@ -29,6 +29,7 @@ struct TypeRecord : TypeChange {
     visibility |= other.visibility;
     colour |= other.colour;
   }
+  [[nodiscard]] TypeChange change() const { return *this; }
 };
 
 struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
@@ -114,15 +115,8 @@ ChangeCursor VoxelRegistry::cursor() const {
 }
 
 TypeChanges VoxelRegistry::changes_since(ChangeCursor& cursor) const {
-  TypeChanges changes;
-  changes.all = !journal_->visit_since(cursor, [&](const TypeRecord& record) { changes.items.push_back(record); });
-  unite_changes(
-      changes.items, [](const TypeChange& a, const TypeChange& b) { return a.type < b.type; },
-      [](TypeChange& into, const TypeChange& later) {
-        into.visibility |= later.visibility;
-        into.colour |= later.colour;
-      });
-  return changes;
+  const auto by_type = [](const TypeRecord& a, const TypeRecord& b) { return a.type < b.type; };
+  return journal_->changes_since<TypeChange>(cursor, by_type);
 }
 
 }  // namespace quoin

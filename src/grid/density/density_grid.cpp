@@ -95,14 +95,7 @@ std::int64_t DensityGrid::solid_count() const {
 }
 
 DensityChanges DensityGrid::changes_since(ChangeCursor& cursor) const {
-  DensityChanges changes;
-  changes.all = !impl_->store.journal().visit_since(
-      cursor, [&](const DensityRecord& record) { changes.items.push_back(record.change()); });
-  unite_changes(changes.items, by_chunk, [](DensityChange& into, const DensityChange& other) {
-    into.box = unite(into.box, other.box);
-    for (std::size_t i = 0; i < 27; ++i) into.distance[i] = std::min(into.distance[i], other.distance[i]);
-  });
-  return changes;
+  return impl_->store.journal().changes_since<DensityChange>(cursor, by_chunk);
 }
 
 bool DensityGrid::has_changed_since(const ChangeCursor& cursor) const {
