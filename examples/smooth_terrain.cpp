@@ -29,7 +29,7 @@ int main() {
   // Cells of one sample in the chunks at a corner, of twice as many in every further ring.
   quoin::SmoothMeshOptions options;
   options.level_of = [](quoin::IVec3 chunk) {
-    return std::clamp(std::max(chunk.x, chunk.z) - 1, 0, quoin::kCoarsestLevel);
+    return std::clamp(std::max(chunk.x, chunk.z) - 1, 0, quoin::kMaxSmoothLevel);
   };
   auto mesh = quoin::build_smooth_mesh(*field, registry, options);
   if (!mesh) return fail(mesh.error());

@@ -48,7 +48,7 @@ class Meshes {
     if (mesh_.indices.empty() && mesh_.positions.empty()) return bytes;
     append_bytes(mesh_.positions, bytes);
     append_bytes(mesh_.normals, bytes);
-    append_bytes(mesh_.openness, bytes);
+    append_bytes(mesh_.occlusion, bytes);
     append_bytes(mesh_.cells, bytes);
     append_bytes(mesh_.indices, bytes);
     return bytes;

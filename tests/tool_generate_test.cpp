@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 
 class ToolGenerate : public ToolTest {};
 
-TEST_F(ToolGenerate, writes_the_same_world_as_the_library) {
+TEST_F(ToolGenerate, WritesTheSameWorldAsTheLibrary) {
   const ToolRun result = run("generate terrain world.vox --seed 9 --chunks 3x2x2 --json");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(result.err, "");
@@ -44,7 +44,7 @@ TEST_F(ToolGenerate, writes_the_same_world_as_the_library) {
   EXPECT_EQ(loaded.scene.types[1].colour, (Rgba8{77, 179, 51, 255}));
 }
 
-TEST_F(ToolGenerate, is_seed_42_and_4x2x4_unless_told) {
+TEST_F(ToolGenerate, IsSeed42And4x2x4UnlessTold) {
   EXPECT_EQ(run("generate terrain a.vox").status, 0);
   EXPECT_EQ(run("generate terrain b.vox --seed 42 --chunks 4x2x4 --threads 3").status, 0);
   EXPECT_EQ(run("generate terrain c.vox --seed 43").status, 0);
@@ -54,7 +54,7 @@ TEST_F(ToolGenerate, is_seed_42_and_4x2x4_unless_told) {
   EXPECT_FALSE(a == text_of(folder_.file("c.vox")));
 }
 
-TEST_F(ToolGenerate, says_what_it_made) {
+TEST_F(ToolGenerate, SaysWhatItMade) {
   const ToolRun result = run("generate terrain hills.vox --chunks 1x1x1");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.out.find("seed 42, 32 x 32 x 32"), std::string::npos) << result.out;
@@ -63,7 +63,7 @@ TEST_F(ToolGenerate, says_what_it_made) {
   EXPECT_NE(run("generate --help").out.find("Example: quoin generate terrain"), std::string::npos);
 }
 
-TEST_F(ToolGenerate, worlds_beyond_256_voxels_keep_every_voxel) {
+TEST_F(ToolGenerate, WorldsBeyond256VoxelsKeepEveryVoxel) {
   const ToolRun made = run("generate terrain wide.vox --chunks 10x1x1 --json");
   ASSERT_EQ(made.status, 0) << made.err;
   const ToolRun info = run("info wide.vox --json");
@@ -71,7 +71,7 @@ TEST_F(ToolGenerate, worlds_beyond_256_voxels_keep_every_voxel) {
   EXPECT_EQ(Json::parse(info.out)["voxels"], Json::parse(made.out)["voxels"]);
 }
 
-TEST_F(ToolGenerate, wrong_usage_is_status_2_and_leaves_no_file) {
+TEST_F(ToolGenerate, WrongUsageIsStatus2AndLeavesNoFile) {
   for (const std::string arguments : {"",
                                       "terrain",
                                       "forest out.vox",
@@ -103,7 +103,7 @@ TEST_F(ToolGenerate, wrong_usage_is_status_2_and_leaves_no_file) {
 }
 
 // Before the work: this world would take minutes and gigabytes.
-TEST_F(ToolGenerate, a_file_that_cannot_be_written_is_status_1_at_once) {
+TEST_F(ToolGenerate, AFileThatCannotBeWrittenIsStatus1AtOnce) {
   const ToolRun result = shell("ulimit -t 10; '" QUOIN_TOOL "' generate terrain nowhere/out.vox --chunks 1024x2x32");
   EXPECT_EQ(result.status, 1);
   expect_one_error_line(result);

@@ -65,7 +65,7 @@ std::size_t open_edges(const WorldMesh& mesh) {
   return open;
 }
 
-TEST_F(ToolSmooth, voxels_become_a_closed_surface_in_every_format) {
+TEST_F(ToolSmooth, VoxelsBecomeAClosedSurfaceInEveryFormat) {
   for (const std::string name : {"out.ply", "out.obj", "out.glb"}) {
     const Json said = converted("tiny.vox " + name + " --mesher smooth --watertight --threads 2");
     EXPECT_EQ(said["mesher"], "smooth");
@@ -86,7 +86,7 @@ TEST_F(ToolSmooth, voxels_become_a_closed_surface_in_every_format) {
   EXPECT_EQ(converted("tiny.vox out.gltf --mesher smooth")["files"], Json({"out.gltf", "out.bin"}));
 }
 
-TEST_F(ToolSmooth, voxels_keep_their_places_and_colours) {
+TEST_F(ToolSmooth, VoxelsKeepTheirPlacesAndColours) {
   std::ofstream(folder_.file("bar.vox"), std::ios::binary) << vox_file({9, 1, 1}, std::string("\0\0\0\1"
                                                                                               "\1\0\0\1"
                                                                                               "\2\0\0\1"
@@ -120,7 +120,7 @@ TEST_F(ToolSmooth, voxels_keep_their_places_and_colours) {
   }
 }
 
-TEST_F(ToolSmooth, occlusion_darkens_hollows_unless_it_is_left_out) {
+TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
   std::string voxels;  // a floor and a wall
   for (int x = 0; x < 16; ++x) {
     for (int y = 0; y < 16; ++y) {
@@ -141,7 +141,7 @@ TEST_F(ToolSmooth, occlusion_darkens_hollows_unless_it_is_left_out) {
   EXPECT_NEAR(plain, 0.6038, 1e-3) << "0xCC in linear light";
 }
 
-TEST_F(ToolSmooth, hidden_instances_and_nothing_to_draw_are_said) {
+TEST_F(ToolSmooth, HiddenInstancesAndNothingToDrawAreSaid) {
   std::ofstream(folder_.file("two.vox"), std::ios::binary) << vox_with_hidden(2);
   const Json said = converted("two.vox out.glb --mesher smooth");
   EXPECT_EQ(said["warnings"], Json({"2 hidden instances left out; --hidden includes them", "nothing to draw"}));
@@ -150,7 +150,7 @@ TEST_F(ToolSmooth, hidden_instances_and_nothing_to_draw_are_said) {
   EXPECT_EQ(parse_glb(read_file(folder_.file("out.glb")).value()).document["nodes"].size(), 2U);
 }
 
-TEST_F(ToolSmooth, a_raw_volume_becomes_its_surface) {
+TEST_F(ToolSmooth, ARawVolumeBecomesItsSurface) {
   const IVec3 size{40, 36, 38};
   const DVec3 centre(21.3, 18.1, 17.6);
   for (const auto& [type, name] :
@@ -177,7 +177,7 @@ TEST_F(ToolSmooth, a_raw_volume_becomes_its_surface) {
   EXPECT_EQ(run("convert ball.raw out.ply --raw-size 40x36x39 --raw-type float64").status, 1);
 }
 
-TEST_F(ToolSmooth, the_surface_value_is_found_and_said) {
+TEST_F(ToolSmooth, TheSurfaceValueIsFoundAndSaid) {
   std::vector<double> values = ball({24, 24, 24}, DVec3(11.5), 8.0);
   for (double& value : values) value = value > 0.0 ? 200.0 : 40.0;
   write("ball.raw", volume_test::encode(values, ScalarType::UInt8));
@@ -189,7 +189,7 @@ TEST_F(ToolSmooth, the_surface_value_is_found_and_said) {
   EXPECT_NE(text.out.find("Solid samples: "), std::string::npos) << text.out;
 }
 
-TEST_F(ToolSmooth, millimetres_are_metres_in_gltf_alone) {
+TEST_F(ToolSmooth, MillimetresAreMetresInGltfAlone) {
   volume_test::NiftiFile file;
   file.dim = {3, 20, 20, 20, 1, 1, 1, 1};
   file.datatype = 16;
@@ -217,7 +217,7 @@ TEST_F(ToolSmooth, millimetres_are_metres_in_gltf_alone) {
   }
 }
 
-TEST_F(ToolSmooth, volumes_without_a_surface_are_empty_files) {
+TEST_F(ToolSmooth, VolumesWithoutASurfaceAreEmptyFiles) {
   for (const double value : {0.0, 255.0}) {
     write("flat.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::UInt8));
     const Json said = converted("flat.raw out.glb --raw-size 10x10x10");
@@ -233,7 +233,7 @@ TEST_F(ToolSmooth, volumes_without_a_surface_are_empty_files) {
   EXPECT_GT(read("out.glb").volume(), 0.0);
 }
 
-TEST_F(ToolSmooth, simplifying_says_how_far_it_went) {
+TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {
   if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
   write("ball.raw", volume_test::encode(ball({40, 40, 40}, DVec3(20.0), 15.0), ScalarType::Float32));
   const std::string arguments = "ball.raw out.ply --raw-size 40x40x40 --raw-type float32 --iso 0";
@@ -247,7 +247,7 @@ TEST_F(ToolSmooth, simplifying_says_how_far_it_went) {
   EXPECT_NE(run("convert " + arguments + " --simplify 0.1").out.find("Simplified: "), std::string::npos);
 }
 
-TEST_F(ToolSmooth, volumes_become_meshes_only) {
+TEST_F(ToolSmooth, VolumesBecomeMeshesOnly) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
   const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
   EXPECT_EQ(voxels.status, 1);
@@ -267,7 +267,7 @@ TEST_F(ToolSmooth, volumes_become_meshes_only) {
   EXPECT_EQ(run("convert a.nrrd out.glb").status, 0);
 }
 
-TEST_F(ToolSmooth, failures_are_one_line_status_1_and_no_file) {
+TEST_F(ToolSmooth, FailuresAreOneLineStatus1AndNoFile) {
   for (const std::string arguments :
        {"missing.nii out.glb", "tiny.vox none/out.ply --mesher smooth", "tiny.vox none/out.gltf --mesher smooth",
         "missing.raw out.glb --raw-size 1x1x1", "tiny.vox out.glb --raw-size 900000000x900000000x900000000"}) {

@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 
 class Tool : public ToolTest {};
 
-TEST_F(Tool, info_says_what_is_in_a_file) {
+TEST_F(Tool, InfoSaysWhatIsInAFile) {
   const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Voxels: 4 of 2 types"), std::string::npos) << text.out;
@@ -40,7 +40,7 @@ TEST_F(Tool, info_says_what_is_in_a_file) {
   EXPECT_EQ(object["warnings"], Json::array());
 }
 
-TEST_F(Tool, info_says_what_is_in_a_volume) {
+TEST_F(Tool, InfoSaysWhatIsInAVolume) {
   std::ofstream(folder_.file("a.nrrd"), std::ios::binary)
       << "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 1\nencoding: raw\nspacings: 0.5 1 2\n\nabcdef";
   const ToolRun text = run("info a.nrrd");
@@ -61,7 +61,7 @@ TEST_F(Tool, info_says_what_is_in_a_volume) {
   EXPECT_EQ(bad.err, "quoin: b.nrrd: byte 10: the header has no field \"dimension\"\n");
 }
 
-TEST_F(Tool, convert_writes_every_format_and_counts) {
+TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
   const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Faces: 18 visible of 24 total"), std::string::npos) << text.out;
@@ -82,7 +82,7 @@ TEST_F(Tool, convert_writes_every_format_and_counts) {
   }
 }
 
-TEST_F(Tool, convert_names_every_file_that_it_writes) {
+TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> files_of = {
       {"a.glb", {"a.glb"}},
       {"b.vox", {"b.vox"}},
@@ -103,7 +103,7 @@ TEST_F(Tool, convert_names_every_file_that_it_writes) {
   }
 }
 
-TEST_F(Tool, the_input_is_not_replaced_by_a_companion) {
+TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
   for (const auto& [in, out] : std::vector<std::array<std::string, 2>>{
            {"foo.bin", "foo.gltf"}, {"foo.mtl", "foo.obj"}, {"foo_palette.png", "foo.obj"}, {"link", "castle.gltf"}}) {
     std::ofstream(folder_.file(in == "link" ? "castle.bin" : in), std::ios::binary) << tiny_vox();
@@ -120,7 +120,7 @@ TEST_F(Tool, the_input_is_not_replaced_by_a_companion) {
   EXPECT_EQ(text_of(folder_.file("castle.png")), "a picture") << "a picture of the same name is nobody's business";
 }
 
-TEST_F(Tool, hidden_instances_are_missed_only_where_they_are_left_out) {
+TEST_F(Tool, HiddenInstancesAreMissedOnlyWhereTheyAreLeftOut) {
   const auto warnings = [&](const std::string& arguments) {
     const ToolRun result = run(arguments + " --json");
     EXPECT_EQ(result.status, 0) << result.err;
@@ -139,7 +139,7 @@ TEST_F(Tool, hidden_instances_are_missed_only_where_they_are_left_out) {
   EXPECT_EQ(run("convert one.vox out.glb").err, "quoin: warning: 1 hidden instance left out; --hidden includes it\n");
 }
 
-TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
+TEST_F(Tool, CulledGivesAQuadAFaceAndGreedyFewer) {
   const auto quads = [&](const std::string& flags) {
     const ToolRun result = run("convert tiny.vox out.glb --json " + flags);
     return Json::parse(result.out)["quads"].get<int>();
@@ -149,20 +149,20 @@ TEST_F(Tool, culled_gives_a_quad_a_face_and_greedy_fewer) {
   EXPECT_LT(quads("--no-ao"), 18);
 }
 
-TEST_F(Tool, more_threads_than_processors_are_no_news) {
+TEST_F(Tool, MoreThreadsThanProcessorsAreNoNews) {
   const ToolRun result = run("convert tiny.vox out.glb --threads 1000");
   EXPECT_EQ(result.status, 0);
   EXPECT_EQ(result.err, "");
 }
 
-TEST_F(Tool, a_file_may_be_converted_onto_itself) {
+TEST_F(Tool, AFileMayBeConvertedOntoItself) {
   ASSERT_EQ(run("convert tiny.vox tiny.vox").status, 0);
   const ToolRun json = run("info tiny.vox --json");
   ASSERT_EQ(json.status, 0) << json.err;
   EXPECT_EQ(Json::parse(json.out)["voxels"], 4);
 }
 
-TEST_F(Tool, failures_are_one_line_status_1_and_no_file) {
+TEST_F(Tool, FailuresAreOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << tiny_vox().substr(0, 60);
   std::ofstream(folder_.file("pointer.vox")) << "version https://git-lfs.github.com/spec/v1\noid sha256:0\n";
   std::ofstream(folder_.file("empty.vox"));
@@ -183,7 +183,7 @@ TEST_F(Tool, failures_are_one_line_status_1_and_no_file) {
   }
 }
 
-TEST_F(Tool, a_full_disk_is_one_line_status_1_and_no_file) {
+TEST_F(Tool, AFullDiskIsOneLineStatus1AndNoFile) {
   // A file system of 16 KiB, mounted where only these commands see it; the filler leaves one page of it.
   const std::string in_small_disk =
       "unshare -rm sh -c \"mkdir -p disk && mount -t tmpfs -o size=16k none disk && "
@@ -205,7 +205,7 @@ TEST_F(Tool, a_full_disk_is_one_line_status_1_and_no_file) {
   }
 }
 
-TEST_F(Tool, a_limit_on_the_size_of_files_is_one_line_status_1_and_no_file) {
+TEST_F(Tool, ALimitOnTheSizeOfFilesIsOneLineStatus1AndNoFile) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox();
   for (const std::string out : {"out.glb", "out.gltf", "out.obj"}) {
     const ToolRun result = shell("ulimit -f 40; '" QUOIN_TOOL "' convert large.vox " + out);
@@ -216,7 +216,7 @@ TEST_F(Tool, a_limit_on_the_size_of_files_is_one_line_status_1_and_no_file) {
   EXPECT_EQ(folder_.count(), 5U) << "the two inputs, run.sh, stdout.txt and stderr.txt";
 }
 
-TEST_F(Tool, signals_leave_no_temporary_file) {
+TEST_F(Tool, SignalsLeaveNoTemporaryFile) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
   for (const std::string signal : {"HUP", "INT", "TERM"}) {
     // Each run ends before, during or after the signal; a few runs meet the middle of the writing.
@@ -232,7 +232,7 @@ TEST_F(Tool, signals_leave_no_temporary_file) {
   }
 }
 
-TEST_F(Tool, an_ignored_hangup_stays_ignored) {
+TEST_F(Tool, AnIgnoredHangupStaysIgnored) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
   const ToolRun result = shell("trap '' HUP; '" QUOIN_TOOL
                                "' convert large.vox out.obj & while kill -0 $! && ! ls -A | grep -q quoin-; do sleep "
@@ -241,7 +241,7 @@ TEST_F(Tool, an_ignored_hangup_stays_ignored) {
   EXPECT_TRUE(exists("out.obj"));
 }
 
-TEST_F(Tool, output_that_cannot_be_written_is_status_1) {
+TEST_F(Tool, OutputThatCannotBeWrittenIsStatus1) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
   for (const std::string arguments :
        {"--help", "--version", "convert --help", "info tiny.vox", "info tiny.vox --json"}) {
@@ -251,7 +251,7 @@ TEST_F(Tool, output_that_cannot_be_written_is_status_1) {
   }
 }
 
-TEST_F(Tool, wrong_usage_names_the_argument) {
+TEST_F(Tool, WrongUsageNamesTheArgument) {
   const std::vector<std::array<std::string, 2>> errors = {
       {"info tiny.vox --frame -1", "quoin: --frame: must be 0 or more, not \"-1\""},
       {"info tiny.vox --frame x", "quoin: --frame: must be 0 or more, not \"x\""},
@@ -285,7 +285,7 @@ TEST_F(Tool, wrong_usage_names_the_argument) {
   }
 }
 
-TEST_F(Tool, wrong_usage_is_status_2) {
+TEST_F(Tool, WrongUsageIsStatus2) {
   for (const std::string arguments :
        {"", "frobnicate", "info", "info tiny.vox --frame -1", "convert tiny.vox", "convert tiny.vox out.xyz",
         "convert tiny.vox out.glb --mesher fast", "convert tiny.vox out.glb --iso 0.5",
@@ -298,7 +298,7 @@ TEST_F(Tool, wrong_usage_is_status_2) {
   }
 }
 
-TEST_F(Tool, help_has_an_example_for_every_command) {
+TEST_F(Tool, HelpHasAnExampleForEveryCommand) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;

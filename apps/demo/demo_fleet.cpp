@@ -78,7 +78,7 @@ void add_fleet(quoin::Scene& scene, const std::vector<quoin::GridHandle>& ships)
 
 quoin::Status draw(int count, char** files) {
   quoin::Scene scene;
-  if (const auto added = add_terrain(scene); !added) return added;
+  if (auto added = add_terrain(scene); !added) return added;
   const auto ships = demo::add_ships(scene);
   if (!ships) return ships.error();
   add_fleet(scene, *ships);

@@ -19,6 +19,10 @@ struct CommonOptions {
   LoadOptions load;
   Threads threads;
   bool json = false;
+
+  [[nodiscard]] InstanceFilter instances() const {
+    return load.show_hidden ? InstanceFilter::All : InstanceFilter::Visible;
+  }
 };
 
 /// Adds IN, --json, --threads, --hidden and --frame to a command.

@@ -34,13 +34,13 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
   Stopwatch watch;
   ProgressBar bar;
   outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
-  const bool hidden = options.common.load.hidden;
+  const InstanceFilter filter = options.common.instances();
   const auto meshes =
-      mesh_scene(scene, {{outcome.mesher == "greedy", !options.occlusion_off, options.watertight}, hidden},
+      mesh_scene(scene, {{outcome.mesher == "greedy", !options.occlusion_off, options.watertight}, filter},
                  options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
   outcome.seconds.mesh = watch.lap();
-  warn_of_left_out(scene, hidden, outcome.warnings);
+  warn_of_left_out(scene, filter, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 
@@ -115,7 +115,8 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
   }
   const LoadOptions& load = options.common.load;
-  if (is_volume) return load.hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
+  if (is_volume)
+    return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
   if (options.iso) return "--iso is for volumes, and the input holds voxels";
   return options.simplify && options.mesher != "smooth" ? "--simplify needs --mesher smooth" : "";
 }

@@ -26,11 +26,11 @@ std::optional<float> simplify_error(const ConvertOptions& options) {
 }
 
 /// The smooth mesher knows neither glass nor light.
-void warn_of_looks(const Scene& scene, bool hidden, std::vector<std::string>& warnings) {
+void warn_of_looks(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
   std::set<GridHandle> drawn;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, hidden)) drawn.insert(instance.grid);
+    if (is_drawn(scene, instance, filter)) drawn.insert(instance.grid);
   }
   bool is_lost = false;
   for (const GridHandle grid : drawn) {
@@ -60,14 +60,14 @@ void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& me
 Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar;
-  const bool hidden = options.common.load.hidden;
-  const auto meshes = mesh_scene_smoothly(scene, {mesh_options(options), simplify_error(options), hidden},
+  const InstanceFilter filter = options.common.instances();
+  const auto meshes = mesh_scene_smoothly(scene, {mesh_options(options), simplify_error(options), filter},
                                           options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
   outcome.mesher = "smooth";
   outcome.seconds.mesh = watch.lap();
-  warn_of_left_out(scene, hidden, outcome.warnings);
-  warn_of_looks(scene, hidden, outcome.warnings);
+  warn_of_left_out(scene, filter, outcome.warnings);
+  warn_of_looks(scene, filter, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 

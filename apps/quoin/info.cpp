@@ -84,11 +84,11 @@ Json grid_json(const GridReport& report) {
   return entry;
 }
 
-Json info_json(const LoadedScene& loaded, bool hidden) {
+Json info_json(const LoadedScene& loaded, InstanceFilter filter) {
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
                  {"types", distinct_types(loaded.scene)},
-                 {"bounds", box(loaded.scene.bounds(hidden))},
+                 {"bounds", box(loaded.scene.bounds(filter))},
                  {"grids", Json::array()},
                  {"warnings", loaded.warnings}};
   for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report));
@@ -133,7 +133,7 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded) {
                      count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
   text += "Voxels: " + with_thousands(scene.voxel_count()) + " of " +
           count_of(static_cast<std::int64_t>(distinct_types(scene)), "type") + "\n";
-  const DBox bounds = scene.bounds(options.load.hidden);
+  const DBox bounds = scene.bounds(options.instances());
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
   for (const GridReport& report : report_grids(scene)) text += grid_text(report);
   return text;
@@ -148,7 +148,7 @@ int run_info(const CommonOptions& options) {
     print_error(loaded.error());
     return kFailed;
   }
-  if (options.json) return print_json(info_json(*loaded, options.load.hidden));
+  if (options.json) return print_json(info_json(*loaded, options.instances()));
   print_warnings(loaded->warnings);
   return print(info_text(options, *loaded));
 }

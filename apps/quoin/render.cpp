@@ -35,12 +35,12 @@ Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& argu
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
   }
   const double aspect = static_cast<double>(arguments.render.width) / arguments.render.height;
-  return frame_scene(loaded.scene, arguments.view, aspect, arguments.common.load.hidden);
+  return frame_scene(loaded.scene, arguments.view, aspect, arguments.common.instances());
 }
 
-void warn_of_empty_pictures(const Scene& scene, bool hidden, const Picture& picture,
+void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Picture& picture,
                             std::vector<std::string>& warnings) {
-  if (scene.bounds(hidden).empty()) {
+  if (scene.bounds(filter).empty()) {
     warnings.emplace_back("no voxel to draw: a picture of the sky");
   } else if (picture.pixels_hit == 0) {
     warnings.emplace_back("no voxel in sight of this camera: a picture of the sky");
@@ -85,7 +85,7 @@ Status take_picture(Renderer& renderer, const RenderOptions& options, Stopwatch&
 
 Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options, Stopwatch& watch,
                    Outcome& outcome) {
-  const CpuRenderer renderer(scene, arguments.common.load.hidden, arguments.common.threads);
+  const CpuRenderer renderer(scene, arguments.common.instances(), arguments.common.threads);
   return take_picture(renderer, options, watch, outcome);
 }
 
@@ -96,14 +96,14 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
   auto renderer = VulkanRenderer::create(vulkan);
   if (!renderer) return renderer.error();
   outcome.device = renderer->device().name;
-  if (auto updated = renderer->update(scene, arguments.common.load.hidden, arguments.common.threads); !updated) {
+  if (auto updated = renderer->update(scene, arguments.common.instances(), arguments.common.threads); !updated) {
     return updated;
   }
   return take_picture(*renderer, options, watch, outcome);
 }
 
 Result<Outcome> render(const RenderArguments& arguments) {
-  const bool hidden = arguments.common.load.hidden;
+  const InstanceFilter filter = arguments.common.instances();
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
   if (auto drawable = check_input(arguments.common.input); !drawable) return drawable.error();
@@ -123,8 +123,8 @@ Result<Outcome> render(const RenderArguments& arguments) {
   if (auto drawn = (is_vulkan ? draw_by_vulkan : draw_by_cpu)(scene, arguments, options, watch, outcome); !drawn) {
     return drawn.error();
   }
-  warn_of_left_out(scene, hidden, outcome.warnings);
-  warn_of_empty_pictures(scene, hidden, outcome.picture, outcome.warnings);
+  warn_of_left_out(scene, filter, outcome.warnings);
+  warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
   if (auto written = write_outputs(arguments, outcome); !written) return written.error();
   outcome.write = watch.lap();
   return outcome;

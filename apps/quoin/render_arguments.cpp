@@ -11,8 +11,8 @@ namespace quoin::tool {
 
 namespace {
 
-constexpr int kMostSamples = 4'096;
-constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+constexpr int kMaxSamples = 4'096;
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 constexpr int kLongestSide = 1'000'000;  // what readers and writers of PNG take
 
 /// An option whose text `settle` reads.
@@ -54,7 +54,7 @@ std::optional<double> read_exposure(const std::string& text) {
 std::optional<PictureSize> read_size(const std::string& text) {
   const auto size = parse_size(text);
   const bool fits = size && std::max(size->width, size->height) <= kLongestSide &&
-                    std::int64_t{size->width} * size->height <= kMostPixels;
+                    std::int64_t{size->width} * size->height <= kMaxPixels;
   return fits ? size : std::nullopt;
 }
 
@@ -77,7 +77,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
                   "Ambient occlusion by rays, or by the vertex levels that meshes carry (default rays)")
       ->check(CLI::IsMember({"rays", "vertex"}));
   command.add_option("--ao-rays", arguments.render.light.occlusion_rays, "Rays a point for --ao rays (default 9)")
-      ->check(CLI::Range(1, kMostSamples));
+      ->check(CLI::Range(1, kMaxSamples));
   command
       .add_option("--ao-affects", arguments.occlusion_affects,
                   "What occlusion darkens: ambient light, or all (default ambient)")
@@ -122,9 +122,9 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
 
 /// Where a name leads: behind symbolic links, also behind one that leads to no file yet.
 std::filesystem::path destination(std::filesystem::path path) {
-  constexpr int kMostLinks = 40;
+  constexpr int kMaxLinks = 40;
   std::error_code error;
-  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(path, error); ++i) {
+  for (int i = 0; i < kMaxLinks && std::filesystem::is_symlink(path, error); ++i) {
     path = path.parent_path() / std::filesystem::read_symlink(path, error);
   }
   return std::filesystem::weakly_canonical(path, error);
@@ -200,7 +200,7 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_camera_options(command, arguments);
   add_light_options(command, arguments);
   command.add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges (default 1)")
-      ->check(CLI::Range(1, kMostSamples));
+      ->check(CLI::Range(1, kMaxSamples));
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
   add_detail_options(command, arguments);
   add_backend_options(command, arguments);

@@ -4,11 +4,11 @@
 
 namespace quoin::tool {
 
-void warn_of_left_out(const Scene& scene, bool hidden, std::vector<std::string>& warnings) {
+void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
   std::size_t left_out = 0;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, true) && !is_drawn(scene, instance, hidden)) ++left_out;
+    if (is_drawn(scene, instance, InstanceFilter::All) && !is_drawn(scene, instance, filter)) ++left_out;
   }
   if (left_out == 1) warnings.emplace_back("1 hidden instance left out; --hidden includes it");
   if (left_out > 1) {

@@ -7,7 +7,7 @@
 
 namespace quoin::tool {
 
-/// Adds a warning when hidden instances are left out because `hidden` is false.
-void warn_of_left_out(const Scene& scene, bool hidden, std::vector<std::string>& warnings);
+/// Adds a warning when hidden instances are left out by `filter`.
+void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings);
 
 }  // namespace quoin::tool

@@ -110,7 +110,7 @@ void add_view_command(CLI::App& app, int& status) {
   const auto arguments = std::make_shared<ViewArguments>();
   command->add_option("IN", arguments->input, "File to open (default: an empty window, to drop files on)")
       ->check(file_name());
-  command->add_flag("--hidden", arguments->load.hidden, "Include hidden layers and nodes");
+  command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
   command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole());
   command->add_option("--size", "Of the window, 320x240 to 16384 a side (default: as it was last)")->type_name("WxH");

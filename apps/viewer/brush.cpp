@@ -31,7 +31,7 @@ VoxelType outcome(const Brush& brush, VoxelType current) {
 }  // namespace
 
 IBox reach_of(const Brush& brush, IVec3 centre) {
-  const int radius = std::clamp(brush.radius, 0, kLargestBrush);
+  const int radius = std::clamp(brush.radius, 0, kMaxBrush);
   const IVec3 middle = glm::clamp(centre, IVec3{-kGreatest}, IVec3{kGreatest});
   if (middle != centre) return {};
   return {middle - radius, middle + radius + 1};
@@ -41,7 +41,7 @@ std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid) {
   const IBox box = reach_of(brush, centre);
   if (box.empty()) return 0;
   // Half a voxel more than the radius, so that spheres look round rather than pointed.
-  const double reach = std::clamp(brush.radius, 0, kLargestBrush) + 0.5;
+  const double reach = std::clamp(brush.radius, 0, kMaxBrush) + 0.5;
   const bool is_sphere = brush.shape == BrushShape::Sphere;
   return grid.edit(box, [&](IVec3 voxel, VoxelType current) {
     const DVec3 offset(voxel - centre);

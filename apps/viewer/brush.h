@@ -20,12 +20,12 @@ enum class BrushAction : std::uint8_t {
 
 enum class BrushShape : std::uint8_t { Box, Sphere };
 
-inline constexpr int kLargestBrush = 32;
+inline constexpr int kMaxBrush = 32;
 
 struct Brush {
   BrushAction action = BrushAction::Place;
   BrushShape shape = BrushShape::Box;
-  int radius = 0;  ///< voxels beyond the middle one, 0 (one voxel) to kLargestBrush
+  int radius = 0;  ///< voxels beyond the middle one, 0 (one voxel) to kMaxBrush
   VoxelType type = 1;
 };
 

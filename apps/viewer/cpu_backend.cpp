@@ -61,7 +61,7 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
 
 struct CpuBackend::Impl {
   Impl(const Scene& scene, const CpuBackendOptions& given, std::function<void()> listener)
-      : options(given), on_frame(std::move(listener)), renderer(scene, given.hidden, given.threads) {
+      : options(given), on_frame(std::move(listener)), renderer(scene, given.instances, given.threads) {
     worker = std::thread([this] { work(); });
   }
 

@@ -9,7 +9,7 @@
 namespace quoin::viewer {
 
 struct CpuBackendOptions {
-  bool hidden = false;  ///< hidden instances are drawn too
+  InstanceFilter instances = InstanceFilter::Visible;
   Threads threads;
   /// How long the first picture after a change of the camera may take, by the time that pixels have taken so far: it
   /// is as fine as that allows. 0: always the coarsest, an eighth of the size.

@@ -57,7 +57,7 @@ Image expected(const Scene& scene, const ViewRequest& request) {
 /// Everything about a backend that a test needs.
 struct Watched {
   explicit Watched(const Scene& scene, double first_frame_seconds = 0.0)
-      : backend(scene, {false, {2}, first_frame_seconds}, [this] { bell.ring(); }) {}
+      : backend(scene, {InstanceFilter::Visible, {2}, first_frame_seconds}, [this] { bell.ring(); }) {}
 
   /// The frames until the picture has settled; empty when it did not.
   std::vector<ViewFrame> settle() {

@@ -112,7 +112,7 @@ Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
   if (!drawer) return drawer.error();
   LiveMeshOptions live;
   live.style = style;
-  live.hidden = options.cpu.hidden;
+  live.instances = options.cpu.instances;
   live.threads = options.cpu.threads;
   live.on_ready = on_frame;
   meshes.reset(new Meshes{style, LiveMeshes(live), std::move(*drawer)});
@@ -128,7 +128,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   const bool is_scene_changed = std::exchange(meshes->is_scene_new, false);
   bool is_new = std::exchange(is_request_new, false) || is_scene_changed;
   if (is_scene_changed) {
-    if (Status taken = meshes->renderer.update(*scene, options.cpu.hidden); !taken) {
+    if (Status taken = meshes->renderer.update(*scene, options.cpu.instances); !taken) {
       return taken.error();
     }
   }
@@ -207,7 +207,7 @@ Status DeviceBackend::Impl::draw_stage() {
 Result<bool> DeviceBackend::Impl::draw_rays() {
   if (std::exchange(is_scene_new, false)) {
     is_request_new = true;
-    if (Status taken = renderer->update(*scene, options.cpu.hidden, options.cpu.threads); !taken) {
+    if (Status taken = renderer->update(*scene, options.cpu.instances, options.cpu.threads); !taken) {
       return taken.error();
     }
   }
@@ -289,11 +289,11 @@ bool DeviceBackend::wants_frames() const {
   return me.is_request_new || is_stale;
 }
 
-std::vector<std::pair<std::string, std::string>> DeviceBackend::facts() const {
+std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   const Impl& me = *impl_;
   if (!me.uses_device() || !me.meshes || me.request->mode == DrawMode::Rays) return {};
-  const VulkanMeshRenderer::Facts drawn = me.meshes->renderer.facts();
-  const LiveMeshes::Facts live = me.meshes->live.facts();
+  const VulkanMeshRenderer::Stats drawn = me.meshes->renderer.stats();
+  const LiveMeshes::Stats live = me.meshes->live.stats();
   return {{"triangles", text("%.0f", static_cast<double>(drawn.triangles))},
           {"of these drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
           {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},

@@ -38,7 +38,7 @@ class DeviceBackend final : public ViewBackend {
   void show(const ViewRequest& request) override;
   [[nodiscard]] std::optional<ViewFrame> take() override;
   [[nodiscard]] bool wants_frames() const override;
-  [[nodiscard]] std::vector<std::pair<std::string, std::string>> facts() const override;
+  [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const override;
   [[nodiscard]] std::optional<Error> fault() override;
   double pause() override;
   void resume(bool changed) override;

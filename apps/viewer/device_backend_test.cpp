@@ -149,7 +149,7 @@ TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
   pictures = settle(*backend);
   ASSERT_FALSE(pictures.empty());
   EXPECT_EQ(pictures.back().rgb, before.rgb);
-  EXPECT_FALSE(backend->facts().empty());
+  EXPECT_FALSE(backend->stats().empty());
 }
 
 TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {

@@ -234,7 +234,7 @@ TEST(Document, SavesAndKnowsWhatIsSaved) {
   const auto again = Document::open(path);
   ASSERT_TRUE(again) << to_string(again.error());
   EXPECT_EQ((*again)->scene().voxel_count(), document.scene().voxel_count());
-  EXPECT_EQ((*again)->scene().bounds(false).max, document.scene().bounds(false).max);
+  EXPECT_EQ((*again)->scene().bounds().max, document.scene().bounds().max);
 }
 
 TEST(Document, WhatCannotBeDoneIsAnError) {

@@ -18,7 +18,7 @@ Chunk copy_of(const Grid& grid, IVec3 place) {
 
 void EditHistory::begin(std::string name) {
   QUOIN_ASSERT(!open_, "the step before has ended");
-  open_.emplace();
+  open_ = Step{};
   open_->name = std::move(name);
 }
 
@@ -65,7 +65,7 @@ void EditHistory::keep(Step step) {
   bytes_ += step.bytes;
   steps_.push_back(std::move(step));
   done_ = steps_.size();
-  while (bytes_ > most_bytes_ && !steps_.empty()) {
+  while (bytes_ > max_bytes_ && !steps_.empty()) {
     base_state_ = steps_.front().state;
     bytes_ -= steps_.front().bytes;
     steps_.pop_front();

@@ -15,7 +15,7 @@ namespace quoin::viewer {
 /// Kept are the chunks that a step changed, before and after; the oldest steps go when they take more than the limit.
 class EditHistory {
  public:
-  explicit EditHistory(std::size_t most_bytes = std::size_t{256} << 20) : most_bytes_(most_bytes) {}
+  explicit EditHistory(std::size_t max_bytes = std::size_t{256} << 20) : max_bytes_(max_bytes) {}
 
   /// Begins a step, ending the one under way.
   void begin(std::string name);
@@ -57,7 +57,7 @@ class EditHistory {
   void keep(Step step);
   static void put(Scene& scene, const ChangedChunk& changed, const Chunk& voxels);
 
-  std::size_t most_bytes_;
+  std::size_t max_bytes_;
   std::deque<Step> steps_;
   std::size_t done_ = 0;  // steps that are in force; those from here on can be redone
   std::size_t bytes_ = 0;

@@ -14,7 +14,8 @@ Error out_of_memory(const std::filesystem::path& path) {
 
 }  // namespace
 
-Loader::Loader(std::filesystem::path path, LoadOptions options, MakeBackend make_backend, std::function<void()> on_done)
+Loader::Loader(std::filesystem::path path, const LoadOptions& options, MakeBackend make_backend,
+               std::function<void()> on_done)
     : path_(std::move(path)) {
   thread_ = std::thread([this, options, make = std::move(make_backend), done = std::move(on_done)] {
     try {

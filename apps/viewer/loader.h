@@ -25,7 +25,8 @@ using MakeBackend = std::function<std::unique_ptr<ViewBackend>(const Document&)>
 class Loader {
  public:
   /// `on_done` is called from the loading thread, unless the loader is destroyed first.
-  Loader(std::filesystem::path path, LoadOptions options, MakeBackend make_backend, std::function<void()> on_done);
+  Loader(std::filesystem::path path, const LoadOptions& options, MakeBackend make_backend,
+         std::function<void()> on_done);
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
   /// Cancels, and waits for the end of the model that is being read; to stop looking at it sooner, keep the loader

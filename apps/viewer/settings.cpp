@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostRecent = 10;
-constexpr std::size_t kMostBytes = std::size_t{1} << 20;
+constexpr std::size_t kMaxRecent = 10;
+constexpr std::size_t kMaxBytes = std::size_t{1} << 20;
 
 const Json* find(const Json& object, const char* key) {
   const auto found = object.find(key);
@@ -81,7 +81,7 @@ void read_recent(const Json& object, std::vector<std::string>& recent) {
   const Json* found = find(object, "recent");
   if (found == nullptr || !found->is_array()) return;
   for (const Json& file : *found) {
-    if (file.is_string() && !file.get<std::string>().empty() && recent.size() < kMostRecent) recent.push_back(file);
+    if (file.is_string() && !file.get<std::string>().empty() && recent.size() < kMaxRecent) recent.push_back(file);
   }
 }
 
@@ -98,7 +98,7 @@ void Settings::note_recent(const std::filesystem::path& file) {
   if (name.empty()) return;
   std::erase(recent, name);
   recent.insert(recent.begin(), name);
-  if (recent.size() > kMostRecent) recent.resize(kMostRecent);
+  if (recent.size() > kMaxRecent) recent.resize(kMaxRecent);
 }
 
 std::filesystem::path settings_path() {
@@ -152,7 +152,7 @@ std::string to_json(const Settings& settings) {
 }
 
 Settings read_settings(const std::filesystem::path& path) {
-  const auto bytes = read_file_beginning(path, kMostBytes);
+  const auto bytes = read_file_beginning(path, kMaxBytes);
   if (!bytes) return {};
   return parse_settings({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
 }

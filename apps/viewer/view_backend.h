@@ -84,7 +84,7 @@ class ViewBackend {
   [[nodiscard]] virtual bool wants_frames() const { return false; }
 
   /// What people may want to know of it: names and values.
-  [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> facts() const { return {}; }
+  [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> stats() const { return {}; }
 
   /// What went wrong with the last request, if anything.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;

@@ -14,7 +14,7 @@ namespace {
 
 struct World {
   Scene scene = workloads::picture_scene();
-  CpuRenderer renderer{scene, false, {1}};
+  CpuRenderer renderer{scene, InstanceFilter::Visible, {1}};
 };
 
 RenderOptions small_picture(bool lit) {

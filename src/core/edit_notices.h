@@ -17,10 +17,15 @@ class EditNotices {
   EditNotices(const EditNotices&) = delete;
   EditNotices& operator=(const EditNotices&) = delete;
 
-  /// From now on the notice is given to this, under a number. Requires: this outlives it.
-  void follow(EditNotice& notice, std::uint32_t index) {
+  /// Has room for that number, so that neither following nor giving a notice of it allocates.
+  void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     if (index >= given_.capacity()) given_.reserve(std::size_t{2} * index + 1);
+  }
+  /// From now on the notice is given to this, under a number. Requires: this outlives it.
+  void follow(EditNotice& notice, std::uint32_t index) {
+    make_room(index);
+    const std::lock_guard lock(mutex_);
     notice.to_ = this;
     notice.index_ = index;
     notice.is_given_ = false;

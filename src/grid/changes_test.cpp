@@ -33,7 +33,7 @@ struct Expected {
   void add(IVec3 voxel) {
     IBox& box = boxes[key_of(chunk_of(voxel))];
     box = unite(box, {voxel, voxel + 1});
-    for (int i = 0; i < 27; ++i) reached.insert(key_of(chunk_of(voxel + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1})));
+    for (int i = 0; i < 27; ++i) reached.insert(key_of(chunk_of(voxel + Neighbourhood::offset(i))));
   }
 };
 

@@ -13,11 +13,11 @@ constexpr std::size_t kCellsPerChunk = 8;
 // A window of so many times what its chunks may have is made smaller; so it does not come and go with one chunk.
 constexpr std::size_t kSlack = 4;
 
-const Chunk::Mixed& all_air() {
-  static const Chunk::Mixed air = [] {
-    Chunk::Mixed made;
+const ChunkStorage& all_air() {
+  static const ChunkStorage air = [] {
+    ChunkStorage made;
     made.palette = {kAir};
-    made.slabs.fill(Chunk::kUniformSlab | 0U);
+    made.slabs.fill(ChunkStorage::kUniformSlab | 0U);
     return made;
   }();
   return air;
@@ -41,14 +41,14 @@ ChunkWindow::ChunkWindow() : air_(&all_air()) {}
 void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch) {
   entries_[cell] = entry;
   epochs_[cell] = epoch;
-  voxels_[cell] = entry == nullptr ? air_ : entry->chunk.mixed();
+  voxels_[cell] = entry == nullptr ? air_ : entry->chunk.storage();
 }
 
 void ChunkWindow::move_to(const Box& box) {
   const std::size_t cells = std::size_t{1} << box.log_cells();
   std::vector<ChunkEntry*> entries(cells, nullptr);
   std::vector<std::uint32_t> epochs(cells, 0);
-  voxels_ = std::vector<const Chunk::Mixed*>(cells, air_);
+  voxels_ = std::vector<const ChunkStorage*>(cells, air_);
   entries_ = std::move(entries);
   epochs_ = std::move(epochs);
   box_ = box;
@@ -112,7 +112,7 @@ VoxelType ChunkTable::voxel(int x, int y, int z) const {
     const ChunkEntry* entry = trie_.find(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
     return entry == nullptr ? kAir : entry->chunk.get(local_x, local_y, local_z);
   }
-  if (const Chunk::Mixed* voxels = window_.voxels(cell)) [[likely]]
+  if (const ChunkStorage* voxels = window_.voxels(cell)) [[likely]]
     return voxels->type(local_x, local_y, local_z);
   return window_.entry(cell)->chunk.get(local_x, local_y, local_z);
 }
@@ -126,7 +126,7 @@ void ChunkTable::erase(const IVec3& chunk) {
     --outside_;
     outside_changed();
   }
-  if (window_.cells() > kSlack * most_cells()) plan();
+  if (window_.cells() > kSlack * max_cells()) plan();
 }
 
 void ChunkTable::clear() {
@@ -136,12 +136,12 @@ void ChunkTable::clear() {
   outside_since_plan_ = 0;
 }
 
-std::size_t ChunkTable::most_cells() const {
+std::size_t ChunkTable::max_cells() const {
   return std::max(kFewCells, kCellsPerChunk * size());
 }
 
 bool ChunkTable::fits(const ChunkWindow::Box& box) const {
-  return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= most_cells();
+  return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= max_cells();
 }
 
 // A new chunk. Where the window cannot grow to hold it, it stays outside, until so many do that it is worth looking
@@ -200,7 +200,7 @@ void ChunkTable::try_to_plan() {
     const ChunkWindow::Box box = box_of_most(left_out);
     if (fits(box)) return move_to(box);
   }
-  if (window_.cells() <= kSlack * most_cells() && 2 * outside_ <= size()) return;
+  if (window_.cells() <= kSlack * max_cells() && 2 * outside_ <= size()) return;
   window_.close();
   outside_ = size();
 }

@@ -8,6 +8,7 @@
 
 #include <quoin/grid/chunk.h>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk_trie.h"
 
 namespace quoin {
@@ -16,6 +17,7 @@ namespace quoin {
 struct ChunkEntry {
   Chunk chunk;
   std::uint64_t serial = 0;  ///< of its last record in the grid's journal
+  int counted = 0;           ///< its voxels that are not air, as the grid counts them
 };
 
 /// A box of chunks in which one is found by its place: a pointer for every chunk of the box, there or not.
@@ -49,12 +51,12 @@ class ChunkWindow {
   /// The epoch in which the entry was last known to be shared with no snapshot.
   [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const { return epochs_[cell]; }
   /// The voxels of a chunk; those of a chunk of air where there is none; null where the chunk is uniform.
-  [[nodiscard]] const Chunk::Mixed* voxels(std::uint32_t cell) const { return voxels_[cell]; }
+  [[nodiscard]] const ChunkStorage* voxels(std::uint32_t cell) const { return voxels_[cell]; }
 
   [[nodiscard]] std::size_t cells() const { return entries_.size(); }
   [[nodiscard]] const Box& box() const { return box_; }
   [[nodiscard]] std::size_t bytes() const {
-    return cells() * (sizeof(ChunkEntry*) + sizeof(Chunk::Mixed*) + sizeof(std::uint32_t));
+    return cells() * (sizeof(ChunkEntry*) + sizeof(ChunkStorage*) + sizeof(std::uint32_t));
   }
 
   /// A chunk that came or went, or whose storage may have moved.
@@ -67,7 +69,7 @@ class ChunkWindow {
   void close();
 
  private:
-  const Chunk::Mixed* air_;
+  const ChunkStorage* air_;
   std::uint32_t first_x_ = 0;
   std::uint32_t first_y_ = 0;
   std::uint32_t first_z_ = 0;
@@ -76,7 +78,7 @@ class ChunkWindow {
   std::uint32_t size_z_ = 0;
   int shift_y_ = 0;
   int shift_z_ = 0;
-  std::vector<const Chunk::Mixed*> voxels_;
+  std::vector<const ChunkStorage*> voxels_;
   std::vector<ChunkEntry*> entries_;
   std::vector<std::uint32_t> epochs_;
   Box box_;
@@ -128,7 +130,7 @@ class ChunkTable {
   }
   /// To be called after every change of a chunk's voxels.
   void voxels_changed(const Slot& slot) {
-    if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != slot.entry->chunk.mixed()) {
+    if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != slot.entry->chunk.storage()) {
       window_.put(slot.cell, slot.entry, epoch());
     }
   }
@@ -160,7 +162,7 @@ class ChunkTable {
   [[nodiscard]] std::uint32_t epoch() const { return epoch_.load(std::memory_order_relaxed); }
   Slot find_shared_to_edit(const IVec3& chunk, std::uint32_t cell);
   void put_leaf(Leaf& leaf);
-  [[nodiscard]] std::size_t most_cells() const;
+  [[nodiscard]] std::size_t max_cells() const;
   [[nodiscard]] bool fits(const ChunkWindow::Box& box) const;
   [[nodiscard]] ChunkWindow::Box box_of_most(std::size_t left_out) const;
   void place(const IVec3& chunk, ChunkEntry& entry);

@@ -22,11 +22,11 @@ namespace {
 
 // The bounds as they were last asked for. What changed since within them, without touching their sides, leaves them as
 // they were; where something else changed, the boxes of all chunks are kept from then on.
-class KeptBounds {
+class BoundsCache {
  public:
-  KeptBounds() : is_wanted_(std::make_shared<std::atomic<bool>>(false)) {}
+  BoundsCache() : is_wanted_(std::make_shared<std::atomic<bool>>(false)) {}
   // Copies keep no boxes until they need them.
-  KeptBounds(const KeptBounds& other) : is_wanted_(other.is_wanted_) {
+  BoundsCache(const BoundsCache& other) : is_wanted_(other.is_wanted_) {
     const std::lock_guard lock(other.mutex_);
     cursor_ = other.cursor_;
     box_ = other.box_;
@@ -98,7 +98,8 @@ class KeptBounds {
 struct Grid::Impl {
   ChunkTable entries;
   ChangeJournal<VoxelRecord> journal;
-  KeptBounds bounds;
+  BoundsCache bounds;
+  std::int64_t voxel_count = 0;  // that are not air
 
   // Books an edit of one chunk, and drops the chunk where nothing is left in it.
   void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit) {
@@ -109,7 +110,10 @@ struct Grid::Impl {
       edit.record.chunk = chunk;
       journal.note(slot.entry->serial, edit.record, entries.size());
     }
-    if (slot.entry->chunk.non_air_count() == 0) entries.erase(chunk);
+    const int voxels = non_air_count(slot.entry->chunk);
+    voxel_count += voxels - slot.entry->counted;
+    slot.entry->counted = voxels;
+    if (voxels == 0) entries.erase(chunk);
   }
 
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
@@ -294,6 +298,7 @@ void Grid::clear() {
     impl_->journal.note(serial, record, impl_->entries.size());
   });
   impl_->entries.clear();
+  impl_->voxel_count = 0;
   notice_.give();
 }
 
@@ -345,7 +350,7 @@ std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) 
     chunks.push_back(change.chunk);
     for (std::uint32_t left = change.neighbours & ~VoxelRecord::kCentreOnly; left != 0; left &= left - 1) {
       const int i = std::countr_zero(left);
-      const IVec3 at = change.chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      const IVec3 at = change.chunk + Neighbourhood::offset(i);
       if (grid.find_chunk(at) != nullptr) chunks.push_back(at);
     }
   }
@@ -358,9 +363,7 @@ IBox Grid::bounds() const {
 }
 
 std::int64_t Grid::voxel_count() const {
-  std::int64_t total = 0;
-  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.non_air_count(); });
-  return total;
+  return impl_->voxel_count;
 }
 
 std::vector<VoxelType> Grid::types() const {

@@ -1,13 +1,30 @@
 #include <quoin/grid/grid.h>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 
 namespace quoin {
 
+VoxelType GridReader::get_elsewhere(int x, int y, int z) {
+  const auto other_yz = static_cast<std::uint32_t>((y ^ last_y_) | (z ^ last_z_));
+  const std::uint32_t other = other_yz | static_cast<std::uint32_t>(x ^ last_x_) | unknown_;
+  if (other >= kChunkEdge) return get_in_other_chunk(x, y, z);
+  if (other_yz != 0) {
+    if (goes_on(x)) return get_in_new_row(x, y, z);
+    last_y_ = y;
+    last_z_ = z;
+    reads_of_row_ = 0;
+  } else if (++reads_of_row_ == kReadsAlongX) {
+    return get_in_new_row(x, y, z);
+  }
+  if (voxels_ == nullptr) return uniform_;
+  return voxels_->type(x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1));
+}
+
 VoxelType GridReader::get_in_other_chunk(int x, int y, int z) {
   unknown_ = 0;
   chunk_ = grid_->find_chunk(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
-  voxels_ = chunk_ == nullptr ? nullptr : chunk_->mixed();
+  voxels_ = chunk_ == nullptr ? nullptr : chunk_->storage();
   uniform_ = chunk_ == nullptr ? kAir : chunk_->uniform().value_or(kAir);
   last_x_ = x;
   if (goes_on(x)) return get_in_new_row(x, y, z);

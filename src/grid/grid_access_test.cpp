@@ -35,7 +35,7 @@ TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
   const auto below = [&random](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
   Grid grid;
   for (int i = 0; i < 27; ++i) {
-    const IVec3 corner = IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1} * kChunkEdge;
+    const IVec3 corner = Neighbourhood::offset(i) * kChunkEdge;
     const int kinds = i % 5 == 0 ? 700 : 3;
     if (i % 3 != 0) grid.fill_box(corner, corner + 63, static_cast<VoxelType>(i));
     if (i % 2 == 0) continue;

@@ -209,7 +209,7 @@ std::vector<IVec3> reached_chunks(const Grid& before, const Grid& after, const I
       for (int x = box.min.x; x < box.max.x; ++x) {
         if (before.get({x, y, z}) == after.get({x, y, z})) continue;
         for (int i = 0; i < 27; ++i) {
-          const IVec3 chunk = chunk_of(IVec3{x, y, z} + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
+          const IVec3 chunk = chunk_of(IVec3{x, y, z} + Neighbourhood::offset(i));
           if (before.find_chunk(chunk) != nullptr) found.insert({chunk.z, chunk.y, chunk.x});
         }
       }

@@ -112,9 +112,9 @@ TEST(Snapshot, AChunkThatNobodySharesAnyMoreIsEditedInPlace) {
   Grid grid;
   grid.fill_sphere({32, 32, 32}, 20.0, 1);
   { const Grid copy = grid.snapshot(); }
-  const Chunk::Mixed* const before = grid.find_chunk({0, 0, 0})->mixed();
+  const ChunkStorage* const before = grid.find_chunk({0, 0, 0})->storage();
   grid.set({32, 32, 32}, 2);
-  EXPECT_EQ(grid.find_chunk({0, 0, 0})->mixed(), before);
+  EXPECT_EQ(grid.find_chunk({0, 0, 0})->storage(), before);
 }
 
 TEST(Snapshot, OfDensitiesStaysAsItWas) {

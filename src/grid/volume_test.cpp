@@ -41,7 +41,7 @@ double variance_within(const std::vector<float>& values, double threshold) {
   return within;
 }
 
-TEST(VolumeThreshold, parts_two_groups_best) {
+TEST(VolumeThreshold, PartsTwoGroupsBest) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -57,14 +57,14 @@ TEST(VolumeThreshold, parts_two_groups_best) {
   }
 }
 
-TEST(VolumeThreshold, lies_amid_the_gap) {
+TEST(VolumeThreshold, LiesAmidTheGap) {
   EXPECT_EQ(volume_threshold(volume_of({4, 1, 1}, {0, 0, 255, 255})), 127.5F);
   EXPECT_NEAR(volume_threshold(volume_of({4, 1, 1}, {-1e30F, -1e30F, 3e30F, 3e30F})), 1e30F, 1e28F);
   const float huge = std::numeric_limits<float>::max();
   EXPECT_NEAR(volume_threshold(volume_of({2, 1, 1}, {-huge, huge})), 0.0F, huge * 1e-3F);
 }
 
-TEST(VolumeThreshold, parts_values_with_no_float_between_them) {
+TEST(VolumeThreshold, PartsValuesWithNoFloatBetweenThem) {
   float low = 1.0F;
   for (int i = 0; i < 4; ++i) {
     const float high = std::nextafter(low, 2.0F);
@@ -73,7 +73,7 @@ TEST(VolumeThreshold, parts_values_with_no_float_between_them) {
   }
 }
 
-TEST(VolumeThreshold, odd_volumes_have_one) {
+TEST(VolumeThreshold, OddVolumesHaveOne) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(volume_threshold(volume_of({3, 1, 1}, {7, 7, 7})), 7.0F);
   EXPECT_EQ(volume_threshold(volume_of({5, 1, 1}, {nan, 0, 10, INFINITY, -INFINITY})), 5.0F);
@@ -82,7 +82,7 @@ TEST(VolumeThreshold, odd_volumes_have_one) {
   EXPECT_EQ(volume_threshold(none), 0.0F);
 }
 
-TEST(UnitsOfLength, have_metres) {
+TEST(UnitsOfLength, HaveMetres) {
   EXPECT_EQ(metres_of_unit("mm"), 1e-3);
   EXPECT_EQ(metres_of_unit("um"), 1e-6);
   EXPECT_EQ(metres_of_unit("microns"), 1e-6);

@@ -34,6 +34,11 @@ struct TypeRecord : TypeChange {
 
 struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
 
+bool has_other_visibility(const TypeChanges& changes) {
+  return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
+                                    [](const TypeChange& change) { return change.visibility; });
+}
+
 VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::make_unique<Journal>()) {
   VoxelProperties air;
   air.name = "air";

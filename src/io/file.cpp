@@ -45,9 +45,9 @@ struct DescriptorGuard {
 
 /// The file at the end of a chain of symbolic links, which need not exist.
 std::filesystem::path behind_links(std::filesystem::path path) {
-  constexpr int kMostLinks = 40;
+  constexpr int kMaxLinks = 40;
   std::error_code error;
-  for (int i = 0; i < kMostLinks; ++i) {
+  for (int i = 0; i < kMaxLinks; ++i) {
     if (!std::filesystem::is_symlink(path, error) || error) break;
     const std::filesystem::path target = std::filesystem::read_symlink(path, error);
     if (error) break;

@@ -71,7 +71,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
     return fail(ErrorCode::Unsupported,
                 "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
   }
-  const Error error = unrecognised(bytes);
+  Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
   if (named_vox) return read_vox(bytes, options);
@@ -99,7 +99,7 @@ const FormatInfo& format_info(FileFormat format) {
 std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_scene_file(bytes)) return FileFormat::Scene;
-  const auto first = first_bytes(bytes, nifti::kMostHeaderBytes);
+  const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
   return std::nullopt;

@@ -21,14 +21,14 @@ Error error_of(const TestFolder& folder, const std::string& name, const std::str
   return loaded ? Error{} : loaded.error();
 }
 
-TEST(Formats, content_decides_what_a_file_is) {
+TEST(Formats, ContentDecidesWhatAFileIs) {
   EXPECT_EQ(detect_format(bytes_of("VOX \x96")), FileFormat::Vox);
   EXPECT_EQ(detect_format(bytes_of("VOX")), std::nullopt);
   EXPECT_EQ(detect_format(bytes_of("glTF")), std::nullopt) << "written, not read";
   EXPECT_EQ(detect_format(std::span<const std::byte>()), std::nullopt);
 }
 
-TEST(Formats, names_decide_what_is_written) {
+TEST(Formats, NamesDecideWhatIsWritten) {
   EXPECT_EQ(format_for_writing("a/b.GLB")->format, FileFormat::Glb);
   EXPECT_EQ(format_for_writing("b.gltf")->format, FileFormat::Gltf);
   EXPECT_EQ(format_for_writing("b.obj")->format, FileFormat::Obj);
@@ -43,7 +43,7 @@ TEST(Formats, names_decide_what_is_written) {
   }
 }
 
-TEST(Formats, files_of_no_known_format_are_refused_with_the_reason) {
+TEST(Formats, FilesOfNoKnownFormatAreRefusedWithTheReason) {
   const TestFolder folder("formats");
   EXPECT_EQ(error_of(folder, "a.txt", "hello").code, ErrorCode::BadFormat);
   EXPECT_NE(error_of(folder, "a.vox", "").message.find("empty"), std::string::npos);

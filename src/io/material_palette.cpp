@@ -20,7 +20,7 @@ bool emits(SurfaceClass surface) {
 std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriangles& target) {
   target.positions.push_back(source.positions[from]);
   target.directions.push_back(source.directions[from]);
-  if (!source.levels.empty()) target.levels.push_back(source.levels[from]);
+  if (!source.block_occlusion.empty()) target.occlusion.push_back(source.block_occlusion[from]);
   target.types.push_back(source.types[from]);
   return static_cast<std::uint32_t>(target.positions.size() - 1);
 }

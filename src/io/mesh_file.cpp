@@ -41,8 +41,8 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
 SceneMeshes without_occlusion(SceneMeshes meshes) {
   for (MeshPart& part : meshes.parts) {
     for (MeshView& view : part.surfaces) {
-      view.levels = {};
-      view.openness = {};
+      view.block_occlusion = {};
+      view.occlusion = {};
     }
   }
   return meshes;

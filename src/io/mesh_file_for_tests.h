@@ -14,12 +14,12 @@
 
 namespace quoin {
 
-/// An octahedron, stretched so that no reflection or turn looks the same, with a colour and openness a vertex.
+/// An octahedron, stretched so that no reflection or turn looks the same, with a colour and occlusion a vertex.
 inline SmoothMesh test_mesh() {
   SmoothMesh mesh;
   mesh.positions = {{5, 0, 0}, {-1, 0, 0}, {0, 3, 0}, {0, -1, 0}, {0, 0, 2}, {0, 0, -1}};
   mesh.normals = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-  mesh.openness = {1.0F, 0.5F, 0.25F, 0.0F, 1.0F, 1.0F};
+  mesh.occlusion = {0.0F, 0.5F, 0.75F, 1.0F, 0.0F, 0.0F};
   mesh.albedo = {{65535, 0, 0, 65535},     {20001, 65535, 0, 65535}, {30000, 100, 65535, 65535},
                  {65535, 65535, 1, 65535}, {13933, 13933, 1, 65535}, {0, 0, 0, 65535}};
   mesh.types = {1, 1, 2, 2, 1, 1};

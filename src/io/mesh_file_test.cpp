@@ -113,7 +113,7 @@ glm::dmat4 random_placement(std::mt19937& random, bool mirrored) {
   return glm::scale(matrix, DVec3(mirrored ? -scale : scale, scale, scale));
 }
 
-TEST_F(SmoothMeshFiles, every_format_puts_vertices_where_the_placement_says) {
+TEST_F(SmoothMeshFiles, EveryFormatPutsVerticesWhereThePlacementSays) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -123,7 +123,7 @@ TEST_F(SmoothMeshFiles, every_format_puts_vertices_where_the_placement_says) {
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, shear_and_uneven_scale_keep_normals_and_outside) {
+TEST_F(SmoothMeshFiles, ShearAndUnevenScaleKeepNormalsAndOutside) {
   glm::dmat4 sheared(1.0);
   sheared[1].x = 0.7;
   place(sheared);
@@ -137,13 +137,13 @@ TEST_F(SmoothMeshFiles, shear_and_uneven_scale_keep_normals_and_outside) {
   EXPECT_EQ(glb.document["nodes"][3]["scale"], nlohmann::json({0.5, 2.0, 3.0}));
 }
 
-TEST_F(SmoothMeshFiles, tiny_units_are_no_reason_to_refuse) {
+TEST_F(SmoothMeshFiles, TinyUnitsAreNoReasonToRefuse) {
   place(glm::scale(glm::dmat4(1.0), DVec3(1e-6)));
   place(glm::scale(glm::dmat4(1.0), DVec3(-1e-9, 1e-9, 1e-9)));
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, placements_share_a_mesh_and_mirrored_ones_another) {
+TEST_F(SmoothMeshFiles, PlacementsShareAMeshAndMirroredOnesAnother) {
   place(glm::dmat4(1.0), "first");
   place(glm::translate(glm::dmat4(1.0), DVec3(0, 9, 0)));
   place(glm::scale(glm::dmat4(1.0), DVec3(-1, 1, 1)));
@@ -159,7 +159,7 @@ TEST_F(SmoothMeshFiles, placements_share_a_mesh_and_mirrored_ones_another) {
   expect_all_formats_agree();
 }
 
-TEST_F(SmoothMeshFiles, colours_are_albedo_times_openness) {
+TEST_F(SmoothMeshFiles, ColoursAreAlbedoDarkenedByOcclusion) {
   place(glm::dmat4(1.0));
   const SmoothMesh& mesh = parts_[0].mesh;
   for (const Format& format : kFormats) {
@@ -168,7 +168,7 @@ TEST_F(SmoothMeshFiles, colours_are_albedo_times_openness) {
       ASSERT_EQ(world.colours.size(), mesh.positions.size());
       for (std::size_t i = 0; i < world.colours.size(); ++i) {
         for (std::size_t channel = 0; channel < 3; ++channel) {
-          const double light = mesh.albedo[i][channel] / 65535.0 * (occlusion ? mesh.openness[i] : 1.0F);
+          const double light = mesh.albedo[i][channel] / 65535.0 * (occlusion ? 1.0F - mesh.occlusion[i] : 1.0F);
           const double stored = world.colours[i][channel];
           if (format.linear) {
             EXPECT_NEAR(stored, light, 0.5001 / 65535) << i;
@@ -183,7 +183,7 @@ TEST_F(SmoothMeshFiles, colours_are_albedo_times_openness) {
   EXPECT_EQ(write(kFormats[1]).colours[1][1], 188 / 255.0) << "half of the light is 188 in sRGB";
 }
 
-TEST_F(SmoothMeshFiles, a_glb_has_what_the_specification_asks_for) {
+TEST_F(SmoothMeshFiles, AGlbHasWhatTheSpecificationAsksFor) {
   place(glm::dmat4(1.0));
   const ParsedGlb glb = write_glb_file();
   const auto& primitive = glb.document["meshes"][0]["primitives"][0];
@@ -202,13 +202,13 @@ TEST_F(SmoothMeshFiles, a_glb_has_what_the_specification_asks_for) {
   EXPECT_EQ(glb.binary.size() % 4, 0U);
 }
 
-TEST_F(SmoothMeshFiles, indices_take_16_bits_as_long_as_none_is_the_restart_value) {
+TEST_F(SmoothMeshFiles, IndicesTake16BitsAsLongAsNoneIsTheRestartValue) {
   for (const std::size_t vertices : {65'534U, 65'535U, 65'536U}) {
     SmoothMesh mesh = test_mesh();
     mesh.positions.resize(vertices, Vec3(0.0F));
     mesh.normals.resize(vertices, Vec3(0.0F, 1.0F, 0.0F));
     mesh.albedo.resize(vertices);
-    mesh.openness.resize(vertices, 1.0F);
+    mesh.occlusion.resize(vertices, 0.0F);
     mesh.indices.back() = static_cast<std::uint32_t>(vertices - 1);
     parts_ = {{"large", mesh, {}, {{"", glm::dmat4(1.0)}}}};
     const ParsedGlb glb = write_glb_file();
@@ -219,7 +219,7 @@ TEST_F(SmoothMeshFiles, indices_take_16_bits_as_long_as_none_is_the_restart_valu
   }
 }
 
-TEST_F(SmoothMeshFiles, gltf_is_the_same_in_two_files) {
+TEST_F(SmoothMeshFiles, GltfIsTheSameInTwoFiles) {
   place(glm::dmat4(1.0));
   const auto path = folder_.file("a b.gltf");
   const SceneMeshes meshes = meshes_of(parts_);
@@ -237,7 +237,7 @@ TEST_F(SmoothMeshFiles, gltf_is_the_same_in_two_files) {
   EXPECT_EQ(read_file(folder_.file("a b.bin")).value(), glb.binary);
 }
 
-TEST_F(SmoothMeshFiles, nothing_to_draw_is_a_valid_file) {
+TEST_F(SmoothMeshFiles, NothingToDrawIsAValidFile) {
   parts_ = {{"empty", {}, {}, {}}};
   for (const Format& format : kFormats) EXPECT_TRUE(write(format).positions.empty()) << format.extension;
   const ParsedGlb glb = write_glb_file();
@@ -249,7 +249,7 @@ TEST_F(SmoothMeshFiles, nothing_to_draw_is_a_valid_file) {
   EXPECT_NE(ply.find("element vertex 0\n"), std::string::npos);
 }
 
-TEST_F(SmoothMeshFiles, objects_of_obj_have_names_that_differ) {
+TEST_F(SmoothMeshFiles, ObjectsOfObjHaveNamesThatDiffer) {
   place(glm::dmat4(1.0), "a b");
   place(glm::dmat4(1.0), "a b");
   place(glm::dmat4(1.0));
@@ -258,7 +258,7 @@ TEST_F(SmoothMeshFiles, objects_of_obj_have_names_that_differ) {
   for (const char* line : {"\no a_b\n", "\no a_b_2\n", "\no thing\n"}) EXPECT_NE(text.find(line), std::string::npos);
 }
 
-TEST_F(SmoothMeshFiles, unsound_input_is_refused_and_leaves_no_file) {
+TEST_F(SmoothMeshFiles, UnsoundInputIsRefusedAndLeavesNoFile) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::pair<std::string, TestPart>> wrong;
   const auto add = [&](const std::string& message, const std::function<void(TestPart&)>& spoil) {
@@ -279,12 +279,12 @@ TEST_F(SmoothMeshFiles, unsound_input_is_refused_and_leaves_no_file) {
   });
   add("a pivot that is not finite", [](TestPart& part) { part.pivot.y = kNan; });
   add("arrays of different lengths", [](TestPart& part) { part.mesh.normals.pop_back(); });
-  add("arrays of different lengths", [](TestPart& part) { part.mesh.openness.pop_back(); });
+  add("arrays of different lengths", [](TestPart& part) { part.mesh.occlusion.pop_back(); });
   add("an index of no vertex", [](TestPart& part) { part.mesh.indices[3] = 6; });
   add("indices that make no whole triangles", [](TestPart& part) { part.mesh.indices.pop_back(); });
   add("a position that is not finite", [](TestPart& part) { part.mesh.positions[2].x = NAN; });
   add("a normal that is not finite", [](TestPart& part) { part.mesh.normals[2].x = INFINITY; });
-  add("an openness beyond 0 to 1", [](TestPart& part) { part.mesh.openness[2] = NAN; });
+  add("an occlusion beyond 0 to 1", [](TestPart& part) { part.mesh.occlusion[2] = NAN; });
   for (const auto& [message, part] : wrong) {
     for (const Format& format : kFormats) {
       const auto path = folder_.file(std::string("wrong") + format.extension);
@@ -298,7 +298,7 @@ TEST_F(SmoothMeshFiles, unsound_input_is_refused_and_leaves_no_file) {
   }
 }
 
-TEST_F(SmoothMeshFiles, cancelling_leaves_the_old_file) {
+TEST_F(SmoothMeshFiles, CancellingLeavesTheOldFile) {
   place(glm::dmat4(1.0));
   for (const Format& format : kFormats) {
     const auto path = folder_.file(std::string("old") + format.extension);
@@ -311,7 +311,7 @@ TEST_F(SmoothMeshFiles, cancelling_leaves_the_old_file) {
   EXPECT_EQ(folder_.count(), kFormats.size());
 }
 
-TEST_F(SmoothMeshFiles, a_folder_that_is_not_there_is_an_error) {
+TEST_F(SmoothMeshFiles, AFolderThatIsNotThereIsAnError) {
   place(glm::dmat4(1.0));
   for (const Format& format : kFormats) {
     const auto refused = write_mesh(meshes_of(parts_), folder_.file(std::string("none/out") + format.extension));
@@ -320,7 +320,7 @@ TEST_F(SmoothMeshFiles, a_folder_that_is_not_there_is_an_error) {
   }
 }
 
-TEST_F(SmoothMeshFiles, a_placement_of_nothing_is_a_node_without_a_mesh) {
+TEST_F(SmoothMeshFiles, APlacementOfNothingIsANodeWithoutAMesh) {
   parts_ = {{"empty", {}, {}, {{"here", glm::translate(glm::dmat4(1.0), DVec3(1, 2, 3))}}}};
   for (const Format& format : kFormats) {
     if (format.format == FileFormat::Glb) continue;
@@ -333,7 +333,7 @@ TEST_F(SmoothMeshFiles, a_placement_of_nothing_is_a_node_without_a_mesh) {
 }
 
 /// Blocks and a smooth mesh in one description.
-TEST(MeshFiles, hold_blocks_and_smooth_meshes_side_by_side) {
+TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
   Scene scene;
   place(scene, add_asymmetric_grid(scene, "L"), {});
   SceneMeshes meshes = mesh_scene(scene).value();
@@ -355,7 +355,7 @@ TEST(MeshFiles, hold_blocks_and_smooth_meshes_side_by_side) {
   EXPECT_EQ(folder.count(), 3U) << "palette and materials of the blocks";
 }
 
-TEST(MeshFiles, blocks_that_do_not_hang_together_are_refused) {
+TEST(MeshFiles, BlocksThatDoNotHangTogetherAreRefused) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
   const TestFolder folder("blocky_unsound");
@@ -376,13 +376,13 @@ TEST(MeshFiles, blocks_that_do_not_hang_together_are_refused) {
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.directions.pop_back(); }));
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.directions[0] = static_cast<Direction>(6); }));
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.types[0] = 60'000; }));
-  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.levels[0] = 4; }));
+  EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.occlusion[0] = 4; }));
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.indices.pop_back(); }));
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.indices[0] = static_cast<std::uint32_t>(t.positions.size()); }));
   EXPECT_TRUE(refuses([](BlockyTriangles& t) { t.positions[0].y = std::numeric_limits<float>::infinity(); }));
 }
 
-TEST(MeshFiles, types_that_are_not_registered_are_refused) {
+TEST(MeshFiles, TypesThatAreNotRegisteredAreRefused) {
   for (const VoxelType type : std::array<VoxelType, 5>{3, 255, 256, 300, 65535}) {
     Scene scene;
     const GridHandle grid = add_asymmetric_grid(scene, "L");
@@ -394,7 +394,7 @@ TEST(MeshFiles, types_that_are_not_registered_are_refused) {
   }
 }
 
-TEST(MeshFiles, a_placement_of_no_part_is_refused) {
+TEST(MeshFiles, APlacementOfNoPartIsRefused) {
   SceneMeshes meshes;
   meshes.placements.push_back({1, "lost", Similarity{}});
   const auto refused = write_mesh(meshes, FileFormat::Ply);
@@ -402,7 +402,7 @@ TEST(MeshFiles, a_placement_of_no_part_is_refused) {
   EXPECT_EQ(refused.error().message, "placement \"lost\" is of a part that is not there");
 }
 
-TEST(MeshFiles, the_format_is_the_path_s_or_the_option_s) {
+TEST(MeshFiles, TheFormatIsThePathSOrTheOptionS) {
   const TestFolder folder("mesh_file_format");
   EXPECT_TRUE(write_mesh({}, folder.file("picture"), {.format = FileFormat::Ply}));
   for (const char* name : {"out.png", "out.vox", "out"}) {
@@ -428,7 +428,7 @@ Volume ball(IVec3 size, DVec3 centre, double radius) {
   return volume;
 }
 
-TEST(MeshFiles, a_ball_in_a_volume_is_one_and_lies_where_the_volume_says) {
+TEST(MeshFiles, ABallInAVolumeIsOneAndLiesWhereTheVolumeSays) {
   for (const double x_axis : {2.0, -2.0}) {
     Volume volume = ball({70, 30, 28}, {40, 15, 13}, 10);
     volume.world_from_voxel = glm::dmat4{{x_axis, 0, 0, 0}, {0, 0, 3, 0}, {0, 1, 0, 0}, {100, 50, 20, 1}};
@@ -444,17 +444,17 @@ TEST(MeshFiles, a_ball_in_a_volume_is_one_and_lies_where_the_volume_says) {
   }
 }
 
-TEST(MeshMistakes, singular_transforms_are_found) {
+TEST(MeshMistakes, SingularTransformsAreFound) {
   QUOIN_EXPECT_MISTAKE((void)VertexTransform(glm::dmat4(0.0), DVec3(0.0)), "not singular");
 }
 
-TEST(MeshMistakes, layouts_of_unsound_meshes_are_found) {
+TEST(MeshMistakes, LayoutsOfUnsoundMeshesAreFound) {
   SceneMeshes meshes;
   meshes.placements.emplace_back();
   QUOIN_EXPECT_MISTAKE((void)lay_out_gltf(meshes), "sound meshes");
 }
 
-TEST(MeshMistakes, materials_of_types_without_a_triangle_are_found) {
+TEST(MeshMistakes, MaterialsOfTypesWithoutATriangleAreFound) {
   const SceneMeshes meshes;
   const MaterialPalette palette(meshes);
   QUOIN_EXPECT_MISTAKE((void)palette.material_of(SurfaceClass::Opaque, 0), "that the meshes have");

@@ -41,20 +41,20 @@ bool all_finite(std::span<const Vec3> points) {
 
 const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
-                       is_none_or_one_a_vertex(view.levels, view);
+                       is_none_or_one_a_vertex(view.block_occlusion, view);
   if (!has_all) return "arrays of different lengths";
   if (largest_of(view.types) >= types) return "a type that is not registered";
   if (largest_of(view.directions) > Direction::NegZ) return "a direction that is none of the six";
-  return largest_of(view.levels) > 3 ? "an occlusion level beyond 3" : nullptr;
+  return largest_of(view.block_occlusion) > 3 ? "an occlusion level beyond 3" : nullptr;
 }
 
 const char* fault_of_smooth(const MeshView& view) {
   const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
-                       is_none_or_one_a_vertex(view.openness, view);
+                       is_none_or_one_a_vertex(view.occlusion, view);
   if (!has_all) return "arrays of different lengths";
   if (!all_finite(view.normals)) return "a normal that is not finite";
-  const auto is_no_share = [](float openness) { return !(openness >= 0.0F && openness <= 1.0F); };
-  return std::ranges::any_of(view.openness, is_no_share) ? "an openness beyond 0 to 1" : nullptr;
+  const auto is_no_share = [](float occlusion) { return !(occlusion >= 0.0F && occlusion <= 1.0F); };
+  return std::ranges::any_of(view.occlusion, is_no_share) ? "an occlusion beyond 0 to 1" : nullptr;
 }
 
 /// What is wrong with a mesh; null when nothing is.
@@ -191,10 +191,10 @@ std::array<Vec3, 6> VertexTransform::face_normals() const {
 }
 
 LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
-  const float openness = view.openness.empty() ? 1.0F : view.openness[vertex];
+  const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
   LinearRgba16 colour{0, 0, 0, 65'535};
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const float light = static_cast<float>(view.albedo[vertex][channel]) * openness;
+    const float light = static_cast<float>(view.albedo[vertex][channel]) * open;
     colour[channel] = static_cast<std::uint16_t>(std::lround(light));
   }
   return colour;
@@ -203,10 +203,10 @@ LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
 std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex) {
   constexpr float kFull = 65'535.0F;  // of LinearRgba16
   const SrgbEncoder& encode = SrgbEncoder::shared();
-  const float openness = view.openness.empty() ? 1.0F : view.openness[vertex];
+  const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
   std::array<std::uint8_t, 3> colour{};
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    colour[channel] = encode(static_cast<float>(view.albedo[vertex][channel]) / kFull * openness);
+    colour[channel] = encode(static_cast<float>(view.albedo[vertex][channel]) / kFull * open);
   }
   return colour;
 }

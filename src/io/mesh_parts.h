@@ -82,7 +82,7 @@ class VertexTransform {
   return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};
 }
 
-/// The colour of a vertex of a smooth mesh, times its openness: linear light, opaque; sRGB.
+/// The colour of a vertex of a smooth mesh, darkened by its occlusion: linear light, opaque; sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
 [[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);
 

@@ -10,11 +10,11 @@
 namespace quoin {
 
 /// The four corner levels that a blocky mesh carries for a face. Cost: 8 voxel look-ups.
-[[nodiscard]] FaceLevels corner_levels(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face);
+[[nodiscard]] FaceOcclusion corner_levels(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face);
 
 /// The same of whatever says which voxels are opaque. Cost: 8 questions.
 template <class IsOpaque>
-[[nodiscard]] FaceLevels corner_levels(IsOpaque&& is_opaque, IVec3 voxel, Direction face) {
+[[nodiscard]] FaceOcclusion corner_levels(IsOpaque&& is_opaque, IVec3 voxel, Direction face) {
   const FaceFrame& frame = frame_of(face);
   const IVec3 front = voxel + normal_of(face);
   std::array<std::array<bool, 3>, 3> is_occluder{};
@@ -36,9 +36,9 @@ template <class IsOpaque>
 /// The occlusion level at a point of a face, 0 to 3, interpolated over the mesh's two triangles.
 ///
 /// `position`: in the grid, on the face.
-[[nodiscard]] float level_at(const FaceLevels& levels, IVec3 voxel, Direction face, DVec3 position);
+[[nodiscard]] float level_at(const FaceOcclusion& levels, IVec3 voxel, Direction face, DVec3 position);
 
 /// A quad's corner levels at (u, v), both 0 to 1, over the triangles that `flips_diagonal` chooses.
-[[nodiscard]] float interpolated_level(const FaceLevels& levels, float u, float v);
+[[nodiscard]] float interpolated_level(const FaceOcclusion& levels, float u, float v);
 
 }  // namespace quoin

@@ -9,7 +9,7 @@ namespace quoin {
 namespace {
 
 // By barycentric coordinates in the triangle of the mesh that holds the point.
-double level_by_triangles(const FaceLevels& levels, double u, double v) {
+double level_by_triangles(const FaceOcclusion& levels, double u, double v) {
   constexpr double kU[] = {0, 1, 1, 0};
   constexpr double kV[] = {0, 0, 1, 1};
   const std::array<std::array<std::size_t, 3>, 2> triangles =
@@ -52,7 +52,7 @@ TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
     position[frame.v] += v;
     if (frame.sign > 0) position[frame.axis] += 1.0;
     const IVec3 chunk = chunk_of(voxel);
-    const FaceLevels levels = face_occlusion(grid.neighbourhood(chunk), types, local_of(voxel), face);
+    const FaceOcclusion levels = face_occlusion(grid.neighbourhood(chunk), types, local_of(voxel), face);
     ASSERT_EQ(corner_levels(reader, types, voxel, face), levels);
     const float level = level_at(levels, voxel, face, position);
     ASSERT_NEAR(level, level_by_triangles(levels, u, v), 1e-5);
@@ -63,8 +63,8 @@ TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
 
 TEST(CornerLight, IsExactAtTheCorners) {
   for (int code = 0; code < 256; ++code) {
-    const FaceLevels levels = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
-                               static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};
+    const FaceOcclusion levels = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
+                                  static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};
     EXPECT_EQ(interpolated_level(levels, 0, 0), levels[0]);
     EXPECT_EQ(interpolated_level(levels, 1, 0), levels[1]);
     EXPECT_EQ(interpolated_level(levels, 1, 1), levels[2]);

@@ -3,9 +3,9 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "light/surfaces.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 

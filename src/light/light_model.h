@@ -33,7 +33,7 @@ constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it da
 [[nodiscard]] inline Vec3 colour_of_detail(Detail detail, int halvings) {
   if (detail == Detail::Near) return {0.10F, 0.55F, 0.12F};
   if (detail == Detail::Far) return {0.08F, 0.20F, 0.75F};
-  const float share = static_cast<float>(halvings - 1) / static_cast<float>(kCoarsestHalving - 1);
+  const float share = static_cast<float>(halvings - 1) / static_cast<float>(kMaxGridLevel - 1);
   return {0.85F, 0.70F - 0.50F * std::clamp(share, 0.0F, 1.0F), 0.03F};
 }
 

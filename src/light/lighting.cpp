@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "light/corner_light.h"
 #include "light/glass.h"
 #include "light/light_model.h"
@@ -87,9 +89,10 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       options_(options),
       directions_(options.occlusion_rays),
       exposure_(exposure_of(options)) {
+  QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : view.tracer().placed()) {
-    if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.halvings);
+    if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.level);
     Frame& frame = frames_.emplace_back();
     frame.voxels_per_cell = placed.voxels_per_cell();
     frame.to_sun = glm::transpose(placed.world_axes) * sun;
@@ -101,6 +104,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
 }
 
 std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const {
+  QUOIN_ASSERT(colours.size() >= points.size(), "a colour for every point");
   if (!options_.lit) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
@@ -174,7 +178,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (group.unknown == 0) return 0;
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
-  FaceLevels levels{};
+  FaceOcclusion levels{};
   const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
     if ((group.unknown >> i & 1U) == 0) continue;

@@ -7,10 +7,10 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "light/occlusion_directions.h"
 #include "light/surfaces.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 

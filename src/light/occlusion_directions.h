@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/hash.h>
 #include <quoin/core/vec.h>
 
@@ -23,7 +24,10 @@ class OcclusionDirections {
   /// Whether all pixels have the same.
   [[nodiscard]] bool is_fixed() const { return is_fixed_; }
   /// Requires: `is_fixed`. `face`: a Direction.
-  [[nodiscard]] DVec3 fixed(std::size_t face, int ray) const { return fixed_[face][static_cast<std::size_t>(ray)]; }
+  [[nodiscard]] DVec3 fixed(std::size_t face, int ray) const {
+    QUOIN_ASSERT(is_fixed_ && ray >= 0 && ray < count_, "a ray of those that all pixels have");
+    return fixed_[face][static_cast<std::size_t>(ray)];
+  }
   /// Requires: not `is_fixed`. `hash`: of the pixel.
   [[nodiscard]] DVec3 spread(std::size_t face, int ray, std::uint32_t hash) const;
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/core/direction.h>
+#include "core/death_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -105,6 +106,14 @@ TEST(OcclusionDirections, PixelsDiffer) {
     for (std::uint32_t x = 0; x < 64; ++x) hashes.insert(hash_of(x, y));
   }
   EXPECT_GT(hashes.size(), 4090U);
+}
+
+TEST(OcclusionDirectionsDeathTest, RaysOfTheOtherKindOrBeyondTheirNumberAreMistakes) {
+  const OcclusionDirections fixed(6);
+  const OcclusionDirections spread(4);
+  QUOIN_EXPECT_MISTAKE((void)fixed.spread(0, 0, 1), "is_fixed_");
+  QUOIN_EXPECT_MISTAKE((void)spread.fixed(0, 0), "is_fixed_");
+  QUOIN_EXPECT_MISTAKE((void)fixed.fixed(0, 6), "ray < count_");
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "scene/tracer/kept_trees.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 namespace {
@@ -149,7 +149,7 @@ void follow_bounds(benchmark::State& state) {
 
 void follow_trees(benchmark::State& state) {
   World world(static_cast<int>(state.range(0)));
-  KeptTrees trees;
+  TreeCache trees;
   trees.update(world.grid(), world.scene.types);
   after_edits(state, world, [&] { fail_unless(trees.update(world.grid(), world.scene.types), "nothing was updated"); });
 }

@@ -12,7 +12,7 @@ namespace quoin {
 namespace {
 
 // So many chunks of one update are compared voxel by voxel; an edit of more reaches most of what is beside them anyway.
-constexpr std::size_t kMostCompared = 32;
+constexpr std::size_t kMaxCompared = 32;
 
 std::uint64_t next_stamp() {
   static std::atomic<std::uint64_t> count{0};
@@ -103,13 +103,13 @@ bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
 }
 
 // Where the chunks of the edits differ from what they were, as far as that is looked into.
-std::vector<DensityBook::Change> DensityBook::changes_of(const Grid& grid, const GridChanges& edits) const {
+std::vector<DensityCache::Change> DensityCache::changes_of(const Grid& grid, const GridChanges& edits) const {
   std::vector<Change> changes;
   if (edits.all) {
     for (const IVec3 chunk : grid.chunks()) changes.push_back({chunk, everything()});
   }
   for (const ChunkChange& edit : edits.items) {
-    if (changes.size() >= kMostCompared) {
+    if (changes.size() >= kMaxCompared) {
       changes.push_back({edit.chunk, everything()});
     } else {
       changes.push_back({edit.chunk, difference(seen_->find_chunk(edit.chunk), grid.find_chunk(edit.chunk), edit.box)});
@@ -118,8 +118,8 @@ std::vector<DensityBook::Change> DensityBook::changes_of(const Grid& grid, const
   return changes;
 }
 
-void DensityBook::follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed,
-                         std::vector<IVec3>& reached) {
+void DensityCache::follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed,
+                          std::vector<IVec3>& reached) {
   const std::vector<Change> changes = changes_of(*grid, edits);
   seen_ = std::move(grid);
   for (const Change& change : changes) {
@@ -130,9 +130,9 @@ void DensityBook::follow(GridSnapshot grid, const GridChanges& edits, std::vecto
   drop_what_is_gone(changed);
 }
 
-void DensityBook::reach_from(const Change& change, std::vector<IVec3>& reached) {
+void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached) {
   for (int i = 0; i < 27; ++i) {
-    const IVec3 at = neighbour_of(change.chunk, i);
+    const IVec3 at = change.chunk + Neighbourhood::offset(i);
     const IVec3 offset = at - change.chunk;
     const auto is_within = [&](const ChangeReach& reach, int samples) {
       return reach.is_within(samples, offset.x, offset.y, offset.z);
@@ -148,35 +148,35 @@ void DensityBook::reach_from(const Change& change, std::vector<IVec3>& reached) 
   }
 }
 
-void DensityBook::drop_what_is_gone(const std::vector<IVec3>& changed) {
+void DensityCache::drop_what_is_gone(const std::vector<IVec3>& changed) {
   for (const IVec3 chunk : changed) {
     if (seen_->find_chunk(chunk) != nullptr) continue;
     for (int i = 0; i < 27; ++i) {
-      if (!has_voxels_near(neighbour_of(chunk, i))) slots_.erase(neighbour_of(chunk, i));
+      if (!has_voxels_near(chunk + Neighbourhood::offset(i))) slots_.erase(chunk + Neighbourhood::offset(i));
     }
   }
 }
 
-void DensityBook::invalidate(IVec3 chunk, bool solid) {
+void DensityCache::invalidate(IVec3 chunk, bool solid) {
   Slot& slot = slots_[chunk];
   slot.under_way.reset();
   (solid ? slot.is_solid_stale : slot.is_type_stale) = true;
 }
 
-bool DensityBook::has_voxels_near(IVec3 chunk) const {
+bool DensityCache::has_voxels_near(IVec3 chunk) const {
   for (int i = 0; i < 27; ++i) {
-    if (seen_->find_chunk(neighbour_of(chunk, i)) != nullptr) return true;
+    if (seen_->find_chunk(chunk + Neighbourhood::offset(i)) != nullptr) return true;
   }
   return false;
 }
 
-LiveDensities DensityBook::around(IVec3 chunk) {
+LiveDensities DensityCache::around(IVec3 chunk) {
   LiveDensities all;
-  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(neighbour_of(chunk, i));
+  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(chunk + Neighbourhood::offset(i));
   return all;
 }
 
-std::shared_ptr<LiveDensity> DensityBook::density(IVec3 chunk) {
+std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk) {
   // As in a DensityGrid, the outermost chunks stay air.
   if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
   Slot& slot = slots_[chunk];
@@ -188,12 +188,12 @@ std::shared_ptr<LiveDensity> DensityBook::density(IVec3 chunk) {
   return made;
 }
 
-std::uint32_t DensityBook::keep(IVec3 chunk, const LiveDensities& made) {
+std::uint32_t DensityCache::keep(IVec3 chunk, const LiveDensities& made) {
   std::uint32_t kept = 0;
   for (int i = 0; i < 27; ++i) {
     const std::shared_ptr<LiveDensity>& each = made[static_cast<std::size_t>(i)];
     if (each == nullptr || !each->is_made()) continue;
-    const auto found = slots_.find(neighbour_of(chunk, i));
+    const auto found = slots_.find(chunk + Neighbourhood::offset(i));
     if (found == slots_.end() || found->second.under_way.lock() != each) continue;
     found->second = Slot{each, {}, false, false};
     kept |= std::uint32_t{1} << i;

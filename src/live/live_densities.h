@@ -20,11 +20,6 @@ namespace quoin {
 /// A grid as it was at one moment, for whoever needs it on other threads.
 using GridSnapshot = std::shared_ptr<const Grid>;
 
-/// The chunk beside another, `i` as in Neighbourhood.
-[[nodiscard]] inline IVec3 neighbour_of(IVec3 chunk, int i) {
-  return chunk + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-}
-
 /// The densities of one chunk of voxels in one state, made by the first who needs them.
 ///
 /// Threads: any; the voxels are let go once the densities are made.
@@ -71,12 +66,12 @@ using DensityStamps = std::array<std::uint64_t, 27>;
 /// Follows the voxels of one grid: which densities hold still, and which chunks an edit reaches.
 ///
 /// Threads: one.
-class DensityBook {
+class DensityCache {
  public:
   /// `reach` is what meshing reads beyond a chunk's own samples.
-  explicit DensityBook(int reach) : reach_(reach) {}
+  explicit DensityCache(int reach) : reach_(reach) {}
 
-  void clear() { *this = DensityBook(reach_); }
+  void clear() { *this = DensityCache(reach_); }
   /// Takes over what was edited since the last time, as `edits` say: the chunks that changed, came or went (`changed`),
   /// and those in which the surface may have changed (`reached`), both sorted. When all has changed, what was there
   /// before is to be cleared first.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk_order.h"
 
 namespace quoin {
@@ -11,7 +12,7 @@ namespace {
 bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   if (chunk == nullptr) return false;
   if (const auto uniform = chunk->uniform()) return *uniform != kAir;
-  return chunk->mixed()->layer_counts[axis][0] != 0;
+  return chunk->storage()->layer_counts[axis][0] != 0;
 }
 
 // Quads belong to the chunk in which their lattice edge starts: it, or the next one along the edge, has a solid sample.
@@ -133,7 +134,7 @@ void LiveGrid::mark_types(const Grid& grid, const std::vector<bool>& changed, Li
     const std::vector<VoxelType> types = grid.find_chunk(chunk)->types();
     const auto has_changed = [&](VoxelType type) { return type < changed.size() && changed[type]; };
     if (std::none_of(types.begin(), types.end(), has_changed)) continue;
-    for (int i = 0; i < 27; ++i) mark_if_there(neighbour_of(chunk, i), now);
+    for (int i = 0; i < 27; ++i) mark_if_there(chunk + Neighbourhood::offset(i), now);
   }
 }
 
@@ -236,10 +237,10 @@ void LiveGrid::keep_densities(const LiveJob& job) {
     if ((kept >> i & 1U) == 0) continue;
     const LiveDensity& density = *job.densities[static_cast<std::size_t>(i)];
     for (int n = 0; n < 27; ++n) {
-      const auto found = chunks_.find(neighbour_of(neighbour_of(job.chunk, i), n));
+      const auto found = chunks_.find(job.chunk + Neighbourhood::offset(i) + Neighbourhood::offset(n));
       if (found == chunks_.end() || found->second.last_stamps == nullptr) continue;
       std::uint64_t& stamp = (*found->second.last_stamps)[static_cast<std::size_t>(26 - n)];
-      if (density.reads_as(stamp, reach, neighbour_of(IVec3{0}, n))) stamp = density.stamp();
+      if (density.reads_as(stamp, reach, Neighbourhood::offset(n))) stamp = density.stamp();
     }
   }
 }

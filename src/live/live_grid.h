@@ -14,7 +14,7 @@
 
 #include "grid/coordinate_hash.h"
 #include "live/live_densities.h"
-#include "live/live_queue.h"
+#include "live/mesh_job_queue.h"
 
 namespace quoin {
 
@@ -107,8 +107,8 @@ class LiveGrid {
   ChangeCursor followed_;
   Chunks chunks_;
   std::unordered_set<IVec3, CoordinateHash> waiting_;
-  IBox box_;               // of all chunks that there were
-  DensityBook densities_;  // smooth
+  IBox box_;                // of all chunks that there were
+  DensityCache densities_;  // smooth
 };
 
 }  // namespace quoin

@@ -1,6 +1,6 @@
 #include <quoin/live/live_meshes.h>
 
-#include "live/live_book.h"
+#include "live/mesh_scheduler.h"
 
 namespace quoin {
 
@@ -10,7 +10,7 @@ std::int64_t ChunkSurface::triangles() const {
 
 std::size_t ChunkSurface::bytes() const {
   return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
-         smooth.normals.capacity() * sizeof(Vec3) + smooth.openness.capacity() * sizeof(float) +
+         smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
          smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
          albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType);
 }
@@ -19,7 +19,7 @@ struct LiveMeshes::Impl {
   explicit Impl(const LiveMeshOptions& options)
       : book(options,
              [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
-  LiveBook book;
+  MeshScheduler book;
 };
 
 LiveMeshes::LiveMeshes(const LiveMeshOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -37,8 +37,8 @@ std::size_t LiveMeshes::pending() const {
 void LiveMeshes::finish(const Scene& scene, DVec3 eye) {
   impl_->book.finish(scene, eye);
 }
-LiveMeshes::Facts LiveMeshes::facts() const {
-  return impl_->book.facts();
+LiveMeshes::Stats LiveMeshes::stats() const {
+  return impl_->book.stats();
 }
 
 }  // namespace quoin

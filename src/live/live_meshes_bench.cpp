@@ -82,7 +82,7 @@ void edit(benchmark::State& state, SurfaceStyle style, int x, int z) {
     update_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     meshes.finish(land.scene, eye);
     surfaces = meshes.take().size();
-    latency_seconds += meshes.facts().last_latency_seconds;
+    latency_seconds += meshes.stats().last_latency_seconds;
     fail_unless(surfaces != 0, "the edit changed nothing");
   }
   state.counters["chunks"] = static_cast<double>(surfaces);

@@ -32,7 +32,7 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     SCOPED_TRACE(seed);
     LiveMeshOptions wanted = options(1 + seed % 3);
     wanted.merge = seed % 2 == 0;
-    wanted.hidden = seed % 5 == 0;
+    wanted.instances = seed % 5 == 0 ? InstanceFilter::All : InstanceFilter::Visible;
     if (seed % 4 == 1) wanted.occlusion.form = SmoothOcclusion::None;
     SceneEditor editor(seed);
     LiveMeshes meshes(wanted);
@@ -75,7 +75,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
     meshes.finish(editor.scene, {});
     shown.apply(meshes.take());
     expect_surfaces(shown, editor.scene, wanted);
-    meshed = meshes.facts().chunks_meshed;
+    meshed = meshes.stats().chunks_meshed;
   }
   EXPECT_GT(meshed, 0);
   EXPECT_GE(calls, meshed);
@@ -97,14 +97,14 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
   one.grid().fill_sphere({60, 60, 60}, 30.0, 1);
   LiveMeshes meshes(options());
   EXPECT_FALSE(all_of(meshes, one.scene).empty());
-  const std::int64_t before = meshes.facts().chunks_meshed;
+  const std::int64_t before = meshes.stats().chunks_meshed;
   one.grid().set({60, 60, 60}, 1);  // what it is
   one.scene.edit(one.placed).position = {5, 5, 5};
   Instance second = one.instance;
   second.position = {500, 0, 0};
   one.scene.add_instance(second);
   EXPECT_TRUE(all_of(meshes, one.scene).empty());
-  EXPECT_EQ(meshes.facts().chunks_meshed, before);
+  EXPECT_EQ(meshes.stats().chunks_meshed, before);
 }
 
 TEST_P(LiveMeshesOf, WhatIsNotDrawnGoesAndComesBack) {

@@ -30,13 +30,13 @@ class FollowedGrid {
   }
   // How many chunks were meshed since the last call, and which were given.
   std::int64_t meshed(ChunkSet& given) {
-    const std::int64_t before = meshes.facts().chunks_meshed;
+    const std::int64_t before = meshes.stats().chunks_meshed;
     meshes.finish(one.scene, {});
     given.clear();
     const std::vector<SurfaceUpdate> updates = meshes.take();
     for (const SurfaceUpdate& update : updates) given.insert(key(update.chunk));
     shown.apply(updates);
-    return meshes.facts().chunks_meshed - before;
+    return meshes.stats().chunks_meshed - before;
   }
 
   OneGrid one;
@@ -47,7 +47,7 @@ class FollowedGrid {
 TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
   FollowedGrid followed(SurfaceStyle::Blocky);
   Grid& grid = followed.one.grid();
-  for (int i = 0; i < 27; ++i) grid.set(neighbour_of({0, 0, 0}, i) * 64 + 30, 1);
+  for (int i = 0; i < 27; ++i) grid.set(Neighbourhood::offset(i) * 64 + 30, 1);
   ChunkSet given;
   EXPECT_EQ(followed.meshed(given), 27);
   std::mt19937 random(5);
@@ -55,7 +55,7 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
     const auto place = [&] { return std::array{0, 1, 31, 62, 63}[random() % 5]; };
     const IVec3 at{place(), place(), place()};
     ChunkSet reached;
-    for (int n = 0; n < 27; ++n) reached.insert(key(chunk_of(neighbour_of(at, n))));
+    for (int n = 0; n < 27; ++n) reached.insert(key(chunk_of(at + Neighbourhood::offset(n))));
     ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : kAir));
     EXPECT_EQ(followed.meshed(given), static_cast<std::int64_t>(reached.size()));
     EXPECT_EQ(given, reached);

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "live/live_queue.h"
+#include "live/mesh_job_queue.h"
 
 namespace quoin {
 namespace {
@@ -66,7 +66,7 @@ bool reads_as_before(const LiveJob& job, int reach) {
     const auto& density = job.densities[static_cast<std::size_t>(i)];
     const std::uint64_t last = (*job.last_stamps)[static_cast<std::size_t>(i)];
     // From that chunk, this one lies the other way.
-    const IVec3 offset = -neighbour_of(IVec3{0}, i);
+    const IVec3 offset = -Neighbourhood::offset(i);
     if (density == nullptr ? last != 0 : !density->reads_as(last, reach, offset)) return false;
   }
   return true;
@@ -102,7 +102,7 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   surface->style = SurfaceStyle::Smooth;
   copy_exactly(workspace.mesh.positions, surface->smooth.positions);
   copy_exactly(workspace.mesh.normals, surface->smooth.normals);
-  copy_exactly(workspace.mesh.openness, surface->smooth.openness);
+  copy_exactly(workspace.mesh.occlusion, surface->smooth.occlusion);
   copy_exactly(workspace.mesh.cells, surface->smooth.cells);
   copy_exactly(workspace.mesh.indices, surface->smooth.indices);
   add_materials(chunks, *job.materials, *surface);

@@ -76,10 +76,10 @@ class ShownSurfaces {
   std::set<SurfaceUpdate> shown_;
 };
 
-inline std::set<GridHandle> drawn_grids(const Scene& scene, bool hidden_too) {
+inline std::set<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   std::set<GridHandle> drawn;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
-    if (instance.visible || hidden_too) drawn.insert(instance.grid);
+    if (passes(filter, instance)) drawn.insert(instance.grid);
   });
   return drawn;
 }
@@ -87,7 +87,7 @@ inline std::set<GridHandle> drawn_grids(const Scene& scene, bool hidden_too) {
 inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
   BlockyMesher mesher;
   std::size_t surfaces = 0;
-  for (const GridHandle handle : drawn_grids(scene, options.hidden)) {
+  for (const GridHandle handle : drawn_grids(scene, options.instances)) {
     const Grid& grid = scene.grids()[handle].grid;
     for (const IVec3 chunk : grid.chunks()) {
       QuadBuffer quads;
@@ -113,14 +113,14 @@ inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const 
 using SmoothCorner = std::array<float, 12>;
 using SmoothTriangles = std::vector<std::array<SmoothCorner, 3>>;
 
-inline SmoothCorner corner_of(Vec3 p, Vec3 n, float openness, const LinearRgba16& colour, VoxelType type) {
+inline SmoothCorner corner_of(Vec3 p, Vec3 n, float occlusion, const LinearRgba16& colour, VoxelType type) {
   return {p.x,
           p.y,
           p.z,
           n.x,
           n.y,
           n.z,
-          openness,
+          occlusion,
           float(colour[0]),
           float(colour[1]),
           float(colour[2]),
@@ -139,7 +139,7 @@ inline SmoothTriangles triangles_of(const ChunkSurface& surface, IVec3 chunk) {
   const auto corner = [&](std::size_t i) {
     const std::uint32_t v = mesh.indices[i];
     const Vec3 position(DVec3(mesh.positions[v]) + DVec3(chunk) * 64.0);
-    return corner_of(position, mesh.normals[v], mesh.openness.empty() ? 1.0F : mesh.openness[v], surface.albedo[v],
+    return corner_of(position, mesh.normals[v], mesh.occlusion.empty() ? 0.0F : mesh.occlusion[v], surface.albedo[v],
                      surface.types[v]);
   };
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) all.push_back({corner(i), corner(i + 1), corner(i + 2)});
@@ -150,7 +150,7 @@ inline SmoothTriangles triangles_of(const SmoothMesh& mesh) {
   SmoothTriangles all;
   const auto corner = [&](std::size_t i) {
     const std::uint32_t v = mesh.indices[i];
-    return corner_of(mesh.positions[v], mesh.normals[v], mesh.openness.empty() ? 1.0F : mesh.openness[v],
+    return corner_of(mesh.positions[v], mesh.normals[v], mesh.occlusion.empty() ? 0.0F : mesh.occlusion[v],
                      mesh.albedo[v], mesh.types[v]);
   };
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) all.push_back({corner(i), corner(i + 1), corner(i + 2)});
@@ -158,7 +158,7 @@ inline SmoothTriangles triangles_of(const SmoothMesh& mesh) {
 }
 
 inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
-  const std::set<GridHandle> drawn = drawn_grids(scene, options.hidden);
+  const std::set<GridHandle> drawn = drawn_grids(scene, options.instances);
   for (const SurfaceUpdate& each : shown.all()) EXPECT_TRUE(drawn.contains(each.grid));
   for (const GridHandle handle : drawn) {
     SmoothMeshOptions wanted;

@@ -133,7 +133,7 @@ std::uint32_t add_copy(SmoothMesh& mesh, std::uint32_t vertex) {
   };
   append(mesh.positions);
   append(mesh.normals);
-  append(mesh.openness);
+  append(mesh.occlusion);
   append(mesh.albedo);
   append(mesh.types);
   return copy;

@@ -19,7 +19,7 @@ namespace quoin::oracle {
 /// A visible unit face: what it shows.
 struct UnitFace {
   VoxelType type = kAir;
-  FaceLevels levels{};
+  FaceOcclusion levels{};
   bool operator==(const UnitFace&) const = default;
 };
 
@@ -32,9 +32,9 @@ inline bool shows(const VoxelRegistry& types, VoxelType a, VoxelType b) {
 }
 
 /// Levels by asking for each of the three voxels of each corner.
-inline FaceLevels levels_of(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
+inline FaceOcclusion levels_of(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
   const FaceFrame& frame = frame_of(d);
-  FaceLevels levels{};
+  FaceOcclusion levels{};
   const int du[4] = {-1, 1, 1, -1};
   const int dv[4] = {-1, -1, 1, 1};
   for (std::size_t corner = 0; corner < 4; ++corner) {
@@ -56,7 +56,7 @@ inline FaceSet visible_faces(const Grid& grid, const VoxelRegistry& types, bool 
   grid.for_each([&](IVec3 v, VoxelType type) {
     for (const Direction d : kDirections) {
       if (!shows(types, type, grid.get(v + normal_of(d)))) continue;
-      faces[{v.x, v.y, v.z, static_cast<int>(d)}] = {type, occlusion ? levels_of(grid, types, v, d) : FaceLevels{}};
+      faces[{v.x, v.y, v.z, static_cast<int>(d)}] = {type, occlusion ? levels_of(grid, types, v, d) : FaceOcclusion{}};
     }
   });
   return faces;
@@ -65,7 +65,7 @@ inline FaceSet visible_faces(const Grid& grid, const VoxelRegistry& types, bool 
 /// Takes a quad apart into unit faces; fails where its levels do not interpolate to one tuple, or a face is there
 /// twice.
 inline void add_quad(const Quad& quad, IVec3 origin, FaceSet& faces) {
-  const FaceLevels levels = quad.levels();
+  const FaceOcclusion levels = quad.occlusion();
   const FaceFrame& frame = frame_of(quad.direction());
   if (quad.size_u() > 1) {
     EXPECT_TRUE(levels[0] == levels[1] && levels[3] == levels[2]);

@@ -22,7 +22,7 @@ namespace {
 bool has_arrays_of_one_length(const SmoothMesh& mesh) {
   const std::size_t count = mesh.positions.size();
   return mesh.normals.size() == count && mesh.albedo.size() == count && mesh.types.size() == count &&
-         (mesh.openness.empty() || mesh.openness.size() == count);
+         (mesh.occlusion.empty() || mesh.occlusion.size() == count);
 }
 
 bool names_vertices(const SmoothMesh& mesh) {
@@ -69,7 +69,7 @@ void order_for_caches(SmoothMesh& mesh) {
   for (std::uint32_t& index : mesh.indices) index = place_of[index];
   keep_used(mesh.positions, place_of, used);
   keep_used(mesh.normals, place_of, used);
-  keep_used(mesh.openness, place_of, used);
+  keep_used(mesh.occlusion, place_of, used);
   keep_used(mesh.albedo, place_of, used);
   keep_used(mesh.types, place_of, used);
 }

@@ -20,7 +20,7 @@ namespace {
 
 using Field = std::function<float(Vec3)>;
 
-/// Surface Nets over the cells of a cube of `edge` samples, a vertex a cell; openness, albedo and types tell the
+/// Surface Nets over the cells of a cube of `edge` samples, a vertex a cell; occlusion, albedo and types tell the
 /// vertices apart.
 SmoothMesh surface_of(const Field& field, int edge) {
   SmoothMesh mesh;
@@ -37,7 +37,7 @@ SmoothMesh surface_of(const Field& field, int edge) {
     vertex_of[{cell.x, cell.y, cell.z}] = number;
     mesh.positions.push_back(Vec3(cell) + vertex.snapped);
     mesh.normals.push_back(vertex.normal);
-    mesh.openness.push_back(static_cast<float>(number % 1000) / 1000.0F);
+    mesh.occlusion.push_back(static_cast<float>(number % 1000) / 1000.0F);
     mesh.albedo.push_back({static_cast<std::uint16_t>(number), static_cast<std::uint16_t>(number >> 16), 0, 65'535});
     mesh.types.push_back(static_cast<VoxelType>(number % 7 + 1));
   }
@@ -106,7 +106,7 @@ class Simplify : public ::testing::Test {
   }
 };
 
-TEST_F(Simplify, a_sphere_stays_closed_and_within_the_error) {
+TEST_F(Simplify, ASphereStaysClosedAndWithinTheError) {
   for (const float error : {0.01F, 0.03F, 0.1F, 0.3F, 1.0F}) {
     SmoothMesh mesh = surface_of(sphere, 41);
     ASSERT_EQ(open_edges(mesh), 0U);
@@ -128,7 +128,7 @@ TEST_F(Simplify, a_sphere_stays_closed_and_within_the_error) {
   }
 }
 
-TEST_F(Simplify, random_blobs_stay_closed) {
+TEST_F(Simplify, RandomBlobsStayClosed) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -146,7 +146,7 @@ TEST_F(Simplify, random_blobs_stay_closed) {
   EXPECT_GT(tried, 5);
 }
 
-TEST_F(Simplify, what_stays_keeps_all_that_it_had) {
+TEST_F(Simplify, WhatStaysKeepsAllThatItHad) {
   const SmoothMesh whole = surface_of(sphere, 41);
   SmoothMesh mesh = whole;
   ASSERT_TRUE(simplify_smooth_mesh(mesh, 0.1F));
@@ -158,25 +158,25 @@ TEST_F(Simplify, what_stays_keeps_all_that_it_had) {
     const std::size_t source = mesh.albedo[i][0] | std::size_t{mesh.albedo[i][1]} << 16;
     EXPECT_EQ(mesh.positions[i], whole.positions[source]);
     EXPECT_EQ(mesh.normals[i], whole.normals[source]);
-    EXPECT_EQ(mesh.openness[i], whole.openness[source]);
+    EXPECT_EQ(mesh.occlusion[i], whole.occlusion[source]);
     EXPECT_EQ(mesh.types[i], whole.types[source]);
   }
 }
 
-TEST_F(Simplify, without_an_error_only_flat_places_lose_triangles) {
+TEST_F(Simplify, WithoutAnErrorOnlyFlatPlacesLoseTriangles) {
   const SmoothMesh whole = surface_of(sphere, 41);
   SmoothMesh mesh = whole;
-  mesh.openness.clear();
+  mesh.occlusion.clear();
   const auto reached = simplify_smooth_mesh(mesh, 0.0F);
   ASSERT_TRUE(reached);
   EXPECT_EQ(*reached, 0.0F);
   EXPECT_GT(mesh.indices.size(), whole.indices.size() * 9 / 10);
   EXPECT_EQ(open_edges(mesh), 0U);
   EXPECT_NEAR(volume(mesh), volume(whole), 1e-3 * volume(whole));
-  EXPECT_TRUE(mesh.openness.empty());
+  EXPECT_TRUE(mesh.occlusion.empty());
 }
 
-TEST(Manifold, sheets_that_share_an_edge_are_separated) {
+TEST(Manifold, SheetsThatShareAnEdgeAreSeparated) {
   SmoothMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}, {0, 0, -1}};
   mesh.normals.resize(6, Vec3(0, 1, 0));
@@ -191,11 +191,11 @@ TEST(Manifold, sheets_that_share_an_edge_are_separated) {
   EXPECT_EQ(mesh.indices.size(), 24U);
   EXPECT_EQ(mesh.positions.size(), 8U) << "both ends of the edge twice";
   EXPECT_EQ(mesh.types.size(), 8U);
-  EXPECT_TRUE(mesh.openness.empty());
+  EXPECT_TRUE(mesh.occlusion.empty());
   EXPECT_EQ(volume(mesh), before);
 }
 
-TEST(Manifold, solids_that_share_a_vertex_are_separated) {
+TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
   SmoothMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}, {9, 9, 9}};
   mesh.normals.resize(8, Vec3(0, 1, 0));
@@ -215,7 +215,7 @@ TEST(Manifold, solids_that_share_a_vertex_are_separated) {
   EXPECT_EQ(volume(mesh), before);
 }
 
-TEST(Manifold, sound_meshes_stay_as_they_are) {
+TEST(Manifold, SoundMeshesStayAsTheyAre) {
   SmoothMesh mesh = surface_of(sphere, 41);
   const SmoothMesh whole = mesh;
   make_manifold(mesh);
@@ -227,7 +227,7 @@ TEST(Manifold, sound_meshes_stay_as_they_are) {
   EXPECT_EQ(mesh.indices, open);
 }
 
-TEST(Manifold, surfaces_that_touch_in_many_edges_become_closed_ones) {
+TEST(Manifold, SurfacesThatTouchInManyEdgesBecomeClosedOnes) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   for (std::uint32_t i = 0; i < 5; ++i) {
@@ -246,7 +246,7 @@ TEST(Manifold, surfaces_that_touch_in_many_edges_become_closed_ones) {
   }
 }
 
-TEST(SimplifyErrors, what_cannot_be_leaves_the_mesh) {
+TEST(SimplifyErrors, WhatCannotBeLeavesTheMesh) {
   SmoothMesh mesh = surface_of(sphere, 41);
   const std::size_t before = mesh.indices.size();
   for (const float error : {-1.0F, std::numeric_limits<float>::quiet_NaN()}) {

@@ -58,11 +58,11 @@ class ProgressOfTiles {
 }  // namespace
 
 struct CpuRenderer::Impl {
-  Impl(const Scene& of_scene, bool hidden_too, Threads threads)
-      : scene(&of_scene), hidden(hidden_too), tracer(of_scene, hidden_too, threads), surfaces(of_scene.types) {}
+  Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
+      : scene(&of_scene), instances(filter), tracer(of_scene, filter, threads), surfaces(of_scene.types) {}
 
   const Scene* scene;
-  bool hidden;
+  InstanceFilter instances;
   SceneTracer tracer;
   Surfaces surfaces;
   DetailChooser detail;
@@ -85,8 +85,8 @@ struct Subject {
 
 }  // namespace
 
-CpuRenderer::CpuRenderer(const Scene& scene, bool hidden, Threads threads)
-    : impl_(std::make_unique<Impl>(scene, hidden, threads)) {}
+CpuRenderer::CpuRenderer(const Scene& scene, InstanceFilter filter, Threads threads)
+    : impl_(std::make_unique<Impl>(scene, filter, threads)) {}
 CpuRenderer::CpuRenderer(CpuRenderer&&) noexcept = default;
 CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
@@ -98,7 +98,7 @@ const SceneTracer& CpuRenderer::tracer() const {
 void CpuRenderer::update(Threads threads) {
   impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);
-  impl_->detail.look_at_types(impl_->scene->types);
+  impl_->detail.update_types(impl_->scene->types);
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
@@ -108,7 +108,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  const PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->hidden, camera, options);
+  const PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->instances, camera, options);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, options.threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position);

@@ -14,7 +14,7 @@ using workloads::fail_unless;
 void picture(benchmark::State& state, const LightOptions& light, Threads threads = {1}) {
   static const Scene scene = workloads::picture_scene();
   fail_unless(scene.voxel_count() == workloads::kPictureVoxels, "the number of voxels", scene.voxel_count());
-  const CpuRenderer renderer(scene, false, {1});
+  const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   RenderOptions options;
   options.threads = threads;
   options.light = light;

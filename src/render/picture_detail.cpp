@@ -7,10 +7,10 @@
 namespace quoin {
 namespace {
 
-std::vector<SelectedInstance> select(const Scene& scene, bool hidden, const Camera& camera,
+std::vector<SelectedInstance> select(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options) {
   DetailPolicy policy = *options.detail;
-  policy.hidden = hidden;
+  policy.instances = filter;
   std::vector<SelectedInstance> selected;
   DetailSelector().select(scene, camera, options.width, options.height, policy, selected);
   return selected;
@@ -22,18 +22,18 @@ void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> se
   for (SelectedInstance& choice : selected) {
     if (next == far.end()) return;
     if (choice.instance != next->instance) continue;
-    choice.halvings = 0;
+    choice.level = 0;
     ++next;
   }
 }
 
 }  // namespace
 
-PictureDetail DetailChooser::choose(const Scene& scene, bool hidden, const Camera& camera,
+PictureDetail DetailChooser::choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                     const RenderOptions& options) {
   PictureDetail detail;
   if (!options.detail) return detail;
-  detail.selected = select(scene, hidden, camera, options);
+  detail.selected = select(scene, filter, camera, options);
   detail.far = take_far(scene, detail.selected, options);
   keep_whole(detail.far.instances, detail.selected);
   return detail;

@@ -23,17 +23,17 @@ struct PictureDetail {
 class DetailChooser {
  public:
   /// Nothing without RenderOptions::detail. Requires: nobody edits the scene meanwhile; it is always the same one.
-  [[nodiscard]] PictureDetail choose(const Scene& scene, bool hidden, const Camera& camera,
+  [[nodiscard]] PictureDetail choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options);
 
-  /// As ImpostorCache::look_at_types.
-  void look_at_types(const VoxelRegistry& types) { impostors_.look_at_types(types); }
+  /// As ImpostorCache::update_types.
+  void update_types(const VoxelRegistry& types) { impostors_.update_types(types); }
 
  private:
   [[nodiscard]] FarImpostors take_far(const Scene& scene, const std::vector<SelectedInstance>& selected,
                                       const RenderOptions& options);
 
-  ImpostorCache impostors_{{FarImpostors::kMostBytes}};
+  ImpostorCache impostors_{{FarImpostors::kMaxBytes}};
   std::mutex building_;  // impostors
 };
 

@@ -8,7 +8,7 @@
 namespace quoin {
 namespace {
 
-constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 
 Status check_camera(const Camera& camera) {
   const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
@@ -31,7 +31,7 @@ Status check_camera(const Camera& camera) {
 Status check(const Camera& camera, const RenderOptions& options) {
   const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
   if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
-  if (std::int64_t{options.width} * options.height > kMostPixels) {
+  if (std::int64_t{options.width} * options.height > kMaxPixels) {
     return refuse("size: more than 268,435,456 pixels");
   }
   if (std::isnan(options.impostor_seconds)) return refuse("impostor_seconds: must be a number");

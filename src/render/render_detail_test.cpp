@@ -129,7 +129,7 @@ int halvings_traced(const Model& model, const Camera& camera, const DetailPolicy
   std::vector<SelectedInstance> selected;
   DetailSelector().select(model.scene, camera, kEdge, kEdge, policy, selected);
   const SceneTracer tracer(model.scene);
-  return tracer.with_detail(selected).placed().at(0).halvings;
+  return tracer.with_detail(selected).placed().at(0).level;
 }
 
 // Of the pictures without detail and with it.

@@ -8,12 +8,12 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "light/glass.h"
 #include "light/lighting.h"
 #include "render/camera_rays.h"
 #include "render/impostor/pass.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 

@@ -95,7 +95,7 @@ void VulkanMeshRenderer::clear() {}
 Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPictureOptions&) {
   return refusal();
 }
-VulkanMeshRenderer::Facts VulkanMeshRenderer::facts() const {
+VulkanMeshRenderer::Stats VulkanMeshRenderer::stats() const {
   return {};
 }
 

@@ -205,12 +205,12 @@ Scene scattered_scene(std::mt19937_64& random) {
 }
 
 /// How far the scene's voxels reach to each side of the picture.
-Extent extent_of(const Camera& camera, double aspect, const Scene& scene, bool hidden_too) {
+Extent extent_of(const Camera& camera, double aspect, const Scene& scene, InstanceFilter filter) {
   Extent all;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid& grid = scene.grids()[instance.grid];
-    if (!instance.visible && !hidden_too) continue;
+    if (!passes(filter, instance)) continue;
     grid.grid.for_each([&](IVec3 voxel, VoxelType) {
       for (unsigned i = 0; i < 8; ++i) {
         const DVec3 corner = DVec3(voxel) + DVec3{i & 1U, i >> 1U & 1U, i >> 2U & 1U};
@@ -230,10 +230,10 @@ TEST(Camera, FramedScenesFillThePictureWithTheirVoxels) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 30; ++i) {
     const Scene scene = scattered_scene(random);
-    const bool hidden_too = i % 2 == 0;
+    const InstanceFilter filter = i % 2 == 0 ? InstanceFilter::All : InstanceFilter::Visible;
     for (const View view : kAllViews) {
       const double aspect = i % 3 == 0 ? 0.6 : 1.8;
-      const Extent extent = extent_of(frame_scene(scene, view, aspect, hidden_too), aspect, scene, hidden_too);
+      const Extent extent = extent_of(frame_scene(scene, view, aspect, filter), aspect, scene, filter);
       EXPECT_GT(extent.depth, 0.0);
       for (const double side : {extent.left, extent.right, extent.low, extent.high}) EXPECT_LE(side, 0.92 + 1e-6);
       EXPECT_TRUE(std::min(extent.left, extent.right) > 0.92 - 1e-6 || std::min(extent.low, extent.high) > 0.92 - 1e-6)

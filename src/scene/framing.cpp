@@ -67,12 +67,12 @@ double scan(const Candidate& candidate, double least) {
   return least;
 }
 
-double reach_of(const Scene& scene, bool hidden_too, DVec3 direction, DVec3 middle) {
+double reach_of(const Scene& scene, InstanceFilter filter, DVec3 direction, DVec3 middle) {
   std::vector<Candidate> candidates;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden_too) || !has_place(instance)) continue;
+    if (grid == nullptr || !passes(filter, instance) || !has_place(instance)) continue;
     add_candidates(instance, *grid, direction, middle, candidates);
   }
   std::sort(candidates.begin(), candidates.end(),
@@ -87,11 +87,11 @@ double reach_of(const Scene& scene, bool hidden_too, DVec3 direction, DVec3 midd
 
 }  // namespace
 
-Camera frame_scene(const Scene& scene, View view, double aspect, bool hidden_too) {
-  const DBox bounds = scene.bounds(hidden_too);
+Camera frame_scene(const Scene& scene, View view, double aspect, InstanceFilter filter) {
+  const DBox bounds = scene.bounds(filter);
   if (bounds.empty()) return frame_view(bounds, view, aspect);
   const DVec3 middle = bounds.min + 0.5 * (bounds.max - bounds.min);
-  const auto reach = [&](DVec3 direction) { return reach_of(scene, hidden_too, direction, middle); };
+  const auto reach = [&](DVec3 direction) { return reach_of(scene, filter, direction, middle); };
   return frame(middle, reach, view, aspect);
 }
 

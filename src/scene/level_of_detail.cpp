@@ -17,7 +17,7 @@ namespace {
 
 // As many as keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
-  static_assert(kCoarsestHalving == 4);
+  static_assert(kMaxGridLevel == 4);
   // Halves and doubles are exact: 16 sizes within the limit are one within its sixteenth.
   const double cell = policy.cell_pixels;
   return static_cast<int>(voxel_pixels <= 0.5 * cell) + static_cast<int>(voxel_pixels <= 0.25 * cell) +
@@ -47,7 +47,7 @@ class PixelScale {
 // What is chosen of an instance, and remembered until the next time.
 struct Choice {
   std::uint32_t generation = std::numeric_limits<std::uint32_t>::max();  // of the instance; none: nothing chosen yet
-  std::uint8_t halvings = 0;
+  std::uint8_t level = 0;
   Detail detail = Detail::Near;
 };
 
@@ -75,9 +75,9 @@ Choice chosen_by_pixels(const ScreenSize& size, const DetailPolicy& policy, cons
     if (choice.detail != Detail::Far) {
       choice.detail = std::clamp(last->detail, choice.detail, detail_by_pixels(smaller, policy));
     }
-    halvings = std::clamp<int>(last->halvings, halvings, halvings_for(smaller.voxel_pixels, policy));
+    halvings = std::clamp<int>(last->level, halvings, halvings_for(smaller.voxel_pixels, policy));
   }
-  choice.halvings = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
+  choice.level = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   return choice;
 }
 
@@ -124,7 +124,8 @@ struct DetailSelector::Impl {
 
   void look_at_grids(const Scene& scene);
   void look_at_grid(GridHandle handle, const SceneGrid& grid);
-  std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum, bool hidden);
+  std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum,
+                                          InstanceFilter filter);
   Choice choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
                 const DetailPolicy& policy);
 };
@@ -159,11 +160,11 @@ void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid
 // Instances are written before it is known whether they are seen: no processor guesses that (a tenth of the time).
 std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instances(const Scene& scene, DVec3 camera,
                                                                                     const Frustum& frustum,
-                                                                                    bool hidden) {
+                                                                                    InstanceFilter filter) {
   if (seen.size() < scene.instances().size()) seen.resize(scene.instances().size());
   std::size_t count = 0;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
-    if (instance.grid.index >= contents.size() || !(instance.visible || hidden)) return;
+    if (instance.grid.index >= contents.size() || !passes(filter, instance)) return;
     const Content& content = contents[instance.grid.index];
     const double voxel_size = instance.voxel_size;
     if (!content.is_there || content.generation != instance.grid.generation || !(voxel_size > 0.0)) return;
@@ -188,7 +189,7 @@ Choice DetailSelector::Impl::choose(InstanceHandle handle, const ScreenSize& siz
   } else {
     choice.detail = detail_by_radius(distance, radius, policy);
     const int halvings = std::max(halvings_for(size.voxel_pixels, policy), 1);
-    choice.halvings = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
+    choice.level = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   }
   choice.generation = handle.generation;
   last = choice;
@@ -207,11 +208,11 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
   impl_->look_at_grids(scene);
   const Frustum frustum(camera, width, height);
   const PixelScale pixels(camera, height);
-  for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.hidden)) {
+  for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.instances)) {
     const double distance = glm::length(seen.centre);
     const ScreenSize size = pixels.of(distance, seen.radius, seen.voxel_size);
     const Choice choice = impl_->choose(seen.instance, size, distance, seen.radius, policy);
-    out.push_back({seen.instance, choice.detail, choice.halvings, distance});
+    out.push_back({seen.instance, choice.detail, choice.level, distance});
   }
 }
 

@@ -136,14 +136,14 @@ TEST(LevelOfDetail, CellsSpanWhatThePolicyAllowsAndNotLessThanHalfOfIt) {
     ASSERT_EQ(selected.size(), 1U);
     const SelectedInstance& chosen = selected[0];
     const double pixels = 300.0 / std::tan(std::numbers::pi / 8) / (distance - radius);
-    const double cell = pixels * std::ldexp(1.0, chosen.halvings);
+    const double cell = pixels * std::ldexp(1.0, chosen.level);
     EXPECT_EQ(chosen.detail, pixels < 1.0 ? Detail::Mid : Detail::Near);
-    EXPECT_TRUE(chosen.halvings == 0 || cell <= policy.cell_pixels);
-    EXPECT_TRUE(chosen.halvings == kCoarsestHalving || 2.0 * cell > policy.cell_pixels);
-    EXPECT_GE(chosen.halvings, last);
-    last = chosen.halvings;
+    EXPECT_TRUE(chosen.level == 0 || cell <= policy.cell_pixels);
+    EXPECT_TRUE(chosen.level == kMaxGridLevel || 2.0 * cell > policy.cell_pixels);
+    EXPECT_GE(chosen.level, last);
+    last = chosen.level;
   }
-  EXPECT_EQ(last, kCoarsestHalving);
+  EXPECT_EQ(last, kMaxGridLevel);
 }
 
 TEST(LevelOfDetail, NothingVisibleIsCulled) {
@@ -195,7 +195,7 @@ TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
         const double distance = threshold * (1.0 + 0.02 * tremor(random));
         selector.select(scene, looking_at_origin(distance), 800, 600, policy, selected);
         ASSERT_EQ(selected.size(), 1U);
-        const int now = static_cast<int>(selected[0].detail) * 10 + selected[0].halvings;
+        const int now = static_cast<int>(selected[0].detail) * 10 + selected[0].level;
         changes += static_cast<int>(now != last);
         last = now;
       }
@@ -262,7 +262,7 @@ TEST(LevelOfDetail, LeavesOutHiddenEmptyAndImpossibleInstances) {
   ASSERT_EQ(selected.size(), 2U);
   EXPECT_EQ(selected[0].instance, all[0]);
   EXPECT_EQ(selected[1].instance, all[6]);
-  policy.hidden = true;
+  policy.instances = InstanceFilter::All;
   DetailSelector().select(scene, looking_at_origin(100), 80, 60, policy, selected);
   EXPECT_EQ(selected.size(), 3U);
 }

@@ -84,6 +84,9 @@ struct Scene::Book {
   void note(InstanceHandle handle, std::size_t keys) {
     journal.note(serials[handle.index], {Kind::Instance, handle.index, handle.generation}, keys);
   }
+  static void make_room(std::vector<std::uint64_t>& of, std::uint32_t index) {
+    if (index >= of.size()) of.resize(index + std::size_t{1});
+  }
   // `keys` are grids and instances: they share a journal.
   void collect(const SlotMap<SceneGrid>& grids, std::size_t keys) {
     notices.take(noticed);
@@ -119,9 +122,11 @@ Scene Scene::snapshot() const {
 }
 
 GridHandle Scene::add_grid(SceneGrid grid) {
+  // Whatever may throw comes first.
+  book_->notices.make_room(grids_.next_index());
+  Book::make_room(book_->grid_serials, grids_.next_index());
   const GridHandle handle = grids_.insert(std::move(grid));
   book_->journal.begin_change();
-  if (handle.index >= book_->grid_serials.size()) book_->grid_serials.resize(handle.index + std::size_t{1});
   book_->grid_serials[handle.index] = 0;  // records of another grid in this slot stay as they are
   book_->note(handle, grids_.size() + instances_.size());
   book_->notices.follow(grids_[handle].grid.notice_, handle.index);
@@ -129,9 +134,9 @@ GridHandle Scene::add_grid(SceneGrid grid) {
 }
 
 InstanceHandle Scene::add_instance(Instance instance) {
+  Book::make_room(book_->serials, instances_.next_index());
   const InstanceHandle handle = instances_.insert(std::move(instance));
   book_->journal.begin_change();
-  if (handle.index >= book_->serials.size()) book_->serials.resize(handle.index + std::size_t{1});
   book_->serials[handle.index] = 0;
   book_->note(handle, grids_.size() + instances_.size());
   return handle;
@@ -196,12 +201,12 @@ std::int64_t Scene::voxel_count() const {
   return count;
 }
 
-DBox Scene::bounds(bool hidden_too) const {
+DBox Scene::bounds(InstanceFilter filter) const {
   DBox box;
   for (const InstanceHandle handle : instances_.handles()) {
     const Instance& instance = instances_[handle];
     const SceneGrid* grid = grids_.find(instance.grid);
-    if (grid == nullptr || (!instance.visible && !hidden_too) || !has_place(instance)) continue;
+    if (grid == nullptr || !passes(filter, instance) || !has_place(instance)) continue;
     const IBox tight = grid->grid.bounds();
     if (tight.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {
@@ -211,6 +216,10 @@ DBox Scene::bounds(bool hidden_too) const {
     }
   }
   return box;
+}
+
+bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter) {
+  return passes(filter, instance) && scene.grids().find(instance.grid) != nullptr;
 }
 
 DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid) {

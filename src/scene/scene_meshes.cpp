@@ -42,10 +42,10 @@ class SharedProgress {
 };
 
 /// Errors: InvalidArgument, naming the first drawn instance that has no place.
-Status check_instances(const Scene& scene, bool hidden) {
+Status check_instances(const Scene& scene, InstanceFilter filter) {
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, hidden)) continue;
+    if (!is_drawn(scene, instance, filter)) continue;
     if (has_place(instance) && glm::length(instance.rotation) > 0.0) continue;
     return fail(ErrorCode::InvalidArgument,
                 "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
@@ -54,11 +54,11 @@ Status check_instances(const Scene& scene, bool hidden) {
 }
 
 /// The grids that drawn instances place, each once, in the order of their handles.
-std::vector<GridHandle> drawn_grids(const Scene& scene, bool hidden) {
+std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   std::vector<GridHandle> grids;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, hidden)) grids.push_back(instance.grid);
+    if (is_drawn(scene, instance, filter)) grids.push_back(instance.grid);
   }
   std::sort(grids.begin(), grids.end());
   grids.erase(std::unique(grids.begin(), grids.end()), grids.end());
@@ -66,11 +66,12 @@ std::vector<GridHandle> drawn_grids(const Scene& scene, bool hidden) {
 }
 
 /// A placement per drawn instance, in their order; `grids[i]` is part `i`.
-std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<GridHandle>& grids, bool hidden) {
+std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<GridHandle>& grids,
+                                         InstanceFilter filter) {
   std::vector<MeshPlacement> placements;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, hidden)) continue;
+    if (!is_drawn(scene, instance, filter)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
     const Similarity place{instance.position, instance.rotation, instance.voxel_size, instance.mirrored};
     placements.push_back({static_cast<std::size_t>(part), instance.name, place});
@@ -180,14 +181,10 @@ MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot) {
   return part;
 }
 
-bool is_drawn(const Scene& scene, const Instance& instance, bool hidden) {
-  return (instance.visible || hidden) && scene.grids().find(instance.grid) != nullptr;
-}
-
 Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options, Threads threads,
                                const Progress& progress) {
-  if (auto sound = check_instances(scene, options.hidden); !sound) return sound.error();
-  const std::vector<GridHandle> grids = drawn_grids(scene, options.hidden);
+  if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
+  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
   MeshResults results = mesh_all(scene, grids, options.mesh, threads, progress);
   for (const auto& result : results) {
     if (result && !*result) return result->error();
@@ -199,19 +196,19 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     add_stats(**results[i], meshes.stats);
     MeshPart& part = meshes.parts.emplace_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
     for (MeshView& view : part.surfaces) {
-      if (!options.mesh.occlusion) view.levels = {};
+      if (!options.mesh.occlusion) view.block_occlusion = {};
     }
   }
-  meshes.placements = placements_of(scene, grids, options.hidden);
+  meshes.placements = placements_of(scene, grids, options.instances);
   return meshes;
 }
 
 Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options, Threads threads,
                                         const Progress& progress) {
-  if (auto sound = check_instances(scene, options.hidden); !sound) return sound.error();
+  if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   SceneMeshes meshes;
-  const std::vector<GridHandle> grids = drawn_grids(scene, options.hidden);
-  std::vector<MeshPlacement> placements = placements_of(scene, grids, options.hidden);
+  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
+  std::vector<MeshPlacement> placements = placements_of(scene, grids, options.instances);
   std::ranges::stable_sort(placements, {}, &MeshPlacement::part);
   auto placement = placements.begin();
   for (std::size_t i = 0; i < grids.size(); ++i) {

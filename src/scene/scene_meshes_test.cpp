@@ -32,7 +32,7 @@ void place(Scene& scene, GridHandle grid, bool visible = true) {
   scene.add_instance(instance);
 }
 
-TEST(SceneMeshes, only_grids_of_drawn_instances_are_meshed_and_each_once) {
+TEST(SceneMeshes, OnlyGridsOfDrawnInstancesAreMeshedAndEachOnce) {
   Scene scene;
   const GridHandle twice = add_grid(scene, 3);
   const GridHandle hidden = add_grid(scene, 4);
@@ -50,13 +50,13 @@ TEST(SceneMeshes, only_grids_of_drawn_instances_are_meshed_and_each_once) {
   EXPECT_EQ(meshes->stats.quads, 6);
   EXPECT_EQ(meshes->stats.triangles, 12);
   EXPECT_EQ(meshes->stats.vertices, 24);
-  const auto all = mesh_scene(scene, {.hidden = true});
+  const auto all = mesh_scene(scene, {.instances = InstanceFilter::All});
   ASSERT_TRUE(all);
   EXPECT_EQ(all->stats.faces_total, 18 + 24);
   EXPECT_EQ(all->parts.size(), 2U) << "none of the grid that is placed nowhere";
 }
 
-TEST(SceneMeshes, instances_of_grids_that_are_gone_are_passed_over) {
+TEST(SceneMeshes, InstancesOfGridsThatAreGoneArePassedOver) {
   Scene scene;
   Instance lost;
   lost.grid = GridHandle{7, 0};
@@ -67,7 +67,7 @@ TEST(SceneMeshes, instances_of_grids_that_are_gone_are_passed_over) {
   EXPECT_TRUE(meshes->placements.empty());
 }
 
-TEST(SceneMeshes, progress_never_falls_and_ends_at_one) {
+TEST(SceneMeshes, ProgressNeverFallsAndEndsAtOne) {
   Scene scene;
   for (const int length : {3, 700, 30, 1000}) place(scene, add_grid(scene, length));
   std::vector<double> told;
@@ -81,7 +81,7 @@ TEST(SceneMeshes, progress_never_falls_and_ends_at_one) {
   EXPECT_NEAR(told.back(), 1.0, 1e-9);
 }
 
-TEST(SceneMeshes, a_listener_can_stop_the_work) {
+TEST(SceneMeshes, AListenerCanStopTheWork) {
   Scene scene;
   for (const int length : {3, 700}) place(scene, add_grid(scene, length));
   const auto meshes = mesh_scene(scene, {}, {}, [](double) { return false; });
@@ -89,7 +89,7 @@ TEST(SceneMeshes, a_listener_can_stop_the_work) {
   EXPECT_EQ(meshes.error().code, ErrorCode::Cancelled);
 }
 
-TEST(SceneMeshes, instances_without_a_place_are_refused) {
+TEST(SceneMeshes, InstancesWithoutAPlaceAreRefused) {
   const auto refuses = [](const std::function<void(Instance&)>& spoil) {
     Scene scene;
     place(scene, add_grid(scene, 1));
@@ -122,7 +122,7 @@ double distance_from_voxels(const Instance& instance, const SceneGrid& grid, DVe
   return nearest;
 }
 
-TEST(SmoothSceneMeshes, surfaces_lie_around_the_voxels_of_every_instance) {
+TEST(SmoothSceneMeshes, SurfacesLieAroundTheVoxelsOfEveryInstance) {
   Scene scene;
   const GridHandle grid = add_asymmetric(scene);
   std::mt19937 random(7);
@@ -154,7 +154,7 @@ TEST(SmoothSceneMeshes, surfaces_lie_around_the_voxels_of_every_instance) {
   }
 }
 
-TEST(SmoothSceneMeshes, are_the_same_at_any_thread_count_and_can_be_cancelled) {
+TEST(SmoothSceneMeshes, AreTheSameAtAnyThreadCountAndCanBeCancelled) {
   Scene scene;
   place(scene, add_asymmetric(scene));
   place(scene, add_grid(scene, 40));
@@ -174,14 +174,14 @@ TEST(SmoothSceneMeshes, are_the_same_at_any_thread_count_and_can_be_cancelled) {
     const MeshView& b = four->parts[i].surfaces[0];
     EXPECT_TRUE(std::ranges::equal(a.positions, b.positions));
     EXPECT_TRUE(std::ranges::equal(a.indices, b.indices));
-    EXPECT_TRUE(std::ranges::equal(a.openness, b.openness));
+    EXPECT_TRUE(std::ranges::equal(a.occlusion, b.occlusion));
   }
   const auto cancelled = mesh_scene_smoothly(scene, {}, {}, [](double) { return false; });
   ASSERT_FALSE(cancelled);
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(VolumeMeshes, simplifying_is_within_the_error_or_refused) {
+TEST(VolumeMeshes, SimplifyingIsWithinTheErrorOrRefused) {
   Volume ball;
   ball.size = {40, 40, 40};
   for (int i = 0; i < 40 * 40 * 40; ++i) {

@@ -28,16 +28,16 @@ TEST(Scene, WorldFromGridMirrorsThenTurnsAboutThePivot) {
 
 TEST(Scene, BoundsAreThoseOfWhatIsPlaced) {
   Scene scene;
-  EXPECT_TRUE(scene.bounds(true).empty());
+  EXPECT_TRUE(scene.bounds(InstanceFilter::All).empty());
   const GridHandle grid = scene.add_grid(box_grid({0, 0, 0}, {3, 1, 0}));
-  EXPECT_TRUE(scene.bounds(true).empty());
+  EXPECT_TRUE(scene.bounds(InstanceFilter::All).empty());
   scene.add_instance({"", grid, {10, 0, 0}, kQuarterTurnAboutY});
-  const DBox shown = scene.bounds(false);
+  const DBox shown = scene.bounds();
   EXPECT_EQ(shown.min, DVec3(10, 0, -4));
   EXPECT_EQ(shown.max, DVec3(11, 2, 0));
   scene.add_instance({"", grid, {0, 50, 0}, DQuat(1, 0, 0, 0), 1.0, false, false});
-  EXPECT_EQ(scene.bounds(false).max, shown.max);
-  EXPECT_EQ(scene.bounds(true).max.y, 52);
+  EXPECT_EQ(scene.bounds().max, shown.max);
+  EXPECT_EQ(scene.bounds(InstanceFilter::All).max.y, 52);
 }
 
 TEST(Scene, RemovingAGridRemovesItsInstances) {

@@ -29,7 +29,7 @@ constexpr float kFarHeight = kBand * kSteepest;
 // Cliffs, in parts of the world's height.
 constexpr double kAmplitude = 0.26;
 constexpr double kWavelength = 0.2;
-constexpr double kLargestNoise = 1.45;  // of both octaves together
+constexpr double kMaxNoise = 1.45;  // of both octaves together
 
 constexpr double kCaveAcross = 1.0 / 56.0;
 constexpr double kCaveUp = 1.0 / 38.0;
@@ -133,7 +133,7 @@ void SmoothColumn::Impl::measure_overhangs() {
 
 // Answers false where all is so far above or below the ground that caves alone can matter.
 bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
-  const auto most = static_cast<float>(largest_amplitude * kLargestNoise);
+  const auto most = static_cast<float>(largest_amplitude * kMaxNoise);
   const auto first = static_cast<float>(corner.y - 1);
   const auto last = static_cast<float>(corner.y + kChunkEdge);
   if (first - highest - most >= kFarHeight) return above.fill(kFarHeight), false;
@@ -163,7 +163,7 @@ bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
 // Answers whether a cave comes near the chunk.
 bool SmoothColumn::Impl::fill_caves(IVec3 corner) {
   if (!has_caves ||
-      static_cast<float>(corner.y) > highest + kFarHeight + static_cast<float>(largest_amplitude * kLargestNoise))
+      static_cast<float>(corner.y) > highest + kFarHeight + static_cast<float>(largest_amplitude * kMaxNoise))
     return false;
   const auto at = [](IVec3 p) { return DVec3{kCaveAcross * p.x, kCaveUp * p.y, kCaveAcross * p.z}; };
   lattice.fill(corner, [&](IVec3 p, std::size_t) { return noise3(land.seed() + kCaveA, at(p).x, at(p).y, at(p).z); });

@@ -1,9 +1,12 @@
 #include <quoin/terrain/smooth_terrain.h>
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
+
+#include <quoin/core/assert.h>
 
 #include "terrain/landform.h"
 #include "terrain/smooth_ground.h"
@@ -16,6 +19,12 @@ constexpr int kMaxUp = 16;
 constexpr int kMaxPlace = 1 << 19;
 constexpr int kUnitsPerChunk = kChunkEdge / kTerrainUnit;
 constexpr float kBand = 8.0F;
+
+// Whether those of a smooth world are all there, as add_terrain_types makes them.
+bool are_filled(const TerrainTypes& t) {
+  const VoxelType all[] = {t.grass, t.earth, t.stone, t.sand, t.snow};
+  return std::find(std::begin(all), std::end(all), kAir) == std::end(all);
+}
 
 Status check(const SmoothTerrainOptions& options) {
   const IVec3 size = options.size;
@@ -51,6 +60,8 @@ IBox samples_of(const IBox& chunks) {
 
 DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                            IVec3 chunk) {
+  QUOIN_ASSERT(check(options).has_value(), "sizes and places within their ranges");
+  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   const IBox chunks = chunks_of(options);
   if (!chunks.contains(chunk)) return DensityChunk(stored_density(kBand, kBand));
   const terrain::Landform land = landform_of(options);
@@ -60,6 +71,7 @@ DensityChunk generate_smooth_terrain_chunk(const SmoothTerrainOptions& options, 
 Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options, const TerrainTypes& types,
                                             Threads threads, const Progress& progress) {
   if (auto sound = check(options); !sound) return sound.error();
+  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   const terrain::Landform land = landform_of(options);
   const IBox chunks = chunks_of(options);
   const auto across = static_cast<std::size_t>(options.size.x);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "terrain/landform.h"
 
 namespace quoin {
@@ -262,6 +263,14 @@ TEST(SmoothTerrain, WhatCannotBeIsRefusedAndCancellingStops) {
   const auto cancelled =
       generate_smooth_terrain(options_of(1, {1, 1, 1}), world.types, {}, [](double) { return false; });
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+}
+
+TEST(SmoothTerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistakes) {
+  const World world;
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(options_of(1, {0, 1, 1}), world.types, {0, 0, 0}), "ranges");
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(options_of(1, {1, 1, 1}), {}, {0, 0, 0}),
+                       "add_terrain_types");
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain(options_of(1, {1, 1, 1}), {}), "add_terrain_types");
 }
 
 }  // namespace

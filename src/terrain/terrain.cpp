@@ -1,8 +1,11 @@
 #include <quoin/terrain/terrain.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
+
+#include <quoin/core/assert.h>
 
 #include "terrain/ground.h"
 #include "terrain/landform.h"
@@ -25,6 +28,13 @@ Status check(const TerrainOptions& options) {
     return fail(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
   }
   return {};
+}
+
+// Whether they are all there, as add_terrain_types makes them.
+bool are_filled(const TerrainTypes& t) {
+  const VoxelType all[] = {t.grass,  t.earth, t.stone,  t.sand,         t.snow,    t.water, t.meadow,
+                           t.gravel, t.trunk, t.leaves, t.young_leaves, t.needles, t.rock,  t.dark_stone};
+  return std::find(std::begin(all), std::end(all), kAir) == std::end(all);
 }
 
 IBox world_box(const TerrainOptions& options) {
@@ -113,6 +123,8 @@ Result<TerrainTypes> add_terrain_types(VoxelRegistry& types) {
 }
 
 Chunk generate_terrain_chunk(const TerrainOptions& options, const TerrainTypes& types, IVec3 chunk) {
+  QUOIN_ASSERT(check(options).has_value(), "sizes and places within their ranges");
+  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   if (!chunks_of(world_box(options)).contains(chunk)) return Chunk();
   const terrain::Landform land(options);
   return ColumnOfChunks(land, options, chunk.x, chunk.z).make(types, chunk.y);
@@ -121,6 +133,7 @@ Chunk generate_terrain_chunk(const TerrainOptions& options, const TerrainTypes& 
 Result<Grid> generate_terrain(const TerrainOptions& options, const TerrainTypes& types, Threads threads,
                               const Progress& progress) {
   if (auto sound = check(options); !sound) return sound.error();
+  QUOIN_ASSERT(are_filled(types), "types that add_terrain_types filled");
   const terrain::Landform land(options);
   const IBox chunks = chunks_of(world_box(options));
   const auto across = static_cast<std::size_t>(chunks.size().x);

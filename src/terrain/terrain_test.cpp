@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "terrain/landform.h"
 
 namespace quoin {
@@ -198,6 +199,13 @@ TEST(Terrain, CanBeCancelled) {
   const auto grid = generate_terrain(options_of(1, {4, 1, 4}), world.types, {}, [](double) { return false; });
   ASSERT_FALSE(grid.has_value());
   EXPECT_EQ(grid.error().code, ErrorCode::Cancelled);
+}
+
+TEST(TerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistakes) {
+  const World world;
+  QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {0, 1, 1}), world.types, {0, 0, 0}), "ranges");
+  QUOIN_EXPECT_MISTAKE((void)generate_terrain_chunk(options_of(1, {1, 1, 1}), {}, {0, 0, 0}), "add_terrain_types");
+  QUOIN_EXPECT_MISTAKE((void)generate_terrain(options_of(1, {1, 1, 1}), {}), "add_terrain_types");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 
 namespace quoin::trace {
@@ -15,7 +16,7 @@ bool counts(const VoxelRegistry& types, VoxelType type, Occupancy which) {
   return types.is_transparent(type) == (which == Occupancy::Transparent);
 }
 
-std::uint32_t index_of(const Chunk::Mixed& mixed, VoxelType type) {
+std::uint32_t index_of(const ChunkStorage& mixed, VoxelType type) {
   if (mixed.direct()) return type;
   return static_cast<std::uint32_t>(std::find(mixed.palette.begin(), mixed.palette.end(), type) -
                                     mixed.palette.begin());
@@ -44,7 +45,7 @@ ChunkRows::ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy w
   for (const VoxelType type : chunk.types()) (belongs(type) ? in_ : out_).push_back(type);
   const bool by_absence = out_.size() < in_.size();
   inverted_ = by_absence ? kAll : 0;
-  if (const Chunk::Mixed* mixed = chunk.mixed()) {
+  if (const ChunkStorage* mixed = chunk.storage()) {
     for (const VoxelType type : by_absence ? out_ : in_) asked_.push_back(index_of(*mixed, type));
   }
 }
@@ -54,11 +55,11 @@ bool ChunkRows::belongs(VoxelType type) const {
 }
 
 ChunkRows::Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
-  const Chunk::Mixed* mixed = chunk_->mixed();
+  const ChunkStorage* mixed = chunk_->storage();
   if (mixed == nullptr) return in_.empty() ? Slab::Empty : Slab::Full;
-  const std::uint32_t slab = mixed->slabs[Chunk::slab_index(y, z)];
-  if ((slab & Chunk::kUniformSlab) != 0) {
-    const std::uint32_t index = slab & ~Chunk::kUniformSlab;
+  const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(y, z)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) {
+    const std::uint32_t index = slab & ~ChunkStorage::kUniformSlab;
     const VoxelType type = mixed->direct() ? static_cast<VoxelType>(index) : mixed->palette[index];
     return belongs(type) ? Slab::Full : Slab::Empty;
   }

@@ -58,7 +58,7 @@ std::optional<Tool> tool_of(Command command) {
 
 void change_brush(Command command, Brush& brush) {
   if (command == Command::BrushSmaller) brush.radius = std::max(brush.radius - 1, 0);
-  if (command == Command::BrushLarger) brush.radius = std::min(brush.radius + 1, kLargestBrush);
+  if (command == Command::BrushLarger) brush.radius = std::min(brush.radius + 1, kMaxBrush);
   if (command != Command::BrushShape) return;
   brush.shape = brush.shape == BrushShape::Box ? BrushShape::Sphere : BrushShape::Box;
 }
@@ -216,7 +216,7 @@ void App::ask_for_picture() {
   request.shading = state_.settings.shading;
   request.wireframe = state_.settings.wireframe;
   // What was drawn before is another picture, however good.
-  if (!asked_ || !is_same(*asked_, request)) state_.facts.is_settled = false;
+  if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
   asked_ = request;
   state_.open.backend->show(request);
 }
@@ -225,8 +225,8 @@ void App::take_picture() {
   if (!state_.open.backend) return;
   if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
   take_fault();
-  const bool is_current = state_.facts.is_settled && state_.facts.width == state_.picture_place.w &&
-                          state_.facts.height == state_.picture_place.h;
+  const bool is_current = state_.stats.is_settled && state_.stats.width == state_.picture_place.w &&
+                          state_.stats.height == state_.picture_place.h;
   if (!is_current) return;
   if (is_screenshot_wanted_) save_screenshot();
   if (!options_.screenshot.empty() && is_running_) {
@@ -238,7 +238,7 @@ void App::take_picture() {
 void App::take_frame(ViewFrame frame) {
   const int width = frame.on_device ? frame.on_device->width() : frame.colour.width;
   const int height = frame.on_device ? frame.on_device->height() : frame.colour.height;
-  state_.facts = {width, height, frame.samples, frame.is_settled, frame.seconds, frame.rays};
+  state_.stats = {width, height, frame.samples, frame.is_settled, frame.seconds, frame.rays};
   if (Status taken = screen_->set_picture(frame); !taken) {
     screen_->forget_picture();
     state_.tell(taken.error());
@@ -279,7 +279,7 @@ void App::stand_in(const Error& why) {
   if (!other) return end_with(other.error());
   const double scale = gui_->scale();
   state_.picture = {};
-  state_.facts = {};
+  state_.stats = {};
   if (state_.open.backend) state_.open.backend->forget_device();
   gui_.reset();
   screen_ = std::move(*other);
@@ -349,8 +349,8 @@ void App::run_command(Command command) {
 void App::show_from(View view) {
   if (!state_.open.backend || !state_.has_picture_place()) return;
   const double aspect = static_cast<double>(state_.picture_place.w) / state_.picture_place.h;
-  const bool hidden = options_.load.hidden;
-  state_.camera.set(frame_scene(state_.scene(), view, aspect, hidden), state_.scene().bounds(hidden));
+  const InstanceFilter filter = options_.instances();
+  state_.camera.set(frame_scene(state_.scene(), view, aspect, filter), state_.scene().bounds(filter));
 }
 
 void App::pick_type() {

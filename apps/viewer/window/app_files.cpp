@@ -32,7 +32,7 @@ void App::run_file_command(Command command) {
       return leave({true, {}});
     case Command::Screenshot:
       if (state_.open.backend) is_screenshot_wanted_ = true;
-      if (!state_.facts.is_settled) state_.tell("the picture is saved once it is done");
+      if (!state_.stats.is_settled) state_.tell("the picture is saved once it is done");
       return;
     case Command::Save:
       if (!state_.can_edit()) return;
@@ -72,7 +72,7 @@ void App::load(const std::filesystem::path& path) {
     abandoned_.push_back(std::move(state_.loader));
   }
   DeviceBackendOptions backend;
-  backend.cpu = {options_.load.hidden, options_.threads, CpuBackendOptions{}.first_frame_seconds};
+  backend.cpu = {options_.instances(), options_.threads, CpuBackendOptions{}.first_frame_seconds};
   backend.rays_on_device = screen_->renderer() != nullptr;
   const auto make = [this, backend](const Document& document) -> std::unique_ptr<ViewBackend> {
     return std::make_unique<DeviceBackend>(
@@ -99,7 +99,7 @@ void App::adopt(OpenDocument opened) {
   state_.hover.reset();
   state_.open.backend.reset();  // before the document that it reads
   state_.open = std::move(opened);
-  state_.facts = {};
+  state_.stats = {};
   state_.picture = {};
   state_.message.reset();
   told_fault_.clear();
@@ -113,7 +113,7 @@ void App::adopt(OpenDocument opened) {
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (loaded.camera) {
-    state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.load.hidden));
+    state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.instances()));
   } else {
     show_from(View::Iso);
   }

@@ -8,7 +8,7 @@ namespace quoin::viewer {
 namespace {
 
 constexpr double kPixelsPerTouch = 4.0;  // of a brush that paints: fine enough to leave no gaps at usual distances
-constexpr int kMostTouches = 128;
+constexpr int kMaxTouches = 128;
 
 std::optional<SceneHit> pick_at(ViewState& state, double x, double y) {
   return state.open.backend->pick(state.camera.camera(), x, y, state.picture_place.w, state.picture_place.h);
@@ -46,7 +46,7 @@ void edit_paused(ViewState& state, Edit edit) {
   state.last_wait_seconds = pause.waited_seconds();
   state.longest_wait_seconds = std::max(state.longest_wait_seconds, pause.waited_seconds());
   pause.changed = edit(*state.open.document);
-  if (pause.changed) state.facts.is_settled = false;
+  if (pause.changed) state.stats.is_settled = false;
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ void Editing::begin(ViewState& state) {
 void Editing::go_on(ViewState& state) {
   const double length = std::hypot(to_.x - from_.x, to_.y - from_.y);
   const bool is_painting = state.open.document->stroke_brush()->action == BrushAction::Paint;
-  const int touches = is_painting ? std::clamp(static_cast<int>(length / kPixelsPerTouch), 1, kMostTouches) : 1;
+  const int touches = is_painting ? std::clamp(static_cast<int>(length / kPixelsPerTouch), 1, kMaxTouches) : 1;
   std::vector<std::optional<SceneHit>> hits;
   for (int touch = 1; is_painting && touch <= touches; ++touch) {
     const double share = static_cast<double>(touch) / touches;

@@ -15,7 +15,7 @@ namespace quoin::viewer {
 
 namespace {
 
-constexpr std::size_t kMostEntries = 5'000;
+constexpr std::size_t kMaxEntries = 5'000;
 
 std::string lower(std::string text) {
   for (char& c : text) {
@@ -59,7 +59,7 @@ void FileChooser::enter(const std::filesystem::path& folder) {
   std::error_code error;
   std::vector<Entry> found;
   for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    if (found.size() >= kMostEntries) break;
+    if (found.size() >= kMaxEntries) break;
     std::error_code odd;
     Entry entry{at->path().filename().string(), at->is_directory(odd), 0};
     if (entry.name.empty() || entry.name.front() == '.') continue;

@@ -89,7 +89,7 @@ void draw_new_colour(ViewState& state) {
   if (ImGui::Button("Add") && state.can_edit()) {
     const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround(value * 255.0F)); };
     const ScenePause pause(*state.open.backend);
-    state.facts.is_settled = false;
+    state.stats.is_settled = false;
     const auto type = state.open.document->type_of_colour({byte(colour[0]), byte(colour[1]), byte(colour[2]), 255});
     if (type) {
       state.brush.type = *type;
@@ -146,7 +146,7 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
   }
   int shape = static_cast<int>(state.brush.shape);
   if (ImGui::Combo("shape", &shape, "box\0sphere\0")) state.brush.shape = static_cast<BrushShape>(shape);
-  ImGui::SliderInt("radius", &state.brush.radius, 0, kLargestBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::SliderInt("radius", &state.brush.radius, 0, kMaxBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
   draw_palette(state);
   draw_new_colour(state);
   ImGui::SameLine();
@@ -246,19 +246,19 @@ void draw_light_part(ViewState& state) {
 
 void draw_statistics_part(const ViewState& state) {
   if (!heading("Statistics")) return;
-  const FrameFacts& facts = state.facts;
+  const FrameStats& stats = state.stats;
   row("frame", "%.1f ms", state.frame_seconds * 1e3);
-  row("picture", "%.1f ms", facts.seconds * 1e3);
+  row("picture", "%.1f ms", stats.seconds * 1e3);
   row("rays a second", "%.1f million",
-      facts.seconds > 0.0 ? static_cast<double>(facts.rays) / facts.seconds / 1e6 : 0.0);
-  row("samples a pixel", "%.0f", facts.samples);
+      stats.seconds > 0.0 ? static_cast<double>(stats.rays) / stats.seconds / 1e6 : 0.0);
+  row("samples a pixel", "%.0f", stats.samples);
   row("flight a second", "%.3g voxels", state.camera.speed());
   row("memory", "%.0f MB", resident_megabytes());
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
   row("last edit waited", "%.2f ms", state.last_wait_seconds * 1e3);
   row("longest so far", "%.2f ms", state.longest_wait_seconds * 1e3);
   if (state.open.backend) {
-    for (const auto& [what, value] : state.open.backend->facts()) {
+    for (const auto& [what, value] : state.open.backend->stats()) {
       ImGui::TextDisabled("%s", what.c_str());
       ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
       ImGui::TextUnformatted(value.c_str());

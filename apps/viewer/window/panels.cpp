@@ -108,10 +108,10 @@ std::string hover_text(const ViewState& state) {
 
 std::string picture_text(const ViewState& state) {
   if (!state.open.backend) return "";
-  const FrameFacts& facts = state.facts;
-  if (facts.is_settled) return "done";
-  if (facts.width < state.picture_place.w) return "drawing";
-  return "refining (" + std::to_string(facts.samples) + ")";
+  const FrameStats& stats = state.stats;
+  if (stats.is_settled) return "done";
+  if (stats.width < state.picture_place.w) return "drawing";
+  return "refining (" + std::to_string(stats.samples) + ")";
 }
 
 ImGuiWindowFlags bar_flags() {

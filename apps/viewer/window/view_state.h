@@ -28,8 +28,8 @@ struct Message {
   }
 };
 
-/// Facts about the picture that is shown.
-struct FrameFacts {
+/// Stats about the picture that is shown.
+struct FrameStats {
   int width = 0;
   int height = 0;
   int samples = 0;
@@ -60,7 +60,7 @@ struct ViewState {
   std::optional<SceneHit> hover;  ///< what is under the mouse
 
   ViewFrame picture;  ///< the last that arrived
-  FrameFacts facts;
+  FrameStats stats;
   double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
   double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop
   double last_wait_seconds = 0.0;

@@ -31,6 +31,10 @@ struct ViewerOptions {
   int height = 0;
   bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
   std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer
+
+  [[nodiscard]] InstanceFilter instances() const {
+    return load.show_hidden ? InstanceFilter::All : InstanceFilter::Visible;
+  }
 };
 
 /// Opens a window on a file and comes back when the user closes it.

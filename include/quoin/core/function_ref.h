@@ -9,24 +9,39 @@ namespace quoin {
 template <class Signature>
 class FunctionRef;
 
-/// A callable that somebody else owns, for the length of a call that takes it as an argument. Allocates nothing.
+/// A callable that somebody else owns, plain functions too, for the length of a call that takes it as an argument.
+/// Allocates nothing. Lifetime: the callable must outlive it.
 template <class Result, class... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:
   template <class Callable>
     requires(!std::is_same_v<std::remove_cvref_t<Callable>, FunctionRef> &&
              std::is_invocable_r_v<Result, Callable&, Arguments...>)
-  FunctionRef(Callable&& callable)  // NOLINT(bugprone-forwarding-reference-overload): not of a FunctionRef, see above
-      : callable_(const_cast<void*>(static_cast<const void*>(std::addressof(callable)))),
-        call_([](void* called, Arguments... arguments) -> Result {
-          return (*static_cast<std::remove_reference_t<Callable>*>(called))(std::forward<Arguments>(arguments)...);
-        }) {}
+  FunctionRef(Callable&& callable) {  // NOLINT(bugprone-forwarding-reference-overload): not of a FunctionRef, see above
+    using Called = std::remove_reference_t<Callable>;
+    if constexpr (std::is_function_v<Called>) {
+      callable_.function = reinterpret_cast<void (*)()>(&callable);
+      call_ = [](Place called, Arguments... arguments) -> Result {
+        return reinterpret_cast<Called*>(called.function)(std::forward<Arguments>(arguments)...);
+      };
+    } else {
+      callable_.object = const_cast<void*>(static_cast<const void*>(std::addressof(callable)));
+      call_ = [](Place called, Arguments... arguments) -> Result {
+        return (*static_cast<Called*>(called.object))(std::forward<Arguments>(arguments)...);
+      };
+    }
+  }
 
   Result operator()(Arguments... arguments) const { return call_(callable_, std::forward<Arguments>(arguments)...); }
 
  private:
-  void* callable_;
-  Result (*call_)(void*, Arguments...);
+  union Place {
+    void* object;
+    void (*function)();
+  };
+
+  Place callable_;
+  Result (*call_)(Place, Arguments...);
 };
 
 }  // namespace quoin

@@ -8,8 +8,8 @@ namespace quoin {
 /// The bits of an IEEE 754 half: 11 bits of precision, up to 65,504, down to 2^-24.
 using Half = std::uint16_t;
 
-inline constexpr float kLargestHalf = 65504.0F;
-inline constexpr float kSmallestHalf = 1.0F / 16777216.0F;
+inline constexpr float kMaxHalf = 65504.0F;
+inline constexpr float kMinHalf = 1.0F / 16777216.0F;
 
 /// Exact; infinities and NaN too.
 [[nodiscard]] constexpr float float_from_half(Half half) {

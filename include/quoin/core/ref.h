@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 
@@ -30,13 +31,13 @@ class RefCounted {
 template <class T>
 class Ref {
  public:
-  Ref() = default;
-  Ref(std::nullptr_t) {}
+  Ref() noexcept = default;
+  Ref(std::nullptr_t) noexcept {}
   /// Owns an object that has no owner yet, or shares it with its owners.
-  explicit Ref(T* object) : object_(object) { acquire(); }
-  Ref(const Ref& other) : object_(other.object_) { acquire(); }
+  explicit Ref(T* object) noexcept : object_(object) { acquire(); }
+  Ref(const Ref& other) noexcept : object_(other.object_) { acquire(); }
   Ref(Ref&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
-  Ref& operator=(const Ref& other) {
+  Ref& operator=(const Ref& other) noexcept {
     Ref(other).swap(*this);
     return *this;
   }
@@ -46,7 +47,7 @@ class Ref {
   }
   ~Ref() { reset(); }
 
-  void reset() {
+  void reset() noexcept {
     T* object = std::exchange(object_, nullptr);
     // Whoever is last sees what the others did before they went.
     if (object != nullptr && object->owners_.fetch_sub(1, std::memory_order_acq_rel) == 1) delete object;
@@ -67,7 +68,7 @@ class Ref {
   }
 
  private:
-  void acquire() const {
+  void acquire() const noexcept {
     if (object_ != nullptr) object_->owners_.fetch_add(1, std::memory_order_relaxed);
   }
 

@@ -31,28 +31,43 @@ template <class T>
 class SlotMap {
  public:
   SlotMap() = default;
-  SlotMap(SlotMap&&) noexcept = default;
-  SlotMap& operator=(SlotMap&&) noexcept = default;
+  /// Leaves the other empty; its handles name the elements here.
+  SlotMap(SlotMap&& other) noexcept
+      : pages_(std::exchange(other.pages_, {})),
+        free_(std::exchange(other.free_, {})),
+        count_(std::exchange(other.count_, 0)),
+        size_(std::exchange(other.size_, 0)) {}
+  SlotMap& operator=(SlotMap&& other) noexcept {
+    SlotMap taken(std::move(other));
+    std::swap(pages_, taken.pages_);
+    std::swap(free_, taken.free_);
+    std::swap(count_, taken.count_);
+    std::swap(size_, taken.size_);
+    return *this;
+  }
+  ~SlotMap() = default;
 
+  /// Errors: bad_alloc, and what moving a T throws; the map is then as it was.
   Handle<T> insert(T value) {
-    std::uint32_t index = count_;
-    if (!free_.empty()) {
-      index = free_.back();
-      free_.pop_back();
-    } else {
-      if (count_ % kPage == 0) pages_.push_back(std::make_unique<Page>());
-      ++count_;
-    }
+    const std::uint32_t index = next_index();
+    if (index / kPage == pages_.size()) pages_.push_back(std::make_unique<Page>());
     Slot& slot = slot_at(index);
     slot.value.emplace(std::move(value));
+    if (index == count_) {
+      ++count_;
+    } else {
+      free_.pop_back();
+    }
     ++size_;
     return {index, slot.generation};
   }
+  /// The slot that the next element is put into: Handle::index of what `insert` returns.
+  [[nodiscard]] std::uint32_t next_index() const { return free_.empty() ? count_ : free_.back(); }
 
   /// Returns false when the handle names nothing.
   bool remove(Handle<T> handle) {
     if (find(handle) == nullptr) return false;
-    free_.push_back(handle.index);
+    free_.push_back(handle.index);  // first, since it may throw
     Slot& slot = slot_at(handle.index);
     slot.value.reset();
     ++slot.generation;

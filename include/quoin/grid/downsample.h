@@ -8,27 +8,27 @@
 
 namespace quoin {
 
-/// The grid in cells of 2^3 voxels: voxel c of the answer stands for the voxels from 2 c to 2 c + 1.
+/// The grid in cells of 2^3 voxels: voxel c of the result stands for the voxels from 2 c to 2 c + 1.
 ///
 /// Solid:   a cell of which at least half is not air (4 voxels of 8). And what is thin: a cell with 2 or 3 voxels that
 ///          lie in both halves along some axis, where the next cell along that axis on either side is not empty and
 ///          none of the four cells beside it is solid by half. Of several such cells side by side the one with the
 ///          least coordinates counts, so that a rod one or two voxels wide becomes a rod one cell wide. So a cell that
-///          is added stands for at least 2 voxels, and none is added beside what is solid: the answer's volume is at
+///          is added stands for at least 2 voxels, and none is added beside what is solid: the result's volume is at
 ///          most 4 times the grid's.
 /// Type:    opaque types before transparent ones; of these the one with the greatest weight, a voxel weighing 1 and 8
 ///          more for every face that meets air (tuned on pictures of terrains); of equal ones the lower.
-/// Threads: the same answer at any number.
-/// Cost:    1.3 to 3 milliseconds a chunk of the answer, of caves and several types.
+/// Threads: the same result at any number.
+/// Cost:    1.3 to 3 milliseconds a chunk of the result, of caves and several types.
 [[nodiscard]] Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
 /// One chunk of `halved(grid, types)`: `chunk` is among its chunks.
 ///
-/// Reads the grid's chunks from 2 * chunk - 1 to 2 * chunk + 2: an edit of chunk c changes the answer's chunks from
+/// Reads the grid's chunks from 2 * chunk - 1 to 2 * chunk + 2: an edit of chunk c changes the result's chunks from
 /// (c - 1) / 2 to (c + 1) / 2, rounded down, and no others.
 [[nodiscard]] Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
-/// A grid's halvings, kept and brought up to date where the grid was edited.
+/// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was edited.
 ///
 /// Threads: any number may read; an update needs it to itself.
 class GridPyramid {
@@ -47,7 +47,7 @@ class GridPyramid {
 
   /// How many there are; none before the first update.
   [[nodiscard]] int levels() const;
-  /// The grid halved `level` times. The reference stays good as long as there are that many levels.
+  /// The grid halved `level` times. Lifetime: the pyramid owns it, until an update leaves fewer levels.
   ///
   /// Requires: 1 <= level <= levels().
   [[nodiscard]] const Grid& level(int level) const;

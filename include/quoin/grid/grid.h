@@ -77,8 +77,8 @@ class Grid {
   void put_chunk(IVec3 chunk, Chunk voxels);
   void clear();
 
-  /// Null where all is air. The pointer is good until the grid is edited; a copy of the chunk for as long as you like,
-  /// and costs no more.
+  /// Null where all is air. Lifetime: the grid owns the chunk, and its next edit may end it; a copy of the chunk costs
+  /// no more than the pointer and is the caller's own.
   [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const { return find_chunk(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] const Chunk* find_chunk(int x, int y, int z) const;
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
@@ -97,7 +97,7 @@ class Grid {
   /// The smallest box around all non-air voxels; empty when there are none. Cost: O(chunks) the first time, and after
   /// edits at its sides; otherwise O(chunks that changed).
   [[nodiscard]] IBox bounds() const;
-  /// Cost: O(chunks).
+  /// Voxels that are not air. Cost: O(1).
   [[nodiscard]] std::int64_t voxel_count() const;
   /// Types that occur, ascending. Cost: O(chunks).
   [[nodiscard]] std::vector<VoxelType> types() const;
@@ -130,7 +130,7 @@ class Grid {
 /// Reads many voxels that lie near each other: remembers the chunk of the last one, and unpacks a row that is
 /// read along x.
 ///
-/// Requires: the grid outlives the reader and is not edited meanwhile.
+/// Lifetime: the grid must outlive the reader, unedited.
 class GridReader {
  public:
   explicit GridReader(const Grid& grid) : grid_(&grid) {}
@@ -162,7 +162,7 @@ class GridReader {
   std::uint64_t row_yz_ = 0;
   std::array<VoxelType, kChunkEdge> row_{};
   const Chunk* chunk_ = nullptr;          // that of the last voxel read elsewhere than in the row
-  const Chunk::Mixed* voxels_ = nullptr;  // its voxels; null where they are all of `uniform_`
+  const ChunkStorage* voxels_ = nullptr;  // its voxels; null where they are all of `uniform_`
   VoxelType uniform_ = kAir;
   std::uint32_t unknown_ = ~std::uint32_t{0};  // 0 from the first read on
   int last_x_ = 0;
@@ -171,26 +171,11 @@ class GridReader {
   int reads_of_row_ = 0;
 };
 
-inline VoxelType GridReader::get_elsewhere(int x, int y, int z) {
-  const auto other_yz = static_cast<std::uint32_t>((y ^ last_y_) | (z ^ last_z_));
-  const std::uint32_t other = other_yz | static_cast<std::uint32_t>(x ^ last_x_) | unknown_;
-  if (other >= kChunkEdge) return get_in_other_chunk(x, y, z);
-  if (other_yz != 0) {
-    if (goes_on(x)) return get_in_new_row(x, y, z);
-    last_y_ = y;
-    last_z_ = z;
-    reads_of_row_ = 0;
-  } else if (++reads_of_row_ == kReadsAlongX) {
-    return get_in_new_row(x, y, z);
-  }
-  if (voxels_ == nullptr) return uniform_;
-  return voxels_->type(x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1));
-}
-
 /// Sets many voxels that lie near each other: collects those of a row of 64 along x and sets them in one edit when it
 /// comes to another row, when it is flushed, and at its end. Until then the grid is as it was.
 ///
-/// Requires: the grid outlives the writer; nobody reads it before a flush and expects what was set.
+/// Lifetime: the grid must outlive the writer.
+/// Requires: nobody reads the grid before a flush and expects what was set.
 /// Cost:     where voxels come in rows, a tenth of `Grid::set`; where every voxel lies in another row, more than that.
 class GridWriter {
  public:

@@ -10,11 +10,14 @@ namespace quoin {
 
 /// A chunk and its 26 neighbours: everything that meshing a chunk may read, in one object.
 ///
-/// A null chunk reads as air. The pointers are borrowed: they hold until the grid is edited.
+/// A null chunk reads as air.
+/// Lifetime: owns nothing; the grid must outlive it, and an edit of the grid ends it.
 struct Neighbourhood {
   /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]; the centre is 13.
   std::array<const Chunk*, 27> chunks{};
 
+  /// The offset of the chunk at an index: -1 to 1 on each axis.
+  [[nodiscard]] static IVec3 offset(int index) { return {index % 3 - 1, index / 3 % 3 - 1, index / 9 - 1}; }
   [[nodiscard]] static std::size_t index(int dx, int dy, int dz) {
     return static_cast<std::size_t>((dz + 1) * 9 + (dy + 1) * 3 + (dx + 1));
   }

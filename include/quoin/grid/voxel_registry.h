@@ -55,6 +55,9 @@ struct TypeChange {
 };
 using TypeChanges = Changes<TypeChange>;
 
+/// Whether any type blocks or lets through light otherwise than before, or may do so.
+[[nodiscard]] bool has_other_visibility(const TypeChanges& changes);
+
 /// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.
 ///
 /// Copies share what they hold until one of them is changed, as a Grid's snapshots do; a cursor that read one reads on

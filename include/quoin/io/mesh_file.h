@@ -33,7 +33,7 @@ struct MeshFileOptions {
 ///            transparent (blended, alpha in the palette), and emissive: texture times emissiveFactor times
 ///            KHR_materials_emissive_strength; strengths within a factor of two share a material and are scaled in the
 ///            texture, so that its 8 bits cost them at most one more bit.
-///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times openness, and one rough,
+///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo darkened by occlusion (times 1 - occlusion), and one rough,
 ///            opaque material.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after

@@ -25,9 +25,9 @@ struct LoadedScene {
 };
 
 struct LoadOptions {
-  bool hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
-  int frame = 0;        ///< which animation frame to take
-  Progress progress{};  ///< told after every model; once it returns false, the work is Cancelled
+  bool show_hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
+  int frame = 0;             ///< which animation frame to take
+  Progress progress{};       ///< told after every model; once it returns false, the work is Cancelled
 };
 
 /// MagicaVoxel's format, versions 150 and 200.

@@ -19,7 +19,7 @@ enum class OcclusionMode : std::uint8_t {
 /// What ambient occlusion darkens.
 enum class OcclusionAffects : std::uint8_t {
   Ambient,  ///< the ambient term only; lowest 0
-  All,      ///< everything, times 0.25 + 0.75 * openness
+  All,      ///< everything, times 1 - 0.75 * occlusion
 };
 
 /// How surfaces are lit; the same for every renderer.

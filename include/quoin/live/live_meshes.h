@@ -41,10 +41,10 @@ struct SurfaceUpdate {
 
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;
-  bool merge = true;                 ///< blocky: neighbouring faces become one quad
-  SmoothOcclusionOptions occlusion;  ///< of smooth surfaces
-  bool hidden = false;               ///< grids of instances that are not visible are meshed too
-  Threads threads;                   ///< workers; 0: one less than the machine has, at least one
+  bool merge = true;                                   ///< blocky: neighbouring faces become one quad
+  SmoothOcclusionOptions occlusion;                    ///< of smooth surfaces
+  InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
+  Threads threads;                                     ///< workers; 0: one less than the machine has, at least one
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
   /// room for more chunks. May be empty. It must not throw or call the meshes.
   std::function<void()> on_ready;
@@ -55,7 +55,8 @@ struct LiveMeshOptions {
 /// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only
 /// when an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was
 /// removed meanwhile are dropped.
-/// Threads: all calls come from one thread.
+/// Lifetime: the scene is only read within calls; surfaces belong to whoever took them.
+/// Threads:  all calls come from one thread.
 class LiveMeshes {
  public:
   /// Errors: std::system_error where the workers cannot be started.
@@ -85,13 +86,13 @@ class LiveMeshes {
   /// Errors: bad_alloc, also when workers' memory runs out for every chunk that is left.
   void finish(const Scene& scene, DVec3 eye);
 
-  struct Facts {
+  struct Stats {
     std::int64_t chunks_meshed = 0;     ///< in all
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
     double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
     std::int64_t out_of_memory = 0;     ///< times a worker's memory ran out; the chunk stays pending, to be tried again
   };
-  [[nodiscard]] Facts facts() const;
+  [[nodiscard]] Stats stats() const;
 
  private:
   struct Impl;

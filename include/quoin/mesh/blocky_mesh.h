@@ -23,9 +23,9 @@ inline constexpr std::size_t kSurfaceClasses = 4;
 
 /// Triangles of one surface class. The vertex arrays have one entry a vertex; no vertex is shared between faces.
 struct BlockyTriangles {
-  std::vector<Vec3> positions;        ///< grid coordinates, voxels
-  std::vector<Direction> directions;  ///< the face's normal
-  std::vector<std::uint8_t> levels;   ///< occlusion, 0 to 3
+  std::vector<Vec3> positions;          ///< grid coordinates, voxels
+  std::vector<Direction> directions;    ///< the face's normal
+  std::vector<std::uint8_t> occlusion;  ///< 0 (open) to 3 (dark)
   std::vector<VoxelType> types;
   std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise from outside
 };

@@ -8,29 +8,31 @@
 
 namespace quoin {
 
-/// Triangles of one surface of any mesh, borrowed, for whoever reads them without minding who made them. Arrays of
-/// vertices have one entry a vertex. A view is one of two kinds:
+/// Triangles of one surface of any mesh, for whoever reads them without minding who made them. Arrays of vertices have
+/// one entry a vertex. A view is one of two kinds:
 ///
-/// Blocks: `directions` and `types`, whose properties say how it looks, and `levels` unless there is no occlusion.
-/// Smooth: `normals` and `albedo`, and `openness` unless there is no occlusion.
+/// Blocks: `directions` and `types`, whose properties say how it looks, and `block_occlusion` unless there is no occlusion.
+/// Smooth: `normals` and `albedo`, and `occlusion` unless there is no occlusion.
+///
+/// Lifetime: owns nothing; the arrays must outlive it, unchanged.
 struct MeshView {
   std::span<const Vec3> positions;
   std::span<const std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from outside
 
   SurfaceClass surface = SurfaceClass::Opaque;
-  std::span<const Direction> directions;  ///< of the face
-  std::span<const VoxelType> types;       ///< of blocks
-  std::span<const std::uint8_t> levels;   ///< occlusion, 0 (open) to 3
+  std::span<const Direction> directions;          ///< of the face
+  std::span<const VoxelType> types;               ///< of blocks
+  std::span<const std::uint8_t> block_occlusion;  ///< 0 (open) to 3 (dark)
 
   std::span<const Vec3> normals;         ///< unit
   std::span<const LinearRgba16> albedo;  ///< without occlusion
-  std::span<const float> openness;       ///< 0 (dark) to 1
+  std::span<const float> occlusion;      ///< 0 (open) to 1 (dark)
 
   /// Whether it is of the smooth kind.
   [[nodiscard]] bool has_albedo() const { return !albedo.empty(); }
 };
 
-/// Requires: the mesh outlives the view, unchanged.
+/// Lifetime: the mesh must outlive the view, unchanged.
 [[nodiscard]] inline MeshView view_of(const BlockyTriangles& mesh, SurfaceClass surface) {
   MeshView view;
   view.positions = mesh.positions;
@@ -38,18 +40,18 @@ struct MeshView {
   view.surface = surface;
   view.directions = mesh.directions;
   view.types = mesh.types;
-  view.levels = mesh.levels;
+  view.block_occlusion = mesh.occlusion;
   return view;
 }
 
-/// Requires: likewise.
+/// Lifetime: likewise.
 [[nodiscard]] inline MeshView view_of(const SmoothMesh& mesh) {
   MeshView view;
   view.positions = mesh.positions;
   view.indices = mesh.indices;
   view.normals = mesh.normals;
   view.albedo = mesh.albedo;
-  view.openness = mesh.openness;
+  view.occlusion = mesh.occlusion;
   return view;
 }
 

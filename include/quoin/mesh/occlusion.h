@@ -11,7 +11,7 @@ namespace quoin {
 
 /// Occlusion of a face's four corners, each 0 (open) to 3 (dark), in the order (0,0) (1,0) (1,1) (0,1) of the
 /// direction's (u, v): counter-clockwise from outside.
-using FaceLevels = std::array<std::uint8_t, 4>;
+using FaceOcclusion = std::array<std::uint8_t, 4>;
 
 /// Occlusion level of one vertex from the three voxels that touch it in the layer in front of the face.
 ///
@@ -30,13 +30,13 @@ using FaceLevels = std::array<std::uint8_t, 4>;
 /// do not darken.
 ///
 /// Cost: 8 voxel look-ups; meshers do 64 faces at once instead.
-[[nodiscard]] FaceLevels face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
-                                        Direction direction);
+[[nodiscard]] FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
+                                           Direction direction);
 
 /// Whether to split a quad along corners 1-3, triangles (1,2,3) (0,1,3), instead of (0,1,2) (0,2,3).
 ///
 /// Keeps the brighter diagonal: flips when the levels of corners 0 and 2 add up to more than those of 1 and 3.
-[[nodiscard]] constexpr bool flips_diagonal(const FaceLevels& levels) {
+[[nodiscard]] constexpr bool flips_diagonal(const FaceOcclusion& levels) {
   return levels[0] + levels[2] > levels[1] + levels[3];
 }
 

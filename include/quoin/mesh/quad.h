@@ -13,14 +13,14 @@ namespace quoin {
 /// One merged face, packed into a word.
 ///
 /// bits 0-5 x, 6-11 y, 12-17 z of the lowest voxel it covers (chunk coordinates); 18-23 and 24-29 size along the
-/// direction's u and v, less one; 30-37 the four levels, corner 0 lowest; 38 diagonal flipped; 39-41 direction;
+/// direction's u and v, less one; 30-37 occlusion of the four corners, corner 0 lowest; 38 diagonal flipped; 39-41 direction;
 /// 42-57 type; the rest 0.
 struct Quad {
   std::uint64_t bits = 0;
 
   static constexpr int kSizeUShift = 18;
   static constexpr int kSizeVShift = 24;
-  static constexpr int kLevelsShift = 30;
+  static constexpr int kOcclusionShift = 30;
   static constexpr int kFlipShift = 38;
   static constexpr int kDirectionShift = 39;
   static constexpr int kTypeShift = 42;
@@ -33,11 +33,11 @@ struct Quad {
   [[nodiscard]] Direction direction() const { return static_cast<Direction>(field(kDirectionShift, 7)); }
   [[nodiscard]] VoxelType type() const { return static_cast<VoxelType>(field(kTypeShift, 0xFFFF)); }
   [[nodiscard]] bool flipped() const { return field(kFlipShift, 1) != 0; }
-  [[nodiscard]] FaceLevels levels() const { return {level(0), level(1), level(2), level(3)}; }
-  [[nodiscard]] std::uint8_t level(int corner) const {
-    return static_cast<std::uint8_t>(field(kLevelsShift + 2 * corner, 3));
+  [[nodiscard]] FaceOcclusion occlusion() const { return {occlusion(0), occlusion(1), occlusion(2), occlusion(3)}; }
+  [[nodiscard]] std::uint8_t occlusion(int corner) const {
+    return static_cast<std::uint8_t>(field(kOcclusionShift + 2 * corner, 3));
   }
-  /// Position of a corner (0..3, as in FaceLevels) in chunk coordinates, 0..64.
+  /// Position of a corner (0..3, as in FaceOcclusion) in chunk coordinates, 0..64.
   [[nodiscard]] IVec3 corner(int index) const {
     const FaceFrame& frame = frame_of(direction());
     IVec3 p = voxel();

@@ -11,9 +11,9 @@ namespace quoin {
 ///
 /// Error:    the root mean square distance, in samples, of a vertex from the planes of all triangles that it stands
 ///           for, as meshoptimizer estimates it; single points of the surface may be some times farther off.
-/// Kept:     vertices that stay keep position, normal, openness, albedo and type. A closed mesh stays closed.
+/// Kept:     vertices that stay keep position, normal, occlusion, albedo and type. A closed mesh stays closed.
 /// Order:    the same bytes on every run.
-/// Requires: arrays of one length (but for empty openness), indices that name vertices, finite positions.
+/// Requires: arrays of one length (but for empty occlusion), indices that name vertices, finite positions.
 /// Errors:   InvalidArgument when the error is not a number of at least 0; Unsupported in builds without meshoptimizer.
 ///           The mesh is as before then.
 /// Cost:     about a microsecond a triangle, on one thread.

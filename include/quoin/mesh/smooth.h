@@ -10,10 +10,11 @@
 
 namespace quoin {
 
-/// How the light that reaches a vertex is estimated from 3x3x3 samples of the field around it.
+/// How the occlusion of a vertex is estimated from 3x3x3 samples of the field around it: 0 where all is open, 1 where all
+/// is solid.
 enum class SmoothOcclusion : std::uint8_t {
   None,
-  Openness,           ///< the share of the samples that are in air
+  SolidShare,         ///< the share of the samples that are solid
   Weighted,           ///< how deep the samples lie in the solid, against the deepest, or `spread` if that is more
   WeightedPublished,  ///< against the deepest alone: jumps where a sample turns slightly solid
 };
@@ -22,18 +23,18 @@ enum class SmoothOcclusion : std::uint8_t {
 /// as large, one level coarser, is as dark.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
-/// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 1. Weighted forms:
-/// clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest end,
+/// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted forms:
+/// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest end,
 /// NaN as the default.
 struct SmoothOcclusionOptions {
-  SmoothOcclusion form = SmoothOcclusion::Openness;
+  SmoothOcclusion form = SmoothOcclusion::SolidShare;
   float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2; 1 and 2 are several times faster than others
   float offset = 0.4F;  ///< of the weighted forms: 0 to 0.99
   float power = 2.0F;   ///< of the weighted forms: 1/16 to 64
 };
 
 /// How far, in samples of level 0, a vertex may read: an edit that is farther than this from a chunk leaves its mesh as
-/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at, 0 to kCoarsestLevel; others
+/// it was. `coarsest_level` is the coarsest that the chunk or a neighbour is meshed at, 0 to kMaxSmoothLevel; others
 /// count as the nearest of these.
 [[nodiscard]] int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level = 0);
 
@@ -44,7 +45,7 @@ enum class SmoothBorder : std::uint8_t {
 };
 
 /// The coarsest level of detail: cells of 8 samples.
-inline constexpr int kCoarsestLevel = 3;
+inline constexpr int kMaxSmoothLevel = 3;
 
 struct SmoothOptions {
   SmoothOcclusionOptions occlusion;
@@ -53,7 +54,7 @@ struct SmoothOptions {
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
   bool split_sheets = false;
   /// Level of detail of the chunk and its neighbours, indexed as a neighbourhood: cells are 2^level samples wide, and
-  /// meshes of different levels meet without a gap. 0 to kCoarsestLevel; more counts as that.
+  /// meshes of different levels meet without a gap. 0 to kMaxSmoothLevel; more counts as that.
   std::array<std::uint8_t, 27> levels{};
 };
 
@@ -83,7 +84,7 @@ struct SmoothChunkMesh {
   Buffer<Vec3> positions;         ///< samples of level 0, origin at the chunk's sample (0, 0, 0); exact multiples of
                                   ///< 2^(level - 16)
   Buffer<Vec3> normals;           ///< unit, into the air
-  Buffer<float> openness;         ///< 0 (dark) to 1; empty without occlusion
+  Buffer<float> occlusion;        ///< 0 (open) to 1 (dark); empty without occlusion
   Buffer<SmoothCell> cells;       ///< where each vertex lies
   Buffer<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from the air
 

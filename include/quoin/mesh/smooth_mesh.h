@@ -22,7 +22,7 @@ using LinearRgba16 = std::array<std::uint16_t, 4>;
 struct SmoothMesh {
   std::vector<Vec3> positions;         ///< the field's coordinates, in samples
   std::vector<Vec3> normals;           ///< unit, into the air
-  std::vector<float> openness;         ///< 0 (dark) to 1; empty without occlusion
+  std::vector<float> occlusion;        ///< 0 (open) to 1 (dark); empty without occlusion
   std::vector<LinearRgba16> albedo;    ///< mean of the materials of the cell's solid samples (of coarse cells: of those
                                        ///< next to the surface), without occlusion
   std::vector<VoxelType> types;        ///< the material of most of these samples; of several, the least
@@ -32,7 +32,7 @@ struct SmoothMesh {
 struct SmoothMeshOptions {
   SmoothOcclusionOptions occlusion;
   bool split_sheets = true;  ///< as in SmoothOptions
-  /// The level of detail of a chunk, 0 to kCoarsestLevel; empty: 0 everywhere. Asked once a chunk, from the calling
+  /// The level of detail of a chunk, 0 to kMaxSmoothLevel; empty: 0 everywhere. Asked once a chunk, from the calling
   /// thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of;
 };

@@ -56,12 +56,12 @@ struct Picture {
 /// Solid:       from inside an opaque voxel everything is that voxel's own colour, unlit.
 ///
 /// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.
-/// Threads: any number may take pictures at once.
+/// Lifetime: the scene must outlive it, in its place; after an edit of the scene `update` comes before anything else.
+/// Threads:  any number may take pictures at once.
 class CpuRenderer {
  public:
-  /// Copies nothing of the voxels but what traversal and shading need; `scene` must outlive it in its place, and after
-  /// an edit be taken over with `update`. Instances that are not visible are left out unless `hidden`.
-  CpuRenderer(const Scene& scene, bool hidden = false, Threads threads = {});
+  /// Copies nothing of the voxels but what traversal and shading need. Draws the instances that `filter` lets pass.
+  CpuRenderer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
   CpuRenderer(CpuRenderer&&) noexcept;
   CpuRenderer& operator=(CpuRenderer&&) noexcept;
   ~CpuRenderer();

@@ -1,13 +1,9 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
-#include <vector>
 
-#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
@@ -21,46 +17,6 @@ namespace quoin {
 /// Directions from which an impostor is seen: the faces +X -X +Y -Y +Z -Z; the edges, for a in (-1, 1), for b in
 /// (-1, 1): (a,b,0), (a,0,b), (0,a,b); the corners, x outermost, then y, z, each -1 then 1.
 inline constexpr int kImpostorViews = 26;
-
-/// The unit vector from the content's centre towards the snapshot's camera, in the grid's own frame.
-/// Requires: 0 <= index < kImpostorViews.
-[[nodiscard]] DVec3 impostor_view(int index);
-
-/// The view whose direction has the largest dot product with `direction` (of any length), the first one on ties; at
-/// most about 27.57 degrees away. None when `direction` is zero or not finite.
-[[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
-
-/// From where a snapshot is taken, in the grid's frame: a pinhole at `position` that looks at the content's centre.
-struct SnapshotCamera {
-  DVec3 position{0.0};
-  DVec3 right{1.0, 0.0, 0.0};
-  DVec3 up{0.0, 1.0, 0.0};
-  DVec3 forward{0.0, 0.0, -1.0};
-  double focal = 1.0;     ///< in texels: the content's sphere just fits the snapshot
-  double reach = 1.0;     ///< R: the radius of the content, at least 1 voxel
-  double distance = 8.0;  ///< from the content's centre: 8 R
-
-  /// Half the side of the square at the content's centre that the snapshot shows, in voxels.
-  [[nodiscard]] double half_size() const;
-};
-
-/// Upright along the grid's +Y; along its +X where the view is within 8 degrees of the Y axis.
-[[nodiscard]] SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge);
-
-/// One view of a grid's opaque voxels: what each texel sees, rows from the top. A texel whose type is air saw nothing;
-/// its depth is infinite.
-struct Snapshot {
-  SnapshotCamera camera;
-  int edge = 0;                         ///< texels a side
-  std::vector<VoxelType> types;         ///< coverage of its own: a black voxel is no hole
-  std::vector<Direction> faces;         ///< of the voxel seen
-  std::vector<std::uint8_t> occlusion;  ///< that a blocky mesh's vertices give there: 0 open, 255 dark
-  std::vector<float> depth;             ///< voxels, Euclidean, from the snapshot's camera
-};
-
-/// Requires: `opaque` is the grid's tree of opaque voxels; 0 <= view < kImpostorViews; 1 <= edge <= 4096.
-[[nodiscard]] Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                                     int view, int edge = 128);
 
 struct ImpostorFaces;
 
@@ -98,6 +54,7 @@ class Impostor {
   [[nodiscard]] const IBox& box() const { return box_; }
   [[nodiscard]] bool is_empty() const { return box_.empty(); }
   [[nodiscard]] std::size_t bytes() const;
+  /// What it holds, laid out as is best for the library's own kernels.
   [[nodiscard]] const ImpostorFaces& faces() const { return *faces_; }
 
  private:
@@ -106,7 +63,7 @@ class Impostor {
   std::shared_ptr<const ImpostorFaces> faces_;
 };
 
-/// An instance that is drawn by its grid's impostor.
+/// An instance that is drawn by its grid's impostor. Lifetime: the impostor must outlive it.
 struct FarInstance {
   InstanceHandle instance;
   const Impostor* impostor = nullptr;

@@ -11,10 +11,10 @@
 namespace quoin {
 
 struct ImpostorCacheOptions {
-  std::size_t most_bytes = std::size_t{1} << 30;  ///< of the impostors that are held
+  std::size_t max_bytes = std::size_t{1} << 30;  ///< of the impostors that are held
 };
 
-struct ImpostorCacheStatistics {
+struct ImpostorCacheStats {
   std::size_t held = 0;     ///< impostors
   std::size_t bytes = 0;    ///< of these
   std::size_t waiting = 0;  ///< grids that were asked for and are yet to be built, or built anew
@@ -28,11 +28,12 @@ struct ImpostorCacheStatistics {
 ///   ...
 ///   cache.build_some(scene, 0.002);  // once a frame
 ///
-/// An edit of a grid, or another in its place, asks for a new impostor; the old one is answered until that is ready.
-/// When there is no room, the ones that were asked for longest ago are dropped; whoever holds one keeps it alive. What
+/// An edit of a grid, or another in its place, asks for a new impostor; the old one is returned until that is ready.
+/// When there is no room, the ones that were asked for longest ago are dropped. What
 /// is asked for within one round, up to the end of a `build_some`, is never dropped for something else of that round,
 /// which then has none.
-/// Threads: any number may call `find`, `statistics` and `build_some` at once, as long as nobody edits the scene
+/// Lifetime: shares impostors with whoever was given one; the scene is only read within calls.
+/// Threads: any number may call `find`, `stats` and `build_some` at once, as long as nobody edits the scene
 ///          meanwhile. One that finds nothing waiting does not wait for what others are building.
 class ImpostorCache {
  public:
@@ -50,11 +51,11 @@ class ImpostorCache {
   /// Cost: the time of one impostor beyond the budget, times one for each thread at most.
   std::size_t build_some(const Scene& scene, double budget_seconds, Threads threads = {1});
 
-  /// Has impostors built anew when types became transparent or opaque since they were; `build_some` does it as well.
+  /// Has impostors built anew where types became transparent or opaque since they were; `build_some` does it as well.
   /// Cost: O(types that changed).
-  void look_at_types(const VoxelRegistry& types);
+  void update_types(const VoxelRegistry& types);
 
-  [[nodiscard]] ImpostorCacheStatistics statistics() const;
+  [[nodiscard]] ImpostorCacheStats stats() const;
 
  private:
   struct Impl;

@@ -16,7 +16,7 @@ namespace quoin {
 
 enum class MeshShading : std::uint8_t {
   Lit,        ///< colours in the reference model of light, without shadows
-  Occlusion,  ///< the openness alone, in grey: a pixel's byte is 255 times it
+  Occlusion,  ///< occlusion alone, in grey: a pixel's byte is 255 (1 - occlusion)
   Normals,    ///< in colours: bytes are 255 (0.5 + 0.5 n), in the world
 };
 
@@ -47,7 +47,9 @@ struct MeshPictureOptions {
 ///        their types; and so is glass where values are shown instead of colours.
 /// Far:   what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
 ///        1/1024 of a voxel is cut off.
-/// Must not outlive the renderer it was made for. Threads: that renderer's. Errors: as there.
+/// Lifetime: the renderer it was made for must outlive it.
+/// Threads:  that renderer's.
+/// Errors:   as there.
 class VulkanMeshRenderer {
  public:
   /// Errors: Unsupported when the device's queue draws no triangles.
@@ -57,7 +59,7 @@ class VulkanMeshRenderer {
   ~VulkanMeshRenderer();
 
   /// Takes over instances and types. Cost: O(instances + types).
-  [[nodiscard]] Status update(const Scene& scene, bool hidden = false);
+  [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
   /// Takes over surfaces; of one chunk the last. Cost: the upload of these.
   /// Errors also: InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
   /// error some surfaces may have been taken over, and the others are what they were.
@@ -69,13 +71,13 @@ class VulkanMeshRenderer {
   /// wireframes where the device has no lines. After an error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
 
-  struct Facts {
+  struct Stats {
     std::size_t chunks = 0;            ///< with a surface
     std::int64_t triangles = 0;        ///< in memory, each once
     std::int64_t drawn_triangles = 0;  ///< of the last picture, after leaving out chunks beside it
     std::size_t bytes = 0;             ///< of surfaces, in device memory
   };
-  [[nodiscard]] Facts facts() const;
+  [[nodiscard]] Stats stats() const;
 
  private:
   struct Impl;

@@ -12,7 +12,8 @@ class VulkanRenderer;
 
 /// A picture that stays in device memory: drawn by the renderers of one device, shown by VulkanWindow, or read.
 ///
-/// Must not outlive the renderer it was made for. Threads: that renderer's.
+/// Lifetime: the renderer it was made for must outlive it.
+/// Threads:  that renderer's.
 class VulkanPicture {
  public:
   /// Of no size yet: whoever draws it decides.

@@ -72,12 +72,13 @@ class VulkanRenderer {
   [[nodiscard]] const VulkanDevice& device() const;
 
   /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards but for levels of detail
-  /// (see above). Instances that are not visible are left out unless `hidden`.
+  /// (see above). Draws the instances that `filter` lets pass.
   ///
-  /// What changed is told by the identities of grids and the versions of chunks; it may be another scene each time.
+  /// What changed the journals of the scene and its grids tell; it may be another scene each time.
   /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
   /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels; then the device holds nothing.
-  [[nodiscard]] Status update(const Scene& scene, bool hidden = false, Threads threads = {});
+  [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
+                              Threads threads = {});
   /// Bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 

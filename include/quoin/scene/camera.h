@@ -6,11 +6,10 @@
 
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/scene/scene.h>
 #include <quoin/trace/ray.h>
 
 namespace quoin {
-
-class Scene;
 
 /// Where a picture is taken from. `right`, `up` and `forward` are unit and perpendicular; right-handed, so
 /// right = forward x up.
@@ -52,9 +51,10 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 [[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);
 
 /// As `frame_view`, but for the voxels themselves: closer, since boxes have corners where often nothing is.
-/// Hidden instances count when `hidden_too`.
+/// Of the instances that `filter` lets pass.
 ///
 /// Cost: O(instances * chunks of their grids), and the voxels of the few chunks that touch the picture's margin.
-[[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect, bool hidden_too = false);
+[[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect,
+                                 InstanceFilter filter = InstanceFilter::Visible);
 
 }  // namespace quoin

@@ -41,10 +41,10 @@ struct DetailPolicy {
   /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9 (docs/decisions/026).
   double cell_pixels = 0.4;
   int far_pixels = 128;  ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
-  /// ByPixels: a level is left only once the measure is beyond its threshold by this share. 0: no memory of the last
+  /// ByPixels: a detail is left only once the measure is beyond its threshold by this share. 0: no memory of the last
   /// choice.
   double hysteresis = 0.1;
-  bool hidden = false;  ///< instances that are not visible are chosen too
+  InstanceFilter instances = InstanceFilter::Visible;  ///< of which it is chosen
 };
 
 /// By the distance between camera and content centre, in the units of `radius`. R = 0: Near at distance 0, else Far;
@@ -63,17 +63,18 @@ struct ScreenSize {
 struct SelectedInstance {
   InstanceHandle instance;
   Detail detail = Detail::Near;
-  /// How often the grid is to be halved where it is traced (1: cells of 2^3 voxels), 0 to kCoarsestHalving. Near: 0.
+  /// The level at which the grid is to be traced: cells of (2^level)^3 voxels, 0 to kMaxGridLevel. Near: 0.
   /// Mid: by DetailPolicy::cell_pixels; ByRadius at least 1. Far: what stands in for the voxels in shadows and the
   /// like.
-  int halvings = 0;
+  int level = 0;
   double distance = 0.0;  ///< from the camera to the content's centre, world units
 };
 
-/// Grids are halved at most this often.
-inline constexpr int kCoarsestHalving = 4;
+/// The coarsest level at which grids are traced.
+inline constexpr int kMaxGridLevel = 4;
 
 /// Chooses what is drawn, and how; remembers the last choice of each instance (hysteresis) and each grid's content.
+/// Lifetime: the scene is only read within calls.
 class DetailSelector {
  public:
   DetailSelector();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -42,6 +43,14 @@ struct Instance {
 };
 
 using InstanceHandle = Handle<Instance>;
+
+/// Which instances a function looks at.
+enum class InstanceFilter : std::uint8_t { Visible, All };
+
+/// Whether an instance is among those of a filter.
+[[nodiscard]] inline bool passes(InstanceFilter filter, const Instance& instance) {
+  return filter == InstanceFilter::All || instance.visible;
+}
 
 /// What changed in a scene; in the order of the handles, each once. Those that were removed are among them: they name
 /// nothing.
@@ -100,8 +109,8 @@ class Scene {
   [[nodiscard]] std::int64_t voxel_count() const;
 
   /// The box around the tight bounds of every placed grid, in world units; empty when nothing is placed.
-  /// Hidden instances count when `hidden_too`.
-  [[nodiscard]] DBox bounds(bool hidden_too) const;
+  /// Of the instances that `filter` lets pass.
+  [[nodiscard]] DBox bounds(InstanceFilter filter = InstanceFilter::Visible) const;
 
  private:
   struct Book;
@@ -109,6 +118,9 @@ class Scene {
   SlotMap<Instance> instances_;
   std::unique_ptr<Book> book_;
 };
+
+/// Whether an instance is drawn: its grid exists, and `filter` lets it pass.
+[[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
 
 /// A point of the instance's grid (voxels) in the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);

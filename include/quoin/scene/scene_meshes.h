@@ -43,7 +43,7 @@ struct MeshPart {
   std::string name;
   std::vector<MeshView> surfaces{};     ///< all of one kind; may be none
   DVec3 pivot{0.0};                     ///< the point that placements take to their translation
-  std::shared_ptr<const void> owner{};  ///< of the arrays that `surfaces` shows; null where someone else keeps them
+  std::shared_ptr<const void> owner{};  ///< of the arrays of `surfaces`; null: they must outlive the part
 };
 
 /// A part that owns its mesh. Surfaces without a triangle are left out.
@@ -69,12 +69,9 @@ struct SceneMeshes {
   MeshStats stats;
 };
 
-/// Whether an instance is drawn: its grid exists, and it is visible or hidden ones are asked for.
-[[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, bool hidden);
-
 struct BlockySceneOptions {
   BlockyMeshOptions mesh{};
-  bool hidden = false;  ///< whether instances that are not visible count as drawn
+  InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
@@ -89,7 +86,7 @@ struct BlockySceneOptions {
 struct SmoothSceneOptions {
   SmoothMeshOptions mesh{};
   std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
-  bool hidden = false;                    ///< whether instances that are not visible count as drawn
+  InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
 };
 
 /// Likewise, with smooth surfaces around the voxels, as field_from_grid and build_smooth_mesh make them. Placements are

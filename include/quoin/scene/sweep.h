@@ -29,7 +29,7 @@ struct SweepHit {
 struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
-  int most_contacts = 5;   ///< after which what is left of the displacement is dropped
+  int max_contacts = 5;    ///< after which what is left of the displacement is dropped
   bool pushes_out = true;  ///< a box that starts inside is moved out first
 };
 

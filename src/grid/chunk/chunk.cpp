@@ -8,6 +8,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/content_hash.h"
 #include "grid/chunk/packed_row.h"
 
@@ -15,14 +16,6 @@ namespace quoin {
 namespace {
 
 constexpr std::uint64_t kAllVoxels = ~std::uint64_t{0};
-constexpr int kSlabRows = 16;
-
-int bits_for(std::size_t types) {
-  if (types <= 2) return 1;
-  if (types <= 4) return 2;
-  if (types <= 16) return 4;
-  return types <= 256 ? 8 : 16;
-}
 
 // A one in each of four counts whose bit is set.
 constexpr auto kFourOnes = [] {
@@ -83,12 +76,12 @@ void for_each_row_of_slab(std::size_t slab, Visit&& visit) {
 
 // The type of all voxels of a row, where there is one and it is quick to see.
 std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
-  const Chunk::Mixed* m = chunk.mixed();
+  const ChunkStorage* m = chunk.storage();
   if (m == nullptr) return chunk.uniform();
-  const std::uint32_t slab = m->slabs[Chunk::slab_index(y, z)];
-  std::uint32_t index = slab & ~Chunk::kUniformSlab;
-  if ((slab & Chunk::kUniformSlab) == 0) {
-    const std::uint64_t* row = m->row(slab, Chunk::row_in_slab(y, z));
+  const std::uint32_t slab = m->slabs[ChunkStorage::slab_index(y, z)];
+  std::uint32_t index = slab & ~ChunkStorage::kUniformSlab;
+  if ((slab & ChunkStorage::kUniformSlab) == 0) {
+    const std::uint64_t* row = m->row(slab, ChunkStorage::row_in_slab(y, z));
     index = packed_row::read(row, m->bits, 0);
     if (!packed_row::all_equal(row, m->bits, 1, index)) return std::nullopt;
   }
@@ -97,17 +90,34 @@ std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
 
 }  // namespace
 
+Chunk::Chunk(VoxelType uniform) : uniform_(uniform) {}
+Chunk::Chunk(const Chunk&) = default;
+Chunk::Chunk(Chunk&&) noexcept = default;
+Chunk& Chunk::operator=(const Chunk&) = default;
+Chunk& Chunk::operator=(Chunk&&) noexcept = default;
+Chunk::~Chunk() = default;
+
+VoxelType Chunk::get(int x, int y, int z) const {
+  QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
+  return storage_ == nullptr ? uniform_ : storage_->type(x, y, z);
+}
+
+int Chunk::non_air_count() const {
+  if (storage_ != nullptr) return storage_->non_air;
+  return uniform_ == kAir ? 0 : static_cast<int>(kChunkVoxels);
+}
+
 void Chunk::copy_storage() {
-  mixed_.make_own();
+  storage_.make_own();
 }
 
 void Chunk::fill(VoxelType type) {
-  mixed_.reset();
+  storage_.reset();
   uniform_ = type;
 }
 
 void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t became_solid) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   const int delta = std::popcount(became_solid) - std::popcount(became_air);
   m.non_air += delta;
   m.layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
@@ -117,26 +127,26 @@ void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t b
 }
 
 std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
-  if (mixed_ == nullptr) return type == uniform_ ? kAllVoxels : 0;
-  const Mixed& m = *mixed_;
+  if (storage_ == nullptr) return type == uniform_ ? kAllVoxels : 0;
+  const ChunkStorage& m = *storage_;
   std::uint32_t index = type;
   if (!m.direct()) {
     const auto found = std::find(m.palette.begin(), m.palette.end(), type);
     if (found == m.palette.end()) return 0;
     index = static_cast<std::uint32_t>(found - m.palette.begin());
   }
-  const std::uint32_t slab = m.slabs[slab_index(y, z)];
-  if ((slab & kUniformSlab) != 0) return (slab & ~kUniformSlab) == index ? kAllVoxels : 0;
-  return packed_row::equal_mask(m.row(slab, row_in_slab(y, z)), m.bits, index);
+  const std::uint32_t slab = m.slabs[ChunkStorage::slab_index(y, z)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) return (slab & ~ChunkStorage::kUniformSlab) == index ? kAllVoxels : 0;
+  return packed_row::equal_mask(m.row(slab, ChunkStorage::row_in_slab(y, z)), m.bits, index);
 }
 
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
-  if (mixed_ == nullptr) make_mixed();
+  if (storage_ == nullptr) make_mixed();
   own();
   const std::uint32_t index = index_for(type);
-  Mixed& m = *mixed_;
-  std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
+  ChunkStorage& m = *storage_;
+  std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   const std::uint32_t first = packed_row::read(row, m.bits, 0);
   if (packed_row::all_equal(row, m.bits, 1, first)) {
     m.move_counts(first, index, static_cast<std::uint32_t>(std::popcount(changed)));
@@ -170,15 +180,16 @@ std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
 
 bool Chunk::set(int x, int y, int z, VoxelType type) {
   QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
-  if (mixed_ == nullptr) return type != uniform_ && set_anywhere(x, y, z, type);
-  Mixed& m = *mixed_;
-  const std::uint32_t slot = m.slabs[slab_index(y, z)];
-  if ((slot & kUniformSlab) != 0 || m.direct() || m.palette[m.recent] != type) return set_anywhere(x, y, z, type);
+  if (storage_ == nullptr) return type != uniform_ && set_anywhere(x, y, z, type);
+  ChunkStorage& m = *storage_;
+  const std::uint32_t slot = m.slabs[ChunkStorage::slab_index(y, z)];
+  if ((slot & ChunkStorage::kUniformSlab) != 0 || m.direct() || m.palette[m.recent] != type)
+    return set_anywhere(x, y, z, type);
   const auto bit = static_cast<unsigned>(x * m.bits);
-  std::uint64_t& word = m.row(slot, row_in_slab(y, z))[bit >> 6];
+  std::uint64_t& word = m.row(slot, ChunkStorage::row_in_slab(y, z))[bit >> 6];
   const std::uint32_t old = static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << m.bits) - 1U);
   if (old == m.recent) return false;
-  if (mixed_.is_shared()) [[unlikely]]
+  if (storage_.is_shared()) [[unlikely]]
     return set_anywhere(x, y, z, type);
   word ^= std::uint64_t{old ^ m.recent} << (bit & 63U);
   m.move_counts(old, m.recent, 1);
@@ -195,11 +206,11 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
 bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = get(x, y, z);
   if (old == type) return false;
-  if (mixed_ == nullptr) make_mixed();
+  if (storage_ == nullptr) make_mixed();
   own();
   const std::uint32_t index = index_for(type);
-  Mixed& m = *mixed_;
-  std::uint64_t* row = m.row(slot_for_writing(slab_index(y, z)), row_in_slab(y, z));
+  ChunkStorage& m = *storage_;
+  std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);
   if ((old == kAir) != (type == kAir)) m.count_voxel(x, y, z, type == kAir ? -1 : 1);
@@ -235,20 +246,21 @@ std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const
 }
 
 void Chunk::read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const {
-  if (mixed_ == nullptr) {
+  if (storage_ == nullptr) {
     std::fill(out.begin(), out.end(), uniform_);
     return;
   }
-  const Mixed& m = *mixed_;
+  const ChunkStorage& m = *storage_;
   const auto type_of = [&](std::uint32_t index) {
     return m.direct() ? static_cast<VoxelType>(index) : m.palette[index];
   };
-  const std::uint32_t slab = m.slabs[slab_index(y, z)];
-  if ((slab & kUniformSlab) != 0) {
-    std::fill(out.begin(), out.end(), type_of(slab & ~kUniformSlab));
+  const std::uint32_t slab = m.slabs[ChunkStorage::slab_index(y, z)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) {
+    std::fill(out.begin(), out.end(), type_of(slab & ~ChunkStorage::kUniformSlab));
     return;
   }
-  packed_row::unpack(m.row(slab, row_in_slab(y, z)), m.bits, m.palette.data(), m.palette.size(), out.data());
+  packed_row::unpack(m.row(slab, ChunkStorage::row_in_slab(y, z)), m.bits, m.palette.data(), m.palette.size(),
+                     out.data());
 }
 
 void Chunk::fill_box(const IBox& box, VoxelType type,
@@ -275,8 +287,8 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
 Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   Chunk chunk(types[0]);
   if (is_one_type(types)) return chunk;
-  chunk.mixed_ = make_ref<Mixed>();
-  Mixed& m = *chunk.mixed_;
+  chunk.storage_ = make_ref<ChunkStorage>();
+  ChunkStorage& m = *chunk.storage_;
   constexpr std::uint32_t kUnseen = 0xFFFF'FFFFU;
   std::vector<std::uint32_t> index_of(std::size_t{1} << 16, kUnseen);
   for (std::size_t first = 0; first < types.size(); first += kChunkEdge) {
@@ -291,9 +303,9 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
   }
   m.bits = bits_for(m.palette.size());
   if (m.direct()) {
-    std::vector<std::uint32_t> counts(Mixed::kRemainders);
+    std::vector<std::uint32_t> counts(ChunkStorage::kRemainders);
     for (const VoxelType type : m.palette) {
-      counts[type % Mixed::kRemainders] += m.counts[index_of[type]];
+      counts[type % ChunkStorage::kRemainders] += m.counts[index_of[type]];
       index_of[type] = type;
     }
     m.palette = {};
@@ -306,7 +318,7 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
 
 void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels> types,
                       const std::vector<std::uint32_t>& index_of) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   const auto row_of = [&](int y, int z) {
     return types.subspan(static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge)).first<kChunkEdge>();
   };
@@ -316,7 +328,7 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
     const auto row = row_of(y, z);
     is_uniform = is_uniform && row[0] == first && is_one_type(row);
   });
-  m.slabs[slab] = kUniformSlab | index_of[first];
+  m.slabs[slab] = ChunkStorage::kUniformSlab | index_of[first];
   const std::uint32_t slot = is_uniform ? 0 : slot_for_writing(slab);
   for_each_row_of_slab(slab, [&](int stored, int y, int z) {
     std::uint64_t solid = first == kAir ? 0 : kAllVoxels;
@@ -332,11 +344,11 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
 }
 
 int Chunk::count(VoxelType type) const {
-  if (mixed_ == nullptr) return type == uniform_ ? static_cast<int>(kChunkVoxels) : 0;
-  if (!mixed_->direct()) {
-    const auto found = std::find(mixed_->palette.begin(), mixed_->palette.end(), type);
-    if (found == mixed_->palette.end()) return 0;
-    return static_cast<int>(mixed_->counts[static_cast<std::size_t>(found - mixed_->palette.begin())]);
+  if (storage_ == nullptr) return type == uniform_ ? static_cast<int>(kChunkVoxels) : 0;
+  if (!storage_->direct()) {
+    const auto found = std::find(storage_->palette.begin(), storage_->palette.end(), type);
+    if (found == storage_->palette.end()) return 0;
+    return static_cast<int>(storage_->counts[static_cast<std::size_t>(found - storage_->palette.begin())]);
   }
   int total = 0;
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -347,8 +359,8 @@ int Chunk::count(VoxelType type) const {
 
 std::vector<VoxelType> Chunk::types() const {
   std::vector<VoxelType> found;
-  if (mixed_ == nullptr) return {uniform_};
-  const Mixed& m = *mixed_;
+  if (storage_ == nullptr) return {uniform_};
+  const ChunkStorage& m = *storage_;
   if (m.direct()) {
     std::vector<bool> seen(std::size_t{1} << 16);
     std::array<VoxelType, kChunkEdge> row{};
@@ -372,10 +384,10 @@ std::vector<VoxelType> Chunk::types() const {
 
 IBox Chunk::bounds() const {
   if (non_air_count() == 0) return {};
-  if (mixed_ == nullptr) return {IVec3{0}, IVec3{kChunkEdge}};
+  if (storage_ == nullptr) return {IVec3{0}, IVec3{kChunkEdge}};
   IBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto& counts = mixed_->layer_counts[static_cast<std::size_t>(axis)];
+    const auto& counts = storage_->layer_counts[static_cast<std::size_t>(axis)];
     const auto is_filled = [](std::uint16_t count) { return count != 0; };
     box.min[axis] = static_cast<int>(std::find_if(counts.begin(), counts.end(), is_filled) - counts.begin());
     box.max[axis] = static_cast<int>(counts.rend() - std::find_if(counts.rbegin(), counts.rend(), is_filled));

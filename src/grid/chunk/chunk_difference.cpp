@@ -3,20 +3,22 @@
 #include <array>
 #include <cstring>
 
+#include "grid/chunk/chunk_storage.h"
+
 namespace quoin {
 namespace {
 
 // Whether the indices of two chunks mean the same types.
-bool share_palette(const Chunk::Mixed* a, const Chunk::Mixed* b) {
+bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
   return a != nullptr && b != nullptr && a->bits == b->bits && a->palette == b->palette;
 }
 
 // Whether a row is stored alike in both. Requires: they share a palette.
-bool is_stored_alike(const Chunk::Mixed& a, const Chunk::Mixed& b, int y, int z) {
-  const std::uint32_t in_a = a.slabs[Chunk::slab_index(y, z)];
-  const std::uint32_t in_b = b.slabs[Chunk::slab_index(y, z)];
-  if (((in_a | in_b) & Chunk::kUniformSlab) != 0) return in_a == in_b;
-  const int row = Chunk::row_in_slab(y, z);
+bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z) {
+  const std::uint32_t in_a = a.slabs[ChunkStorage::slab_index(y, z)];
+  const std::uint32_t in_b = b.slabs[ChunkStorage::slab_index(y, z)];
+  if (((in_a | in_b) & ChunkStorage::kUniformSlab) != 0) return in_a == in_b;
+  const int row = ChunkStorage::row_in_slab(y, z);
   return std::memcmp(a.row(in_a, row), b.row(in_b, row), static_cast<std::size_t>(a.bits) * sizeof(std::uint64_t)) == 0;
 }
 
@@ -24,12 +26,12 @@ bool is_stored_alike(const Chunk::Mixed& a, const Chunk::Mixed& b, int y, int z)
 template <class Compare>
 void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, Compare&& compare) {
   if (before.shares_storage_with(after)) return;
-  const bool share = share_palette(before.mixed(), after.mixed());
+  const bool share = share_palette(before.storage(), after.storage());
   std::array<VoxelType, kChunkEdge> old_row;
   std::array<VoxelType, kChunkEdge> new_row;
   for (int z = within.min.z; z < within.max.z; ++z) {
     for (int y = within.min.y; y < within.max.y; ++y) {
-      if (share && is_stored_alike(*before.mixed(), *after.mixed(), y, z)) continue;
+      if (share && is_stored_alike(*before.storage(), *after.storage(), y, z)) continue;
       before.read_row(y, z, old_row);
       after.read_row(y, z, new_row);
       compare(y, z, old_row, new_row);
@@ -52,9 +54,9 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
 }
 
 ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
-  static const Chunk kAllAir;
-  const Chunk& a = before == nullptr ? kAllAir : *before;
-  const Chunk& b = after == nullptr ? kAllAir : *after;
+  static const Chunk all_air;
+  const Chunk& a = before == nullptr ? all_air : *before;
+  const Chunk& b = after == nullptr ? all_air : *after;
   ChunkDifference found;
   for_each_other_row(a, b, within, [&](int y, int z, const auto& old_row, const auto& new_row) {
     std::uint64_t solid = 0;

@@ -27,7 +27,7 @@ void expect_equal(const ChangeReach& a, const ChangeReach& b) {
   EXPECT_EQ(a.samples, b.samples);
   for (int reach = 0; reach <= 64; ++reach) {
     for (int i = 0; i < 27; ++i) {
-      const IVec3 d = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      const IVec3 d = Neighbourhood::offset(i);
       ASSERT_EQ(a.is_within(reach, d.x, d.y, d.z), b.is_within(reach, d.x, d.y, d.z)) << reach << " " << i;
     }
   }

@@ -5,33 +5,24 @@
 #include <new>
 #include <utility>
 
-#include <quoin/grid/chunk.h>
-
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 
 namespace quoin {
 namespace {
 
-constexpr int kSlabRows = 16;
 // What it costs to store a slab's voxels anew or to look through them, in changes of single voxels.
 constexpr std::uint32_t kCreditOfSlot = 4;
-constexpr std::uint32_t kMostCredit = 1U << 30;
+constexpr std::uint32_t kMaxCredit = 1U << 30;
 constexpr std::size_t kAllTypes = std::size_t{1} << 16;
-
-int bits_for(std::size_t types) {
-  if (types <= 2) return 1;
-  if (types <= 4) return 2;
-  if (types <= 16) return 4;
-  return types <= 256 ? 8 : 16;
-}
 
 // Calls `visit(type, voxels)` for the types of all voxels at 16 bits, several times for one.
 template <class Visit>
-void for_each_type(const Chunk::Mixed& m, Visit&& visit) {
+void for_each_type(const ChunkStorage& m, Visit&& visit) {
   std::array<VoxelType, kChunkEdge> row{};
   for (const std::uint32_t entry : m.slabs) {
-    if ((entry & Chunk::kUniformSlab) != 0) {
-      visit(entry & ~Chunk::kUniformSlab, kSlabRows * kChunkEdge);
+    if ((entry & ChunkStorage::kUniformSlab) != 0) {
+      visit(entry & ~ChunkStorage::kUniformSlab, kSlabRows * kChunkEdge);
       continue;
     }
     for (int i = 0; i < kSlabRows; ++i) {
@@ -49,18 +40,18 @@ struct Numbering {
 };
 
 // Voxels by type.
-std::vector<std::uint32_t> count_types(const Chunk::Mixed& m) {
+std::vector<std::uint32_t> count_types(const ChunkStorage& m) {
   std::vector<std::uint32_t> voxels(kAllTypes);
   for_each_type(m, [&](std::uint32_t type, int count) { voxels[type] += static_cast<std::uint32_t>(count); });
   return voxels;
 }
 
 // Requires: the voxels have a palette, and `bits` are enough for what is used of it.
-Numbering numbering_of_palette(const Chunk::Mixed& m, int bits) {
+Numbering numbering_of_palette(const ChunkStorage& m, int bits) {
   Numbering to;
   if (bits == 16) {
     to.new_index.assign(m.palette.begin(), m.palette.end());
-    to.counts.resize(Chunk::Mixed::kRemainders);
+    to.counts.resize(ChunkStorage::kRemainders);
     for (std::size_t i = 0; i < m.palette.size(); ++i) to.counts[m.palette[i] % to.counts.size()] += m.counts[i];
     return to;
   }
@@ -75,7 +66,7 @@ Numbering numbering_of_palette(const Chunk::Mixed& m, int bits) {
 }
 
 // Requires: the voxels are types themselves, and `bits` are enough for these.
-Numbering numbering_of_types(const Chunk::Mixed& m, int bits) {
+Numbering numbering_of_types(const ChunkStorage& m, int bits) {
   Numbering to;
   to.new_index.resize(kAllTypes);
   if (bits == 16) {
@@ -113,29 +104,29 @@ void renumber_row(const std::uint64_t* from, int from_bits, const std::vector<st
 }  // namespace
 
 void Chunk::make_mixed() {
-  Ref<Mixed> made = make_ref<Mixed>();
-  Mixed& m = *made;
+  Ref<ChunkStorage> made = make_ref<ChunkStorage>();
+  ChunkStorage& m = *made;
   m.palette.push_back(uniform_);
   m.counts.push_back(kChunkVoxels);
   m.used = 1;
-  m.slabs.fill(kUniformSlab | 0U);
+  m.slabs.fill(ChunkStorage::kUniformSlab | 0U);
   if (uniform_ != kAir) {
     m.non_air = kChunkVoxels;
     for (auto& axis : m.layer_counts) axis.fill(kChunkEdge * kChunkEdge);
   }
-  mixed_ = std::move(made);
+  storage_ = std::move(made);
 }
 
 // The palette index of a type, adding it where it is new; may widen the voxels.
 std::uint32_t Chunk::index_for(VoxelType type) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   if (m.direct()) return type;
   if (m.palette[m.recent] != type) m.recent = find_or_add(type);
   return m.direct() ? type : m.recent;
 }
 
 std::uint32_t Chunk::find_or_add(VoxelType type) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   const auto found = std::find(m.palette.begin(), m.palette.end(), type);
   if (found != m.palette.end()) return static_cast<std::uint32_t>(found - m.palette.begin());
   if (m.used < m.palette.size()) {
@@ -154,27 +145,27 @@ std::uint32_t Chunk::find_or_add(VoxelType type) {
 
 // A slot of its own for a slab, filled with the slab's type where it had none.
 std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   const std::uint32_t entry = m.slabs[slab];
-  if ((entry & kUniformSlab) == 0) return entry;
+  if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
   const auto slab_words = static_cast<std::size_t>(kSlabRows * m.bits);
   std::uint32_t slot = m.first_free;
-  if (slot != Mixed::kNoSlot) {
+  if (slot != ChunkStorage::kNoSlot) {
     m.first_free = static_cast<std::uint32_t>(*m.row(slot, 0));
     --m.free_count;
   } else {
     m.words.resize(m.words.size() + slab_words);
     slot = m.slot_count++;
   }
-  std::fill_n(m.row(slot, 0), slab_words, packed_row::repeat(m.bits, entry & ~kUniformSlab));
+  std::fill_n(m.row(slot, 0), slab_words, packed_row::repeat(m.bits, entry & ~ChunkStorage::kUniformSlab));
   m.slabs[slab] = slot;
   return slot;
 }
 
 // Requires: every voxel of the slab has this index.
 void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
-  Mixed& m = *mixed_;
-  const std::uint32_t slot = std::exchange(m.slabs[slab], kUniformSlab | index);
+  ChunkStorage& m = *storage_;
+  const std::uint32_t slot = std::exchange(m.slabs[slab], ChunkStorage::kUniformSlab | index);
   *m.row(slot, 0) = m.first_free;
   m.first_free = slot;
   ++m.free_count;
@@ -184,12 +175,12 @@ void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
 // where as many changed before, so that edits that come and go cost a bounded time each.
 void Chunk::after_writing(int y, int z, std::uint32_t index, std::uint32_t changed) {
   constexpr std::uint32_t kFewFree = 8;
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   if (!m.direct() && m.counts[index] == kChunkVoxels) return fill(m.palette[index]);
-  m.credit = std::min(m.credit, kMostCredit) + changed;
-  const std::size_t slab = slab_index(y, z);
+  m.credit = std::min(m.credit, kMaxCredit) + changed;
+  const std::size_t slab = ChunkStorage::slab_index(y, z);
   const std::uint32_t slot = m.slabs[slab];
-  if (packed_row::all_equal(m.row(slot, row_in_slab(y, z)), m.bits, 1, index) &&
+  if (packed_row::all_equal(m.row(slot, ChunkStorage::row_in_slab(y, z)), m.bits, 1, index) &&
       packed_row::all_equal(m.row(slot, 0), m.bits, kSlabRows, index)) {
     release_slot(slab, index);
     if (m.free_count > kFewFree && m.free_count > m.slot_count / 4) return tidy();
@@ -198,7 +189,7 @@ void Chunk::after_writing(int y, int z, std::uint32_t index, std::uint32_t chang
 }
 
 std::size_t Chunk::used_types() const {
-  const Mixed& m = *mixed_;
+  const ChunkStorage& m = *storage_;
   if (!m.direct()) return m.used;
   std::bitset<kAllTypes> seen;
   for_each_type(m, [&](std::uint32_t type, int) { seen[type] = true; });
@@ -208,7 +199,7 @@ std::size_t Chunk::used_types() const {
 // Gives back what edits left behind, where that is much.
 void Chunk::tidy() {
   constexpr std::uint32_t kSoon = 64;
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   if (is_one_entry()) return fill(get(0, 0, 0));
   const bool may_narrow = m.used <= 1U << (m.bits / 2);
   const auto types = static_cast<std::uint32_t>(may_narrow ? used_types() : kAllTypes);
@@ -226,14 +217,15 @@ void Chunk::tidy() {
 
 // Whether all slabs are of the same one type.
 bool Chunk::is_one_entry() const {
-  const std::uint32_t first = mixed_->slabs[0];
-  return (first & kUniformSlab) != 0 && std::all_of(mixed_->slabs.begin(), mixed_->slabs.end(),
-                                                    [first](std::uint32_t entry) { return entry == first; });
+  const std::uint32_t first = storage_->slabs[0];
+  return (first & ChunkStorage::kUniformSlab) != 0 &&
+         std::all_of(storage_->slabs.begin(), storage_->slabs.end(),
+                     [first](std::uint32_t entry) { return entry == first; });
 }
 
 // Stores the voxels anew, `bits` wide, without free slots and unused palette entries.
 void Chunk::repack(int bits) {
-  Mixed& m = *mixed_;
+  ChunkStorage& m = *storage_;
   Numbering to = m.direct() ? numbering_of_types(m, bits) : numbering_of_palette(m, bits);
   const bool is_same = m.direct() ? bits == 16 : bits == m.bits && to.palette.size() == m.palette.size();
   const auto old_words = static_cast<std::size_t>(kSlabRows * m.bits);
@@ -243,8 +235,8 @@ void Chunk::repack(int bits) {
   std::uint32_t slots = 0;
   for (std::size_t slab = 0; slab < slabs.size(); ++slab) {
     const std::uint32_t entry = m.slabs[slab];
-    if ((entry & kUniformSlab) != 0) {
-      slabs[slab] = kUniformSlab | to.new_index[entry & ~kUniformSlab];
+    if ((entry & ChunkStorage::kUniformSlab) != 0) {
+      slabs[slab] = ChunkStorage::kUniformSlab | to.new_index[entry & ~ChunkStorage::kUniformSlab];
       continue;
     }
     std::uint64_t* out = words.data() + slots * new_words;
@@ -265,26 +257,26 @@ void Chunk::repack(int bits) {
   m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
   m.count_at = 0;
   m.recent = 0;
-  m.first_free = Mixed::kNoSlot;
+  m.first_free = ChunkStorage::kNoSlot;
   m.free_count = 0;
   m.slot_count = slots;
 }
 
 std::size_t Chunk::bytes() const {
-  if (mixed_ == nullptr) return sizeof(Chunk);
-  const Mixed& m = *mixed_;
-  return sizeof(Chunk) + sizeof(Mixed) + m.palette.capacity() * sizeof(VoxelType) +
+  if (storage_ == nullptr) return sizeof(Chunk);
+  const ChunkStorage& m = *storage_;
+  return sizeof(Chunk) + sizeof(ChunkStorage) + m.palette.capacity() * sizeof(VoxelType) +
          m.counts.capacity() * sizeof(std::uint32_t) + m.words.capacity() * sizeof(std::uint64_t);
 }
 
 void Chunk::compact() {
-  if (mixed_ == nullptr) return;
+  if (storage_ == nullptr) return;
   if (is_one_entry()) return fill(get(0, 0, 0));
   // What others share they would keep all the same.
-  if (mixed_.is_shared()) return;
+  if (storage_.is_shared()) return;
   repack(bits_for(used_types()));
-  mixed_->palette.shrink_to_fit();
-  mixed_->counts.shrink_to_fit();
+  storage_->palette.shrink_to_fit();
+  storage_->counts.shrink_to_fit();
 }
 
 }  // namespace quoin

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/chunk/chunk_storage.h"
+
 namespace quoin {
 namespace {
 
@@ -108,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(Widths, ChunkOfTypes, testing::Values(2, 3, 4, 5, 16, 1
 TEST(Chunk, ReusesPaletteEntriesThatFellOutOfUse) {
   Chunk chunk;
   for (int i = 1; i < 60'000; ++i) chunk.set(5, 5, 5, static_cast<VoxelType>(i));
-  EXPECT_LE(chunk.mixed()->bits, 2);
+  EXPECT_LE(chunk.storage()->bits, 2);
 }
 
 TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {

@@ -18,7 +18,7 @@ double linear(DVec3 p) {
 }
 
 DensityGrid linear_field() {
-  DensityGrid grid(kLargestHalf);
+  DensityGrid grid(kMaxHalf);
   grid.edit({IVec3(-8), IVec3(8)}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(linear(DVec3(p))), 1};
   });

@@ -7,13 +7,13 @@
 #include <quoin/core/assert.h>
 
 #include "grid/chunk/content_hash.h"
+#include "grid/density/density_storage.h"
 #include "grid/density/stored_density.h"
 
 namespace quoin {
 namespace {
 
-constexpr std::size_t kSlabRows = 16;
-constexpr std::size_t kSlabValues = kSlabRows * kChunkEdge;
+constexpr std::size_t kSlabValues = std::size_t{kSlabRows} * kChunkEdge;
 
 std::uint64_t differences(const Half* a, const Half* b) {
   std::uint64_t mask = 0;
@@ -35,9 +35,34 @@ Half stored_density(float density, float band) {
 }
 
 DensityChunk::DensityChunk(Half density, VoxelType material) : uniform_(density), materials_(material) {}
+DensityChunk::DensityChunk(const DensityChunk&) = default;
+DensityChunk::DensityChunk(DensityChunk&&) noexcept = default;
+DensityChunk& DensityChunk::operator=(const DensityChunk&) = default;
+DensityChunk& DensityChunk::operator=(DensityChunk&&) noexcept = default;
+DensityChunk::~DensityChunk() = default;
+
+Half DensityChunk::get(int x, int y, int z) const {
+  QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
+  if (storage_ == nullptr) return uniform_;
+  const std::uint32_t slab = storage_->slabs[ChunkStorage::slab_index(y, z)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) return static_cast<Half>(slab);
+  return storage_->row(slab, ChunkStorage::row_in_slab(y, z))[x];
+}
+
+std::uint64_t DensityChunk::solid_row(int y, int z) const {
+  if (storage_ == nullptr) return is_solid(uniform_) ? ~std::uint64_t{0} : 0;
+  return storage_->solid[static_cast<std::size_t>(z * kChunkEdge + y)];
+}
+
+const Half* DensityChunk::row(int y, int z) const {
+  if (storage_ == nullptr) return nullptr;
+  const std::uint32_t slab = storage_->slabs[ChunkStorage::slab_index(y, z)];
+  const bool is_uniform = (slab & ChunkStorage::kUniformSlab) != 0;
+  return is_uniform ? nullptr : storage_->row(slab, ChunkStorage::row_in_slab(y, z));
+}
 
 void DensityChunk::fill(Half density) {
-  mixed_.reset();
+  storage_.reset();
   uniform_ = density;
 }
 
@@ -51,16 +76,16 @@ void DensityChunk::read_row(int y, int z, std::span<Half, kChunkEdge> out) const
 }
 
 void DensityChunk::make_mixed() {
-  mixed_ = make_ref<Mixed>();
-  mixed_->slabs.fill(kUniformSlab | uniform_);
-  mixed_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
+  storage_ = make_ref<DensityStorage>();
+  storage_->slabs.fill(ChunkStorage::kUniformSlab | uniform_);
+  storage_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
 }
 
 // A slot of its own for a slab, filled with the slab's density where it had none.
 std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
-  Mixed& m = *mixed_;
+  DensityStorage& m = *storage_;
   const std::uint32_t entry = m.slabs[slab];
-  if ((entry & kUniformSlab) == 0) return entry;
+  if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
   std::uint32_t slot = 0;
   if (!m.free_slots.empty()) {
     slot = m.free_slots.back();
@@ -83,32 +108,32 @@ std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunk
   }
   if (std::memcmp(old, densities.data(), sizeof(Half) * kChunkEdge) == 0) return 0;
   const std::uint64_t changed = differences(old, densities.data());
-  if (mixed_ == nullptr) make_mixed();
-  mixed_.make_own();
-  const std::uint32_t slot = slot_for_writing(Chunk::slab_index(y, z));
-  const std::size_t first = (std::size_t{slot} * kSlabRows + static_cast<std::size_t>(Chunk::row_in_slab(y, z)));
-  std::memcpy(mixed_->values.data() + first * kChunkEdge, densities.data(), sizeof(Half) * kChunkEdge);
-  mixed_->solid[static_cast<std::size_t>(z * kChunkEdge + y)] = solid_bits(densities.data());
+  if (storage_ == nullptr) make_mixed();
+  storage_.make_own();
+  const std::uint32_t slot = slot_for_writing(ChunkStorage::slab_index(y, z));
+  const std::size_t first = (std::size_t{slot} * kSlabRows + static_cast<std::size_t>(ChunkStorage::row_in_slab(y, z)));
+  std::memcpy(storage_->values.data() + first * kChunkEdge, densities.data(), sizeof(Half) * kChunkEdge);
+  storage_->solid[static_cast<std::size_t>(z * kChunkEdge + y)] = solid_bits(densities.data());
   return changed;
 }
 
 void DensityChunk::unite_slabs() {
-  if (mixed_ == nullptr) return;
-  for (std::size_t i = 0; i < mixed_->slabs.size(); ++i) {
-    const std::uint32_t slab = mixed_->slabs[i];
-    if ((slab & kUniformSlab) != 0) continue;
-    const Half* values = mixed_->row(slab, 0);
+  if (storage_ == nullptr) return;
+  for (std::size_t i = 0; i < storage_->slabs.size(); ++i) {
+    const std::uint32_t slab = storage_->slabs[i];
+    if ((slab & ChunkStorage::kUniformSlab) != 0) continue;
+    const Half* values = storage_->row(slab, 0);
     // All are equal when each equals the next.
     if (std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) != 0) continue;
     const Half value = *values;
-    mixed_.make_own();
-    mixed_->free_slots.push_back(slab);
-    mixed_->slabs[i] = kUniformSlab | value;
+    storage_.make_own();
+    storage_->free_slots.push_back(slab);
+    storage_->slabs[i] = ChunkStorage::kUniformSlab | value;
   }
-  const std::uint32_t first = mixed_->slabs[0];
-  if ((first & kUniformSlab) == 0) return;
+  const std::uint32_t first = storage_->slabs[0];
+  if ((first & ChunkStorage::kUniformSlab) == 0) return;
   const bool is_uniform =
-      std::all_of(mixed_->slabs.begin(), mixed_->slabs.end(), [&](std::uint32_t s) { return s == first; });
+      std::all_of(storage_->slabs.begin(), storage_->slabs.end(), [&](std::uint32_t s) { return s == first; });
   if (is_uniform) fill(static_cast<Half>(first));
 }
 
@@ -116,12 +141,12 @@ void DensityChunk::compact() {
   unite_slabs();
   materials_.compact();
   // What others share they would keep all the same.
-  if (mixed_ == nullptr || mixed_.is_shared()) return;
+  if (storage_ == nullptr || storage_.is_shared()) return;
   std::vector<Half> values;
-  Mixed& m = *mixed_;
+  DensityStorage& m = *storage_;
   values.reserve(m.values.size() - m.free_slots.size() * kSlabValues);
   for (std::uint32_t& slab : m.slabs) {
-    if ((slab & kUniformSlab) != 0) continue;
+    if ((slab & ChunkStorage::kUniformSlab) != 0) continue;
     const Half* from = m.row(slab, 0);
     slab = static_cast<std::uint32_t>(values.size() / kSlabValues);
     values.insert(values.end(), from, from + kSlabValues);
@@ -131,8 +156,8 @@ void DensityChunk::compact() {
 }
 
 bool DensityChunk::is_full() const {
-  if (mixed_ == nullptr) return is_solid(uniform_);
-  return std::all_of(mixed_->solid.begin(), mixed_->solid.end(), [](std::uint64_t row) { return ~row == 0; });
+  if (storage_ == nullptr) return is_solid(uniform_);
+  return std::all_of(storage_->solid.begin(), storage_->solid.end(), [](std::uint64_t row) { return ~row == 0; });
 }
 
 std::uint64_t DensityChunk::content_hash() const {
@@ -149,9 +174,9 @@ std::uint64_t DensityChunk::content_hash() const {
 
 std::size_t DensityChunk::bytes() const {
   const std::size_t fixed = sizeof(DensityChunk) - sizeof(Chunk) + materials_.bytes();
-  if (mixed_ == nullptr) return fixed;
-  return fixed + sizeof(Mixed) + mixed_->values.capacity() * sizeof(Half) +
-         mixed_->free_slots.capacity() * sizeof(std::uint32_t);
+  if (storage_ == nullptr) return fixed;
+  return fixed + sizeof(DensityStorage) + storage_->values.capacity() * sizeof(Half) +
+         storage_->free_slots.capacity() * sizeof(std::uint32_t);
 }
 
 }  // namespace quoin

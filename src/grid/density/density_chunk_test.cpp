@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/density/density_storage.h"
+
 namespace quoin {
 namespace {
 
@@ -32,7 +34,7 @@ TEST(StoredDensity, EndsAtTheBandAndReadsNanAsFarAir) {
   EXPECT_EQ(stored_density(-kInfinity, 8.0F), kDeep);
   EXPECT_EQ(stored_density(std::nanf(""), 8.0F), kFar);
   EXPECT_EQ(stored_density(-std::nanf(""), 8.0F), kFar);
-  EXPECT_EQ(float_from_half(stored_density(1e9F, kLargestHalf)), kLargestHalf);
+  EXPECT_EQ(float_from_half(stored_density(1e9F, kMaxHalf)), kMaxHalf);
 }
 
 TEST(StoredDensity, ABandBetweenTwoHalvesIsNeverExceeded) {
@@ -154,7 +156,7 @@ TEST(DensityChunk, HoldsOnlyTheSlabsThatDiffer) {
   chunk.compact();
   EXPECT_EQ(chunk.get(5, 0, 0), 0);
   EXPECT_EQ(chunk.solid_row(0, 0), 0U);
-  EXPECT_LT(chunk.bytes(), sizeof(DensityChunk) + sizeof(DensityChunk::Mixed) + 2 * 2 * 16 * 64);
+  EXPECT_LT(chunk.bytes(), sizeof(DensityChunk) + sizeof(DensityStorage) + 2 * 2 * 16 * 64);
 }
 
 TEST(DensityNeighbourhood, ReadsAcrossChunksAndOutside) {

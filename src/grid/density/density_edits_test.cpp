@@ -59,7 +59,7 @@ DensitySample smoothed(PlainField& old, IVec3 p, double weight) {
   double sum = 0.0;
   std::map<VoxelType, int> materials;
   for (int i = 0; i < 27; ++i) {
-    const IVec3 at = p + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+    const IVec3 at = p + Neighbourhood::offset(i);
     if (i == 13) continue;
     sum += old.density(at);
     if (old.density(at) < 0.0F) ++materials[old.at(at).material];

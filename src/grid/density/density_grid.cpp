@@ -111,7 +111,7 @@ std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges&
   std::vector<IVec3> chunks;
   const auto add_around = [&](IVec3 chunk, auto&& is_affected) {
     for (int i = 0; i < 27; ++i) {
-      const IVec3 offset{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      const IVec3 offset = Neighbourhood::offset(i);
       if (is_affected(offset)) chunks.push_back(chunk + offset);
     }
   };

@@ -73,7 +73,7 @@ class Window {
 VoxelType prevailing_material(const DensityStore& store, IVec3 sample) {
   std::map<VoxelType, int> counts;
   for (int i = 0; i < 27; ++i) {
-    const IVec3 at = sample + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+    const IVec3 at = sample + Neighbourhood::offset(i);
     if (i != 13 && DensityChunk::is_solid(store.get(at))) ++counts[store.material(at)];
   }
   const auto most =
@@ -110,7 +110,7 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
   const IBox near{wanted.min - 1, wanted.max + 1};
   store.entries().for_each_in(near, [&](IVec3 at, const DensityStore::Entry&) {
     for (int i = 0; i < 27; ++i) {
-      const IVec3 chunk = at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+      const IVec3 chunk = at + Neighbourhood::offset(i);
       if (wanted.contains(chunk)) chunks.push_back(chunk);
     }
   });

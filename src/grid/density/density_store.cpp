@@ -39,7 +39,7 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
 }  // namespace
 
 DensityStore::DensityStore(float band) : far_(largest_within(band)) {
-  QUOIN_ASSERT(band > 0.0F && band <= kLargestHalf, "0 < band <= 65,504");
+  QUOIN_ASSERT(band > 0.0F && band <= kMaxHalf, "0 < band <= 65,504");
 }
 
 VoxelType DensityStore::material(IVec3 sample) const {

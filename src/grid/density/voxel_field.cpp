@@ -211,7 +211,7 @@ bool is_one_kind_throughout(const Neighbourhood& chunks) {
 std::vector<IVec3> chunks_near(const Grid& grid) {
   std::vector<IVec3> all;
   for (const IVec3 at : grid.chunks()) {
-    for (int i = 0; i < 27; ++i) all.push_back(at + IVec3{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1});
+    for (int i = 0; i < 27; ++i) all.push_back(at + Neighbourhood::offset(i));
   }
   sort_and_unite(all);
   return all;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 
 namespace quoin {
@@ -61,12 +62,12 @@ void ChunkHalver::add(VoxelType type, int half, std::uint64_t cells) {
 void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
   // Solid cells hold voxels, so there is a chunk.
   const Chunk& chunk = *masks_.octant({half, y / kHalfEdge, z / kHalfEdge});
-  const Chunk::Mixed* mixed = chunk.mixed();
+  const ChunkStorage* mixed = chunk.storage();
   if (mixed == nullptr) return add(*chunk.uniform(), half, solid);
   const int fine_y = 2 * (y % kHalfEdge);
   const int fine_z = 2 * (z % kHalfEdge);
-  const std::uint32_t slab = mixed->slabs[Chunk::slab_index(fine_y, fine_z)];
-  if ((slab & Chunk::kUniformSlab) != 0) return add(chunk.get(0, fine_y, fine_z), half, solid);
+  const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(fine_y, fine_z)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) return add(chunk.get(0, fine_y, fine_z), half, solid);
   find_layers(chunk, slab, half, y, z);
   std::uint64_t found = 0;
   std::uint64_t several = 0;
@@ -80,13 +81,13 @@ void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
 
 // The types in the four rows of half a row of cells, whose slab has voxels of its own.
 void ChunkHalver::find_layers(const Chunk& chunk, std::uint32_t slab, int half, int y, int z) {
-  const Chunk::Mixed& mixed = *chunk.mixed();
+  const ChunkStorage& mixed = *chunk.storage();
   std::array<const std::uint64_t*, 4> rows{};
   std::array<std::uint64_t, 4> left{};
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const int fine_y = 2 * y + static_cast<int>(i & 1);
     const int fine_z = 2 * z + static_cast<int>(i >> 1);
-    rows[i] = mixed.row(slab, Chunk::row_in_slab(fine_y, fine_z));
+    rows[i] = mixed.row(slab, ChunkStorage::row_in_slab(fine_y, fine_z));
     left[i] = masks_.voxels(half, fine_y, fine_z);
   }
   layers_.clear();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 
 namespace quoin {
@@ -47,7 +48,7 @@ WordCells cells_of(const CellVoxels& voxels) {
 // The rows of a chunk as masks of what is not air; looks air up in the palette once.
 class SolidRows {
  public:
-  explicit SolidRows(const Chunk& chunk) : voxels_(chunk.mixed()) {
+  explicit SolidRows(const Chunk& chunk) : voxels_(chunk.storage()) {
     if (voxels_ == nullptr) {
       uniform_ = chunk.uniform() == kAir ? 0 : ~std::uint64_t{0};
       return;
@@ -62,9 +63,10 @@ class SolidRows {
   [[nodiscard]] std::uint64_t row(int y, int z) const {
     if (voxels_ == nullptr) return uniform_;
     if (!has_air_) return ~std::uint64_t{0};
-    const std::uint32_t slab = voxels_->slabs[Chunk::slab_index(y, z)];
-    if ((slab & Chunk::kUniformSlab) != 0) return (slab & ~Chunk::kUniformSlab) == air_ ? 0 : ~std::uint64_t{0};
-    return ~packed_row::equal_mask(voxels_->row(slab, Chunk::row_in_slab(y, z)), voxels_->bits, air_);
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    if ((slab & ChunkStorage::kUniformSlab) != 0)
+      return (slab & ~ChunkStorage::kUniformSlab) == air_ ? 0 : ~std::uint64_t{0};
+    return ~packed_row::equal_mask(voxels_->row(slab, ChunkStorage::row_in_slab(y, z)), voxels_->bits, air_);
   }
 
   /// The first two voxels of a row, at their bits, or the last two.
@@ -72,9 +74,9 @@ class SolidRows {
     const std::uint64_t ends = is_first ? 3U : std::uint64_t{3} << 62;
     if (voxels_ == nullptr) return uniform_ & ends;
     if (!has_air_) return ends;
-    const std::uint32_t slab = voxels_->slabs[Chunk::slab_index(y, z)];
-    if ((slab & Chunk::kUniformSlab) != 0) return (slab & ~Chunk::kUniformSlab) == air_ ? 0 : ends;
-    const int row = Chunk::row_in_slab(y, z);
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    if ((slab & ChunkStorage::kUniformSlab) != 0) return (slab & ~ChunkStorage::kUniformSlab) == air_ ? 0 : ends;
+    const int row = ChunkStorage::row_in_slab(y, z);
     const int x = is_first ? 0 : kChunkEdge - 2;
     return (std::uint64_t{voxels_->read(slab, row, x) != air_} | std::uint64_t{voxels_->read(slab, row, x + 1) != air_}
                                                                      << 1)
@@ -83,8 +85,8 @@ class SolidRows {
 
   /// The 16 rows of a slab in the order in which they are stored.
   void slab(std::size_t index, std::array<std::uint64_t, 16>& out) const {
-    const std::uint32_t slot = voxels_ == nullptr ? Chunk::kUniformSlab : voxels_->slabs[index];
-    if ((slot & Chunk::kUniformSlab) != 0 || !has_air_) {
+    const std::uint32_t slot = voxels_ == nullptr ? ChunkStorage::kUniformSlab : voxels_->slabs[index];
+    if ((slot & ChunkStorage::kUniformSlab) != 0 || !has_air_) {
       const int y = static_cast<int>(index % 16) * 4;
       const int z = static_cast<int>(index / 16) * 4;
       out.fill(row(y, z));
@@ -109,7 +111,7 @@ class SolidRows {
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = halves[2 * i] | halves[2 * i + 1] << 32;
   }
 
-  const Chunk::Mixed* voxels_;
+  const ChunkStorage* voxels_;
   std::uint64_t uniform_ = 0;
   std::uint32_t air_ = kAir;
   bool has_air_ = true;
@@ -151,13 +153,13 @@ void HalvingMasks::read_voxels(IVec3 octant) {
   std::array<std::uint64_t, 16> rows;
   for (int z = low.z & ~3; z < high.z; z += 4) {
     for (int y = low.y & ~3; y < high.y; y += 4) {
-      solid.slab(Chunk::slab_index(y, z), rows);
+      solid.slab(ChunkStorage::slab_index(y, z), rows);
       const int last_y = std::min(y + 4, high.y);
       const int last_z = std::min(z + 4, high.z);
       for (int row_z = std::max(z, low.z); row_z < last_z; ++row_z) {
         for (int row_y = std::max(y, low.y); row_y < last_y; ++row_y) {
           fine(first.y + row_y, first.z + row_z)[word] =
-              rows[static_cast<std::size_t>(Chunk::row_in_slab(row_y, row_z))];
+              rows[static_cast<std::size_t>(ChunkStorage::row_in_slab(row_y, row_z))];
         }
       }
     }

@@ -43,7 +43,7 @@ void write_colours(const MeshView& view, BlockWriter& out) {
   if (view.has_albedo()) {
     for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(linear_colour(view, i));
   }
-  for (const std::uint8_t level : view.levels) {
+  for (const std::uint8_t level : view.block_occlusion) {
     const std::uint8_t grey = occlusion_grey(level);
     out.put(std::array<std::uint8_t, 4>{grey, grey, grey, 255});
   }

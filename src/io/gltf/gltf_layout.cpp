@@ -94,7 +94,7 @@ GltfPrimitive lay_out_primitive(const VertexTransform& transform, const Material
   primitive.positions = reserve_view(vertices * 12, end);
   primitive.normals = reserve_view(vertices * 12, end);
   if (!view.has_albedo()) primitive.texture_coordinates = reserve_view(vertices * 8, end);
-  primitive.colours = reserve_view(view.has_albedo() ? vertices * 8 : view.levels.size() * 4, end);
+  primitive.colours = reserve_view(view.has_albedo() ? vertices * 8 : view.block_occlusion.size() * 4, end);
   primitive.indices = reserve_view(view.indices.size() * (primitive.wide_indices ? 4 : 2), end);
   return primitive;
 }

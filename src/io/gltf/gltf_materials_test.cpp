@@ -14,7 +14,7 @@ using Json = nlohmann::json;
 
 using GltfMaterials = Gltf;
 
-TEST_F(GltfMaterials, occlusion_is_linear_grey_with_full_alpha_and_can_be_left_out) {
+TEST_F(GltfMaterials, OcclusionIsLinearGreyWithFullAlphaAndCanBeLeftOut) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const auto meshes = mesh_scene(scene_);
   const ParsedGlb glb = write(*meshes);
@@ -24,7 +24,7 @@ TEST_F(GltfMaterials, occlusion_is_linear_grey_with_full_alpha_and_can_be_left_o
   EXPECT_EQ(glb.document["accessors"][accessor]["type"], "VEC4");
   EXPECT_EQ(glb.document["accessors"][accessor]["normalized"], true);
   const auto colours = glb.array<std::array<std::uint8_t, 4>>(accessor);
-  const auto& levels = meshes->parts[0].surfaces[0].levels;
+  const auto& levels = meshes->parts[0].surfaces[0].block_occlusion;
   ASSERT_EQ(colours.size(), levels.size());
   constexpr std::array<std::uint8_t, 4> grey_of_level = {255, 191, 128, 64};
   std::set<std::uint8_t> seen;
@@ -38,7 +38,7 @@ TEST_F(GltfMaterials, occlusion_is_linear_grey_with_full_alpha_and_can_be_left_o
   EXPECT_FALSE(plain.document["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"));
 }
 
-TEST_F(GltfMaterials, every_type_has_its_texel) {
+TEST_F(GltfMaterials, EveryTypeHasItsTexel) {
   SceneGrid grid;
   grid.name = "ramp";
   for (int i = 0; i < 600; ++i) {
@@ -71,7 +71,7 @@ TEST_F(GltfMaterials, every_type_has_its_texel) {
   EXPECT_EQ(glb.document["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"], 1.0);
 }
 
-TEST_F(GltfMaterials, transparent_types_blend_with_alpha_in_the_palette) {
+TEST_F(GltfMaterials, TransparentTypesBlendWithAlphaInThePalette) {
   VoxelProperties glass;
   glass.colour = {10, 200, 220, 90};
   glass.visibility = Visibility::Transparent;
@@ -100,7 +100,7 @@ double linear_from_srgb(int srgb) {
   return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-TEST_F(GltfMaterials, emission_comes_out_right_in_linear_light_whatever_the_strengths) {
+TEST_F(GltfMaterials, EmissionComesOutRightInLinearLightWhateverTheStrengths) {
   const std::vector<float> strengths = {8.0F, 6.5F, 4.0F, 3.9F, 0.5F, 0.02F, 1000.0F};
   SceneGrid grid;
   std::vector<VoxelType> types;
@@ -138,7 +138,7 @@ TEST_F(GltfMaterials, emission_comes_out_right_in_linear_light_whatever_the_stre
   EXPECT_EQ(found.size(), strengths.size());
 }
 
-TEST_F(GltfMaterials, one_strength_keeps_the_palette_colour_in_the_emissive_texture) {
+TEST_F(GltfMaterials, OneStrengthKeepsThePaletteColourInTheEmissiveTexture) {
   VoxelProperties lamp;
   lamp.colour = {201, 102, 3, 255};
   lamp.emission = 0.35F;

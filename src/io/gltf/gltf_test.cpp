@@ -75,7 +75,7 @@ void expect_outward_windings(const ParsedGlb& glb) {
   }
 }
 
-TEST_F(Gltf, instances_of_one_grid_share_its_mesh_and_keep_names_and_transforms) {
+TEST_F(Gltf, InstancesOfOneGridShareItsMeshAndKeepNamesAndTransforms) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0}, "first");
   const InstanceHandle second = place(scene_, grid, {10.5, -3, 1e6}, "second");
@@ -98,7 +98,7 @@ TEST_F(Gltf, instances_of_one_grid_share_its_mesh_and_keep_names_and_transforms)
   EXPECT_TRUE(glb.document["asset"]["generator"].get<std::string>().starts_with("Quoin "));
 }
 
-TEST_F(Gltf, every_instance_lies_where_the_scene_has_it_mirrored_ones_too) {
+TEST_F(Gltf, EveryInstanceLiesWhereTheSceneHasItMirroredOnesToo) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-20.0, 20.0);
@@ -127,7 +127,7 @@ TEST_F(Gltf, every_instance_lies_where_the_scene_has_it_mirrored_ones_too) {
   }
 }
 
-TEST_F(Gltf, an_asymmetric_model_is_pinned) {
+TEST_F(Gltf, AnAsymmetricModelIsPinned) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   place(scene_, grid, {0, 0, 0});
   Instance& mirrored = scene_.edit(place(scene_, grid, {0, 0, 0}));
@@ -149,7 +149,7 @@ TEST_F(Gltf, an_asymmetric_model_is_pinned) {
   EXPECT_EQ(reflected.max, DVec3(-1, -0.5, 0.5));
 }
 
-TEST_F(Gltf, arrays_are_aligned_bounded_and_inside_the_buffer) {
+TEST_F(Gltf, ArraysAreAlignedBoundedAndInsideTheBuffer) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const ParsedGlb glb = write();
   EXPECT_EQ(glb.document["buffers"][0]["byteLength"], glb.binary.size());
@@ -172,7 +172,7 @@ SceneMeshes mesh_of_size(std::size_t vertices) {
   for (std::size_t i = 0; i < vertices; ++i) {
     surface.positions.emplace_back(static_cast<float>(i / 3), i % 3 == 1 ? 1.0F : 0.0F, i % 3 == 2 ? 1.0F : 0.0F);
     surface.directions.push_back(Direction::PosX);
-    surface.levels.push_back(0);
+    surface.occlusion.push_back(0);
     surface.types.push_back(1);
   }
   for (std::size_t i = 0; i + 2 < vertices; i += 3) {
@@ -186,7 +186,7 @@ SceneMeshes mesh_of_size(std::size_t vertices) {
   return meshes;
 }
 
-TEST_F(Gltf, indices_take_16_bits_where_they_fit) {
+TEST_F(Gltf, IndicesTake16BitsWhereTheyFit) {
   const auto component = [&](std::size_t vertices) {
     const ParsedGlb glb = write(mesh_of_size(vertices));
     const Json& primitive = glb.document["meshes"][0]["primitives"][0];
@@ -199,7 +199,7 @@ TEST_F(Gltf, indices_take_16_bits_where_they_fit) {
   EXPECT_EQ(component(65'538), 5125);
 }
 
-TEST_F(Gltf, an_empty_scene_and_an_empty_grid_are_valid_files) {
+TEST_F(Gltf, AnEmptySceneAndAnEmptyGridAreValidFiles) {
   const ParsedGlb nothing = write();
   EXPECT_EQ(nothing.document["scenes"], Json::parse("[{}]"));
   EXPECT_TRUE(nothing.binary.empty());
@@ -214,19 +214,19 @@ TEST_F(Gltf, an_empty_scene_and_an_empty_grid_are_valid_files) {
   EXPECT_FALSE(glb.document.contains("buffers"));
 }
 
-TEST_F(Gltf, hidden_instances_are_left_out_unless_asked_for) {
+TEST_F(Gltf, HiddenInstancesAreLeftOutUnlessAskedFor) {
   const GridHandle grid = add_asymmetric_grid(scene_, "crane");
   const GridHandle other = add_asymmetric_grid(scene_, "ghost");
   place(scene_, grid, {0, 0, 0}, "seen");
   scene_.edit(place(scene_, other, {0, 0, 0}, "unseen")).visible = false;
   EXPECT_EQ(write().document["nodes"].size(), 1U);
-  const auto all = mesh_scene(scene_, {.hidden = true});
+  const auto all = mesh_scene(scene_, {.instances = InstanceFilter::All});
   ASSERT_TRUE(all);
   EXPECT_EQ(write(*all).document["nodes"].size(), 2U);
   EXPECT_EQ(all->parts.size(), 2U);
 }
 
-TEST_F(Gltf, names_that_are_no_utf8_are_repaired) {
+TEST_F(Gltf, NamesThatAreNoUtf8AreRepaired) {
   SceneGrid grid;
   grid.name = "caf\xE9";
   grid.grid.set({0, 0, 0}, add_type(scene_, "stone", {90, 90, 90, 255}));
@@ -234,7 +234,7 @@ TEST_F(Gltf, names_that_are_no_utf8_are_repaired) {
   EXPECT_EQ(write().document["meshes"][0]["name"], "caf\xEF\xBF\xBD");
 }
 
-TEST_F(Gltf, more_than_4_gib_is_refused) {
+TEST_F(Gltf, MoreThan4GibIsRefused) {
   constexpr std::uint64_t limit = std::numeric_limits<std::uint32_t>::max();
   EXPECT_EQ(glb_file_bytes(100, 0).value_or(0), 120U);
   EXPECT_EQ(glb_file_bytes(100, limit - 128).value_or(0), limit);
@@ -243,7 +243,7 @@ TEST_F(Gltf, more_than_4_gib_is_refused) {
   EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
 }
 
-TEST_F(Gltf, the_same_bytes_at_any_thread_count) {
+TEST_F(Gltf, TheSameBytesAtAnyThreadCount) {
   std::mt19937 random(11);
   for (int g = 0; g < 5; ++g) {
     const GridHandle handle = add_asymmetric_grid(scene_, "grid " + std::to_string(g));
@@ -265,7 +265,7 @@ TEST_F(Gltf, the_same_bytes_at_any_thread_count) {
   EXPECT_EQ(one, file(8));
 }
 
-TEST_F(Gltf, text_form_holds_the_same_content) {
+TEST_F(Gltf, TextFormHoldsTheSameContent) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const auto meshes = mesh_scene(scene_);
   const ParsedGlb glb = write(*meshes);
@@ -283,7 +283,7 @@ TEST_F(Gltf, text_form_holds_the_same_content) {
   EXPECT_EQ(*bytes, text.size() + buffer.size());
 }
 
-TEST_F(Gltf, failures_leave_no_file) {
+TEST_F(Gltf, FailuresLeaveNoFile) {
   place(scene_, add_asymmetric_grid(scene_, "crane"), {0, 0, 0});
   const auto meshes = mesh_scene(scene_);
   const auto missing = write_mesh(*meshes, folder_.file("no such folder/out.glb"));

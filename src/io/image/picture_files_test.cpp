@@ -151,7 +151,7 @@ TEST_F(PictureFiles, ImpossiblePicturesAndPathsAreErrors) {
   EXPECT_EQ(read_pfm(file("a.png")).error().path, file("a.png").string());
 }
 
-TEST(PngMistakes, pixels_that_are_not_what_the_sizes_say_are_found) {
+TEST(PngMistakes, PixelsThatAreNotWhatTheSizesSayAreFound) {
   QUOIN_EXPECT_MISTAKE((void)encode_png({2, 2, 3, {}}), "as many bytes of pixels as the sizes say");
 }
 

@@ -29,7 +29,7 @@ std::string one_word(const std::string& name) {
   return word;
 }
 
-constexpr std::size_t kMostDigits = 40;
+constexpr std::size_t kMaxDigits = 40;
 
 /// Writes what the corners of voxels are mostly, whole and half numbers, as std::to_chars does; null for other ones.
 /// From 100,000 on that may choose an exponent.
@@ -40,7 +40,7 @@ char* write_halves(double value, char* out) {
   if (static_cast<double>(halves) != value * 2.0) return nullptr;
   if (halves < 0) *out++ = '-';
   const auto size = static_cast<std::uint32_t>(halves < 0 ? -halves : halves);
-  out = std::to_chars(out, out + kMostDigits, size / 2).ptr;
+  out = std::to_chars(out, out + kMaxDigits, size / 2).ptr;
   if (size % 2 != 0) {
     *out++ = '.';
     *out++ = '5';
@@ -51,7 +51,7 @@ char* write_halves(double value, char* out) {
 char* write_number(double value, char* out) {
   if (char* end = write_halves(value, out)) return end;
   const double rounded = std::round(value * 1e6) / 1e6 + 0.0;
-  return std::to_chars(out, out + kMostDigits, rounded).ptr;
+  return std::to_chars(out, out + kMaxDigits, rounded).ptr;
 }
 
 /// Writes the parts that lines of an OBJ file consist of.
@@ -73,17 +73,17 @@ class ObjLines {
 };
 
 std::string ObjLines::text_of(double value) {
-  std::array<char, kMostDigits> room{};
+  std::array<char, kMaxDigits> room{};
   return {room.data(), write_number(value, room.data())};
 }
 
 void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
-  char* at = out_.room(keyword.size() + 3 * (1 + kMostDigits));
+  char* at = out_.room(keyword.size() + 3 * (1 + kMaxDigits));
   at = std::copy(keyword.begin(), keyword.end(), at);
   for (int axis = 0; axis < 3; ++axis) {
     *at++ = ' ';
     at = digits == 0 ? write_number(v[axis], at)
-                     : std::to_chars(at, at + kMostDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
+                     : std::to_chars(at, at + kMaxDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
   }
   out_.advance(at);
 }
@@ -206,7 +206,7 @@ class ObjText {
   void write_vertices(const MeshView& view, const VertexTransform& transform) {
     for (std::size_t i = 0; i < view.positions.size() && !out_.failed(); ++i) {
       lines_.triple("v", transform.position(view.positions[i]));
-      if (!view.levels.empty()) out_.put_text(greys_[view.levels[i]]);
+      if (!view.block_occlusion.empty()) out_.put_text(greys_[view.block_occlusion[i]]);
       out_.put('\n');
     }
   }
@@ -214,13 +214,13 @@ class ObjText {
   /// `normal_and_texture(corner)`: the number of its normal among those of the object, and its texture or 0.
   template <class Numbers>
   void write_faces(const MeshView& view, bool turned, Numbers normal_and_texture) {
-    constexpr std::size_t kMostOfCorner = 64;
+    constexpr std::size_t kMaxOfCorner = 64;
     for (std::size_t i = 0; i < view.indices.size() && !out_.failed(); i += 3) {
-      char* at = out_.room(2 + 3 * kMostOfCorner);
+      char* at = out_.room(2 + 3 * kMaxOfCorner);
       *at++ = 'f';
       for (const std::uint32_t corner : corners_of(view, i, turned)) {
         const auto [normal, texture] = normal_and_texture(corner);
-        char* const end = at + kMostOfCorner;
+        char* const end = at + kMaxOfCorner;
         *at++ = ' ';
         at = std::to_chars(at, end, vertices_ + corner + 1).ptr;
         *at++ = '/';

@@ -103,7 +103,7 @@ class Obj : public ::testing::Test {
   TestFolder folder_{std::string("obj_") + ::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-TEST_F(Obj, objects_are_baked_with_outward_windings_mirrored_ones_too) {
+TEST_F(Obj, ObjectsAreBakedWithOutwardWindingsMirroredOnesToo) {
   place({0, 0, 0});
   Instance& turned = place({100, 5, -7.25});
   turned.rotation = glm::normalize(DQuat(0.3, 0.5, -0.1, 0.7));
@@ -120,12 +120,12 @@ TEST_F(Obj, objects_are_baked_with_outward_windings_mirrored_ones_too) {
   }
   DBox second;
   for (std::size_t i = obj.positions.size() / 2; i < obj.positions.size(); ++i) second.extend(obj.positions[i]);
-  const DBox all = scene_.bounds(false);
+  const DBox all = scene_.bounds();
   EXPECT_NEAR(second.max.x, all.max.x, 1e-5);
   EXPECT_NEAR(second.max.y, all.max.y, 1e-5);
 }
 
-TEST_F(Obj, texture_coordinates_meet_the_palette) {
+TEST_F(Obj, TextureCoordinatesMeetThePalette) {
   place({0, 0, 0});
   const ParsedObj obj = write();
   const PngImage palette = *decode_png(*read_file(folder_.file("my model_palette.png")));
@@ -140,7 +140,7 @@ TEST_F(Obj, texture_coordinates_meet_the_palette) {
   EXPECT_EQ(seen, (std::set<std::array<int, 3>>{{90, 80, 70}, {10, 200, 220}, {250, 240, 10}}));
 }
 
-TEST_F(Obj, materials_are_in_the_library_beside_it) {
+TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {
   place({0, 0, 0});
   const ParsedObj obj = write();
   EXPECT_EQ(obj.library, "my model.mtl");
@@ -157,7 +157,7 @@ TEST_F(Obj, materials_are_in_the_library_beside_it) {
   EXPECT_EQ(folder_.count(), 4U);
 }
 
-TEST_F(Obj, occlusion_is_a_colour_of_vertices_only_when_there_is_any) {
+TEST_F(Obj, OcclusionIsAColourOfVerticesOnlyWhenThereIsAny) {
   place({0, 0, 0});
   const ParsedObj shaded = write();
   EXPECT_EQ(shaded.greys.size(), shaded.positions.size());
@@ -165,7 +165,7 @@ TEST_F(Obj, occlusion_is_a_colour_of_vertices_only_when_there_is_any) {
   EXPECT_TRUE(write(false).greys.empty());
 }
 
-TEST_F(Obj, failures_leave_no_file) {
+TEST_F(Obj, FailuresLeaveNoFile) {
   place({0, 0, 0});
   const SceneMeshes meshes = *mesh_scene(scene_);
   EXPECT_FALSE(write_mesh(meshes, folder_.file("out.obj"), {}, [](double) { return false; }));
@@ -173,7 +173,7 @@ TEST_F(Obj, failures_leave_no_file) {
   EXPECT_EQ(folder_.count(), 0U);
 }
 
-TEST_F(Obj, an_empty_scene_is_a_file_without_objects) {
+TEST_F(Obj, AnEmptySceneIsAFileWithoutObjects) {
   EXPECT_TRUE(write().objects.empty());
 }
 

@@ -73,10 +73,10 @@ void write_vertices(const MeshView& view, const VertexTransform& transform, cons
     return;
   }
   const auto normals = transform.face_normals();
-  const bool has_levels = !view.levels.empty();
+  const bool has_levels = !view.block_occlusion.empty();
   for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
     put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
-               colours[view.types[i] * kLevels + (has_levels ? view.levels[i] : 0)], out);
+               colours[view.types[i] * kLevels + (has_levels ? view.block_occlusion[i] : 0)], out);
   }
 }
 

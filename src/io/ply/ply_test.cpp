@@ -7,7 +7,7 @@ namespace quoin {
 
 namespace {
 
-TEST(BlockyPly, every_face_stands_in_the_world_with_its_colour) {
+TEST(BlockyPly, EveryFaceStandsInTheWorldWithItsColour) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");
   const InstanceHandle mirrored = place(scene, grid, {10, 20, 30});
@@ -28,7 +28,7 @@ TEST(BlockyPly, every_face_stands_in_the_world_with_its_colour) {
   EXPECT_EQ(world.inward_normals(), 0U);
   DBox box;
   for (const DVec3& p : world.positions) box.extend(p);
-  const DBox expected = scene.bounds(false);
+  const DBox expected = scene.bounds();
   EXPECT_LT(glm::length(box.min - expected.min) + glm::length(box.max - expected.max), 1e-4);
   std::size_t red = 0;
   std::size_t darkened = 0;

@@ -15,10 +15,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kMostBytes = std::size_t{64} << 20;
-constexpr int kMostDepth = 32;
-constexpr std::size_t kMostFiles = 65'536;
-constexpr std::size_t kMostInstances = std::size_t{1} << 22;
+constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
+constexpr int kMaxDepth = 32;
+constexpr std::size_t kMaxFiles = 65'536;
+constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
 constexpr int kVersion = 1;
 
 /// A place in the file: a key or an index below another place, the file itself without. Text is made of it only where
@@ -267,9 +267,9 @@ void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
     faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 is",
                ErrorCode::Unsupported);
   }
-  read_list(file, "files", kMostFiles,
+  read_list(file, "files", kMaxFiles,
             [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
-  read_list(file, "instances", kMostInstances, [&](const Json& each, const Place& place) {
+  read_list(file, "instances", kMaxInstances, [&](const Json& each, const Place& place) {
     scene.placements.push_back(placement_of(each, place, faults));
   });
   if (const Json* sun = file.find("sun")) {
@@ -304,10 +304,10 @@ int depth_of(std::string_view text) {
 }  // namespace
 
 Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
-  if (text.size() > kMostBytes) return fail(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB");
+  if (text.size() > kMaxBytes) return fail(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB");
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
-  if (depth_of(chars) > kMostDepth) {
-    return fail(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMostDepth) + " levels deep");
+  if (depth_of(chars) > kMaxDepth) {
+    return fail(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
   }
   SceneFile scene;
   Faults faults;

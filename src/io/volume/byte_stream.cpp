@@ -14,10 +14,10 @@ namespace quoin {
 namespace {
 
 // A match of 258 bytes takes two bits at least (RFC 1951).
-constexpr std::uint64_t kMostDeflateRatio = 1032;
+constexpr std::uint64_t kMaxDeflateRatio = 1032;
 
 // zlib counts in 32 bits.
-constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;
+constexpr std::size_t kMaxAtOnce = std::size_t{1} << 30;
 
 // 15 bits of window, and 16 more for gzip's header and trailer.
 constexpr int kGzipWindow = 15 + 16;
@@ -48,9 +48,9 @@ ByteStream::ByteStream(std::span<const std::byte> file, std::size_t begin, Compr
 
 ByteStream::~ByteStream() = default;
 
-std::uint64_t ByteStream::most_bytes() const {
+std::uint64_t ByteStream::max_bytes() const {
   const std::uint64_t held = file_.size() - begin_;
-  return inflater_ ? held * kMostDeflateRatio : held;
+  return inflater_ ? held * kMaxDeflateRatio : held;
 }
 
 Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
@@ -62,7 +62,7 @@ Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
   }
   std::size_t filled = 0;
   while (filled < out.size() && !inflater_->is_done) {
-    const auto count = inflate_some(out.subspan(filled, std::min(out.size() - filled, kMostAtOnce)));
+    const auto count = inflate_some(out.subspan(filled, std::min(out.size() - filled, kMaxAtOnce)));
     if (!count) return count;
     filled += *count;
   }
@@ -72,7 +72,7 @@ Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
 /// One call of inflate; it may give nothing and still have got ahead.
 Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
   z_stream& state = inflater_->state;
-  const std::size_t offered = std::min(file_.size() - position_, kMostAtOnce);
+  const std::size_t offered = std::min(file_.size() - position_, kMaxAtOnce);
   // zlib reads through this pointer only; its type dates from before const.
   state.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(file_.data() + position_));
   state.avail_in = static_cast<uInt>(offered);
@@ -125,7 +125,7 @@ Result<std::uint64_t> ByteStream::skip(std::uint64_t count) {
 Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most) {
   const bool is_gzip = begins_gzip(file);
   ByteStream stream(file, 0, is_gzip ? Compression::Gzip : Compression::None);
-  std::vector<std::byte> bytes(static_cast<std::size_t>(std::min<std::uint64_t>(most, stream.most_bytes())));
+  std::vector<std::byte> bytes(static_cast<std::size_t>(std::min<std::uint64_t>(most, stream.max_bytes())));
   const auto count = stream.read(bytes);
   if (!count) return count.error();
   bytes.resize(*count);

@@ -35,7 +35,7 @@ class ByteStream {
 
   /// The most bytes that the whole stream can give: exact without compression; 1,032 a byte with it, which deflate
   /// cannot exceed.
-  [[nodiscard]] std::uint64_t most_bytes() const;
+  [[nodiscard]] std::uint64_t max_bytes() const;
   /// The bytes left in the file itself.
   [[nodiscard]] std::size_t remaining() const { return file_.size() - position_; }
   /// Where in the file the next byte comes from.

@@ -196,7 +196,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
     return fail(ErrorCode::BadFormat, claim(volume, count * width) + ", but there are " + how + std::to_string(held),
                 {}, offset);
   };
-  const std::uint64_t most = stream.is_compressed() ? stream.most_bytes() : stream.remaining();
+  const std::uint64_t most = stream.is_compressed() ? stream.max_bytes() : stream.remaining();
   if (count * width > most) return cut_off(most, stream.is_compressed() ? "at most " : "");
   std::vector<std::byte> piece(std::min(count, kValuesAtOnce) * width);
   // Reserved memory costs nothing until values come to fill it.

@@ -59,7 +59,7 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 namespace quoin::nifti {
 
 /// How many bytes `read_header` wants at most.
-inline constexpr std::size_t kMostHeaderBytes = 540;
+inline constexpr std::size_t kMaxHeaderBytes = 540;
 
 /// Whether a NIfTI-1 or -2 header of either byte order begins here, alone or of a pair.
 [[nodiscard]] bool is_header(std::span<const std::byte> bytes);
@@ -72,12 +72,12 @@ inline constexpr std::size_t kMostHeaderBytes = 540;
 namespace quoin::nrrd {
 
 /// How many bytes a header may have; one of a few dozen lines has some thousand.
-inline constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
+inline constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 16;
 
 /// Whether a NRRD header begins here.
 [[nodiscard]] bool is_header(std::span<const std::byte> bytes);
 
-/// Reads a header; sources as in read_volume. `bytes` may be the file's first kMostHeaderBytes.
+/// Reads a header; sources as in read_volume. `bytes` may be the file's first kMaxHeaderBytes.
 /// Requires: is_header(bytes). Offsets in errors count from `bytes`.
 [[nodiscard]] Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options);
 

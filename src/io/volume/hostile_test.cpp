@@ -183,16 +183,16 @@ TEST(VolumeHostile, TheCorpusIsHarmless) {
   EXPECT_GT(count, 5);
 }
 
-TEST(VolumeMistakes, a_stream_that_begins_behind_its_file_is_found) {
+TEST(VolumeMistakes, AStreamThatBeginsBehindItsFileIsFound) {
   QUOIN_EXPECT_MISTAKE((void)ByteStream({}, 1, Compression::None), "the stream begins in the file");
 }
 
-TEST(VolumeMistakes, sizes_that_are_not_positive_are_found) {
+TEST(VolumeMistakes, SizesThatAreNotPositiveAreFound) {
   Volume volume;
   QUOIN_EXPECT_MISTAKE((void)set_size({1, 0, 1}, {}, std::nullopt, volume), "positive extents");
 }
 
-TEST(VolumeMistakes, headers_that_are_none_are_found) {
+TEST(VolumeMistakes, HeadersThatAreNoneAreFound) {
   QUOIN_EXPECT_MISTAKE((void)nifti::read_header({}, {}), "a header begins here");
   QUOIN_EXPECT_MISTAKE((void)nrrd::read_header({}, {}), "a header begins here");
 }

@@ -302,7 +302,7 @@ Status place(const Fields& fields, std::size_t dimensions, Volume& volume) {
 }
 
 constexpr std::string_view kMagic = "NRRD000";
-constexpr std::int64_t kMostDimensions = 16;
+constexpr std::int64_t kMaxDimensions = 16;
 
 std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -361,7 +361,7 @@ Result<std::size_t> read_dimensions(const Fields& fields) {
   const auto field = required(fields, "dimension");
   if (!field) return field.error();
   const auto dimensions = parse_integer(field->text);
-  if (!dimensions || *dimensions < 1 || *dimensions > kMostDimensions) {
+  if (!dimensions || *dimensions < 1 || *dimensions > kMaxDimensions) {
     return bad("the dimension is " + quoted(field->text), field->at);
   }
   if (*dimensions >= 3) return static_cast<std::size_t>(*dimensions);
@@ -448,7 +448,7 @@ bool is_header(std::span<const std::byte> bytes) {
 
 Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options) {
   QUOIN_ASSERT(is_header(bytes), "a header begins here");
-  const std::string_view text = text_of(bytes.first(std::min(bytes.size(), kMostHeaderBytes)));
+  const std::string_view text = text_of(bytes.first(std::min(bytes.size(), kMaxHeaderBytes)));
   if (text[kMagic.size()] < '1' || text[kMagic.size()] > '5') {
     return unsupported("a NRRD of version " + std::string(1, text[kMagic.size()]) + "; 1 to 5 are read", 0);
   }

@@ -18,9 +18,9 @@ struct Beginning {
 };
 
 Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
-  auto first = first_bytes(bytes, std::max(nifti::kMostHeaderBytes, nrrd::kMostHeaderBytes));
+  auto first = first_bytes(bytes, std::max(nifti::kMaxHeaderBytes, nrrd::kMaxHeaderBytes));
   // Damage farther on shows when the values are read; what came before it may still be a header.
-  if (!first) first = first_bytes(bytes, nifti::kMostHeaderBytes);
+  if (!first) first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (!first) return first.error();
   return Beginning{std::move(*first), begins_gzip(bytes) ? Compression::Gzip : Compression::None};
 }

@@ -202,7 +202,7 @@ inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOption
   if (!written) {
     return written.error().code == ErrorCode::LimitExceeded ? "" : "cannot write: " + to_string(written.error());
   }
-  const Result<LoadedScene> again = read_vox(*written, {.hidden = false, .frame = 0});
+  const Result<LoadedScene> again = read_vox(*written, {.show_hidden = false, .frame = 0});
   if (!again) return "cannot read what was written: " + to_string(again.error());
   return difference(loaded->scene, again->scene);
 }

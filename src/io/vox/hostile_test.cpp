@@ -278,7 +278,7 @@ TEST(VoxHostile, TheCorpusIsHarmless) {
     const auto bytes = read_file(entry.path());
     ASSERT_TRUE(bytes) << entry.path();
     for (const int frame : {0, 1}) {
-      EXPECT_EQ(wrong_with(*bytes, {.hidden = frame == 1, .frame = frame}), "") << entry.path();
+      EXPECT_EQ(wrong_with(*bytes, {.show_hidden = frame == 1, .frame = frame}), "") << entry.path();
     }
     ++count;
   }

@@ -148,8 +148,8 @@ namespace {
 constexpr float kDefaultRoughness = 0.1F;
 constexpr float kDefaultTransparency = 0.5F;
 constexpr float kLeastAlpha = 0.1F;
-constexpr float kMostFlux = 16.0F;
-constexpr float kMostRefraction = 10.0F;
+constexpr float kMaxFlux = 16.0F;
+constexpr float kMaxRefraction = 10.0F;
 const float kDefaultRefraction = VoxelProperties{}.ior;
 
 const std::array<std::string, 11> kDecodedKeys = {"_type",  "_rough", "_metal", "_plastic", "_weight", "_alpha",
@@ -180,7 +180,7 @@ void make_transparent(VoxelProperties& out, float transparency) {
 
 float emitted(const Attributes& attributes) {
   const float share = unit(either(number(attributes, "_emit"), number(attributes, "_weight")), 1.0F);
-  const float flux = std::clamp(number(attributes, "_flux").value_or(0.0F), -kMostFlux, kMostFlux);
+  const float flux = std::clamp(number(attributes, "_flux").value_or(0.0F), -kMaxFlux, kMaxFlux);
   return share * std::exp2(flux);
 }
 
@@ -210,7 +210,7 @@ void decode_published(const Attributes& attributes, VoxelProperties& out) {
   std::optional<float> refraction = number(attributes, "_ri");
   if (!refraction.has_value() && number(attributes, "_ior").has_value())
     refraction = 1.0F + *number(attributes, "_ior");
-  out.ior = std::clamp(refraction.value_or(kDefaultRefraction), 1.0F, kMostRefraction);
+  out.ior = std::clamp(refraction.value_or(kDefaultRefraction), 1.0F, kMaxRefraction);
 }
 
 /// What Quoin's own keys say, in the order of encode_own.
@@ -238,12 +238,12 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   out.roughness = std::clamp(out.roughness, 0.0F, 1.0F);
   out.metalness = std::clamp(out.metalness, 0.0F, 1.0F);
   out.emission = std::max(out.emission, 0.0F);
-  out.ior = std::clamp(out.ior, 1.0F, kMostRefraction);
+  out.ior = std::clamp(out.ior, 1.0F, kMaxRefraction);
 }
 
 void encode_emission(float emission, Attributes& out) {
   int flux = 0;
-  while (emission > std::exp2(static_cast<float>(flux)) && flux < static_cast<int>(kMostFlux)) ++flux;
+  while (emission > std::exp2(static_cast<float>(flux)) && flux < static_cast<int>(kMaxFlux)) ++flux;
   out["_emit"] = to_text(emission / std::exp2(static_cast<float>(flux)));
   if (flux > 0) out["_flux"] = std::to_string(flux);
 }

@@ -19,14 +19,14 @@ constexpr std::size_t kGridBytesPerFileByte = 64;
 
 Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::ModelBuilder& builder,
                                           std::size_t file_bytes, const Progress& progress, Scene& scene) {
-  const std::size_t most_bytes = kFreeGridBytes + kGridBytesPerFileByte * file_bytes;
+  const std::size_t max_bytes = kFreeGridBytes + kGridBytesPerFileByte * file_bytes;
   std::size_t grid_bytes = 0;
   std::vector<GridHandle> handles;
   handles.reserve(document.models.size());
   for (const vox::Model& model : document.models) {
     SceneGrid grid = builder.build(model);
     grid_bytes += grid.grid.bytes();
-    if (grid_bytes > most_bytes) {
+    if (grid_bytes > max_bytes) {
       return fail(ErrorCode::LimitExceeded, "scattered voxels take far more memory than the file has bytes", {},
                   model.offset);
     }
@@ -48,7 +48,7 @@ Instance instance_of(const vox::Placement& placement, GridHandle grid, const Loa
   }
   instance.rotation = turn.rotation;
   instance.mirrored = turn.mirrored;
-  instance.visible = !placement.hidden || options.hidden;
+  instance.visible = !placement.hidden || options.show_hidden;
   return instance;
 }
 

@@ -52,7 +52,7 @@ TEST(VoxRead, AModelWithoutNodesStandsOnTheGroundCentred) {
   const LoadedScene loaded = load(FileBuilder().model(4, 6, 5, {{0, 0, 0, 1}, {3, 5, 4, 1}}).file());
   EXPECT_EQ(loaded.format, "vox");
   EXPECT_TRUE(loaded.warnings.empty());
-  const DBox bounds = loaded.scene.bounds(false);
+  const DBox bounds = loaded.scene.bounds();
   EXPECT_EQ(bounds.min, DVec3(-2, 0, -3));
   EXPECT_EQ(bounds.max, DVec3(2, 5, 3));
 }
@@ -134,7 +134,7 @@ TEST(VoxRead, HiddenNodesAndLayersHideWhatIsBelow) {
   EXPECT_TRUE(instance_at(loaded, 2).visible);
   EXPECT_FALSE(instance_at(loaded, 3).visible);
   EXPECT_TRUE(loaded.warnings.empty()) << "they are kept";
-  const LoadedScene all = load(bytes, {.hidden = true});
+  const LoadedScene all = load(bytes, {.show_hidden = true});
   EXPECT_TRUE(all.warnings.empty());
   for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(instance_at(all, i).visible);
 }
@@ -287,12 +287,12 @@ TEST(VoxRead, FewSomeAndManyVoxelsInAChunkAreAllPlacedTheSame) {
   }
 }
 
-TEST(VoxMistakes, a_reader_of_bytes_that_are_not_there_is_found) {
+TEST(VoxMistakes, AReaderOfBytesThatAreNotThereIsFound) {
   const std::vector<std::byte> bytes(4);
   QUOIN_EXPECT_MISTAKE((void)ByteReader(bytes, 0, 5), "a stretch of the bytes");
 }
 
-TEST(VoxMistakes, a_registry_with_types_is_found) {
+TEST(VoxMistakes, ARegistryWithTypesIsFound) {
   VoxelRegistry types;
   ASSERT_TRUE(types.add({}));
   QUOIN_EXPECT_MISTAKE((void)vox::register_palette({}, {}, types), "types hold air only");

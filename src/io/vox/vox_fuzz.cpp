@@ -9,7 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
   // The length chooses the options, so that every input has one meaning.
   const bool second = size % 2 == 1;
-  const std::string wrong = quoin::vox_test::wrong_with(bytes, {.hidden = second, .frame = second ? 1 : 0});
+  const std::string wrong = quoin::vox_test::wrong_with(bytes, {.show_hidden = second, .frame = second ? 1 : 0});
   if (!wrong.empty()) {
     std::fprintf(stderr, "%s\n", wrong.c_str());
     std::abort();

@@ -299,7 +299,7 @@ TEST(VoxWrite, TheSameSceneGivesTheSameBytes) {
   EXPECT_EQ(*write_vox(random_scene(7), warnings), *write_vox(random_scene(7), warnings));
 }
 
-TEST(VoxMistakes, pieces_without_a_place_in_the_file_are_found) {
+TEST(VoxMistakes, PiecesWithoutAPlaceInTheFileAreFound) {
   const std::vector<vox::Piece> pieces(1);
   QUOIN_EXPECT_MISTAKE(vox::write_voxels({}, {}, pieces, {}, {}), "a place for every piece");
 }

@@ -191,10 +191,10 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
     low = or3(low, _mm512_slli_epi32(width, L::kWidthShift), _mm512_slli_epi32(rows_before, L::kHeightShift));
     if constexpr (kOcclusion) {
       const __m512i levels = sixteen_bytes(parts.bytes[Parts::kLevels] + i);
-      low = _mm512_or_si512(low, _mm512_slli_epi32(levels, Quad::kLevelsShift));
+      low = _mm512_or_si512(low, _mm512_slli_epi32(levels, Quad::kOcclusionShift));
       const __m512i flip = _mm512_rorv_epi32(_mm512_permutexvar_epi32(_mm512_srli_epi32(levels, 5), flips), levels);
       high = _mm512_ternarylogic_epi32(high, flip, _mm512_set1_epi32(1 << (Quad::kFlipShift - 32)), 0xF8);
-      high = _mm512_or_si512(high, _mm512_srli_epi32(levels, 32 - Quad::kLevelsShift));
+      high = _mm512_or_si512(high, _mm512_srli_epi32(levels, 32 - Quad::kOcclusionShift));
     }
     _mm512_storeu_si512(out + i, _mm512_permutex2var_epi32(low, low_half, high));
     _mm512_storeu_si512(out + i + 8, _mm512_permutex2var_epi32(low, high_half, high));

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 
+#include "grid/chunk/chunk_storage.h"
 #include "grid/chunk/packed_row.h"
 #include "mesh/blocky/scratch.h"
 #include "mesh/blocky/words.inl"
@@ -109,14 +110,14 @@ using Four __attribute__((vector_size(32))) = std::uint64_t;
 using UnalignedFour __attribute__((vector_size(32), aligned(8))) = std::uint64_t;
 
 // Where each row's packed voxels lie; those of uniform slabs are written out once.
-void find_rows(const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
+void find_rows(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; z += 4) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
-      const std::size_t slab = Chunk::slab_index(y, z);
+      const std::size_t slab = ChunkStorage::slab_index(y, z);
       const std::uint32_t entry = voxels.slabs[slab];
-      const bool is_uniform = (entry & Chunk::kUniformSlab) != 0;
+      const bool is_uniform = (entry & ChunkStorage::kUniformSlab) != 0;
       if (is_uniform) {
-        const std::uint64_t pattern = packed_row::repeat(voxels.bits, entry & ~Chunk::kUniformSlab);
+        const std::uint64_t pattern = packed_row::repeat(voxels.bits, entry & ~ChunkStorage::kUniformSlab);
         for (int i = 0; i < voxels.bits; ++i) s.patterns[slab][i] = pattern;
       }
       const auto first = reinterpret_cast<std::uint64_t>(is_uniform ? s.patterns[slab] : voxels.row(entry, 0));
@@ -156,18 +157,18 @@ QUOIN_INLINE Four plane_of_rows(const std::uint64_t* rows, int k) {
 }
 
 // How many of the planes of narrow palette indices may differ from 0.
-int index_planes(const Chunk::Mixed& voxels) {
+int index_planes(const ChunkStorage& voxels) {
   if (voxels.bits > 4) return 0;
   return voxels.bits == 4 && voxels.palette.size() <= 8 ? 3 : voxels.bits;
 }
 
 // The lowest planes of rows of 1, 2 or 4 bits a voxel.
 template <int kBits, int kPlanes>
-void split_planes(const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
+void split_planes(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; z += 4) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
-      const std::uint32_t entry = voxels.slabs[Chunk::slab_index(y, z)];
-      const bool is_uniform = (entry & Chunk::kUniformSlab) != 0;
+      const std::uint32_t entry = voxels.slabs[ChunkStorage::slab_index(y, z)];
+      const bool is_uniform = (entry & ChunkStorage::kUniformSlab) != 0;
       for (int k = 0; k < kPlanes; ++k) {
         for (int i = 0; i < 4; ++i) {
           const Four rows = is_uniform ? Four{} - (entry >> k & 1U) : plane_of_rows<kBits>(voxels.row(entry, 4 * i), k);
@@ -185,7 +186,7 @@ struct OpenIndices {
   int count;
 };
 
-OpenIndices open_indices(const Chunk::Mixed& voxels, const Scratch& s) {
+OpenIndices open_indices(const ChunkStorage& voxels, const Scratch& s) {
   OpenIndices open{};
   for (const std::uint8_t wanted : {0, 2}) {
     for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
@@ -245,7 +246,7 @@ void combine_planes(const SlabRange& range, const OpenIndices& open, Scratch& s)
 }
 
 template <int kBits, int kPlanes>
-void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
+void read_planes(const Job& job, const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   split_planes<kBits, kPlanes>(voxels, range, s);
   const OpenIndices open = open_indices(voxels, s);
   if (job.one_type) {
@@ -259,7 +260,7 @@ void read_planes(const Job& job, const Chunk::Mixed& voxels, const SlabRange& ra
 
 // As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
 template <int kBits>
-void classify_wide(const Job& job, const Chunk::Mixed& voxels, const SlabRange& range, Scratch& s) {
+void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   const auto cells_of = [&](const std::uint64_t* row, std::uint32_t index) {
     std::uint64_t pattern[kBits];
     for (int i = 0; i < kBits; ++i) pattern[i] = packed_row::repeat(kBits, index);
@@ -320,7 +321,7 @@ void classify_uniform(const Job& job, const SlabRange& range, Scratch& s) {
 }
 
 void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
-  const Chunk::Mixed* voxels = job.chunks->centre()->mixed();
+  const ChunkStorage* voxels = job.chunks->centre()->storage();
   if (voxels == nullptr) {
     classify_uniform(job, range, s);
     return;
@@ -359,7 +360,7 @@ class OpaqueVoxels {
  public:
   OpaqueVoxels(const Chunk* chunk, const VoxelRegistry& types) : types_(&types) {
     if (chunk == nullptr) return;
-    voxels_ = chunk->mixed();
+    voxels_ = chunk->storage();
     if (voxels_ == nullptr) {
       all_ = types.is_opaque(*chunk->uniform());
       return;
@@ -376,9 +377,10 @@ class OpaqueVoxels {
   // Bit x: the voxel at x.
   [[nodiscard]] std::uint64_t row(int y, int z) const {
     if (voxels_ == nullptr) return std::uint64_t{0} - static_cast<std::uint64_t>(all_);
-    const std::uint32_t slab = voxels_->slabs[Chunk::slab_index(y, z)];
-    if ((slab & Chunk::kUniformSlab) != 0) return std::uint64_t{0} - is_opaque(slab & ~Chunk::kUniformSlab);
-    const std::uint64_t* cells = voxels_->row(slab, Chunk::row_in_slab(y, z));
+    const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
+    if ((slab & ChunkStorage::kUniformSlab) != 0)
+      return std::uint64_t{0} - is_opaque(slab & ~ChunkStorage::kUniformSlab);
+    const std::uint64_t* cells = voxels_->row(slab, ChunkStorage::row_in_slab(y, z));
     switch (voxels_->bits) {
       case 1:
         return narrow_row<1>(cells);
@@ -397,7 +399,8 @@ class OpaqueVoxels {
     constexpr std::uint64_t kAllRows = 0xFFFF;
     if (voxels_ == nullptr) return all_ ? kAllRows : 0;
     const std::uint32_t entry = voxels_->slabs[slab];
-    if ((entry & Chunk::kUniformSlab) != 0) return is_opaque(entry & ~Chunk::kUniformSlab) != 0 ? kAllRows : 0;
+    if ((entry & ChunkStorage::kUniformSlab) != 0)
+      return is_opaque(entry & ~ChunkStorage::kUniformSlab) != 0 ? kAllRows : 0;
     const auto step = static_cast<std::size_t>(voxels_->bits);
     const std::uint64_t* word = voxels_->row(entry, 0) + (kLast ? step - 1 : 0);
     const unsigned shift = kLast ? 64U - static_cast<unsigned>(step) : 0U;
@@ -442,7 +445,7 @@ class OpaqueVoxels {
     return ~mask;
   }
 
-  const Chunk::Mixed* voxels_ = nullptr;  // null: all or none are opaque
+  const ChunkStorage* voxels_ = nullptr;  // null: all or none are opaque
   const VoxelRegistry* types_;
   bool all_ = false;
   int other_count_ = 0;
@@ -473,7 +476,7 @@ bool gather_rows(const Job& job, Scratch& s) {
 // Whether a voxel of the 18 neighbours with another x may be opaque: their palettes need not be read for that.
 bool has_row_ends(const Job& job) {
   const auto may_be_opaque = [&](const Chunk* chunk) {
-    return chunk != nullptr && (chunk->mixed() != nullptr || job.types->is_opaque(*chunk->uniform()));
+    return chunk != nullptr && (chunk->storage() != nullptr || job.types->is_opaque(*chunk->uniform()));
   };
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
@@ -491,7 +494,7 @@ void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
   const auto last = [](int d) { return d > 0 ? 0 : 63; };
   for (int z = first(dz) & ~3; z <= last(dz); z += 4) {
     for (int y = first(dy) & ~3; y <= last(dy); y += 4) {
-      const std::size_t slab = Chunk::slab_index(y, z);
+      const std::size_t slab = ChunkStorage::slab_index(y, z);
       const Four rows_before = Four{} + before.ends_of_slab<true>(slab);
       const Four rows_after = Four{} + after.ends_of_slab<false>(slab);
       for (int i = 0; i < 4; ++i) {

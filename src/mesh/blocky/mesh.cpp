@@ -17,7 +17,7 @@ void append_quad(const Quad& quad, IVec3 origin, BlockyTriangles& out) {
   for (int corner = 0; corner < 4; ++corner) {
     out.positions.emplace_back(origin + quad.corner(corner));
     out.directions.push_back(quad.direction());
-    out.levels.push_back(quad.level(corner));
+    out.occlusion.push_back(quad.occlusion(corner));
     out.types.push_back(quad.type());
   }
   constexpr std::array<std::uint32_t, 6> kPlain = {0, 1, 2, 0, 2, 3};
@@ -30,7 +30,7 @@ void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoi
   for (const OutlinePoint& point : outline) {
     out.positions.emplace_back(origin + point.position);
     out.directions.push_back(quad.direction());
-    out.levels.push_back(point.level);
+    out.occlusion.push_back(point.level);
     out.types.push_back(quad.type());
   }
   triangulate_outline(outline, quad.flipped(), base, out.indices);

@@ -58,7 +58,7 @@ TEST(BlockyMesh, IsTheSameAtAnyThreadCount) {
   for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
     EXPECT_EQ(one->surfaces[i].positions, four->surfaces[i].positions);
     EXPECT_EQ(one->surfaces[i].indices, four->surfaces[i].indices);
-    EXPECT_EQ(one->surfaces[i].levels, four->surfaces[i].levels);
+    EXPECT_EQ(one->surfaces[i].occlusion, four->surfaces[i].occlusion);
   }
 }
 

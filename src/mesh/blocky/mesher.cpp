@@ -8,6 +8,7 @@
 #include <quoin/mesh/visible_faces.h>
 
 #include "core/instruction_set.h"
+#include "grid/chunk/chunk_storage.h"
 #include "mesh/blocky/scratch.h"
 
 namespace quoin {
@@ -23,10 +24,10 @@ LevelTables make_level_tables() {
     const std::uint8_t l10 = vertex_occlusion(bit(5), bit(1), bit(2));
     const std::uint8_t l01 = vertex_occlusion(bit(3), bit(7), bit(6));
     const std::uint8_t l11 = vertex_occlusion(bit(5), bit(7), bit(8));
-    const auto pack = [](const FaceLevels& levels) {
+    const auto pack = [](const FaceOcclusion& levels) {
       const int packed = levels[0] | levels[1] << 2 | levels[2] << 4 | levels[3] << 6;
-      return static_cast<std::uint64_t>(packed) << Quad::kLevelsShift | std::uint64_t{flips_diagonal(levels)}
-                                                                            << Quad::kFlipShift;
+      return static_cast<std::uint64_t>(packed) << Quad::kOcclusionShift | std::uint64_t{flips_diagonal(levels)}
+                                                                               << Quad::kFlipShift;
     };
     tables.u_along_bits[around] = pack({l00, l10, l11, l01});
     tables.u_along_rows[around] = pack({l00, l01, l11, l10});
@@ -52,7 +53,7 @@ LevelTables make_level_tables() {
 
 bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
   if (!types.has_transparent()) return false;
-  const Chunk::Mixed* voxels = chunk.mixed();
+  const ChunkStorage* voxels = chunk.storage();
   if (voxels == nullptr) return types.is_transparent(*chunk.uniform());
   if (voxels->direct()) return true;
   for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
@@ -73,7 +74,7 @@ namespace {
 std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
   const Chunk& centre = *job.chunks->centre();
   std::uint64_t mask = 0;
-  const Chunk::Mixed* voxels = centre.mixed();
+  const ChunkStorage* voxels = centre.storage();
   if (voxels != nullptr && !voxels->direct()) {
     for (const VoxelType type : voxels->palette) {
       if (!job.types->is_transparent(type)) continue;
@@ -254,7 +255,8 @@ void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, cons
   }
 }
 
-FaceLevels face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel, Direction direction) {
+FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
+                             Direction direction) {
   const FaceFrame& frame = frame_of(direction);
   const auto is_occluder = [&](int du, int dv) {
     IVec3 at = voxel + normal_of(direction);

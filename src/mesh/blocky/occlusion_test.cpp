@@ -121,19 +121,19 @@ TEST(FaceOcclusion, AWallDarkensTheFloorAtItsFoot) {
   Grid grid;
   grid.set({5, 0, 5}, kStone);
   grid.set({5, 1, 6}, kStone);
-  const FaceLevels levels =
+  const FaceOcclusion levels =
       face_occlusion(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), {5, 0, 5}, Direction::PosY);
   // +Y has u = z, v = x: corners 1 and 2 lie towards z = 6.
-  EXPECT_EQ(levels, (FaceLevels{0, 1, 1, 0}));
+  EXPECT_EQ(levels, (FaceOcclusion{0, 1, 1, 0}));
 }
 
 TEST(FaceOcclusion, GlassDoesNotDarken) {
   Grid grid;
   grid.set({5, 0, 5}, kStone);
   grid.set({5, 1, 6}, kGlass);
-  const FaceLevels levels =
+  const FaceOcclusion levels =
       face_occlusion(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), {5, 0, 5}, Direction::PosY);
-  EXPECT_EQ(levels, FaceLevels{});
+  EXPECT_EQ(levels, FaceOcclusion{});
 }
 
 TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {

@@ -63,7 +63,7 @@ class NeighbourOffset : public testing::TestWithParam<int> {};
 // A chunk with a single neighbour, for each of the 26 places of it: its voxels must hide and darken.
 TEST_P(NeighbourOffset, AloneHidesAndDarkens) {
   const int i = GetParam();
-  const IVec3 offset{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
+  const IVec3 offset = Neighbourhood::offset(i);
   const VoxelRegistry types = oracle::mixed_types();
   for (const VoxelType type : {VoxelType{1}, VoxelType{4}}) {
     Grid grid = oracle::random_world(static_cast<unsigned>(i), {IVec3{0}, IVec3{64}}, 5, 0.02);

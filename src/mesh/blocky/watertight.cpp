@@ -61,10 +61,10 @@ void OutlineFinder::outline(const Quad& quad, std::vector<OutlinePoint>& out) co
     const IVec3 step = glm::sign(to - from);
     const int axis = step.x != 0 ? 0 : step.y != 0 ? 1 : 2;
     const bool all = edge_is_on_border(from, axis);
-    out.push_back({from, quad.level(corner)});
+    out.push_back({from, quad.occlusion(corner)});
     for (IVec3 p = from + step; p != to; p += step) {
       // Quads merge only where levels are constant, so along an edge longer than a voxel they do not change.
-      if (all || is_vertex(p)) out.push_back({p, quad.level(corner)});
+      if (all || is_vertex(p)) out.push_back({p, quad.occlusion(corner)});
     }
   }
 }

@@ -152,8 +152,13 @@ struct SampleAxis {
   return axis;
 }
 
+/// The share of 27 samples that are solid, of which so many are in air.
+[[gnu::always_inline]] inline float solid_share(int in_air) {
+  return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
+}
+
 /// What the weighted forms make of the sum of the depths and the deepest (both at most 0).
-[[gnu::always_inline]] inline float weighted_openness(float sum, float least, const SmoothOcclusionOptions& options) {
+[[gnu::always_inline]] inline float weighted_occlusion(float sum, float least, const SmoothOcclusionOptions& options) {
   float ratio = 0.0F;
   if (options.form == SmoothOcclusion::Weighted) {
     ratio = -sum / (27.0F * std::max(-least, options.spread));
@@ -164,15 +169,15 @@ struct SampleAxis {
   const bool squared = options.power == 2.0F;
   const float darkness = squared ? base * base : std::pow(base, options.power);
   const float open = squared ? options.offset * options.offset : std::pow(options.offset, options.power);
-  return std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
+  return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
 }
 
 /// Occlusion from the samples' densities, which come by z, then y, then x.
-[[gnu::always_inline]] inline float openness_of(const std::array<float, 27>& samples,
-                                                const SmoothOcclusionOptions& options) {
-  if (options.form == SmoothOcclusion::Openness) {
+[[gnu::always_inline]] inline float occlusion_of(const std::array<float, 27>& samples,
+                                                 const SmoothOcclusionOptions& options) {
+  if (options.form == SmoothOcclusion::SolidShare) {
     const auto open = std::count_if(samples.begin(), samples.end(), [](float v) { return v >= 0.0F; });
-    return static_cast<float>(open) * (1.0F / 27.0F);
+    return solid_share(static_cast<int>(open));
   }
   // Nine triples along x: those of even and odd number are added up apart, as two halves of a register.
   std::array<std::array<float, 3>, 2> sums{};
@@ -183,14 +188,14 @@ struct SampleAxis {
     least = std::min(least, v);
   }
   const float sum = ((sums[0][0] + sums[1][0]) + (sums[0][1] + sums[1][1])) + (sums[0][2] + sums[1][2]);
-  return weighted_openness(sum, least, options);
+  return weighted_occlusion(sum, least, options);
 }
 
 /// The occlusion of a vertex; `density(x, y, z)` is the lattice point at that offset from the cell's lowest corner, in
 /// samples of the level.
 template <class Density>
-[[gnu::always_inline]] inline float vertex_openness(Vec3 fraction, Vec3 normal, const SmoothOcclusionOptions& options,
-                                                    Density density) {
+[[gnu::always_inline]] inline float occlusion_at_vertex(Vec3 fraction, Vec3 normal,
+                                                        const SmoothOcclusionOptions& options, Density density) {
   const Vec3 centre = occlusion_centre(fraction, normal, options.spread);
   const std::array<SampleAxis, 3> axes = {sample_axis(centre.x, options.spread), sample_axis(centre.y, options.spread),
                                           sample_axis(centre.z, options.spread)};
@@ -213,7 +218,7 @@ template <class Density>
     const float low = along_y(0);
     samples[i] = low + axes[0].fraction[ix] * (along_y(1) - low);
   }
-  return openness_of(samples, options);
+  return occlusion_of(samples, options);
 }
 
 }  // namespace quoin::smooth

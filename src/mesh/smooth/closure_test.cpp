@@ -111,7 +111,7 @@ TEST(SmoothClosure, InfiniteDensitiesMakeASurfaceOfFiniteVertices) {
   oracle::expect_manifold(count_surface(mesh));
   for (const Vec3 p : mesh.positions) EXPECT_TRUE(is_finite(DVec3(p)));
   for (const Vec3 n : mesh.normals) EXPECT_NEAR(glm::length(n), 1.0F, 1e-5F);
-  for (const float open : mesh.openness) EXPECT_TRUE(open >= 0.0F && open <= 1.0F);
+  for (const float occlusion : mesh.occlusion) EXPECT_TRUE(occlusion >= 0.0F && occlusion <= 1.0F);
 }
 
 TEST(SmoothClosure, NormalsOfASphereAreNearlyItsRadii) {

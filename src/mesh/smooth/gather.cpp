@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "grid/density/density_storage.h"
 #include "mesh/smooth/scratch.h"
 
 namespace quoin::smooth {
@@ -39,8 +40,8 @@ std::uint64_t solid_row(const DensityChunk* chunk, Half outside, ChunkCoordinate
 
 // The signs of 64 rows of one chunk column at once, as they lie in storage.
 void copy_signs(const DensityChunk* chunk, Half outside, int z, std::uint64_t* to) {
-  if (chunk != nullptr && chunk->mixed() != nullptr) {
-    std::memcpy(to, chunk->mixed()->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
+  if (chunk != nullptr && chunk->storage() != nullptr) {
+    std::memcpy(to, chunk->storage()->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
                 kChunkEdge * sizeof(std::uint64_t));
     return;
   }
@@ -123,7 +124,7 @@ SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level
   const auto limit = [](float& value, float least, float most, float otherwise) {
     value = std::isnan(value) ? otherwise : std::clamp(value, least, most);
   };
-  limit(occlusion.spread, 1.0F / 16.0F, level == kCoarsestLevel ? 2.0F : 4.0F, defaults.spread);
+  limit(occlusion.spread, 1.0F / 16.0F, level == kMaxSmoothLevel ? 2.0F : 4.0F, defaults.spread);
   limit(occlusion.offset, 0.0F, 0.99F, defaults.offset);
   limit(occlusion.power, 1.0F / 16.0F, 64.0F, defaults.power);
   return occlusion;
@@ -175,7 +176,7 @@ void begin_occlusion(Work& work) {
 namespace quoin {
 
 int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
-  const int level = std::clamp(coarsest_level, 0, kCoarsestLevel);
+  const int level = std::clamp(coarsest_level, 0, kMaxSmoothLevel);
   const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, level);
   // Without occlusion, splitting sheets looks at the cells beside its own.
   return (std::max(smooth::apron_of(limited), 1) + 1) << level;

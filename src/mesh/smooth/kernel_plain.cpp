@@ -51,9 +51,9 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   }
 }
 
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion) {
   decode_around(work, slice.z);
-  occlusion_one_by_one(work, slice, count, out, openness);
+  occlusion_one_by_one(work, slice, count, out, occlusion);
 }
 
 // The squared length of a diagonal, in 64ths of a cell.

@@ -86,7 +86,7 @@ class ChunkLevels {
  private:
   template <class Counts>
   [[nodiscard]] LevelRange range(IVec3 min, IVec3 max, const Counts& counts) const {
-    LevelRange found{kCoarsestLevel, 0};
+    LevelRange found{kMaxSmoothLevel, 0};
     for (int z = min.z; z <= max.z; ++z) {
       for (int y = min.y; y <= max.y; ++y) {
         for (int x = min.x; x <= max.x; ++x) {

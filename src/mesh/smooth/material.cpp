@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/srgb.h"
+#include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
 namespace {
@@ -28,19 +29,19 @@ VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
 
 // The materials of the solid corners of a cell that lies within a chunk, row by row.
 std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
-  const Chunk::Mixed* mixed = chunk.materials().mixed();
+  const ChunkStorage* mixed = chunk.materials().storage();
   std::size_t found = 0;
   for (int row = 0; row < 4; ++row) {
     const int y = first.y + (row & 1);
     const int z = first.z + (row >> 1);
     const auto solid = static_cast<std::uint32_t>(chunk.solid_row(y, z) >> first.x & 3U);
     if (solid == 0) continue;
-    const std::uint32_t slab = mixed->slabs[Chunk::slab_index(y, z)];
-    const bool is_uniform = (slab & Chunk::kUniformSlab) != 0;
+    const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(y, z)];
+    const bool is_uniform = (slab & ChunkStorage::kUniformSlab) != 0;
     for (int x = 0; x < 2; ++x) {
       if ((solid >> x & 1U) == 0) continue;
-      const std::uint32_t index =
-          is_uniform ? slab & ~Chunk::kUniformSlab : mixed->read(slab, Chunk::row_in_slab(y, z), first.x + x);
+      const std::uint32_t index = is_uniform ? slab & ~ChunkStorage::kUniformSlab
+                                             : mixed->read(slab, ChunkStorage::row_in_slab(y, z), first.x + x);
       out[found++] = mixed->direct() ? static_cast<VoxelType>(index) : mixed->palette[index];
     }
   }

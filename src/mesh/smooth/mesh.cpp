@@ -44,11 +44,11 @@ class LevelMap {
     levels_.reserve(chunks_.size());
     for (const IVec3 chunk : chunks_) {
       const int level = level_of(chunk);
-      if (level < 0 || level > kCoarsestLevel) {
+      if (level < 0 || level > kMaxSmoothLevel) {
         return fail(ErrorCode::InvalidArgument, "level of detail " + std::to_string(level) + " of chunk " +
                                                     std::to_string(chunk.x) + ", " + std::to_string(chunk.y) + ", " +
                                                     std::to_string(chunk.z) + " is not 0 to " +
-                                                    std::to_string(kCoarsestLevel));
+                                                    std::to_string(kMaxSmoothLevel));
       }
       levels_.push_back(static_cast<std::uint8_t>(level));
     }
@@ -82,7 +82,7 @@ struct BorderVertex {
 struct Part {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
-  std::vector<float> openness;
+  std::vector<float> occlusion;
   std::vector<SurfaceMaterial> materials;
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one
@@ -120,7 +120,7 @@ class Workspaces {
 void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.positions.reserve(mesh.positions.size());
   part.normals.reserve(mesh.normals.size());
-  part.openness.reserve(mesh.openness.size());
+  part.occlusion.reserve(mesh.occlusion.size());
   part.materials.reserve(mesh.positions.size());
   part.indices.resize(mesh.indices.size());
 }
@@ -143,7 +143,7 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
     workspace.places[i] = place;
     part.positions.push_back(mesh.positions[i]);
     part.normals.push_back(mesh.normals[i]);
-    if (!mesh.openness.empty()) part.openness.push_back(mesh.openness[i]);
+    if (!mesh.occlusion.empty()) part.occlusion.push_back(mesh.occlusion[i]);
     part.materials.push_back(materials.of_cell(chunks, cell, level));
     if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
   }
@@ -204,7 +204,7 @@ class Builder {
     }
     mesh.positions.resize(vertices);
     mesh.normals.resize(vertices);
-    if (options_.occlusion.form != SmoothOcclusion::None) mesh.openness.resize(vertices);
+    if (options_.occlusion.form != SmoothOcclusion::None) mesh.occlusion.resize(vertices);
     mesh.albedo.resize(vertices);
     mesh.types.resize(vertices);
     mesh.indices.resize(indices);
@@ -228,7 +228,7 @@ class Builder {
       mesh.types[first + v] = part.materials[v].type;
     }
     std::copy(part.normals.begin(), part.normals.end(), mesh.normals.begin() + first);
-    std::copy(part.openness.begin(), part.openness.end(), mesh.openness.begin() + first);
+    std::copy(part.occlusion.begin(), part.occlusion.end(), mesh.occlusion.begin() + first);
   }
 
   void copy_indices(std::size_t i, SmoothMesh& mesh) const {

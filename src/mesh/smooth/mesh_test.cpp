@@ -45,7 +45,7 @@ std::multiset<TriangleBits> triangles_of(const Positions& positions, const Indic
 
 // The field's chunks and borders do not show: it is as if it were meshed in one piece.
 TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
-  for (int level = 0; level <= kCoarsestLevel; ++level) {
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     SCOPED_TRACE(testing::Message() << "level " << level);
     const IBox box{{50, -20, 40}, {90, 20, 80}};
     const DensityGrid grid = grid_of(box, oracle::waves(5, 12.0));
@@ -64,12 +64,12 @@ TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
               triangles_of(whole.positions, whole.indices, Vec3{0.0F}));
     std::map<PositionBits, std::pair<Vec3, float>> known;
     for (std::uint32_t v = 0; v < whole.positions.size(); ++v) {
-      known[bits_of(whole.positions, v, Vec3{0.0F})] = {whole.normals[v], whole.openness[v]};
+      known[bits_of(whole.positions, v, Vec3{0.0F})] = {whole.normals[v], whole.occlusion[v]};
     }
     for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
-      const auto& [normal, openness] = known.at(bits_of(mesh.positions, v, Vec3{0.0F}));
+      const auto& [normal, occlusion] = known.at(bits_of(mesh.positions, v, Vec3{0.0F}));
       ASSERT_EQ(mesh.normals[v], normal);
-      ASSERT_EQ(mesh.openness[v], openness);
+      ASSERT_EQ(mesh.occlusion[v], occlusion);
     }
   }
 }
@@ -83,7 +83,7 @@ TEST(SmoothMesh, IsTheSameAtAnyThreadCount) {
   ASSERT_TRUE(one.has_value() && four.has_value());
   EXPECT_EQ(one->positions, four->positions);
   EXPECT_EQ(one->normals, four->normals);
-  EXPECT_EQ(one->openness, four->openness);
+  EXPECT_EQ(one->occlusion, four->occlusion);
   EXPECT_EQ(one->albedo, four->albedo);
   EXPECT_EQ(one->types, four->types);
   EXPECT_EQ(one->indices, four->indices);
@@ -116,7 +116,7 @@ VoxelRegistry red_and_white() {
 
 TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
   SmoothMeshOptions options;
-  for (int level = 0; level <= kCoarsestLevel; ++level) {
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     options.level_of = [=](IVec3 chunk) { return chunk.x == 0 ? level : 0; };
     const auto mesh = build_smooth_mesh(two_layers(), red_and_white(), options, {1});
     ASSERT_TRUE(mesh.has_value());
@@ -150,7 +150,7 @@ TEST(SmoothMesh, AThinCoverShowsAtEveryLevel) {
     const double height = 40.3 + 5.0 * std::sin(0.1 * p.x) + 4.0 * std::cos(0.07 * p.z);
     return DensitySample{static_cast<float>(p.y - height), p.y > height - 2.0 ? VoxelType{2} : VoxelType{1}};
   });
-  for (int level = 0; level <= kCoarsestLevel; ++level) {
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     SmoothMeshOptions options;
     options.level_of = [=](IVec3 chunk) { return chunk.z == 0 ? level : 0; };
     const auto mesh = build_smooth_mesh(grid, red_and_white(), options, {1});
@@ -185,12 +185,12 @@ TEST(SmoothMesh, UnknownMaterialsAreWhite) {
   for (const LinearRgba16 albedo : mesh.albedo) EXPECT_EQ(albedo, (LinearRgba16{65'535, 65'535, 65'535, 65'535}));
 }
 
-TEST(SmoothMesh, HasNoOpennessWithoutOcclusion) {
+TEST(SmoothMesh, HasNoOcclusionUnlessAskedFor) {
   const DensityGrid grid = grid_of({IVec3{0}, IVec3{9}}, oracle::sphere(DVec3{4.2}, 3.0));
   SmoothMeshOptions options;
-  EXPECT_EQ(mesh_of(grid, options).openness.size(), mesh_of(grid, options).positions.size());
+  EXPECT_EQ(mesh_of(grid, options).occlusion.size(), mesh_of(grid, options).positions.size());
   options.occlusion.form = SmoothOcclusion::None;
-  EXPECT_TRUE(mesh_of(grid, options).openness.empty());
+  EXPECT_TRUE(mesh_of(grid, options).occlusion.empty());
 }
 
 TEST(SmoothMesh, AsksForEachLevelOnceAndRefusesWhatIsNone) {

@@ -46,7 +46,7 @@ SmoothMesher::~SmoothMesher() = default;
 
 void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions& wanted, SmoothChunkMesh& out) {
   SmoothOptions options = wanted;
-  for (std::uint8_t& level : options.levels) level = std::min<std::uint8_t>(level, kCoarsestLevel);
+  for (std::uint8_t& level : options.levels) level = std::min<std::uint8_t>(level, kMaxSmoothLevel);
   const int n = kChunkEdge >> options.levels[13];
   const bool is_open = options.border == SmoothBorder::Open;
   if (!is_open && !smooth::ChunkLevels(options.levels).all_same()) {
@@ -60,7 +60,7 @@ void SmoothMesher::mesh(const DensityNeighbourhood& chunks, const SmoothOptions&
 void SmoothChunkMesh::clear() {
   positions.clear();
   normals.clear();
-  openness.clear();
+  occlusion.clear();
   cells.clear();
   indices.clear();
 }

@@ -68,7 +68,7 @@ void run(benchmark::State& state, const Case& what) {
   }
 }
 
-// A whole generated world, welded, with openness and materials.
+// A whole generated world, welded, with occlusion and materials.
 void world(benchmark::State& state) {
   VoxelRegistry types;
   const auto materials = add_terrain_types(types);
@@ -104,7 +104,7 @@ BENCHMARK(world)
 [[maybe_unused]] const bool kRegistered = [] {
   const std::pair<SmoothOcclusion, const char*> kForms[] = {
       {SmoothOcclusion::None, "normals"},
-      {SmoothOcclusion::Openness, "normals_ao"},
+      {SmoothOcclusion::SolidShare, "normals_ao"},
       {SmoothOcclusion::Weighted, "normals_weighted_ao"},
   };
   const std::pair<InstructionSet, const char*> kSets[] = {

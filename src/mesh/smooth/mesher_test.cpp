@@ -19,7 +19,7 @@ bool same_bytes(const Buffer<T>& a, const Buffer<T>& b) {
 void expect_same(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
   EXPECT_TRUE(same_bytes(a.positions, b.positions));
   EXPECT_TRUE(same_bytes(a.normals, b.normals));
-  EXPECT_TRUE(same_bytes(a.openness, b.openness));
+  EXPECT_TRUE(same_bytes(a.occlusion, b.occlusion));
   EXPECT_TRUE(same_bytes(a.cells, b.cells));
   EXPECT_TRUE(same_bytes(a.indices, b.indices));
 }
@@ -34,7 +34,7 @@ TEST_P(SmoothSets, GiveTheBytesOfThePlainKernel) {
   SmoothMesher plain = made_with<SmoothMesher>(InstructionSet::Plain);
   SmoothMesher other = made_with<SmoothMesher>(GetParam());
   for (const World& world : worlds) {
-    for (const SmoothOcclusion form : {SmoothOcclusion::None, SmoothOcclusion::Openness, SmoothOcclusion::Weighted,
+    for (const SmoothOcclusion form : {SmoothOcclusion::None, SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
                                        SmoothOcclusion::WeightedPublished}) {
       for (const float spread : {0.4F, 1.0F, 2.0F, 2.5F}) {
         for (const int level : {0, 1, 3}) {
@@ -59,7 +59,7 @@ INSTANTIATE_TEST_SUITE_P(InstructionSets, SmoothSets,
 TEST(SmoothMesher, GivesTheSameBytesWhateverItMeshedBefore) {
   const World first(noise(1, 5.0));
   const World second(sphere({31, 31, 31}, 25.5));
-  const SmoothOptions options = with(SmoothOcclusion::Openness);
+  const SmoothOptions options = with(SmoothOcclusion::SolidShare);
   SmoothMesher fresh;
   SmoothChunkMesh expected;
   fresh.mesh(second.around(), options, expected);
@@ -96,12 +96,12 @@ TEST(SmoothMesher, HoldsStillWhereTheSurfacePassesThroughPoints) {
   const World world([](IVec3 p) { return p.y - 20.0; });
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
-  mesher.mesh(world.around(), with(SmoothOcclusion::Openness), mesh);
+  mesher.mesh(world.around(), with(SmoothOcclusion::SolidShare), mesh);
   ASSERT_EQ(mesh.positions.size(), 65U * 65U);
   EXPECT_EQ(mesh.indices.size(), 64U * 64U * 6U);
   for (const Vec3& p : mesh.positions) EXPECT_EQ(p.y, 20.0F);
   for (const Vec3& n : mesh.normals) EXPECT_LT(glm::length(n - Vec3(0, 1, 0)), 1e-6F);
-  for (const float open : mesh.openness) EXPECT_EQ(open, 1.0F);
+  for (const float occlusion : mesh.occlusion) EXPECT_EQ(occlusion, 0.0F);
 }
 
 TEST(SmoothMesher, FindsNothingInOneSign) {
@@ -126,7 +126,7 @@ TEST(SmoothMesher, SurvivesInfinitiesAndNaN) {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   for (const SmoothOcclusion form :
-       {SmoothOcclusion::Openness, SmoothOcclusion::Weighted, SmoothOcclusion::WeightedPublished}) {
+       {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted, SmoothOcclusion::WeightedPublished}) {
     mesher.mesh(world.around(), with(form), mesh);
     ASSERT_GT(mesh.positions.size(), 10'000U);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -134,7 +134,7 @@ TEST(SmoothMesher, SurvivesInfinitiesAndNaN) {
         ASSERT_TRUE(mesh.positions[i][axis] >= -1.0F && mesh.positions[i][axis] <= 64.0F);
       }
       ASSERT_NEAR(glm::length(mesh.normals[i]), 1.0F, 1e-5F);
-      ASSERT_TRUE(mesh.openness[i] >= 0.0F && mesh.openness[i] <= 1.0F);
+      ASSERT_TRUE(mesh.occlusion[i] >= 0.0F && mesh.occlusion[i] <= 1.0F);
     }
   }
 }
@@ -144,13 +144,13 @@ TEST(SmoothMesher, LevelsBeyondTheCoarsestCountAsIt) {
   SmoothMesher mesher;
   SmoothChunkMesh coarsest;
   SmoothChunkMesh mesh;
-  mesher.mesh(world.around(), with(SmoothOcclusion::Openness, kCoarsestLevel), coarsest);
+  mesher.mesh(world.around(), with(SmoothOcclusion::SolidShare, kMaxSmoothLevel), coarsest);
   EXPECT_GT(coarsest.indices.size(), 0U);
   for (const int level : {4, 6, 7, 64, 255}) {
-    mesher.mesh(world.around(), with(SmoothOcclusion::Openness, level), mesh);
+    mesher.mesh(world.around(), with(SmoothOcclusion::SolidShare, level), mesh);
     expect_same(mesh, coarsest);
   }
-  EXPECT_EQ(reach_of({}, 40), reach_of({}, kCoarsestLevel));
+  EXPECT_EQ(reach_of({}, 40), reach_of({}, kMaxSmoothLevel));
   EXPECT_EQ(reach_of({}, -1), reach_of({}, 0));
 }
 

@@ -90,13 +90,13 @@ inline Samples samples_of(const NineRows& rows, F fx, const Thirds& low_lanes, c
   return samples;
 }
 
-inline void store_openness(const Samples& samples, float* out) {
+inline void store_counted(const Samples& samples, float* out) {
   std::uint64_t open = 0;
   for (int i = 0; i < 4; ++i) open |= std::uint64_t{open_bits(samples.v[i])} << (16 * i);
   const std::uint32_t last = open_bits(samples.v[4]);
   for (int i = 0; i < kVerticesAtOnce; ++i) {
     const int count = std::popcount(open >> (8 * i) & 0x003F'003F'003F'003FU) + std::popcount(last >> (8 * i) & 0x07U);
-    out[i] = static_cast<float>(count) * (1.0F / 27.0F);
+    out[i] = solid_share(count);
   }
 }
 
@@ -117,15 +117,15 @@ inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions&
     const float* const s = sums + 8 * i;
     const float* const l = leasts + 8 * i;
     const float deepest = std::min({l[0], l[1], l[2], l[3], l[4], l[5]});
-    out[i] = weighted_openness(((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]), deepest, options);
+    out[i] = weighted_occlusion(((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]), deepest, options);
   }
 }
 
 template <int kSpread>
-void add_occlusion(const Work& work, const Slice& slice, std::size_t count, float* openness) {
+void add_occlusion(const Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   const Thirds low_lanes(kSpread, 0);
   const Thirds high_lanes(kSpread, 1);
-  const bool is_counted = work.occlusion.form == SmoothOcclusion::Openness;
+  const bool is_counted = work.occlusion.form == SmoothOcclusion::SolidShare;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const Centres centres = find_centres(work, slice, first);
     const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);
@@ -133,22 +133,22 @@ void add_occlusion(const Work& work, const Slice& slice, std::size_t count, floa
       const NineRows rows = rows_around<kSpread>(work, centres, lane);
       const Samples samples = samples_of(rows, spread_out(centres.fx + lane), low_lanes, high_lanes);
       if (is_counted) {
-        store_openness(samples, openness + first + lane);
+        store_counted(samples, occlusion + first + lane);
       } else {
-        store_weighted(samples, work.occlusion, openness + first + lane);
+        store_weighted(samples, work.occlusion, occlusion + first + lane);
       }
     }
   }
 }
 
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness) {
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion) {
   if (count == 0) return;
   decode_around(work, slice.z);
-  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, openness);
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, occlusion);
   if (work.occlusion.spread == 1.0F) {
-    add_occlusion<1>(work, slice, count, openness);
+    add_occlusion<1>(work, slice, count, occlusion);
   } else {
-    add_occlusion<2>(work, slice, count, openness);
+    add_occlusion<2>(work, slice, count, occlusion);
   }
 }
 

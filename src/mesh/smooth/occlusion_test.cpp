@@ -16,7 +16,7 @@
 namespace quoin {
 namespace {
 
-constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::Openness, SmoothOcclusion::Weighted,
+constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
                                       SmoothOcclusion::WeightedPublished};
 
 /// A field as far as a vertex of the middle chunk may read; the rest is not computed.
@@ -55,9 +55,9 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
     for (const SmoothOcclusion form : kForms) {
       for (const float spread : {0.4F, 2.0F}) {
         const SmoothChunkMesh mesh = mesh_of(world, form, spread);
-        ASSERT_GT(mesh.openness.size(), 1'000U);
-        for (const float open : mesh.openness) {
-          ASSERT_EQ(open, 1.0F) << n.x << " " << n.y << " " << n.z << " spread " << spread;
+        ASSERT_GT(mesh.occlusion.size(), 1'000U);
+        for (const float occlusion : mesh.occlusion) {
+          ASSERT_EQ(occlusion, 0.0F) << n.x << " " << n.y << " " << n.z << " spread " << spread;
         }
       }
     }
@@ -67,12 +67,12 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
 TEST(SmoothOcclusion, AConvexSurfaceIsFullyOpen) {
   for (const SmoothOcclusion form : kForms) {
     const SmoothChunkMesh mesh = mesh_of(sphere({31.2, 32.4, 30.9}, 20.0), form);
-    for (const float open : mesh.openness) ASSERT_EQ(open, 1.0F);
+    for (const float occlusion : mesh.occlusion) ASSERT_EQ(occlusion, 0.0F);
   }
 }
 
 /// A valley along z whose two slopes rise at `degrees` from the horizontal.
-double openness_in_valley(double degrees, SmoothOcclusion form) {
+double occlusion_in_valley(double degrees, SmoothOcclusion form) {
   const double angle = glm::radians(degrees);
   const DVec3 left(std::sin(angle), std::cos(angle), 0);
   const DVec3 right(-std::sin(angle), std::cos(angle), 0);
@@ -87,7 +87,7 @@ double openness_in_valley(double degrees, SmoothOcclusion form) {
   int count = 0;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     if (std::abs(mesh.positions[i].x - bottom.x) > 1.0) continue;
-    sum += mesh.openness[i];
+    sum += mesh.occlusion[i];
     ++count;
   }
   return sum / count;
@@ -95,14 +95,14 @@ double openness_in_valley(double degrees, SmoothOcclusion form) {
 
 TEST(SmoothOcclusion, AValleyIsTheDarkerTheSharperItIs) {
   for (const SmoothOcclusion form : kForms) {
-    double last = 1.0;
-    EXPECT_EQ(openness_in_valley(0, form), 1.0);
+    double last = 0.0;
+    EXPECT_EQ(occlusion_in_valley(0, form), 0.0);
     for (const double degrees : {15, 30, 45, 60}) {
-      const double open = openness_in_valley(degrees, form);
-      EXPECT_LT(open, last) << degrees;
-      last = open;
+      const double occlusion = occlusion_in_valley(degrees, form);
+      EXPECT_GT(occlusion, last) << degrees;
+      last = occlusion;
     }
-    EXPECT_LT(last, 0.8);
+    EXPECT_GT(last, 0.2);
   }
 }
 
@@ -142,21 +142,22 @@ TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
   // Within the band at every size.
   const World small(
       [](IVec3 p) { return 0.3 * (std::sin(0.7 * p.x) + std::sin(0.9 * p.y + 1.0) + std::cos(0.8 * p.z)); });
-  for (int level = 1; level <= kCoarsestLevel; ++level) {
+  for (int level = 1; level <= kMaxSmoothLevel; ++level) {
     const World large = enlarged(small, level);
     for (const SmoothOcclusion form : kForms) {
       for (const float spread : {0.7F, 2.0F}) {
         const SmoothChunkMesh fine = mesh_of(small, form, spread);
-        std::map<std::uint32_t, float> openness;
-        for (std::size_t i = 0; i < fine.cells.size(); ++i) openness[fine.cells[i].bits] = fine.openness[i];
+        std::map<std::uint32_t, float> expected;
+        for (std::size_t i = 0; i < fine.cells.size(); ++i) expected[fine.cells[i].bits] = fine.occlusion[i];
         SmoothMesher mesher;
         SmoothChunkMesh coarse;
         mesher.mesh(large.around(), with(form, level, spread), coarse);
         ASSERT_GT(coarse.cells.size(), 40U);
-        EXPECT_LT(*std::min_element(coarse.openness.begin(), coarse.openness.end()), 1.0F);
+        EXPECT_GT(*std::max_element(coarse.occlusion.begin(), coarse.occlusion.end()), 0.0F);
         for (std::size_t i = 0; i < coarse.cells.size(); ++i) {
           if (coarse.cells[i].chunk_offset() != IVec3(0)) continue;  // called by other names in the small field
-          ASSERT_EQ(coarse.openness[i], openness.at(coarse.cells[i].bits)) << "level " << level << " spread " << spread;
+          ASSERT_EQ(coarse.occlusion[i], expected.at(coarse.cells[i].bits))
+              << "level " << level << " spread " << spread;
         }
       }
     }
@@ -166,34 +167,34 @@ TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
 TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
   const DVec3 centre(31.5);
   using Cell = std::array<int, 3>;
-  const auto openness_by_cell = [&](const Symmetry& turn, SmoothOcclusion form) {
+  const auto occlusion_by_cell = [&](const Symmetry& turn, SmoothOcclusion form) {
     const SmoothChunkMesh mesh = mesh_of([&](IVec3 p) { return hills(turn(DVec3(p) - centre)); }, form);
     std::map<Cell, float> cells;
     for (std::size_t i = 0; i < mesh.cells.size(); ++i) {
       if (mesh.cells[i].chunk_offset() != IVec3(0)) continue;
       const DVec3 cell = turn(DVec3(mesh.cells[i].cell()) + 0.5 - centre) + centre;
       cells[{static_cast<int>(std::floor(cell.x)), static_cast<int>(std::floor(cell.y)),
-             static_cast<int>(std::floor(cell.z))}] = mesh.openness[i];
+             static_cast<int>(std::floor(cell.z))}] = mesh.occlusion[i];
     }
     return cells;
   };
   const std::vector<Symmetry> all = symmetries();
   ASSERT_EQ(all.size(), 48U);
-  for (const SmoothOcclusion form : {SmoothOcclusion::Openness, SmoothOcclusion::Weighted}) {
+  for (const SmoothOcclusion form : {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted}) {
     // The sum is held to all 48, the count, which shares all but its last step, to every fifth.
-    const std::size_t step = form == SmoothOcclusion::Openness ? 5 : 1;
-    const auto expected = openness_by_cell(all[0], form);
+    const std::size_t step = form == SmoothOcclusion::SolidShare ? 5 : 1;
+    const auto expected = occlusion_by_cell(all[0], form);
     int shared = 0;
     int jumps = 0;
     for (std::size_t i = 0; i < all.size(); i += step) {
-      for (const auto& [cell, open] : openness_by_cell(all[i], form)) {
+      for (const auto& [cell, occlusion] : occlusion_by_cell(all[i], form)) {
         // Cells at x, y or z = 63 have their mirror images in cell -1, which the neighbour owns.
         const auto found = expected.find(cell);
         if (found == expected.end()) continue;
         ++shared;
-        const double difference = std::abs(open - found->second);
+        const double difference = std::abs(occlusion - found->second);
         // A count jumps where a sample is 0 but for rounding.
-        if (form == SmoothOcclusion::Openness && std::abs(difference - 1.0 / 27) < 1e-6) {
+        if (form == SmoothOcclusion::SolidShare && std::abs(difference - 1.0 / 27) < 1e-6) {
           ++jumps;
         } else {
           ASSERT_LE(difference, 1e-5);
@@ -230,7 +231,7 @@ TEST(SmoothOcclusion, ChunksAgreeBitForBitAtSharedVertices) {
         ++shared;
         ASSERT_EQ(low.positions[found->second], high.positions[v] + Vec3(step * kChunkEdge));
         ASSERT_EQ(std::memcmp(&low.normals[found->second], &high.normals[v], sizeof(Vec3)), 0);
-        ASSERT_EQ(low.openness[found->second], high.openness[v]);
+        ASSERT_EQ(low.occlusion[found->second], high.occlusion[v]);
       }
       EXPECT_GT(shared, i == 6 ? -1 : 10) << step.x << step.y << step.z;
     }
@@ -244,7 +245,7 @@ TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
     const int reach = reach_of(options.occlusion, level);
     DensityGrid grid(kBand);
     for (int i = 0; i < 27; ++i) {
-      const IVec3 chunk(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      const IVec3 chunk = Neighbourhood::offset(i);
       grid.put_chunk(chunk, chunk_of_field(field, chunk));
     }
     SmoothMesher mesher;
@@ -255,13 +256,13 @@ TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
     });
     SmoothChunkMesh after;
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
-    ASSERT_EQ(before.openness.size(), after.openness.size());
-    EXPECT_EQ(std::memcmp(before.openness.data(), after.openness.data(), 4 * before.openness.size()), 0);
+    ASSERT_EQ(before.occlusion.size(), after.occlusion.size());
+    EXPECT_EQ(std::memcmp(before.occlusion.data(), after.occlusion.data(), 4 * before.occlusion.size()), 0);
     // One sample nearer it matters: the reach is not wider than it must be by more than what the corner case takes.
     grid.edit({{-64, -64, -reach}, {128, 128, 0}}, [](IVec3, DensitySample) { return DensitySample{-8.0F, 1}; });
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
-    const bool is_same = before.openness.size() == after.openness.size() &&
-                         std::memcmp(before.openness.data(), after.openness.data(), 4 * before.openness.size()) == 0;
+    const bool is_same = before.occlusion.size() == after.occlusion.size() &&
+                         std::memcmp(before.occlusion.data(), after.occlusion.data(), 4 * before.occlusion.size()) == 0;
     EXPECT_FALSE(is_same);
   }
 }

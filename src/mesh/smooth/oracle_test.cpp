@@ -24,7 +24,7 @@ void expect_same_bytes(const Buffer<T>& a, const Buffer<T>& b, const char* what)
 void expect_same(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
   expect_same_bytes(a.positions, b.positions, "positions");
   expect_same_bytes(a.normals, b.normals, "normals");
-  expect_same_bytes(a.openness, b.openness, "openness");
+  expect_same_bytes(a.occlusion, b.occlusion, "occlusion");
   expect_same_bytes(a.cells, b.cells, "cells");
   expect_same_bytes(a.indices, b.indices, "indices");
 }
@@ -55,7 +55,7 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
   }
   SmoothChunkMesh expected;
   SmoothChunkMesh mesh;
-  for (int level = 0; level <= kCoarsestLevel; ++level) {
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     for (const SmoothBorder border : {SmoothBorder::Shared, SmoothBorder::Open}) {
       SmoothOptions options;
       options.border = border;

@@ -83,7 +83,7 @@ std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t*
 std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_place, std::uint16_t* end);
 void decode_row(const Half* from, float* to, int count);
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* openness);
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion);
 template <Axis kAxis>
 void make_quads(const Work& work, const Slice& slice, std::size_t count, std::uint32_t* out);
 
@@ -219,11 +219,11 @@ void decode_around(Work& work, int z) {
 }
 
 void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out,
-                          float* openness) {
+                          float* occlusion) {
   for (std::size_t i = 0; i < count; ++i) {
     const int place = work.places[i];
     const Vec3 fraction(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
-    openness[i] = vertex_openness(
+    occlusion[i] = occlusion_at_vertex(
         fraction, out.normals.data()[slice.first_vertex + i], work.occlusion,
         [&](int x, int y, int z) { return work.decoded_row(row_of(place) + y, slice.z + z)[column_of(place) + x]; });
   }
@@ -309,9 +309,9 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
     out.normals.resize(vertices);
     out.cells.resize(vertices);
     if (has_occlusion) {
-      out.openness.reserve(vertices + kSlack);
-      add_occlusion(work, slice, count, out, out.openness.data() + slice.first_vertex);
-      out.openness.resize(vertices);
+      out.occlusion.reserve(vertices + kSlack);
+      add_occlusion(work, slice, count, out, out.occlusion.data() + slice.first_vertex);
+      out.occlusion.resize(vertices);
     }
     quads_of_slice<Axis::X>(work, slice, out);
     quads_of_slice<Axis::Y>(work, slice, out);

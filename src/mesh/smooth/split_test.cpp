@@ -139,7 +139,7 @@ TEST_P(SplitNoise, ScatteredSamplesGiveAManifold) {
 TEST_P(SplitNoise, AManifoldAtEveryLevel) {
   const IBox box{IVec3{64 - 32}, IVec3{64 + 32}};
   const DensityGrid grid = grid_of(box, oracle::waves(GetParam(), 6.0));
-  for (int level = 0; level <= kCoarsestLevel; ++level) {
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", level " << level);
     SmoothMeshOptions options;
     options.level_of = [=](IVec3) { return level; };
@@ -171,7 +171,7 @@ TEST(SmoothSheets, CellsOfOneSheetKeepTheirBits) {
     ++same;
     ASSERT_EQ(std::memcmp(&plain.positions[v], &split.positions[v], sizeof(Vec3)), 0);
     ASSERT_EQ(std::memcmp(&plain.normals[v], &split.normals[v], sizeof(Vec3)), 0);
-    ASSERT_EQ(plain.openness[v], split.openness[v]);
+    ASSERT_EQ(plain.occlusion[v], split.occlusion[v]);
   }
   EXPECT_GT(same, 1000);
 }

@@ -33,7 +33,7 @@ class World {
  public:
   explicit World(const std::function<double(IVec3)>& field) {
     for (int i = 0; i < 27; ++i) {
-      chunks_.push_back(chunk_of_field(field, {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}));
+      chunks_.push_back(chunk_of_field(field, Neighbourhood::offset(i)));
     }
   }
   [[nodiscard]] DensityNeighbourhood around() const {

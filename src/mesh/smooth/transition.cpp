@@ -211,7 +211,7 @@ void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptio
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out) {
   QUOIN_ASSERT(options.border == SmoothBorder::Shared, "options.border must be Shared");
   QUOIN_ASSERT(
-      std::all_of(options.levels.begin(), options.levels.end(), [](int level) { return level <= kCoarsestLevel; }));
+      std::all_of(options.levels.begin(), options.levels.end(), [](int level) { return level <= kMaxSmoothLevel; }));
   Transitions(chunks, options, out).run(mesh_own_cells);
 }
 

@@ -106,7 +106,7 @@ VertexBits bits_of(const SmoothChunkMesh& mesh, std::size_t i) {
   const Vec3 position = mesh.positions[i] - Vec3(mesh.cells[i].chunk_offset() * kChunkEdge);
   std::memcpy(vertex.bits.data(), &position, 12);
   std::memcpy(vertex.bits.data() + 3, &mesh.normals[i], 12);
-  if (!mesh.openness.empty()) std::memcpy(vertex.bits.data() + 6, &mesh.openness[i], 4);
+  if (!mesh.occlusion.empty()) std::memcpy(vertex.bits.data() + 6, &mesh.occlusion[i], 4);
   return vertex;
 }
 
@@ -146,7 +146,7 @@ TEST(SmoothBorders, ChunksGiveTheirCommonVerticesTheSameBits) {
     const DensityGrid grid = grid_of(box_over_borders(), oracle::waves(seed, 9.0 + 4.0 * seed));
     for (const bool split : {false, true}) {
       expect_that_chunks_agree(grid, random_levels(seed), split);
-      for (int level = 0; level <= kCoarsestLevel; ++level) {
+      for (int level = 0; level <= kMaxSmoothLevel; ++level) {
         expect_that_chunks_agree(
             grid, [=](IVec3) { return level; }, split);
       }
@@ -177,7 +177,7 @@ CellKey cell_around(IVec3 sample, const std::function<int(IVec3)>& level_of) {
 void look_at_edge(const DensityGrid& grid, const std::function<int(IVec3)>& level_of, IVec3 p, int axis,
                   Polygons& polygons) {
   std::set<CellKey> cells;
-  int level = kCoarsestLevel;
+  int level = kMaxSmoothLevel;
   for (const IVec3 side : smooth::cells_around(p, axis)) {
     cells.insert(cell_around(side, level_of));
     level = std::min(level, level_of(chunk_of(side)));

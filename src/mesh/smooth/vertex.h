@@ -20,7 +20,8 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
   const auto density = [&](int x, int y, int z) {
     return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
   };
-  out.openness[index] = vertex_openness(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
+  out.occlusion[index] =
+      occlusion_at_vertex(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
 }
 
 /// The index of a new vertex.
@@ -30,7 +31,7 @@ inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const Smo
   const std::size_t index = out.positions.size();
   out.positions.resize(index + 1);
   out.normals.resize(index + 1);
-  if (occlusion.form != SmoothOcclusion::None) out.openness.resize(index + 1);
+  if (occlusion.form != SmoothOcclusion::None) out.occlusion.resize(index + 1);
   out.cells.push_back(name);
   write_vertex(chunks, occlusion, cell, vertex, static_cast<std::uint32_t>(index), out);
   return static_cast<std::uint32_t>(index);

@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-constexpr std::int64_t kMostVoxels = std::int64_t{1} << 26;  // of the box that faces are found in all at once
+constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 26;  // of the box that faces are found in all at once
 
 // Texels a side: so many that one is no larger than a voxel, as far as the memory for that is worth it.
 int edge_for(const ContentSphere& content) {
@@ -21,7 +21,7 @@ int edge_for(const ContentSphere& content) {
   return voxels <= Impostor::kEdge ? Impostor::kEdge : 2 * Impostor::kEdge;
 }
 
-std::uint8_t packed(const FaceLevels& levels) {
+std::uint8_t packed(const FaceOcclusion& levels) {
   unsigned all = 0;
   for (std::size_t i = 0; i < 4; ++i) all |= static_cast<unsigned>(levels[i]) << 2 * i;
   return static_cast<std::uint8_t>(all);
@@ -79,8 +79,8 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   auto faces = std::make_shared<ImpostorFaces>();
   const int edge = edge_for(made.content_);
   // Beyond that, a ray for each texel takes less time.
-  const std::int64_t most_faces = std::int64_t{kImpostorViews} * edge * edge;
-  const std::optional<ImpostorShell> shell = ImpostorShell::build(opaque, kMostVoxels, most_faces);
+  const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
+  const std::optional<ImpostorShell> shell = ImpostorShell::build(opaque, kMaxVoxels, max_faces);
   const std::vector<SeenFace> seen =
       shell ? faces_seen_of(*shell, made.box_, made.content_, edge) : faces_seen_by_rays(opaque, made.content_, edge);
   faces->edge = edge;

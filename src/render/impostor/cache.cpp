@@ -31,7 +31,7 @@ struct ImpostorCache::Impl {
   mutable std::mutex mutex;
   std::map<GridHandle, Entry> entries;
   std::deque<GridHandle> waiting;
-  ImpostorCacheStatistics statistics;
+  ImpostorCacheStats stats;
   std::uint64_t built_bytes = 0;
   ChangeCursor followed_types;
   std::uint64_t types_changed = 0;  // how often, in whether they are transparent
@@ -52,14 +52,14 @@ struct ImpostorCache::Impl {
 
   void release(Entry& entry) {
     if (entry.impostor == nullptr) return;
-    --statistics.held;
-    statistics.bytes -= entry.impostor->bytes();
+    --stats.held;
+    stats.bytes -= entry.impostor->bytes();
     entry.impostor = nullptr;
   }
 
   // Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
   bool make_room(std::size_t bytes, std::uint64_t used_before) {
-    while (statistics.bytes + bytes > options.most_bytes) {
+    while (stats.bytes + bytes > options.max_bytes) {
       auto oldest = entries.end();
       for (auto each = entries.begin(); each != entries.end(); ++each) {
         if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before)
@@ -67,7 +67,7 @@ struct ImpostorCache::Impl {
         if (oldest == entries.end() || each->second.last_use < oldest->second.last_use) oldest = each;
       }
       if (oldest == entries.end()) return false;
-      ++statistics.dropped;
+      ++stats.dropped;
       drop(oldest);
     }
     return true;
@@ -84,7 +84,7 @@ struct ImpostorCache::Impl {
     const std::lock_guard lock(mutex);
     const auto entry = entries.find(grid);
     if (entry == entries.end()) return false;
-    const std::size_t likely = statistics.built == 0 ? 1 : built_bytes / statistics.built;
+    const std::size_t likely = stats.built == 0 ? 1 : built_bytes / stats.built;
     if (entry->second.impostor != nullptr || make_room(likely, entry->second.last_use)) return true;
     entries.erase(entry);
     return false;
@@ -98,26 +98,23 @@ struct ImpostorCache::Impl {
 
   void look_at(const VoxelRegistry& types) {
     const std::lock_guard lock(mutex);
-    const TypeChanges changes = types.changes_since(followed_types);
-    const bool are_others =
-        std::any_of(changes.items.begin(), changes.items.end(), [](const TypeChange& each) { return each.visibility; });
-    if (changes.all || are_others) ++types_changed;
+    if (has_other_visibility(types.changes_since(followed_types))) ++types_changed;
   }
 
   void put(GridHandle grid, const Origin& origin, std::shared_ptr<const Impostor> made) {
     const std::lock_guard lock(mutex);
     const auto entry = entries.try_emplace(grid).first;
     const std::size_t bytes = made->bytes();
-    ++statistics.built;
+    ++stats.built;
     built_bytes += bytes;
     release(entry->second);
     if (!make_room(bytes, entry->second.last_use)) {
-      ++statistics.dropped;
+      ++stats.dropped;
       entries.erase(entry);
       return;
     }
-    ++statistics.held;
-    statistics.bytes += bytes;
+    ++stats.held;
+    stats.bytes += bytes;
     entry->second = {std::move(made), origin, entry->second.last_use, false};
   }
 
@@ -190,15 +187,15 @@ std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds,
   return impl_->waiting.size();
 }
 
-void ImpostorCache::look_at_types(const VoxelRegistry& types) {
+void ImpostorCache::update_types(const VoxelRegistry& types) {
   impl_->look_at(types);
 }
 
-ImpostorCacheStatistics ImpostorCache::statistics() const {
+ImpostorCacheStats ImpostorCache::stats() const {
   const std::lock_guard lock(impl_->mutex);
-  ImpostorCacheStatistics statistics = impl_->statistics;
-  statistics.waiting = impl_->waiting.size();
-  return statistics;
+  ImpostorCacheStats stats = impl_->stats;
+  stats.waiting = impl_->waiting.size();
+  return stats;
 }
 
 }  // namespace quoin

@@ -35,14 +35,14 @@ TEST(ImpostorCache, BuildsWhatIsAskedForSomeAtATime) {
   ImpostorCache cache;
   for (const GridHandle grid : world.grids) EXPECT_EQ(cache.find(world.scene, grid), nullptr);
   for (const GridHandle grid : world.grids) EXPECT_EQ(cache.find(world.scene, grid), nullptr) << "asked for once";
-  EXPECT_EQ(cache.statistics().waiting, 3U);
+  EXPECT_EQ(cache.stats().waiting, 3U);
   EXPECT_EQ(cache.build_some(world.scene, 0.0), 2U) << "one at least";
   EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
   EXPECT_EQ(cache.build_some(world.scene, 100.0, {2}), 0U);
   EXPECT_NE(cache.find(world.scene, world.grids[2]), nullptr);
-  EXPECT_EQ(cache.statistics().built, 3U);
-  EXPECT_EQ(cache.statistics().held, 3U);
+  EXPECT_EQ(cache.stats().built, 3U);
+  EXPECT_EQ(cache.stats().held, 3U);
   EXPECT_EQ(cache.find(world.scene, GridHandle{}), nullptr);
 }
 
@@ -61,8 +61,8 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_NE(renewed, old);
   EXPECT_TRUE(shows(*renewed, 2));
   EXPECT_FALSE(shows(*old, 2)) << "whoever holds it still has it";
-  EXPECT_EQ(cache.statistics().held, 1U);
-  EXPECT_EQ(cache.statistics().bytes, renewed->bytes());
+  EXPECT_EQ(cache.stats().held, 1U);
+  EXPECT_EQ(cache.stats().bytes, renewed->bytes());
 }
 
 TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
@@ -83,7 +83,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   VoxelProperties glass = world.scene.types[3];
   glass.visibility = Visibility::Transparent;
   world.scene.types.replace(3, glass);
-  cache.look_at_types(world.scene.types);
+  cache.update_types(world.scene.types);
   EXPECT_TRUE(ready()->is_empty());
 }
 
@@ -93,7 +93,7 @@ TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
   world.scene.edit(world.grids[0]).grid.fill_box({0, 0, 0}, {0, 2, 3}, type);
   ImpostorCache cache;
   const auto is_empty = [&] {
-    cache.look_at_types(world.scene.types);
+    cache.update_types(world.scene.types);
     static_cast<void>(cache.find(world.scene, world.grids[0]));
     EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
     return cache.find(world.scene, world.grids[0])->is_empty();
@@ -117,8 +117,8 @@ TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   EXPECT_EQ(cache.find(world.scene, world.grids[2]), nullptr);
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
-  EXPECT_EQ(cache.statistics().held, 2U);
-  EXPECT_EQ(cache.statistics().dropped, 1U);
+  EXPECT_EQ(cache.stats().held, 2U);
+  EXPECT_EQ(cache.stats().dropped, 1U);
   EXPECT_NE(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_NE(cache.find(world.scene, world.grids[2]), nullptr);
   EXPECT_EQ(cache.find(world.scene, world.grids[1]), nullptr);
@@ -130,9 +130,9 @@ TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
-  EXPECT_EQ(cache.statistics().held, 0U);
-  EXPECT_EQ(cache.statistics().bytes, 0U);
-  EXPECT_EQ(cache.statistics().dropped, 1U);
+  EXPECT_EQ(cache.stats().held, 0U);
+  EXPECT_EQ(cache.stats().bytes, 0U);
+  EXPECT_EQ(cache.stats().dropped, 1U);
 }
 
 TEST(ImpostorCache, ForgetsGridsThatAreGone) {
@@ -142,7 +142,7 @@ TEST(ImpostorCache, ForgetsGridsThatAreGone) {
   world.scene.remove_grid(world.grids[0]);
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
-  EXPECT_EQ(cache.statistics().built, 0U);
+  EXPECT_EQ(cache.stats().built, 0U);
 }
 
 TEST(ImpostorCache, MayBeAskedWhileAnotherThreadBuilds) {
@@ -155,7 +155,7 @@ TEST(ImpostorCache, MayBeAskedWhileAnotherThreadBuilds) {
     for (const GridHandle grid : world.grids) ready += cache.find(world.scene, grid) != nullptr;
   }
   builder.join();
-  EXPECT_EQ(cache.statistics().built, 8U);
+  EXPECT_EQ(cache.stats().built, 8U);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene, std::span<
   const auto begin = Clock::now();
   const std::vector<GridHandle> grids = far_grids(scene, selected);
   std::size_t bytes = 0;
-  for (std::size_t i = 0; i < grids.size() && bytes < FarImpostors::kMostBytes; i += kAtOnce) {
+  for (std::size_t i = 0; i < grids.size() && bytes < FarImpostors::kMaxBytes; i += kAtOnce) {
     const auto some = std::span(grids).subspan(i, std::min(kAtOnce, grids.size() - i));
     for (const GridHandle grid : some) static_cast<void>(cache.find(scene, grid));
     const double left = seconds - std::chrono::duration<double>(Clock::now() - begin).count();
@@ -40,7 +40,7 @@ FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene, std::span<
       std::shared_ptr<const Impostor> found = cache.find(scene, grid);
       if (found == nullptr) continue;
       bytes += found->bytes();
-      if (bytes > FarImpostors::kMostBytes) break;
+      if (bytes > FarImpostors::kMaxBytes) break;
       far.kept.emplace(grid, std::move(found));
     }
   }

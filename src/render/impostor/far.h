@@ -14,7 +14,7 @@ namespace quoin {
 
 /// The far ones among the instances of one picture that have impostors.
 struct FarImpostors {
-  static constexpr std::size_t kMostBytes = std::size_t{1} << 30;  ///< of all grids; those beyond have none
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  ///< of all grids; those beyond have none
 
   std::vector<FarInstance> instances;
   std::map<GridHandle, std::shared_ptr<const Impostor>> kept;  ///< what they point to

@@ -10,6 +10,7 @@
 
 #include "light/corner_light.h"
 #include "render/impostor/faces.h"
+#include "render/impostor/snapshot.h"
 
 namespace quoin {
 namespace {

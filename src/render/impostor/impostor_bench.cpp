@@ -76,7 +76,7 @@ Scene far_scene() {
 
 void far1000(benchmark::State& state, bool impostors) {
   static const Scene scene = far_scene();
-  static const CpuRenderer renderer(scene, false, {1});
+  static const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   Camera camera;
   camera.vertical_fov = 0.9;
   RenderOptions options;

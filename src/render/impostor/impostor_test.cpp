@@ -16,6 +16,7 @@
 
 #include "core/death_for_tests.h"
 #include "light/corner_light.h"
+#include "render/impostor/snapshot.h"
 #include "render/render_test_support.h"
 
 namespace quoin {

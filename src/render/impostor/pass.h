@@ -6,11 +6,11 @@
 #include <vector>
 
 #include <quoin/render/impostor.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "render/camera_rays.h"
 #include "render/impostor/raster.h"
 #include "render/impostor/screen.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "render/impostor/snapshot.h"
+
 namespace quoin {
 namespace {
 
@@ -86,7 +88,7 @@ std::optional<PixelArea> ImpostorScreen::area_of(const Sphere& sphere) const {
 
 std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std::int32_t index,
                                                    const Impostor& impostor) const {
-  if (impostor.is_empty() || placed.halvings != 0) return std::nullopt;
+  if (impostor.is_empty() || placed.level != 0) return std::nullopt;
   const ContentSphere& content = impostor.content();
   const DVec3 position = placed.position - camera_.position;
   const DVec3 centre = position + placed.world_axes * (content.centre - placed.pivot) * placed.voxel_size;

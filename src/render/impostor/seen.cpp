@@ -10,7 +10,7 @@
 #include <quoin/trace/packet.h>
 
 #include "render/impostor/raster.h"
-#include "render/snapshot_rays.h"
+#include "render/impostor/snapshot.h"
 
 namespace quoin {
 namespace {

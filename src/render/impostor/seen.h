@@ -9,6 +9,7 @@
 
 #include "render/impostor/faces.h"
 #include "render/impostor/shell.h"
+#include "render/impostor/snapshot.h"
 
 namespace quoin {
 

@@ -27,13 +27,13 @@ ImpostorShell::ImpostorShell(const IBox& box) : origin_((floor_of(box.min, 2) - 
                 static_cast<std::size_t>(size_.z));
 }
 
-std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std::int64_t most_voxels,
-                                                  std::int64_t most_faces) {
+std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std::int64_t max_voxels,
+                                                  std::int64_t max_faces) {
   const IBox box = tree.bounds();
   const IVec3 size = cells_around(box);
-  std::int64_t most_cells = most_voxels / 64;
-  for (int axis = 0; axis < 3; ++axis) most_cells /= size[axis];
-  if (most_cells == 0) return std::nullopt;
+  std::int64_t max_cells = max_voxels / 64;
+  for (int axis = 0; axis < 3; ++axis) max_cells /= size[axis];
+  if (max_cells == 0) return std::nullopt;
   ImpostorShell shell(box);
   const IVec3 low = floor_of(box.min, 6);
   const IVec3 high = floor_of(box.max - 1, 6);
@@ -42,7 +42,7 @@ std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std
       for (int x = low.x; x <= high.x; ++x) shell.copy_chunk(tree, {x, y, z});
     }
   }
-  if (shell.count_faces() > most_faces) return std::nullopt;
+  if (shell.count_faces() > max_faces) return std::nullopt;
   return shell;
 }
 

@@ -23,9 +23,8 @@ struct VoxelFace {
 /// Memory: a bit a voxel of the box and of what lies within four voxels of it.
 class ImpostorShell {
  public:
-  /// None where the box and what it keeps around it have more than `most_voxels`, or there are more than `most_faces`.
-  static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t most_voxels,
-                                            std::int64_t most_faces);
+  /// None where the box and what it keeps around it have more than `max_voxels`, or there are more than `max_faces`.
+  static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
   /// By direction, then by cell of 4^3 voxels.
   [[nodiscard]] std::vector<VoxelFace> faces() const;

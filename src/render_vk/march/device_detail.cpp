@@ -33,7 +33,7 @@ void DeviceDetail::clear() {
 }
 
 void DeviceDetail::look_at(const Scene& scene) {
-  if (has_other_visibility(scene.types, followed_types_)) clear();
+  if (has_other_visibility(scene.types.changes_since(followed_types_))) clear();
   const SceneChanges changes = scene.changes_since(followed_scene_);
   const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
   if (!changes.all && std::none_of(changes.grids.begin(), changes.grids.end(), is_gone)) return;
@@ -48,7 +48,7 @@ void DeviceDetail::look_at(const Scene& scene) {
 }
 
 Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
-                                      const Camera& camera, const RenderOptions& options, std::uint64_t most_bytes) {
+                                      const Camera& camera, const RenderOptions& options, std::uint64_t max_bytes) {
   ++picture_;
   Placement placement = device.placement();
   const ImpostorScreen screen(camera, options.width, options.height);
@@ -59,8 +59,8 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
     clear();
     return done.error();
   }
-  drop_unused(most_bytes);
-  impostors_.drop_unused(most_bytes);
+  drop_unused(max_bytes);
+  impostors_.drop_unused(max_bytes);
   return placement;
 }
 
@@ -68,7 +68,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
                                 std::span<const SelectedInstance> selected, Threads threads, Placement& placement) {
   std::vector<ShaderGrid> table = device.grid_table();
   std::vector<InstanceTree::Change> halved;
-  const CoarseGrids::Lock coarse = coarse_.make(scene, selected, threads);
+  const HalvedGridCache::Lock coarse = coarse_.make(scene, selected, threads);
   auto next = placement.placed.begin();
   for (const SelectedInstance& choice : selected) {
     next = find_placed(next, placement.placed.end(), choice.instance);
@@ -76,7 +76,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
     if (next->placed.instance != choice.instance) continue;
     next->placed.detail = choice.detail;
     const GridHandle grid = scene.instances()[choice.instance].grid;
-    const CoarseLevel* found = coarse.find(grid, choice.halvings);
+    const CoarseLevel* found = coarse.find(grid, choice.level);
     if (found == nullptr) continue;
     const Level* level = nullptr;
     if (Status done = put_level(*found, grid, table, level); !done) return done;
@@ -96,7 +96,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
 // Brings a level up to date and into the table, once a picture.
 Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table,
                                const Level*& level) {
-  Level& known = levels_[{grid, coarse.halvings}];
+  Level& known = levels_[{grid, coarse.level}];
   level = &known;
   if (known.last_use == picture_) return {};
   Status done = known.voxels.update(*memory_, *coarse.voxels, coarse.trees.opaque(), coarse.trees.transparent());
@@ -106,9 +106,9 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
   return done;
 }
 
-void DeviceDetail::drop_unused(std::uint64_t most_bytes) {
+void DeviceDetail::drop_unused(std::uint64_t max_bytes) {
   std::uint64_t held = halved_bytes();
-  while (held > most_bytes) {
+  while (held > max_bytes) {
     const auto oldest = std::min_element(levels_.begin(), levels_.end(), [](const auto& a, const auto& b) {
       return a.second.last_use < b.second.last_use;
     });

@@ -12,7 +12,7 @@
 #include "render_vk/march/device_grid.h"
 #include "render_vk/march/device_impostors.h"
 #include "render_vk/march/device_scene.h"
-#include "scene/tracer/coarse_grids.h"
+#include "scene/tracer/halved_grid_cache.h"
 
 namespace quoin::vulkan {
 
@@ -20,7 +20,7 @@ namespace quoin::vulkan {
 /// picture.
 class DeviceDetail {
  public:
-  static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
+  static constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
 
   explicit DeviceDetail(DeviceMemory& memory) : memory_(&memory), impostors_(memory) {}
 
@@ -32,14 +32,14 @@ class DeviceDetail {
 
   /// Answers the scene's instances in their detail: traced in grids halved as often as `detail` says, or less often
   /// where that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
-  /// `most_bytes` of device memory, of each of both, those are released that pictures have not asked for longest; what
+  /// `max_bytes` of device memory, of each of both, those are released that pictures have not asked for longest; what
   /// this one asks for stays.
   ///
   /// Requires: `device` was updated with `scene`, which is as it was then; no commands run.
   /// Errors:   those of DeviceImpostors::draw; then it holds nothing.
   [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
                                         const Camera& camera, const RenderOptions& options,
-                                        std::uint64_t most_bytes = kMostBytes);
+                                        std::uint64_t max_bytes = kMaxBytes);
 
   /// Of device memory that halved grids take, and impostors.
   [[nodiscard]] std::uint64_t halved_bytes() const;
@@ -48,10 +48,8 @@ class DeviceDetail {
  private:
   struct Key {
     GridHandle grid;
-    int halvings = 0;
-    bool operator<(const Key& other) const {
-      return grid != other.grid ? grid < other.grid : halvings < other.halvings;
-    }
+    int level = 0;
+    bool operator<(const Key& other) const { return grid != other.grid ? grid < other.grid : level < other.level; }
   };
   struct Level {
     DeviceGrid voxels;
@@ -61,11 +59,11 @@ class DeviceDetail {
   Status put_halved(const DeviceScene& device, const Scene& scene, std::span<const SelectedInstance> selected,
                     Threads threads, Placement& placement);
   Status put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table, const Level*& level);
-  void drop_unused(std::uint64_t most_bytes);
+  void drop_unused(std::uint64_t max_bytes);
 
   DeviceMemory* memory_;
   DeviceImpostors impostors_;
-  CoarseGrids coarse_;
+  HalvedGridCache coarse_;
   std::map<Key, Level> levels_;
   ChangeCursor followed_scene_;
   ChangeCursor followed_types_;

@@ -159,9 +159,9 @@ ShaderFar DeviceImpostors::shader_far(const Entry& entry, const DrawnImpostor& d
   return far;
 }
 
-void DeviceImpostors::drop_unused(std::uint64_t most_bytes) {
+void DeviceImpostors::drop_unused(std::uint64_t max_bytes) {
   std::uint64_t held = bytes();
-  while (held > most_bytes) {
+  while (held > max_bytes) {
     const auto oldest = std::min_element(entries_.begin(), entries_.end(), [](const auto& a, const auto& b) {
       return a.second.last_use < b.second.last_use;
     });

@@ -31,7 +31,7 @@ class DeviceImpostors {
   [[nodiscard]] Status draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
                             int height, Placement& placement);
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
-  void drop_unused(std::uint64_t most_bytes);
+  void drop_unused(std::uint64_t max_bytes);
 
   /// What was made of a grid goes when `is_gone(handle)`.
   template <class IsGone>

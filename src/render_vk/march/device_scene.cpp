@@ -12,7 +12,7 @@ namespace quoin::vulkan {
 namespace {
 
 constexpr std::int64_t kWidest = std::int64_t{1} << 29;  // voxels; shaders count in 32 bits
-constexpr std::size_t kMostInstances = std::size_t{1} << 24;
+constexpr std::size_t kMaxInstances = std::size_t{1} << 24;
 
 template <class T>
 std::span<const std::byte> bytes_of(const std::vector<T>& values) {
@@ -26,8 +26,8 @@ bool is_too_wide(const IBox& bounds) {
   return false;
 }
 
-bool can_be_traced(const Instance& instance, const SceneGrid* grid, bool hidden) {
-  return grid != nullptr && (instance.visible || hidden) && has_place(instance) && is_finite(grid->pivot) &&
+bool can_be_traced(const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
+  return grid != nullptr && passes(filter, instance) && has_place(instance) && is_finite(grid->pivot) &&
          !grid->grid.bounds().empty();
 }
 
@@ -43,9 +43,9 @@ PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHa
 
 }  // namespace
 
-Status DeviceScene::update(const Scene& scene, bool hidden, Threads threads) {
+Status DeviceScene::update(const Scene& scene, InstanceFilter filter, Threads threads) {
   try {
-    Status done = try_update(scene, hidden, threads);
+    Status done = try_update(scene, filter, threads);
     if (done) done = memory_->flush();
     if (!done) clear();
     return done;
@@ -68,20 +68,14 @@ void DeviceScene::clear() {
   followed_types_ = followed_visibility_ = followed_scene_ = {};
 }
 
-bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed) {
-  const TypeChanges changes = types.changes_since(followed);
-  return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
-                                    [](const TypeChange& change) { return change.visibility; });
-}
-
 // Lists the instances and keeps, of the known grids, those that are among them.
-void DeviceScene::place(const Scene& scene, bool hidden) {
+void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   placement_.placed.clear();
   for (auto& [handle, grid] : grids_) grid.is_used = false;
   std::vector<DBox> boxes;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (!can_be_traced(instance, grid, hidden)) return;
+    if (!can_be_traced(instance, grid, filter)) return;
     KnownGrid& known = grids_[instance.grid];
     known.is_used = true;
     known.bounds = grid->grid.bounds();
@@ -101,10 +95,10 @@ void DeviceScene::place(const Scene& scene, bool hidden) {
 }
 
 // The placed grids that may be other than before; `places` where instances are to be placed anew.
-std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, bool hidden, bool& places) {
+std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceFilter filter, bool& places) {
   const SceneChanges changes = scene.changes_since(followed_scene_);
-  places = changes.all || hidden != hidden_ || !changes.instances.empty();
-  hidden_ = hidden;
+  places = changes.all || filter != filter_ || !changes.instances.empty();
+  filter_ = filter;
   std::vector<GridHandle> changed;
   for (const GridHandle handle : changes.grids) {
     const auto known = grids_.find(handle);
@@ -115,7 +109,7 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, bool hidd
     if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
   }
   if (!places) return changed;
-  place(scene, hidden);
+  place(scene, filter);
   changed.clear();
   for (const auto& [handle, known] : grids_) changed.push_back(handle);
   return changed;
@@ -147,16 +141,16 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
   return {};
 }
 
-Status DeviceScene::try_update(const Scene& scene, bool hidden, Threads threads) {
+Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Threads threads) {
   // Grids are packed by what their types are.
-  if (has_other_visibility(scene.types, followed_visibility_)) {
+  if (has_other_visibility(scene.types.changes_since(followed_visibility_))) {
     for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
     grids_.clear();
     followed_scene_ = {};
   }
   bool places = false;
-  const std::vector<GridHandle> changed = changed_grids(scene, hidden, places);
-  if (placement_.placed.size() > kMostInstances) {
+  const std::vector<GridHandle> changed = changed_grids(scene, filter, places);
+  if (placement_.placed.size() > kMaxInstances) {
     return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
   }
   if (Status done = update_grids(scene, changed, threads); !done) return done;

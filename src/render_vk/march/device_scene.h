@@ -11,7 +11,7 @@
 #include "render_vk/device/memory.h"
 #include "render_vk/march/device_grid.h"
 #include "scene/tracer/instance_tree.h"
-#include "scene/tracer/kept_trees.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin::vulkan {
 
@@ -41,9 +41,6 @@ struct Placement {
   bool has_transparent = false;
   std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
 };
-
-/// Whether any type became transparent or opaque, or may have; moves the cursor to the present.
-[[nodiscard]] bool has_other_visibility(const VoxelRegistry& types, ChangeCursor& followed);
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
@@ -54,7 +51,7 @@ class DeviceScene {
   explicit DeviceScene(DeviceMemory& memory) : memory_(&memory) {}
 
   /// As VulkanRenderer::update. After an error it holds nothing.
-  [[nodiscard]] Status update(const Scene& scene, bool hidden, Threads threads);
+  [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return placement_; }
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
@@ -66,17 +63,17 @@ class DeviceScene {
     IBox bounds;
     DVec3 pivot{0.0};
     bool is_used = false;  // by an instance
-    KeptTrees trees;
+    TreeCache trees;
     DeviceGrid voxels;
     std::int32_t index = 0;
   };
 
   void clear();
-  void place(const Scene& scene, bool hidden);
-  [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, bool hidden, bool& places);
+  void place(const Scene& scene, InstanceFilter filter);
+  [[nodiscard]] std::vector<GridHandle> changed_grids(const Scene& scene, InstanceFilter filter, bool& places);
   Status update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads);
   void finish_placed(const Scene& scene);
-  Status try_update(const Scene& scene, bool hidden, Threads threads);
+  Status try_update(const Scene& scene, InstanceFilter filter, Threads threads);
   Status put_surfaces(const VoxelRegistry& types);
   Status put_grids();
 
@@ -85,7 +82,7 @@ class DeviceScene {
   ChangeCursor followed_types_;
   ChangeCursor followed_visibility_;
   ChangeCursor followed_scene_;
-  bool hidden_ = false;
+  InstanceFilter filter_ = InstanceFilter::Visible;
   Placement placement_;
   Place grids_place_;
   std::vector<ShaderGrid> grid_table_;

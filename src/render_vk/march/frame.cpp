@@ -165,7 +165,7 @@ void add_placed(const Placement& scene, const Camera& camera, const RenderOption
     set_start(grid, spaces[i], rays, depths[i], options, placed);
     set_spaces(grid, spaces[i], view_origin, placed);
     set_sun(grid.placed, sun, placed);
-    placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.halvings), 0.0F};
+    placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.level), 0.0F};
   }
   const double spread = rays.spread(least);
   data.frame.view_depth = static_cast<float>(least);

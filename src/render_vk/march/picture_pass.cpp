@@ -11,8 +11,8 @@ namespace quoin::vulkan {
 namespace {
 
 // What commands do should be over before anything thinks that the device hangs: of one tile, and of one batch.
-constexpr std::int64_t kMostRays = std::int64_t{1} << 22;
-constexpr std::int64_t kMostRaysAtOnce = std::int64_t{1} << 24;
+constexpr std::int64_t kMaxRays = std::int64_t{1} << 22;
+constexpr std::int64_t kMaxRaysAtOnce = std::int64_t{1} << 24;
 const char* const kDoing = "drawing";
 
 std::int64_t rays_of_pixel(const RenderOptions& options) {
@@ -25,7 +25,7 @@ std::int64_t rays_of_pixel(const RenderOptions& options) {
 std::int32_t tile_edge(const RenderOptions& options, bool has_glass, bool is_processor) {
   std::int32_t edge = is_processor ? 256 : 1024;
   if (has_glass) edge = is_processor ? 128 : 256;
-  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options) > kMostRays) edge /= 2;
+  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options) > kMaxRays) edge /= 2;
   return edge;
 }
 
@@ -298,7 +298,7 @@ Status PicturePass::resolve(std::span<const Tile> tiles) {
 Status PicturePass::add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress) {
   const std::vector<Tile> tiles = tiles_of(options);
   const std::int64_t rays_of_tile = rays_of_pixel(options) * tile_edge_ * tile_edge_;
-  const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMostRaysAtOnce / rays_of_tile, 1));
+  const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMaxRaysAtOnce / rays_of_tile, 1));
   const double all = static_cast<double>(tiles.size()) * options.samples;
   double count = 0.0;
   for (int sample = 0; sample < options.samples; ++sample) {

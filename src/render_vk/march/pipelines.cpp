@@ -94,8 +94,8 @@ void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& 
 }
 
 void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
-  constexpr std::uint32_t kMostAcross = 32768;
-  const std::uint32_t across = std::min(push.far_groups, kMostAcross);
+  constexpr std::uint32_t kMaxAcross = 32768;
+  const std::uint32_t across = std::min(push.far_groups, kMaxAcross);
   dispatch(commands, pass, push, across, (push.far_groups + across - 1) / across);
 }
 

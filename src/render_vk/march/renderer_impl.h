@@ -29,12 +29,12 @@ struct VulkanRenderer::Impl {
         detail(memory) {}
 
   /// Null: there is none.
-  void look_at(const Scene* updated, bool hidden_too) {
+  void look_at(const Scene* updated, InstanceFilter filter) {
     if (chooser == nullptr || updated != voxels) chooser = std::make_unique<DetailChooser>();
     voxels = updated;
-    hidden = hidden_too;
+    instances = filter;
     if (updated == nullptr) return detail.clear();
-    chooser->look_at_types(updated->types);
+    chooser->update_types(updated->types);
     detail.look_at(*updated);
   }
 
@@ -45,7 +45,7 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceDetail detail;
   /// What levels of detail are made of, as of the last update: null where there was none.
   const Scene* voxels = nullptr;
-  bool hidden = false;
+  InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
   std::uint64_t uploaded = 0;
 };

@@ -4,6 +4,7 @@
 #include <bit>
 #include <tuple>
 
+#include "grid/chunk/chunk_storage.h"
 #include "trace/tree_view.h"
 
 namespace quoin::vulkan {
@@ -50,7 +51,7 @@ class RecordWriter {
   }
 
   void add_types(const Chunk& voxels) {
-    const Chunk::Mixed* mixed = voxels.mixed();
+    const ChunkStorage* mixed = voxels.storage();
     const std::size_t begin = record.words.size();
     for (const std::size_t header : headers_) {
       if (mixed == nullptr) {

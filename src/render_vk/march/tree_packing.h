@@ -15,7 +15,7 @@ namespace quoin::vulkan {
 ///
 ///   for each tree that holds any of it, at a multiple of 32 bytes: a header (address of the types, bits a voxel, where
 ///   the voxels' words begin; for a chunk of one type 0 bits and that type), the nodes of its bricks, the words of
-///   their cells; then the types: slabs, palette, words, as Chunk::Mixed has them.
+///   their cells; then the types: slabs, palette, words, as ChunkStorage has them.
 struct ChunkRecord {
   std::vector<std::uint32_t> words;
   Node opaque;  ///< of the whole chunk; mask 0 where there is none

@@ -25,7 +25,7 @@ class VulkanDetail : public vulkan_test::VulkanDetailTest {
     const SceneTracer whole(scene_);
     const SceneTracer detailed = whole.with_detail(selected);
     std::set<int> halvings;
-    for (const PlacedGrid& placed : detailed.placed()) halvings.insert(placed.halvings);
+    for (const PlacedGrid& placed : detailed.placed()) halvings.insert(placed.level);
     return halvings;
   }
 };
@@ -155,16 +155,16 @@ TEST_F(VulkanDetail, WhatPicturesNoLongerUseGivesWay) {
   add_crowd(scene_, grids, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));
   vulkan::DeviceDetail& detail = renderer_->impl().detail;
-  const auto place = [&](GridHandle wanted, std::uint64_t most_bytes) {
+  const auto place = [&](GridHandle wanted, std::uint64_t max_bytes) {
     std::vector<SelectedInstance> selected;
     for (const InstanceHandle handle : scene_.instances().handles()) {
       if (scene_.instances()[handle].grid == wanted) selected.push_back({handle, Detail::Mid, 1});
     }
-    ASSERT_TRUE(detail.place(renderer_->impl().scene, scene_, {selected, {}}, {}, {}, most_bytes));
+    ASSERT_TRUE(detail.place(renderer_->impl().scene, scene_, {selected, {}}, {}, {}, max_bytes));
   };
-  place(grids[0], vulkan::DeviceDetail::kMostBytes);
+  place(grids[0], vulkan::DeviceDetail::kMaxBytes);
   const std::uint64_t first = detail.halved_bytes();
-  place(grids[1], vulkan::DeviceDetail::kMostBytes);
+  place(grids[1], vulkan::DeviceDetail::kMaxBytes);
   const std::uint64_t both = detail.halved_bytes();
   EXPECT_GT(first, 0U);
   EXPECT_GT(both, first);

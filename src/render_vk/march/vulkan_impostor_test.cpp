@@ -150,8 +150,8 @@ TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
   const RenderOptions options = in_detail(128, 96, 128);
   compare(camera, options, "far_without_hidden");
-  ASSERT_TRUE(renderer_->update(scene_, true));
-  const auto all = CpuRenderer(scene_, true).render(camera, options);
+  ASSERT_TRUE(renderer_->update(scene_, InstanceFilter::All));
+  const auto all = CpuRenderer(scene_, InstanceFilter::All).render(camera, options);
   expect_equal(taken_as_is(camera, options), *all, "far_with_hidden");
   EXPECT_GT(all->pixels_hit, render_test::taken(scene_, camera, options).pixels_hit);
 }

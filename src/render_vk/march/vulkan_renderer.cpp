@@ -17,7 +17,7 @@ class Subject {
                                           const RenderOptions& options) {
     Subject subject(impl.scene.placement());
     if (!options.detail || impl.voxels == nullptr) return subject;
-    const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.hidden, camera, options);
+    const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
     auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
     if (!placed) return placed.error();
     subject.detailed_ = std::move(*placed);
@@ -60,11 +60,11 @@ const VulkanDevice& VulkanRenderer::device() const {
   return impl_->device->description();
 }
 
-Status VulkanRenderer::update(const Scene& scene, bool hidden, Threads threads) {
+Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads threads) {
   const std::uint64_t before = impl_->memory.written();
-  Status done = impl_->scene.update(scene, hidden, threads);
+  Status done = impl_->scene.update(scene, filter, threads);
   impl_->uploaded = impl_->memory.written() - before;
-  impl_->look_at(done ? &scene : nullptr, hidden);
+  impl_->look_at(done ? &scene : nullptr, filter);
   return done;
 }
 
@@ -82,7 +82,7 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
 
 Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
                             const Progress& progress) {
-  constexpr int kMostSamples = 4096;
+  constexpr int kMaxSamples = 4096;
   if (Status status = check(camera, options); !status) return status;
   VulkanPicture::Impl& target = picture.impl();
   if (Status status = target.resize(options.width, options.height); !status) return status;
@@ -90,7 +90,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (is_new || target.samples == 0 || target.sums.handle() == VK_NULL_HANDLE) {
     if (Status status = target.begin_sums(); !status) return status;
   }
-  if (target.samples + options.samples > kMostSamples) {
+  if (target.samples + options.samples > kMaxSamples) {
     return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
   const auto subject = Subject::of(*impl_, camera, options);

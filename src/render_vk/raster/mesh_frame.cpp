@@ -176,7 +176,7 @@ bool faces_camera(const Quad& quad, const MeshDraw& draw, const Space& space, co
 
 void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData& data) {
   for (const MeshDraw& draw : data.draws) data.glass_quads += draw.mesh->glass.size();
-  if (data.glass_quads > kMostOrdered) return;
+  if (data.glass_quads > kMaxOrdered) return;
   struct Entry {
     float distance;
     ShaderGlassQuad quad;
@@ -253,7 +253,7 @@ QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
 }
 
 std::int64_t MeshFrameData::triangles() const {
-  const bool is_ordered = glass_quads > 0 && glass_quads <= kMostOrdered;
+  const bool is_ordered = glass_quads > 0 && glass_quads <= kMaxOrdered;
   std::int64_t count = is_ordered ? 2 * static_cast<std::int64_t>(order.size()) : 0;
   for (const MeshDraw& draw : draws) {
     count += draw.mesh->indices / 3;

@@ -47,7 +47,7 @@ struct MeshFrameData {
   ShaderMeshPush sky;
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
-  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMostOrdered`: then
+  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`: then
   /// chunks are drawn in their order, and the quads of each as they come.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
@@ -58,7 +58,7 @@ struct MeshFrameData {
   [[nodiscard]] std::int64_t triangles() const;
 };
 
-constexpr std::size_t kMostOrdered = std::size_t{1} << 20;
+constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 
 /// All that is in the world is made relative to the camera here, in double precision; then each instance is counted
 /// from a corner of a chunk near the camera, so that a corner that chunks share is the same number in each of them.

@@ -141,7 +141,7 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
   // What is solid first, so that less of the sky is to be drawn.
   std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
   if (data.glass_quads > 0) {
-    const auto over = data.glass_quads > kMostOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
+    const auto over = data.glass_quads > kMaxOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
   }
   if (wireframe == Wireframe::Over) steps.push_back({Step::Over::All, kDrawEdgesOver});

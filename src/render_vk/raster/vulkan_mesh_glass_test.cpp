@@ -144,7 +144,7 @@ TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
   std::vector<SurfaceUpdate> surfaces = blocky_surfaces(shown);
   put(shown, surfaces);
   const Image sorted = drawn(camera, options);
-  EXPECT_LT(meshes_->facts().drawn_triangles, 1000);
+  EXPECT_LT(meshes_->stats().drawn_triangles, 1000);
   // A million quads that look the other way.
   Grid back;
   constexpr VoxelType kRed = 3;  // the third that was added
@@ -158,7 +158,7 @@ TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
   surfaces.push_back({surfaces[0].grid, {0, 0, 3}, surface});
   put(shown, surfaces);
   const Image by_chunk = drawn(camera, options);
-  EXPECT_GT(meshes_->facts().drawn_triangles, 1 << 21);
+  EXPECT_GT(meshes_->stats().drawn_triangles, 1 << 21);
   EXPECT_EQ(by_chunk.rgb, sorted.rgb);
 }
 

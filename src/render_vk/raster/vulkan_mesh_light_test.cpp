@@ -168,10 +168,10 @@ TEST_F(VulkanMeshLight, MergedQuadsLookLikeSingleFaces) {
   const Camera camera = towards({10, 40, 70}, {0, 4, 0});
   const MeshPictureOptions options = mesh_options(without_shadows(sized(320, 180)));
   put(scene, blocky_surfaces(scene, false));
-  const std::int64_t faces = meshes_->facts().triangles;
+  const std::int64_t faces = meshes_->stats().triangles;
   const Image single = drawn(camera, options);
   put(scene, blocky_surfaces(scene, true));
-  EXPECT_LT(meshes_->facts().triangles, faces);
+  EXPECT_LT(meshes_->stats().triangles, faces);
   const Image merged = drawn(camera, options);
   int different = 0;
   for (std::size_t i = 0; i < single.rgb.size(); ++i) different += std::abs(single.rgb[i] - merged.rgb[i]) > 2;

@@ -26,7 +26,7 @@ struct VulkanMeshRenderer::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  void place(const Scene& scene, bool hidden);
+  void place(const Scene& scene, InstanceFilter filter);
   Status put_surfaces(const VoxelRegistry& types);
   Status upload_surfaces(const std::vector<Vec4>& table);
 
@@ -84,16 +84,16 @@ Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) 
   return VulkanMeshRenderer(std::make_unique<Impl>(shared, std::move(*pass)));
 }
 
-Status VulkanMeshRenderer::update(const Scene& scene, bool hidden) {
-  impl_->place(scene, hidden);
+Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
+  impl_->place(scene, filter);
   return impl_->put_surfaces(scene.types);
 }
 
-void VulkanMeshRenderer::Impl::place(const Scene& scene, bool hidden) {
+void VulkanMeshRenderer::Impl::place(const Scene& scene, InstanceFilter filter) {
   instances.clear();
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (grid == nullptr || !(instance.visible || hidden) || !has_place(instance) || !is_finite(grid->pivot)) return;
+    if (grid == nullptr || !passes(filter, instance) || !has_place(instance) || !is_finite(grid->pivot)) return;
     instances.push_back(
         {instance.grid, world_axes(instance), instance.position, grid->pivot, instance.voxel_size, instance.mirrored});
   });
@@ -167,7 +167,7 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   return {};
 }
 
-VulkanMeshRenderer::Facts VulkanMeshRenderer::facts() const {
+VulkanMeshRenderer::Stats VulkanMeshRenderer::stats() const {
   return {impl_->store.chunks(), impl_->store.triangles(), impl_->drawn_triangles, impl_->store.bytes()};
 }
 

@@ -48,9 +48,9 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   Scene scene = boxes();
   const RenderOptions options = without_shadows(sized(160, 90));
   compare(scene, before_boxes(), options, "two_boxes");
-  EXPECT_EQ(meshes_->facts().chunks, 2U);
-  EXPECT_EQ(meshes_->facts().triangles, 24);
-  EXPECT_EQ(meshes_->facts().bytes, 2U * 64U) << "six quads of 8 bytes, in places of multiples of 32";
+  EXPECT_EQ(meshes_->stats().chunks, 2U);
+  EXPECT_EQ(meshes_->stats().triangles, 24);
+  EXPECT_EQ(meshes_->stats().bytes, 2U * 64U) << "six quads of 8 bytes, in places of multiples of 32";
   SurfaceUpdate update = blocky_surfaces(scene)[0];
   Grid& grid = scene.edit(update.grid).grid;
   const auto expect_current = [&](const std::string& name) {
@@ -61,16 +61,16 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   update.surface = blocky_surface(grid, scene.types, {0, 0, 0});
   ASSERT_TRUE(meshes_->put(std::vector{update}));
   expect_current("replaced");
-  EXPECT_EQ(meshes_->facts().chunks, 2U);
+  EXPECT_EQ(meshes_->stats().chunks, 2U);
   grid.fill_box({0, 0, 0}, {63, 63, 63}, kAir);
   update.surface = nullptr;
   ASSERT_TRUE(meshes_->put(std::vector{update, update}));
   expect_current("removed");
-  EXPECT_EQ(meshes_->facts().chunks, 1U);
-  EXPECT_EQ(meshes_->facts().drawn_triangles, 8) << "of four directions: the camera is between top and bottom";
+  EXPECT_EQ(meshes_->stats().chunks, 1U);
+  EXPECT_EQ(meshes_->stats().drawn_triangles, 8) << "of four directions: the camera is between top and bottom";
   meshes_->clear();
-  EXPECT_EQ(meshes_->facts().chunks, 0U);
-  EXPECT_EQ(meshes_->facts().bytes, 0U);
+  EXPECT_EQ(meshes_->stats().chunks, 0U);
+  EXPECT_EQ(meshes_->stats().bytes, 0U);
 }
 
 TEST_F(VulkanMeshUpdate, OfOneChunkInOneCallTheLastCounts) {
@@ -83,7 +83,7 @@ TEST_F(VulkanMeshUpdate, OfOneChunkInOneCallTheLastCounts) {
   const RenderOptions options = without_shadows(sized(160, 90));
   put(scene, {wrong, right[0], wrong, right[0], right[1]});
   expect_like(drawn(before_boxes(), mesh_options(options)), render_test::taken(scene, before_boxes(), options), "last");
-  EXPECT_EQ(meshes_->facts().chunks, 2U);
+  EXPECT_EQ(meshes_->stats().chunks, 2U);
 }
 
 TEST_F(VulkanMeshUpdate, InstancesFollowTheScene) {
@@ -106,7 +106,7 @@ TEST_F(VulkanMeshUpdate, InstancesFollowTheScene) {
   expect_current("recoloured");
   scene.edit(handle).visible = false;
   const Image hidden = (expect_current("hidden"), drawn(before_boxes(), mesh_options(options)));
-  ASSERT_TRUE(meshes_->update(scene, true));
+  ASSERT_TRUE(meshes_->update(scene, InstanceFilter::All));
   EXPECT_NE(drawn(before_boxes(), mesh_options(options)).rgb, hidden.rgb);
   scene.remove_grid(surfaces[0].grid);
   expect_current("no_grid");
@@ -190,14 +190,14 @@ TEST_F(VulkanMeshUpdate, TenThousandChunksComeAreReplacedAndGo) {
     }
     std::shuffle(updates.begin(), updates.end(), random);
     put(scene, updates);
-    EXPECT_EQ(meshes_->facts().chunks, 10'000U);
-    EXPECT_EQ(meshes_->facts().bytes, bytes) << "seed " << seed;
+    EXPECT_EQ(meshes_->stats().chunks, 10'000U);
+    EXPECT_EQ(meshes_->stats().bytes, bytes) << "seed " << seed;
   }
   for (SurfaceUpdate& update : updates) update.surface = nullptr;
   put(scene, updates);
-  EXPECT_EQ(meshes_->facts().chunks, 0U);
-  EXPECT_EQ(meshes_->facts().bytes, 0U);
-  EXPECT_EQ(meshes_->facts().triangles, 0);
+  EXPECT_EQ(meshes_->stats().chunks, 0U);
+  EXPECT_EQ(meshes_->stats().bytes, 0U);
+  EXPECT_EQ(meshes_->stats().triangles, 0);
 }
 
 TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
@@ -207,7 +207,7 @@ TEST_F(VulkanMeshUpdate, WrongSurfacesAreRefusedAndChangeNothing) {
   const auto expect_refused = [&](std::shared_ptr<ChunkSurface> surface, const std::string& message) {
     surfaces[1].surface = std::move(surface);
     expect_error(meshes_->put(surfaces), ErrorCode::InvalidArgument, message);
-    EXPECT_EQ(meshes_->facts().triangles, 24);
+    EXPECT_EQ(meshes_->stats().triangles, 24);
   };
   const auto blocky = blocky_surface(scene.grids()[surfaces[0].grid].grid, scene.types, {2, 0, 0});
   blocky->opaque_quads = 7;

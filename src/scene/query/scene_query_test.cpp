@@ -283,7 +283,7 @@ TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
   const SceneTracer full(scene);
   const SelectedInstance selected{handle, Detail::Mid, 1, 0.0};
   const SceneTracer halved = full.with_detail({&selected, 1});
-  ASSERT_EQ(halved.placed().at(0).halvings, 1);
+  ASSERT_EQ(halved.placed().at(0).level, 1);
   const Ray ray{{110.3, 200.0, 10.2}, {0.0, -1.0, 0.0}};
   const auto expected = first_hit(full, ray);
   const auto hit = first_hit(halved, ray);

@@ -250,7 +250,7 @@ SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types
   OrientedBox moving = box;
   DVec3 left = displacement;
   std::vector<DVec3> normals;
-  for (int contact = 0; contact < options.most_contacts; ++contact) {
+  for (int contact = 0; contact < options.max_contacts; ++contact) {
     const auto hit = sweep_box(tracer, types, moving, left);
     if (!hit) {
       if (is_finite(left)) moving.centre += left;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kNoLeaf = std::numeric_limits<std::size_t>::max();
 // By how much a tree may become slower to search before it is built from scratch.
-constexpr double kMostWorse = 1.5;
+constexpr double kMaxWorse = 1.5;
 
 // Narrows [low, high] to the t at which `origin + t * direction` is at most `limit`.
 void clip(double origin, double direction, double limit, double& low, double& high) {
@@ -115,7 +115,7 @@ void InstanceTree::change(std::span<const Change> changes) {
     areas_ += area_of(nodes_[i].box);
   }
   // Also when it is not a number.
-  if (!nodes_.empty() && !(search_cost() <= kMostWorse * built_cost_)) build();
+  if (!nodes_.empty() && !(search_cost() <= kMaxWorse * built_cost_)) build();
 }
 
 // Makes the nodes below one that holds `items`, whose boxes stand in `order_` from `begin` on.

@@ -54,7 +54,7 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
   expected.scene.add_instance(expected.instance(unit));
   const SceneTracer expected_tracer(expected.scene);
   const Ray ray{{0, 0, 60},
-                glm::normalize(expected.scene.bounds(false).min + expected.scene.bounds(false).max - DVec3(0, 0, 120))};
+                glm::normalize(expected.scene.bounds().min + expected.scene.bounds().max - DVec3(0, 0, 120))};
   const auto expected_hit = first_hit(expected_tracer, ray);
   ASSERT_TRUE(expected_hit.has_value());
   for (const double length : {1e-300, 1e-160, 1e-5, 0.5, 3.0, -2.0, 1e160, 1e300}) {
@@ -71,7 +71,7 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
     ASSERT_TRUE(hit.has_value());
     EXPECT_EQ(hit->voxel, expected_hit->voxel);
     EXPECT_NEAR(hit->distance, expected_hit->distance, 1e-9);
-    EXPECT_LT(glm::distance(world.scene.bounds(false).max, expected.scene.bounds(false).max), 1e-9);
+    EXPECT_LT(glm::distance(world.scene.bounds().max, expected.scene.bounds().max), 1e-9);
     const auto chosen = selected(world.scene);
     ASSERT_EQ(chosen.size(), 1U);
     EXPECT_NEAR(chosen[0].distance, selected(expected.scene)[0].distance, 1e-9);
@@ -104,12 +104,12 @@ TEST(OddInstances, WhatIsNotFiniteOrHasNoSizeIsLeftOutOfEverything) {
   world.scene.edit(world.scene.add_grid({})).pivot.x = kNan;
   const SceneTracer tracer(world.scene);
   EXPECT_TRUE(tracer.placed().empty());
-  EXPECT_TRUE(world.scene.bounds(true).empty());
+  EXPECT_TRUE(world.scene.bounds(InstanceFilter::All).empty());
   EXPECT_TRUE(selected(world.scene).empty());
   EXPECT_FALSE(first_hit(tracer, {{10, 0.5, 60}, {0, 0, -1}}).has_value());
   EXPECT_TRUE(overlaps(tracer, world.scene.types, DVec3(0.0), 1e9).empty());
   EXPECT_FALSE(sweep_box(tracer, world.scene.types, {}, {100, 0, 0}).has_value());
-  EXPECT_TRUE(is_finite(frame_scene(world.scene, View::Iso, 1.5, true).position));
+  EXPECT_TRUE(is_finite(frame_scene(world.scene, View::Iso, 1.5, InstanceFilter::All).position));
 }
 
 TEST(OddInstances, ACameraWithinAGridOrAtItsContentsCentreSeesItNear) {

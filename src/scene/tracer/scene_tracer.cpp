@@ -7,9 +7,9 @@
 
 namespace quoin {
 
-SceneTracer::SceneTracer(const Scene& scene, bool hidden, Threads threads) : impl_(std::make_unique<Impl>()) {
+SceneTracer::SceneTracer(const Scene& scene, InstanceFilter filter, Threads threads) : impl_(std::make_unique<Impl>()) {
   impl_->scene = &scene;
-  impl_->hidden = hidden;
+  impl_->filter = filter;
   impl_->update(threads);
 }
 
@@ -22,11 +22,11 @@ SceneTracer::SceneTracer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected, Threads threads) const {
   auto detailed = std::make_unique<Impl>();
   detailed->scene = impl_->scene;
-  detailed->hidden = impl_->hidden;
+  detailed->filter = impl_->filter;
   detailed->placed = impl_->placed;
   detailed->has_transparent = impl_->has_transparent;
   std::vector<InstanceTree::Change> halved;
-  const CoarseGrids::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
+  const HalvedGridCache::Lock levels = impl_->coarse.make(*impl_->scene, selected, threads);
   auto next = detailed->placed.begin();
   for (const SelectedInstance& choice : selected) {
     next = std::lower_bound(next, detailed->placed.end(), choice.instance,
@@ -35,7 +35,7 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
     if (next->instance != choice.instance) continue;
     next->detail = choice.detail;
     const GridHandle grid = impl_->scene->instances()[choice.instance].grid;
-    const CoarseLevel* level = levels.find(grid, choice.halvings);
+    const CoarseLevel* level = levels.find(grid, choice.level);
     if (level == nullptr) continue;
     level->put_in(*next);
     halved.push_back({static_cast<std::size_t>(next - detailed->placed.begin()), bounds_in_world(*next, level->tight)});

@@ -6,9 +6,9 @@
 
 #include <quoin/scene/scene_tracer.h>
 
-#include "scene/tracer/coarse_grids.h"
+#include "scene/tracer/halved_grid_cache.h"
 #include "scene/tracer/instance_tree.h"
-#include "scene/tracer/kept_trees.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 
@@ -21,7 +21,7 @@ struct TracedGrid {
   bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
   bool is_placed = false;      ///< by an instance that is traced
   std::uint64_t shape = 0;     ///< another number whenever pivot or bounds have changed, and of every other grid
-  KeptTrees trees;             ///< up to date while it is placed
+  TreeCache trees;             ///< up to date while it is placed
 };
 
 /// The box around a placed grid whose voxels lie within `tight`, with room for rounding.
@@ -45,7 +45,7 @@ struct SceneTracer::Impl {
   };
 
   const Scene* scene = nullptr;
-  bool hidden = false;
+  InstanceFilter filter = InstanceFilter::Visible;
   ChangeCursor followed_types;
   ChangeCursor followed_scene;
   std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null where none was seen
@@ -53,7 +53,7 @@ struct SceneTracer::Impl {
   std::vector<Source> sources;  // of `placed`
   InstanceTree instances;       // of `placed`, in the world
   bool has_transparent = false;
-  CoarseGrids coarse;  // those of `with_detail`
+  HalvedGridCache coarse;  // those of `with_detail`
 
   bool update(Threads threads);
 
@@ -61,7 +61,7 @@ struct SceneTracer::Impl {
   bool has_other_trees = false;  // than those that `placed` names
   bool is_unfinished = false;    // an update was broken off
 
-  void look_at_types(const TypeChanges& changes);
+  bool update_types(const TypeChanges& changes);
   [[nodiscard]] bool look_at_grids(const SceneChanges& changes);
   [[nodiscard]] bool look_at(GridHandle handle);
   [[nodiscard]] bool move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved);

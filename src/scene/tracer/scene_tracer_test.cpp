@@ -1,4 +1,3 @@
-#include <quoin/scene/scene_tracer.h>
 
 #include <cmath>
 #include <limits>
@@ -8,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>
+
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {
@@ -190,7 +191,7 @@ TEST(SceneTracer, LeavesOutHiddenEmptyAndImpossibleInstances) {
   instance.position.x = std::numeric_limits<double>::quiet_NaN();
   scene.add_instance(instance);
   EXPECT_EQ(SceneTracer(scene).placed().size(), 1U);
-  EXPECT_EQ(SceneTracer(scene, true).placed().size(), 2U);
+  EXPECT_EQ(SceneTracer(scene, InstanceFilter::All).placed().size(), 2U);
 }
 
 TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {

@@ -10,10 +10,6 @@
 namespace quoin {
 namespace {
 
-bool is_seen_through_otherwise(const TypeChange& change) {
-  return change.visibility;
-}
-
 bool has_type_of(const Grid& grid, const std::vector<VoxelType>& ascending) {
   const std::vector<VoxelType> types = grid.types();
   return std::any_of(types.begin(), types.end(),
@@ -43,9 +39,8 @@ bool SceneTracer::Impl::update(Threads threads) {
   SceneChanges changes = scene->changes_since(scene_now);
   followed_types = followed_scene = {};  // stay so when memory runs out
   const bool was_unfinished = std::exchange(is_unfinished, true);
-  look_at_types(types);
   // Trees that were forgotten are made again wherever they are.
-  changes.all |= types.all || std::any_of(types.items.begin(), types.items.end(), is_seen_through_otherwise);
+  changes.all |= update_types(types);
   const bool are_shapes_same = look_at_grids(changes);
   const bool moves_all = changes.all || !are_shapes_same;
   const bool are_placed = !was_unfinished && (moves_all ? move_all_instances() : move_instances(changes));
@@ -60,13 +55,16 @@ bool SceneTracer::Impl::update(Threads threads) {
   return std::exchange(has_other_trees, false);
 }
 
-// Forgets what was made of types that were not seen through and now are, or the other way around.
-void SceneTracer::Impl::look_at_types(const TypeChanges& changes) {
+// Forgets what was made of types that were not seen through and now are, or the other way around. False when there was
+// nothing of the kind.
+bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
+  if (!has_other_visibility(changes)) return false;
   std::vector<VoxelType> changed;
   for (const TypeChange& change : changes.items) {
-    if (is_seen_through_otherwise(change)) changed.push_back(change.type);
+    if (change.visibility) changed.push_back(change.type);
   }
-  if (!changes.all && changed.empty()) return;
+  std::vector<GridHandle> kept;
+  bool has_forgotten = false;
   for (const auto& each : grids) {
     if (each == nullptr) continue;
     // Edited meanwhile, it may have lost the last voxel of such a type.
@@ -74,9 +72,13 @@ void SceneTracer::Impl::look_at_types(const TypeChanges& changes) {
     if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
         has_type_of(grid->grid, changed)) {
       each->trees.forget();
+      has_forgotten = true;
+    } else {
+      kept.push_back(each->handle);
     }
   }
-  coarse.forget([](GridHandle) { return true; });
+  coarse.forget([&](GridHandle handle) { return !std::binary_search(kept.begin(), kept.end(), handle); });
+  return has_forgotten;
 }
 
 // False when a grid has other bounds or another pivot than before, came or went.
@@ -129,7 +131,7 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
 
 // The grid of an instance that is to be traced where it has a place; null for any other.
 TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
-  if ((!instance.visible && !hidden) || instance.grid.index >= grids.size()) return nullptr;
+  if (!passes(filter, instance) || instance.grid.index >= grids.size()) return nullptr;
   TracedGrid* grid = grids[instance.grid.index].get();
   if (grid == nullptr || grid->handle != instance.grid || !grid->can_be_placed) return nullptr;
   return grid;

@@ -36,7 +36,7 @@ void expect_up_to_date(const SceneTracer& tracer, const Scene& scene) {
 // A tenth of the instances, another one in each round, by up to `step`; where they leave the square they come back.
 void tenth_moved(benchmark::State& state, double step) {
   Scene scene = mixed_scene(kInstances);
-  SceneTracer tracer(scene, false, {1});
+  SceneTracer tracer(scene, InstanceFilter::Visible, {1});
   const std::vector<InstanceHandle> handles = scene.instances().handles();
   std::mt19937 random(12);
   std::uniform_real_distribution<double> by(-step, step);
@@ -64,7 +64,7 @@ BENCHMARK(far)->Name("scene/update10000/tenth_moved_far")->Unit(benchmark::kMicr
 
 void one_voxel(benchmark::State& state) {
   Scene scene = mixed_scene(kInstances);
-  SceneTracer tracer(scene, false, {1});
+  SceneTracer tracer(scene, InstanceFilter::Visible, {1});
   // The largest: 512 chunks.
   Grid& grid = scene.edit(scene.grids().handles().back()).grid;
   bool is_solid = true;
@@ -81,14 +81,14 @@ BENCHMARK(one_voxel)->Name("scene/update10000/one_voxel")->Unit(benchmark::kMicr
 
 void nothing(benchmark::State& state) {
   const Scene scene = mixed_scene(kInstances);
-  SceneTracer tracer(scene, false, {1});
+  SceneTracer tracer(scene, InstanceFilter::Visible, {1});
   for (auto _ : state) fail_unless(!tracer.update({1}), "something is said to have changed");
 }
 BENCHMARK(nothing)->Name("scene/update10000/nothing")->Unit(benchmark::kMicrosecond);
 
 void one_added(benchmark::State& state) {
   Scene scene = mixed_scene(kInstances);
-  SceneTracer tracer(scene, false, {1});
+  SceneTracer tracer(scene, InstanceFilter::Visible, {1});
   for (auto _ : state) {
     state.PauseTiming();
     const InstanceHandle first = scene.instances().handles().front();
@@ -105,7 +105,7 @@ BENCHMARK(one_added)->Name("scene/update10000/one_replaced")->Unit(benchmark::kM
 void anew(benchmark::State& state) {
   const Scene scene = mixed_scene(kInstances);
   for (auto _ : state) {
-    const SceneTracer tracer(scene, false, {1});
+    const SceneTracer tracer(scene, InstanceFilter::Visible, {1});
     benchmark::DoNotOptimize(tracer.placed().data());
   }
 }

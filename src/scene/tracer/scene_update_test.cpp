@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include <quoin/scene/scene_query.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "grid/change_follower.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {
@@ -172,13 +172,13 @@ void expect_same_placed(const SceneTracer& updated, const SceneTracer& fresh, bo
     EXPECT_EQ(a.position, b.position);
     EXPECT_EQ(a.voxel_size, b.voxel_size);
     EXPECT_EQ(a.detail, b.detail);
-    EXPECT_EQ(a.halvings, b.halvings);
+    EXPECT_EQ(a.level, b.level);
     EXPECT_EQ(a.opaque->bounds(), b.opaque->bounds());
     ASSERT_EQ(a.transparent == nullptr, b.transparent == nullptr);
     if (a.transparent != nullptr) {
       EXPECT_EQ(a.transparent->bounds(), b.transparent->bounds());
     }
-    counts.halved += b.halvings > 0;
+    counts.halved += b.level > 0;
   }
 }
 
@@ -227,7 +227,7 @@ std::vector<SelectedInstance> random_details(const SceneTracer& tracer, Changing
   std::vector<SelectedInstance> selected;
   for (const PlacedGrid& placed : tracer.placed()) {
     if (world.below(4) == 0) continue;
-    selected.push_back({placed.instance, Detail::Mid, world.below(kCoarsestHalving + 1)});
+    selected.push_back({placed.instance, Detail::Mid, world.below(kMaxGridLevel + 1)});
   }
   return selected;
 }
@@ -237,13 +237,13 @@ TEST(SceneUpdate, IsAsATracerMadeAnewWhateverHappenedToTheScene) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
     ChangingScene world(seed);
-    const bool hidden = seed % 3 == 0;
-    SceneTracer tracer(world.scene, hidden, {1});
+    const InstanceFilter filter = seed % 3 == 0 ? InstanceFilter::All : InstanceFilter::Visible;
+    SceneTracer tracer(world.scene, filter, {1});
     for (int round = 0; round < 12; ++round) {
       SCOPED_TRACE(round);
       for (int i = world.below(8); i >= 0; --i) world.change();
       tracer.update({1});
-      const SceneTracer fresh(world.scene, hidden, {1});
+      const SceneTracer fresh(world.scene, filter, {1});
       expect_same_placed(tracer, fresh, false, counts);
       expect_same_hits(tracer, fresh, world, counts);
       if (round % 2 == 0) {

@@ -9,6 +9,7 @@
 
 #include "scene/tracer/packet_tree.h"
 #include "scene/tracer/scene_tracer_impl.h"
+#include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {

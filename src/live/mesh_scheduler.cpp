@@ -1,4 +1,4 @@
-#include "live/live_book.h"
+#include "live/mesh_scheduler.h"
 
 #include <algorithm>
 #include <iterator>
@@ -22,27 +22,27 @@ std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {
   return style == SurfaceStyle::Blocky ? kBlocky : std::clamp<std::size_t>(4 * std::size_t{workers}, 8, kBlocky);
 }
 
-bool is_drawn(const Instance& instance, const Scene& scene, bool hidden_too) {
-  return (instance.visible || hidden_too) && has_place(instance) && scene.grids().find(instance.grid) != nullptr;
+bool is_placed(const Scene& scene, const Instance& instance, InstanceFilter filter) {
+  return is_drawn(scene, instance, filter) && has_place(instance);
 }
 
 }  // namespace
 
 // A chunk that waits for a job.
-struct LiveBook::Candidate {
+struct MeshScheduler::Candidate {
   double distance = 0.0;
   LiveGrid* live = nullptr;
   GridHandle handle;
   IVec3 chunk{0};
 };
 
-LiveBook::LiveBook(const LiveMeshOptions& options, LiveQueue::Work work)
+MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work)
     : options_(options),
       workers_(worker_count(options.threads)),
-      most_ahead_(jobs_ahead(options.style, workers_)),
+      max_ahead_(jobs_ahead(options.style, workers_)),
       queue_(workers_, std::move(work), options.on_ready) {}
 
-void LiveBook::update(const Scene& scene, DVec3 eye) {
+void MeshScheduler::update(const Scene& scene, DVec3 eye) {
   try {
     update_or_throw(scene, eye);
   } catch (...) {
@@ -52,12 +52,12 @@ void LiveBook::update(const Scene& scene, DVec3 eye) {
 }
 
 // Memory ran out in the middle: whatever was lost is found by beginning anew.
-void LiveBook::forget() {
+void MeshScheduler::forget() {
   for (auto& [handle, grid] : grids_) grid.forget();
   followed_scene_ = {};
 }
 
-void LiveBook::update_or_throw(const Scene& scene, DVec3 eye) {
+void MeshScheduler::update_or_throw(const Scene& scene, DVec3 eye) {
   const LiveClock::time_point now = LiveClock::now();
   collect();
   const std::vector<bool> changed_types = follow_types(scene.types);
@@ -76,7 +76,7 @@ void LiveBook::update_or_throw(const Scene& scene, DVec3 eye) {
 }
 
 // The drawn grids that may have changed.
-std::vector<GridHandle> LiveBook::follow_scene(const Scene& scene) {
+std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
   ChangeCursor now = followed_scene_;
   const SceneChanges changes = scene.changes_since(now);
   followed_scene_ = now;
@@ -100,7 +100,7 @@ std::vector<GridHandle> LiveBook::follow_scene(const Scene& scene) {
 }
 
 // Which types look otherwise than before, by type; empty when none does.
-std::vector<bool> LiveBook::follow_types(const VoxelRegistry& types) {
+std::vector<bool> MeshScheduler::follow_types(const VoxelRegistry& types) {
   ChangeCursor now = followed_types_;
   const TypeChanges changes = types.changes_since(now);
   const bool is_blocky = options_.style == SurfaceStyle::Blocky;
@@ -123,13 +123,13 @@ std::vector<bool> LiveBook::follow_types(const VoxelRegistry& types) {
 }
 
 // Sorted, each once.
-std::vector<GridHandle> LiveBook::drawn_grids(const Scene& scene) const {
+std::vector<GridHandle> MeshScheduler::drawn_grids(const Scene& scene) const {
   std::vector<GridHandle> drawn;
   std::vector<bool> is_known;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     const std::size_t index = instance.grid.index;
     if (index < is_known.size() && is_known[index]) return;
-    if (!is_drawn(instance, scene, options_.hidden)) return;
+    if (!is_placed(scene, instance, options_.instances)) return;
     if (is_known.size() <= index) is_known.resize(index + 1);
     is_known[index] = true;
     drawn.push_back(instance.grid);
@@ -138,41 +138,41 @@ std::vector<GridHandle> LiveBook::drawn_grids(const Scene& scene) const {
   return drawn;
 }
 
-void LiveBook::collect() {
+void MeshScheduler::collect() {
   for (const std::unique_ptr<LiveJob>& job : queue_.collect()) {
     if (LiveGrid* live = find(job->grid)) live->collect(*job);
   }
 }
 
-void LiveBook::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
+void MeshScheduler::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
   for (const std::unique_ptr<LiveJob>& job : queue_.withdraw(is_unwanted)) {
     if (LiveGrid* live = find(job->grid)) live->withdrawn(*job);
   }
 }
 
-LiveGrid* LiveBook::find(GridHandle grid) {
+LiveGrid* MeshScheduler::find(GridHandle grid) {
   const auto found = grids_.find(grid);
   return found == grids_.end() ? nullptr : &found->second;
 }
 
-std::map<GridHandle, ChunkDistances> LiveBook::distances_of_grids(const Scene& scene, DVec3 eye) const {
+std::map<GridHandle, ChunkDistances> MeshScheduler::distances_of_grids(const Scene& scene, DVec3 eye) const {
   std::map<GridHandle, ChunkDistances> distances;
   for (const auto& [handle, live] : grids_) distances.try_emplace(handle, live.box(), eye);
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     const auto found = distances.find(instance.grid);
-    if (found == distances.end() || !is_drawn(instance, scene, options_.hidden)) return;
+    if (found == distances.end() || !is_placed(scene, instance, options_.instances)) return;
     found->second.add(instance, scene.grids()[instance.grid]);
   });
   for (auto& [handle, places] : distances) places.sort();
   return distances;
 }
 
-bool LiveBook::has_waiting() const {
+bool MeshScheduler::has_waiting() const {
   return std::any_of(grids_.begin(), grids_.end(), [](const auto& each) { return !each.second.waiting().empty(); });
 }
 
 // The chunks that wait for jobs, as many as may get one, the nearest first.
-std::vector<LiveBook::Candidate> LiveBook::candidates(const std::map<GridHandle, ChunkDistances>& distances) {
+std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<GridHandle, ChunkDistances>& distances) {
   std::vector<Candidate> all;
   for (auto& [handle, live] : grids_) {
     const ChunkDistances& places = distances.at(handle);
@@ -182,14 +182,14 @@ std::vector<LiveBook::Candidate> LiveBook::candidates(const std::map<GridHandle,
     if (a.distance != b.distance) return a.distance < b.distance;
     return a.handle == b.handle ? by_zyx(a.chunk, b.chunk) : a.handle < b.handle;
   };
-  const std::size_t most = std::min(all.size(), most_ahead_);
+  const std::size_t most = std::min(all.size(), max_ahead_);
   std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(most), all.end(), comes_before);
   all.resize(most);
   return all;
 }
 
 // Gives jobs to the workers; those that wait and are farther than what comes now have to wait longer.
-void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
+void MeshScheduler::hand_over(const Scene& scene, DVec3 eye) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene, eye);
@@ -197,7 +197,7 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
   std::vector<double> queued = queue_.measure([&](const LiveJob& job) { return distances.at(job.grid).to(job.chunk); });
   double farthest = kNone;  // of those that came and have to go
   for (const Candidate& each : candidates(distances)) {
-    if (queued.size() >= most_ahead_) {
+    if (queued.size() >= max_ahead_) {
       if (queued.back() <= each.distance) break;
       farthest = queued.back();
       queued.pop_back();
@@ -216,7 +216,7 @@ void LiveBook::hand_over(const Scene& scene, DVec3 eye) {
   if (farthest != kNone) withdraw([&](const LiveJob& job) { return job.distance >= farthest; });
 }
 
-std::vector<SurfaceUpdate> LiveBook::take() {
+std::vector<SurfaceUpdate> MeshScheduler::take() {
   std::vector<SurfaceUpdate> taken;
   try {
     collect();
@@ -232,13 +232,13 @@ std::vector<SurfaceUpdate> LiveBook::take() {
   return taken;
 }
 
-void LiveBook::finish(const Scene& scene, DVec3 eye) {
+void MeshScheduler::finish(const Scene& scene, DVec3 eye) {
   for (;;) {
-    const LiveMeshes::Facts before = facts();
+    const LiveMeshes::Stats before = stats();
     update(scene, eye);
     if (totals_.unfinished == 0) return queue_.wait(0);  // for what was removed while it was meshed
-    queue_.wait(has_waiting() ? most_ahead_ / 2 : 0);
-    const LiveMeshes::Facts after = facts();
+    queue_.wait(has_waiting() ? max_ahead_ / 2 : 0);
+    const LiveMeshes::Stats after = stats();
     // Nothing but failures: it will not do to try for ever.
     if (after.out_of_memory != before.out_of_memory && after.chunks_meshed == before.chunks_meshed) {
       throw std::bad_alloc();
@@ -246,8 +246,8 @@ void LiveBook::finish(const Scene& scene, DVec3 eye) {
   }
 }
 
-LiveMeshes::Facts LiveBook::facts() const {
-  return queue_.facts();
+LiveMeshes::Stats MeshScheduler::stats() const {
+  return queue_.stats();
 }
 
 }  // namespace quoin

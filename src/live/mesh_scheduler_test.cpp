@@ -1,4 +1,4 @@
-#include "live/live_book.h"
+#include "live/mesh_scheduler.h"
 
 #include <condition_variable>
 #include <mutex>
@@ -16,7 +16,7 @@ class GatedWork {
  public:
   explicit GatedWork(const LiveMeshOptions& options) : options_(options) {}
 
-  LiveQueue::Work work() {
+  MeshJobQueue::Work work() {
     return [this](LiveJob& job, LiveWorkspace& workspace) {
       {
         std::unique_lock lock(mutex_);
@@ -76,7 +76,7 @@ std::size_t faces_of(const SurfaceUpdate& update) {
   return update.surface == nullptr ? 0 : update.surface->quads.size();
 }
 
-TEST(LiveBook, TheNearestChunksComeFirst) {
+TEST(MeshScheduler, TheNearestChunksComeFirst) {
   OneGrid one;
   fill_row(one.grid(), 200);
   Instance& instance = one.scene.edit(one.placed);
@@ -84,7 +84,7 @@ TEST(LiveBook, TheNearestChunksComeFirst) {
   instance.mirrored = true;
   GatedWork gated(blocky(1));
   gated.open();
-  LiveBook book(blocky(1), gated.work());
+  MeshScheduler book(blocky(1), gated.work());
   // Mirrored, chunk i lies from -32 i to -32 i - 32.
   book.finish(one.scene, {-32 * 120.0, 0.0, 15.0});
   const std::vector<GatedWork::Started> started = gated.started();
@@ -94,11 +94,11 @@ TEST(LiveBook, TheNearestChunksComeFirst) {
   EXPECT_EQ(started.back().chunk.x, 0);
 }
 
-TEST(LiveBook, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
+TEST(MeshScheduler, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
   OneGrid one;
   fill_row(one.grid(), 200);
   GatedWork gated(blocky(1));
-  LiveBook book(blocky(1), gated.work());
+  MeshScheduler book(blocky(1), gated.work());
   book.update(one.scene, {0.0, 30.0, 30.0});
   gated.wait_for_started(1);
   book.update(one.scene, {64 * 150.0 + 30.0, 30.0, 30.0});
@@ -109,20 +109,20 @@ TEST(LiveBook, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
   gated.open();
   book.finish(one.scene, {});
   EXPECT_EQ(book.take().size(), 200U);
-  EXPECT_EQ(book.facts().chunks_meshed, 200);
+  EXPECT_EQ(book.stats().chunks_meshed, 200);
 }
 
-TEST(LiveBook, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
+TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   OneGrid one;
   for (int i = 0; i < 100; ++i) {
     for (int x = 0; x < 64; ++x) one.grid().set({64 * i + x, x, x / 2}, static_cast<VoxelType>(1 + x % 3));
   }
   GatedWork gated(blocky(1));
-  LiveBook book(blocky(1), gated.work());
-  const auto storage = [&](int chunk) { return one.grid().find_chunk({chunk, 0, 0})->mixed(); };
+  MeshScheduler book(blocky(1), gated.work());
+  const auto storage = [&](int chunk) { return one.grid().find_chunk({chunk, 0, 0})->storage(); };
   book.update(one.scene, {});
   gated.wait_for_started(1);
-  const Chunk::Mixed* before = storage(90);
+  const ChunkStorage* before = storage(90);
   one.grid().set({64 * 90 + 5, 40, 40}, 1);
   EXPECT_NE(storage(90), before) << "workers are to see what was there";
   gated.open();
@@ -133,11 +133,11 @@ TEST(LiveBook, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   EXPECT_EQ(storage(91), before) << "nobody shares it any more";
 }
 
-TEST(LiveBook, OfSeveralEditsBeforeItsTurnTheLastCounts) {
+TEST(MeshScheduler, OfSeveralEditsBeforeItsTurnTheLastCounts) {
   OneGrid one;
   fill_row(one.grid(), 2);
   GatedWork gated(blocky(1));
-  LiveBook book(blocky(1), gated.work());
+  MeshScheduler book(blocky(1), gated.work());
   book.update(one.scene, {});
   gated.wait_for_started(1);  // chunk 0; chunk 1 waits
   for (int i = 1; i <= 5; ++i) {
@@ -146,15 +146,15 @@ TEST(LiveBook, OfSeveralEditsBeforeItsTurnTheLastCounts) {
   }
   gated.open();
   book.finish(one.scene, {});
-  EXPECT_EQ(book.facts().chunks_meshed, 2);
+  EXPECT_EQ(book.stats().chunks_meshed, 2);
   for (const SurfaceUpdate& update : book.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
 }
 
-TEST(LiveBook, AnEditDuringMeshingGivesBothInOrder) {
+TEST(MeshScheduler, AnEditDuringMeshingGivesBothInOrder) {
   OneGrid one;
   fill_row(one.grid(), 1);
   GatedWork gated(blocky(1));
-  LiveBook book(blocky(1), gated.work());
+  MeshScheduler book(blocky(1), gated.work());
   book.update(one.scene, {});
   gated.wait_for_started(1);
   one.grid().set({3, 3, 3}, 1);
@@ -173,13 +173,13 @@ TEST(LiveBook, AnEditDuringMeshingGivesBothInOrder) {
   EXPECT_EQ(book.pending(), 0U);
 }
 
-TEST(LiveBook, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
+TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
   for (const bool replaced : {false, true}) {
     SCOPED_TRACE(replaced);
     OneGrid one;
     fill_row(one.grid(), 1);
     GatedWork gated(blocky(1));
-    LiveBook book(blocky(1), gated.work());
+    MeshScheduler book(blocky(1), gated.work());
     book.update(one.scene, {});
     gated.wait_for_started(1);
     one.grid() = Grid();
@@ -197,10 +197,10 @@ TEST(LiveBook, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
 }
 
 // Each edit adds a voxel that touches no other: the faces count the edits.
-TEST(LiveBook, NothingOlderIsGivenAfterSomethingNewer) {
+TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   LiveMeshOptions options = blocky(4);
   OneGrid one;
-  LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
     // Jobs of one chunk overtake each other.
     if (job.serial % 3 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     make_live_surface(options, job, workspace);
@@ -227,7 +227,7 @@ TEST(LiveBook, NothingOlderIsGivenAfterSomethingNewer) {
 }
 
 // Of chunks that look as before nothing is given, but those who wait for `pending` to be 0 learn of them.
-TEST(LiveBook, WhoActsOnlyWhenCalledComesToTheEnd) {
+TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
   OneGrid one;
   constexpr int kEdited = 40;
   for (int row = 0; row < 2; ++row) {
@@ -246,7 +246,7 @@ TEST(LiveBook, WhoActsOnlyWhenCalledComesToTheEnd) {
     called.notify_all();
   };
   std::atomic<int> as_before{0};
-  LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
     make_live_surface(options, job, workspace);
     as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
   });
@@ -267,14 +267,14 @@ TEST(LiveBook, WhoActsOnlyWhenCalledComesToTheEnd) {
   EXPECT_GT(as_before, 0) << "the test is of such chunks";
 }
 
-TEST(LiveBook, MemoryThatRunsOutIsTriedAgain) {
+TEST(MeshScheduler, MemoryThatRunsOutIsTriedAgain) {
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     LiveMeshOptions options = blocky(2);
     options.style = style;
     OneGrid one;
     one.grid().fill_box({25, 25, 25}, {35, 35, 35}, 1);
     std::atomic<int> calls{0};
-    LiveBook book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+    MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
       if (++calls % 2 == 1) throw std::bad_alloc();
       make_live_surface(options, job, workspace);
     });
@@ -286,27 +286,27 @@ TEST(LiveBook, MemoryThatRunsOutIsTriedAgain) {
       ++updates;
     } while (book.pending() != 0 && updates < 100'000'000);
     expect_surfaces(shown, one.scene, options);
-    EXPECT_EQ(book.facts().out_of_memory, calls / 2);
-    EXPECT_GT(book.facts().out_of_memory, 0);
+    EXPECT_EQ(book.stats().out_of_memory, calls / 2);
+    EXPECT_GT(book.stats().out_of_memory, 0);
   }
 }
 
-TEST(LiveBook, FinishSaysSoWhereMemoryNeverSuffices) {
+TEST(MeshScheduler, FinishSaysSoWhereMemoryNeverSuffices) {
   OneGrid one;
   fill_row(one.grid(), 3);
-  LiveBook book(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
+  MeshScheduler book(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
   EXPECT_THROW(book.finish(one.scene, {}), std::bad_alloc);
   EXPECT_EQ(book.pending(), 3U);
   EXPECT_TRUE(book.take().empty());
 }
 
-TEST(LiveBook, EndsWithoutMeshingWhatWaits) {
+TEST(MeshScheduler, EndsWithoutMeshingWhatWaits) {
   OneGrid one;
   fill_row(one.grid(), 60);
   std::atomic<int> started{0};
   std::atomic<int> ended{0};
   {
-    LiveBook book(blocky(2), [&](LiveJob&, LiveWorkspace&) {
+    MeshScheduler book(blocky(2), [&](LiveJob&, LiveWorkspace&) {
       ++started;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       ++ended;

@@ -11,21 +11,21 @@
 
 #include "live/live_distance.h"
 #include "live/live_grid.h"
-#include "live/live_queue.h"
+#include "live/mesh_job_queue.h"
 
 namespace quoin {
 
 /// LiveMeshes, with the workers' work to be chosen.
-class LiveBook {
+class MeshScheduler {
  public:
   /// Calls of `work` come from several threads at once.
-  LiveBook(const LiveMeshOptions& options, LiveQueue::Work work);
+  MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
   void update(const Scene& scene, DVec3 eye);
   [[nodiscard]] std::vector<SurfaceUpdate> take();
   [[nodiscard]] std::size_t pending() const { return totals_.pending; }
   void finish(const Scene& scene, DVec3 eye);
-  [[nodiscard]] LiveMeshes::Facts facts() const;
+  [[nodiscard]] LiveMeshes::Stats stats() const;
 
  private:
   struct Candidate;
@@ -45,14 +45,14 @@ class LiveBook {
 
   const LiveMeshOptions options_;
   const unsigned workers_;
-  const std::size_t most_ahead_;  // jobs that wait for workers
+  const std::size_t max_ahead_;  // jobs that wait for workers
   LiveTotals totals_;
   LiveTypes types_;
   ChangeCursor followed_types_;
   ChangeCursor followed_scene_;
   std::vector<GridHandle> drawn_;  // sorted
   std::map<GridHandle, LiveGrid> grids_;
-  LiveQueue queue_;  // last: its threads end first
+  MeshJobQueue queue_;  // last: its threads end first
 };
 
 }  // namespace quoin

@@ -55,17 +55,17 @@ struct LiveWorkspace {
 /// Workers, the jobs that wait for them, nearest first, and those that are done.
 ///
 /// Threads: all calls come from one thread.
-class LiveQueue {
+class MeshJobQueue {
  public:
   /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory.
   using Work = std::function<void(LiveJob&, LiveWorkspace&)>;
 
   /// `on_ready`, if any, is called by a worker after each job that did not run out of memory.
-  LiveQueue(unsigned workers, Work work, std::function<void()> on_ready);
+  MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready);
   /// Waits for jobs that were started; gives up the rest.
-  ~LiveQueue();
-  LiveQueue(const LiveQueue&) = delete;
-  LiveQueue& operator=(const LiveQueue&) = delete;
+  ~MeshJobQueue();
+  MeshJobQueue(const MeshJobQueue&) = delete;
+  MeshJobQueue& operator=(const MeshJobQueue&) = delete;
 
   void push(std::unique_ptr<LiveJob> job);
   /// Takes back what no worker has started of the jobs for which `is_unwanted`.
@@ -76,7 +76,7 @@ class LiveQueue {
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once none is left at all.
   void wait(std::size_t waiting);
-  [[nodiscard]] LiveMeshes::Facts facts() const;
+  [[nodiscard]] LiveMeshes::Stats stats() const;
 
  private:
   void run();
@@ -92,7 +92,7 @@ class LiveQueue {
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<LiveJob>> queue_;
   std::vector<std::unique_ptr<LiveJob>> done_;  // with room for all that wait and run
-  LiveMeshes::Facts facts_;
+  LiveMeshes::Stats stats_;
   std::vector<std::jthread> workers_;  // last: they end first
 };
 

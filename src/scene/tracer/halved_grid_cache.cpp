@@ -1,4 +1,4 @@
-#include "scene/tracer/coarse_grids.h"
+#include "scene/tracer/halved_grid_cache.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,16 +20,16 @@ bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
 }  // namespace
 
 void CoarseLevel::put_in(PlacedGrid& placed) const {
-  const double cell = std::ldexp(1.0, halvings);
+  const double cell = std::ldexp(1.0, level);
   placed.voxels = voxels;
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
   placed.pivot = placed.grid->pivot / cell;
   placed.voxel_size *= cell;
-  placed.halvings = halvings;
+  placed.level = level;
 }
 
-void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
+void HalvedGridCache::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
   ChangeCursor now = followed;
   const GridChanges changes = grid.changes_since(now);
   followed = {};  // stays so when memory runs out
@@ -46,7 +46,7 @@ void CoarseGrids::Entry::make(const Grid& grid, const VoxelRegistry& types, int 
 }
 
 // Brings what there is up to date with an edit.
-void CoarseGrids::Entry::renew(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+void HalvedGridCache::Entry::renew(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   const int most = pyramid.levels();
   pyramid.update(grid, types, most, threads);
   is_coarsest = false;
@@ -54,7 +54,7 @@ void CoarseGrids::Entry::renew(const Grid& grid, const VoxelRegistry& types, Thr
 }
 
 // Puts a level of the pyramid among those that are like the grid; false, and none from there on, when it is not.
-bool CoarseGrids::Entry::take_level(const Grid& grid, const VoxelRegistry& types, int halvings) {
+bool HalvedGridCache::Entry::take_level(const Grid& grid, const VoxelRegistry& types, int halvings) {
   const auto index = static_cast<std::size_t>(halvings - 1);
   if (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid)) {
     levels.resize(std::min(levels.size(), index));
@@ -63,25 +63,26 @@ bool CoarseGrids::Entry::take_level(const Grid& grid, const VoxelRegistry& types
   if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
   CoarseLevel& level = *levels[index];
   level.voxels = &pyramid.level(halvings);
-  level.halvings = halvings;
+  level.level = halvings;
   if (level.trees.update(*level.voxels, types)) level.tight = level.voxels->bounds();
   return true;
 }
 
-const CoarseLevel* CoarseGrids::Lock::find(GridHandle grid, int halvings) const {
+const CoarseLevel* HalvedGridCache::Lock::find(GridHandle grid, int halvings) const {
   const auto found = grids_->entries_.find(grid);
   if (halvings <= 0 || found == grids_->entries_.end() || found->second.levels.empty()) return nullptr;
   const auto& levels = found->second.levels;
   return levels[std::min(static_cast<std::size_t>(halvings), levels.size()) - 1].get();
 }
 
-CoarseGrids::Lock CoarseGrids::make(const Scene& scene, std::span<const SelectedInstance> selected, Threads threads) {
+HalvedGridCache::Lock HalvedGridCache::make(const Scene& scene, std::span<const SelectedInstance> selected,
+                                            Threads threads) {
   Lock lock(*this);
   std::map<GridHandle, int> wanted;
   for (const SelectedInstance& choice : selected) {
-    if (choice.halvings <= 0) continue;
+    if (choice.level <= 0) continue;
     int& most = wanted[scene.instances()[choice.instance].grid];
-    most = std::max(most, choice.halvings);
+    most = std::max(most, choice.level);
   }
   std::vector<std::pair<GridHandle, int>> tasks(wanted.begin(), wanted.end());
   for (const auto& [grid, halvings] : tasks) entries_[grid];

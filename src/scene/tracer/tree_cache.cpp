@@ -1,4 +1,4 @@
-#include "scene/tracer/kept_trees.h"
+#include "scene/tracer/tree_cache.h"
 
 #include <algorithm>
 #include <utility>
@@ -14,7 +14,7 @@ bool has_transparent_types(const Chunk* chunk, const VoxelRegistry& types) {
 
 }  // namespace
 
-bool KeptTrees::update(const Grid& grid, const VoxelRegistry& types) {
+bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   ChangeCursor now = followed_;
   const GridChanges changes = grid.changes_since(now);
   if (changes.empty()) return false;
@@ -27,7 +27,7 @@ bool KeptTrees::update(const Grid& grid, const VoxelRegistry& types) {
 }
 
 // Where there was no tree, there was no transparent voxel but in what changed.
-void KeptTrees::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
+void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (!transparent_) {
     const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };
     const std::vector<IVec3> present = changes.all ? grid.chunks() : std::vector<IVec3>();

@@ -11,7 +11,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
-#include "scene/tracer/kept_trees.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 
@@ -21,8 +21,8 @@ struct PlacedGrid;
 struct CoarseLevel {
   const Grid* voxels = nullptr;
   IBox tight;  ///< around these
-  int halvings = 0;
-  KeptTrees trees;
+  int level = 0;
+  TreeCache trees;
 
   /// Has a placed grid traced through this instead of its own voxels. Requires: it is placed as the scene says.
   void put_in(PlacedGrid& placed) const;
@@ -33,7 +33,7 @@ struct CoarseLevel {
 ///
 /// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
 /// bridge's deck, becomes twice as thick, and shows. Threads: any number may call.
-class CoarseGrids {
+class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;
     GridPyramid pyramid;
@@ -53,9 +53,9 @@ class CoarseGrids {
     [[nodiscard]] const CoarseLevel* find(GridHandle grid, int halvings) const;
 
    private:
-    friend class CoarseGrids;
-    explicit Lock(const CoarseGrids& grids) : grids_(&grids), lock_(grids.mutex_) {}
-    const CoarseGrids* grids_;
+    friend class HalvedGridCache;
+    explicit Lock(const HalvedGridCache& grids) : grids_(&grids), lock_(grids.mutex_) {}
+    const HalvedGridCache* grids_;
     std::unique_lock<std::mutex> lock_;
   };
 
@@ -69,7 +69,7 @@ class CoarseGrids {
     std::erase_if(entries_, [&](const auto& entry) { return is_stale(entry.first); });
   }
 
-  CoarseGrids() = default;
+  HalvedGridCache() = default;
 
  private:
   mutable std::mutex mutex_;

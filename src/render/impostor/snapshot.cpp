@@ -8,7 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "light/corner_light.h"
-#include "render/snapshot_rays.h"
+#include "render/impostor/snapshot.h"
 
 namespace quoin {
 
@@ -87,7 +87,7 @@ Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const Occup
         const Ray ray = rays.ray(lane);
         const RayHit hit = hits[lane];
         const auto texel = static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
-        const FaceLevels levels = corner_levels(reader, types, hit.voxel, hit.face);
+        const FaceOcclusion levels = corner_levels(reader, types, hit.voxel, hit.face);
         const float level = level_at(levels, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
         snapshot.types[texel] = reader.get(hit.voxel);
         snapshot.faces[texel] = hit.face;

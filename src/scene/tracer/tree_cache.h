@@ -8,7 +8,7 @@
 namespace quoin {
 
 /// What rays that make light need of one grid, and how far it has followed the grid's changes.
-class KeptTrees {
+class TreeCache {
  public:
   /// Makes the trees, or takes over what was edited since the last time; everything when it is another grid. Returns
   /// whether there was anything to do.

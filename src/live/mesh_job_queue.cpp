@@ -1,4 +1,4 @@
-#include "live/live_queue.h"
+#include "live/mesh_job_queue.h"
 
 #include <algorithm>
 #include <new>
@@ -20,7 +20,7 @@ void drop_inputs(LiveJob& job) {
 
 }  // namespace
 
-LiveQueue::LiveQueue(unsigned workers, Work work, std::function<void()> on_ready)
+MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready)
     : work_(std::move(work)), on_ready_(std::move(on_ready)) {
   try {
     for (unsigned i = 0; i < workers; ++i) workers_.emplace_back([this] { run(); });
@@ -34,7 +34,7 @@ LiveQueue::LiveQueue(unsigned workers, Work work, std::function<void()> on_ready
   }
 }
 
-LiveQueue::~LiveQueue() {
+MeshJobQueue::~MeshJobQueue() {
   {
     const std::lock_guard lock(mutex_);
     is_stopping_ = true;
@@ -43,7 +43,7 @@ LiveQueue::~LiveQueue() {
   workers_.clear();
 }
 
-void LiveQueue::push(std::unique_ptr<LiveJob> job) {
+void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
   {
     const std::lock_guard lock(mutex_);
     const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;
@@ -54,7 +54,7 @@ void LiveQueue::push(std::unique_ptr<LiveJob> job) {
   wake_.notify_one();
 }
 
-std::vector<std::unique_ptr<LiveJob>> LiveQueue::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
+std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
   std::vector<std::unique_ptr<LiveJob>> taken;
   const std::lock_guard lock(mutex_);
   taken.reserve(queue_.size());
@@ -66,7 +66,7 @@ std::vector<std::unique_ptr<LiveJob>> LiveQueue::withdraw(const std::function<bo
   return taken;
 }
 
-std::vector<double> LiveQueue::measure(const std::function<double(const LiveJob&)>& distance) {
+std::vector<double> MeshJobQueue::measure(const std::function<double(const LiveJob&)>& distance) {
   std::vector<double> distances;
   const std::lock_guard lock(mutex_);
   distances.reserve(queue_.size());
@@ -75,7 +75,7 @@ std::vector<double> LiveQueue::measure(const std::function<double(const LiveJob&
   return distances;
 }
 
-std::vector<std::unique_ptr<LiveJob>> LiveQueue::collect() {
+std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::collect() {
   std::vector<std::unique_ptr<LiveJob>> taken;
   const std::lock_guard lock(mutex_);
   taken.reserve(done_.size());
@@ -84,17 +84,17 @@ std::vector<std::unique_ptr<LiveJob>> LiveQueue::collect() {
   return taken;
 }
 
-void LiveQueue::wait(std::size_t waiting) {
+void MeshJobQueue::wait(std::size_t waiting) {
   std::unique_lock lock(mutex_);
   progressed_.wait(lock, [&] { return queue_.size() <= waiting && (waiting != 0 || running_ == 0); });
 }
 
-LiveMeshes::Facts LiveQueue::facts() const {
+LiveMeshes::Stats MeshJobQueue::stats() const {
   const std::lock_guard lock(mutex_);
-  return facts_;
+  return stats_;
 }
 
-std::unique_ptr<LiveJob> LiveQueue::take_nearest() {
+std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
   const auto nearest = std::min_element(queue_.begin(), queue_.end(), [](const auto& a, const auto& b) {
     return a->distance != b->distance ? a->distance < b->distance : a->serial < b->serial;
   });
@@ -103,7 +103,7 @@ std::unique_ptr<LiveJob> LiveQueue::take_nearest() {
   return job;
 }
 
-void LiveQueue::run() {
+void MeshJobQueue::run() {
   LiveWorkspace workspace;
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -129,16 +129,16 @@ void LiveQueue::run() {
   }
 }
 
-void LiveQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start) {
+void MeshJobQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start) {
   {
     const std::lock_guard lock(mutex_);
     const LiveClock::time_point now = LiveClock::now();
     if (job->outcome == LiveJob::Outcome::Meshed) {
-      ++facts_.chunks_meshed;
-      facts_.last_mesh_seconds = seconds(now - start);
-      facts_.last_latency_seconds = seconds(now - job->seen);
+      ++stats_.chunks_meshed;
+      stats_.last_mesh_seconds = seconds(now - start);
+      stats_.last_latency_seconds = seconds(now - job->seen);
     } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
-      ++facts_.out_of_memory;
+      ++stats_.out_of_memory;
     }
     done_.push_back(std::move(job));
     --running_;

@@ -1,0 +1,92 @@
+#include <quoin/core/slot_map.h>
+
+#include <map>
+#include <new>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+TEST(SlotMap, ElementsStayWhereTheyAreWhateverElseHappens) {
+  SlotMap<std::string> map;
+  const auto first = map.insert("first");
+  const std::string* const place = map.find(first);
+  for (int i = 0; i < 1000; ++i) (void)map.insert(std::to_string(i));
+  EXPECT_EQ(map.find(first), place);
+  const SlotMap<std::string> moved = std::move(map);
+  EXPECT_EQ(moved.find(first), place);
+  EXPECT_EQ(*place, "first");
+}
+
+TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
+  SlotMap<int> map;
+  const auto handle = map.insert(1);
+  SlotMap<int> moved = std::move(map);
+  EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move): what is promised
+  EXPECT_EQ(map.find(handle), nullptr);
+  EXPECT_TRUE(map.handles().empty());
+  const auto again = map.insert(2);
+  EXPECT_EQ(map[again], 2);
+  EXPECT_EQ(moved[handle], 1);
+  moved = std::move(map);
+  EXPECT_EQ(moved[again], 2);
+  EXPECT_EQ(moved.size(), 1U);
+  EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move)
+}
+
+TEST(SlotMap, AHandleOfARemovedElementNamesNothingForEver) {
+  SlotMap<int> map;
+  const auto old = map.insert(1);
+  EXPECT_EQ(map.next_index(), 1U);
+  EXPECT_TRUE(map.remove(old));
+  EXPECT_FALSE(map.remove(old));
+  EXPECT_EQ(map.next_index(), old.index);
+  const auto next = map.insert(2);
+  EXPECT_EQ(next.index, old.index);
+  EXPECT_EQ(map.find(old), nullptr);
+  EXPECT_EQ(map[next], 2);
+}
+
+// Moving one throws now and then, as copying what cannot be moved may.
+struct Fragile {
+  explicit Fragile(int given) : value(given) {}
+  Fragile(const Fragile& other) : value(other.value) {
+    if (throws) throw std::bad_alloc();
+  }
+  Fragile& operator=(const Fragile&) = default;
+  ~Fragile() = default;
+  int value;
+  static inline bool throws = false;
+};
+
+TEST(SlotMap, AnInsertThatThrowsLeavesItAsItWas) {
+  SlotMap<Fragile> map;
+  std::map<std::uint32_t, int> plain;
+  std::mt19937 random(5);
+  for (int i = 0; i < 2'000; ++i) {
+    const Fragile made(i);
+    Fragile::throws = random() % 3 == 0;
+    const std::uint32_t index = map.next_index();
+    if (Fragile::throws) {
+      EXPECT_THROW((void)map.insert(made), std::bad_alloc);
+      EXPECT_EQ(map.next_index(), index);
+    } else {
+      EXPECT_EQ(map.insert(made).index, index);
+      plain[index] = i;
+    }
+    Fragile::throws = false;
+    if (random() % 4 == 0 && !map.empty()) {
+      const auto gone = map.handles()[random() % map.size()];
+      plain.erase(gone.index);
+      EXPECT_TRUE(map.remove(gone));
+    }
+    ASSERT_EQ(map.size(), plain.size());
+  }
+  map.for_each([&](Handle<Fragile> handle, const Fragile& value) { EXPECT_EQ(plain.at(handle.index), value.value); });
+}
+
+}  // namespace
+}  // namespace quoin

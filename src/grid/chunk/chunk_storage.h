@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <quoin/grid/chunk.h>
+
+namespace quoin {
+
+/// Rows of a slab, and bits that a palette of so many types takes for each voxel.
+inline constexpr int kSlabRows = 16;
+[[nodiscard]] inline int bits_for(std::size_t types) {
+  if (types <= 2) return 1;
+  if (types <= 4) return 2;
+  if (types <= 16) return 4;
+  return types <= 256 ? 8 : 16;
+}
+
+/// The voxels of a chunk of several types. Shared by copies of the chunk until one of them is written.
+///
+///   slab [z / 4][y / 4]: 16 rows of 64 voxels along x, each `bits` words; a slab of one type has no slot in `words`
+struct ChunkStorage : RefCounted {
+  static constexpr std::uint32_t kUniformSlab = 0x8000'0000U;
+  static constexpr std::uint32_t kNoSlot = 0xFFFF'FFFFU;
+  /// Of types at 16 bits: so few that a chunk can keep their counts, so many that 256 types or fewer show.
+  static constexpr std::uint32_t kRemainders = 1'024;
+  int bits = 1;                            ///< a voxel: 1, 2, 4, 8 or 16
+  std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
+  std::vector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
+  std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
+  std::vector<std::uint64_t> words;        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
+  std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer
+  int non_air = 0;
+  std::uint32_t used = 0;              ///< entries of `counts` that are not 0
+  std::uint32_t recent = 0;            ///< palette index that was written last
+  std::uint32_t credit = 0;            ///< voxels that changed, less what storing them anew has cost since
+  std::uint32_t count_at = 0;          ///< at 16 bits: the credit from which on types may be counted
+  std::uint32_t first_free = kNoSlot;  ///< a slot that no slab has; its first word holds the next one
+  std::uint32_t free_count = 0;
+  std::uint32_t slot_count = 0;  ///< free ones included
+
+  [[nodiscard]] static std::size_t slab_index(int y, int z) {
+    return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));
+  }
+  [[nodiscard]] static int row_in_slab(int y, int z) { return ((z & 3) << 2) | (y & 3); }
+
+  [[nodiscard]] bool direct() const { return bits == 16; }
+  /// The entry of `counts` for an index.
+  [[nodiscard]] std::uint32_t counted_at(std::uint32_t index) const { return direct() ? index % kRemainders : index; }
+  /// Books voxels that change from one index to another.
+  void move_counts(std::uint32_t from_index, std::uint32_t to_index, std::uint32_t voxels) {
+    const std::uint32_t from = counted_at(from_index);
+    const std::uint32_t to = counted_at(to_index);
+    if (counts[to] == 0) ++used;
+    counts[to] += voxels;
+    counts[from] -= voxels;
+    if (counts[from] == 0) --used;
+  }
+  /// Books that a voxel became air, or was: -1 or 1.
+  void count_voxel(int x, int y, int z, int delta) {
+    non_air += delta;
+    layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
+    layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
+    layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
+  }
+  [[nodiscard]] const std::uint64_t* row(std::uint32_t slot, int row_in_slab) const {
+    return words.data() + (static_cast<std::size_t>(slot) * 16 + static_cast<std::size_t>(row_in_slab)) *
+                              static_cast<std::size_t>(bits);
+  }
+  [[nodiscard]] std::uint64_t* row(std::uint32_t slot, int row_in_slab) {
+    return const_cast<std::uint64_t*>(std::as_const(*this).row(slot, row_in_slab));
+  }
+  // By shifts: who waits for the slot waits less than for a multiplication.
+  [[nodiscard]] std::uint32_t read(std::uint32_t slot, int row_in_slab, int x) const {
+    const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
+    const unsigned bit = static_cast<unsigned>(x) << log;
+    const std::size_t in_slab = (static_cast<std::size_t>(row_in_slab) << log) + (bit >> 6);
+    const std::uint64_t word = words.data()[(std::size_t{slot} << (log + 4)) + in_slab];
+    return static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << bits) - 1U);
+  }
+  /// Requires: 0 <= x, y, z < 64.
+  [[nodiscard]] VoxelType type(int x, int y, int z) const {
+    const std::uint32_t slab = slabs[slab_index(y, z)];
+    const std::uint32_t index = (slab & kUniformSlab) != 0 ? slab & ~kUniformSlab : read(slab, row_in_slab(y, z), x);
+    return direct() ? static_cast<VoxelType>(index) : palette[index];
+  }
+};
+
+/// Chunk::non_air_count, where a call would be a good part of its cost.
+[[nodiscard]] inline int non_air_count(const Chunk& chunk) {
+  return chunk.storage() != nullptr ? chunk.storage()->non_air : chunk.non_air_count();
+}
+
+// What is about to be written: of this chunk alone.
+inline ChunkStorage& Chunk::own() {
+  if (storage_.is_shared()) [[unlikely]]
+    copy_storage();
+  return *storage_;
+}
+
+}  // namespace quoin

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/density_chunk.h>
+
+#include "grid/chunk/chunk_storage.h"
+
+namespace quoin {
+
+/// The densities of a chunk of several. Shared by copies of the chunk until one of them is written.
+struct DensityStorage : RefCounted {
+  std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`
+  std::vector<Half> values;                ///< [slot][z % 4][y % 4][x]
+  std::vector<std::uint32_t> free_slots;
+  std::array<std::uint64_t, kChunkEdge * kChunkEdge> solid{};  ///< [z][y]: the signs of a row
+
+  [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {
+    return values.data() + (std::size_t{slot} * 16 + static_cast<std::size_t>(row_in_slab)) * kChunkEdge;
+  }
+};
+
+}  // namespace quoin

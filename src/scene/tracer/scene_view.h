@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include <quoin/scene/scene_tracer.h>
+#include <quoin/trace/packet.h>
+#include <quoin/trace/ray.h>
+
+namespace quoin {
+
+/// What a packet of rays met in a scene; lanes whose bit in `grids.hit` is not set hold nothing of meaning.
+struct SceneHits {
+  PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
+  RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
+};
+
+/// A transparent voxel on a ray.
+struct TransparentSpan {
+  VoxelSpan span;
+  std::int32_t placed = 0;
+};
+
+/// Traces rays through a scene, relative to a point near which they are.
+///
+/// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
+///         world's origin as near it; and grid, PlacedGrid::voxels of a placed grid. A ray's t is the same number in
+///         both.
+/// Threads: any number may trace at once.
+class SceneView {
+ public:
+  /// `tracer` must outlive it. Cost: O(instances).
+  SceneView(const SceneTracer& tracer, DVec3 origin);
+  SceneView(SceneView&&) noexcept;
+  SceneView& operator=(SceneView&&) noexcept;
+  ~SceneView();
+
+  [[nodiscard]] const SceneTracer& tracer() const;
+
+  /// From now on `first_hits` passes through these (indices into SceneTracer::placed), which are drawn in another way.
+  /// They still stop other rays. Cost: O(instances * log instances).
+  void leave_to_impostors(std::span<const std::int32_t> placed);
+
+  /// The nearest opaque voxel of all instances for each ray, in view space; of equally near ones the instance that
+  /// comes first.
+  void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
+
+  /// Which rays meet an opaque voxel of any instance. They are in the space of grid `home`, which is asked first.
+  [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
+
+  /// Which rays meet a transparent voxel of any instance.
+  [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
+
+  /// Calls `visit` for every transparent voxel that one ray passes: instance by instance, each in the ray's order.
+  /// Where `visit` returns false that instance ends.
+  void visit_transparent(const Ray& ray_in_view, double max_t,
+                         const std::function<bool(const TransparentSpan&)>& visit) const;
+
+  [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
+  [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin
