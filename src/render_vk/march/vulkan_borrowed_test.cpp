@@ -53,7 +53,9 @@ TEST_F(VulkanBorrowed, DrawsThePicturesOfAnOwnDevice) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer borrowing = renderer();
   EXPECT_EQ(borrowing.device().name, describe_vulkan_device(own_->instance, own_->physical)->name);
-  auto owning = VulkanRenderer::create({borrowing.device().name});
+  VulkanOptions same;
+  same.device = borrowing.device().name;
+  auto owning = VulkanRenderer::create(same);
   ASSERT_TRUE(owning) << to_string(owning.error());
   EXPECT_EQ(drawn(borrowing, scene).rgb, drawn(*owning, scene).rgb);
 }
