@@ -246,21 +246,21 @@ class OwnImage {
     }();
     return red_first(bytes);
   }
-  /// Gives a level these bytes and leaves it in VK_IMAGE_LAYOUT_GENERAL.
+  /// Gives a level these bytes and leaves it in VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL.
   void write(const VulkanImageTarget& level, const std::vector<std::uint8_t>& bytes) {
     const std::vector<std::uint8_t> ordered = red_first(bytes);
     std::memcpy(mapped_, ordered.data(), ordered.size());
     device_->run([&](VkCommandBuffer commands) {
       auto barrier = info_of<VkImageMemoryBarrier>(VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER);
       barrier.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-      barrier.newLayout = VK_IMAGE_LAYOUT_GENERAL;
+      barrier.newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL;
       barrier.srcQueueFamilyIndex = barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
       barrier.image = image_;
       barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, level.mip_level, 1, level.array_layer, 1};
       device_->api.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT, 0,
                                         0, nullptr, 0, nullptr, 1, &barrier);
       const VkBufferImageCopy all = whole(level);
-      device_->api.vkCmdCopyBufferToImage(commands, buffer_, image_, VK_IMAGE_LAYOUT_GENERAL, 1, &all);
+      device_->api.vkCmdCopyBufferToImage(commands, buffer_, image_, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &all);
     });
   }
 

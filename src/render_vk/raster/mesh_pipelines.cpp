@@ -130,7 +130,8 @@ struct Stages {
       all[i].module = shaders[i];
       all[i].pName = "main";
     }
-    if (way.what == MeshWay::What::Blocky) all[0].pSpecializationInfo = &constants;
+    if (way.what != MeshWay::What::Blocky) return;
+    for (VkPipelineShaderStageCreateInfo& stage : all) stage.pSpecializationInfo = &constants;
   }
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
