@@ -65,7 +65,8 @@ struct VulkanFeatureStorage {
 /// (VkPhysicalDeviceVulkan12Features or VkPhysicalDeviceBufferDeviceAddressFeatures), whose other members stay as they
 /// are, or else in one more, which is put in `storage` and chained first.
 ///
-/// Requires: what is chained to `info` may be written to; `storage` stays in its place until vkCreateDevice has returned.
+/// Requires: `info.sType` says what it is; what is chained to it may be written to; `storage` stays in its place until
+///           vkCreateDevice has returned.
 /// Errors:   Unsupported when the library was built without Vulkan.
 [[nodiscard]] Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& storage);
 

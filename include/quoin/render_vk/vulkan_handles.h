@@ -16,8 +16,8 @@ struct VkDeviceCreateInfo;
 
 namespace quoin {
 
-/// A VkImage: a pointer where addresses have 64 bits, else a number, as vulkan.h has it unless VK_USE_64_BIT_PTR_DEFINES
-/// says otherwise.
+/// A VkImage: a pointer where addresses have 64 bits, else a number, as vulkan.h has it unless its
+/// VK_USE_64_BIT_PTR_DEFINES says otherwise.
 using VulkanImageHandle = std::conditional_t<sizeof(void*) == 8, VkImage_T*, std::uint64_t>;
 
 /// PFN_vkVoidFunction and PFN_vkGetInstanceProcAddr. Windows of 32 bits calls these in another way.

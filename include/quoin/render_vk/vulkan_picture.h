@@ -50,10 +50,11 @@ class VulkanPicture {
   /// Changes:  for B8G8R8A8 the compute pipeline that is bound and the constants that are pushed; and the picture keeps
   ///           a second copy of its bytes in device memory from then on.
   /// Requires: `commands` is being recorded, outside of a render pass, for the renderer's device and queue family.
-  ///           Until it has run, the picture is neither drawn, written nor destroyed, and no renderer of it either.
-  /// Errors:   InvalidArgument when nothing was drawn, a handle is null, the image has no size, the picture does not lie
-  ///           within it, or `layout_after` is none; Unsupported for other formats, naming the format; LimitExceeded.
-  ///           After an error nothing was recorded.
+  ///           Until it has run, the picture is neither drawn, written nor destroyed, nor its renderer.
+  /// Cost:     recording: O(1); running: a copy of 4 bytes a pixel, two for B8G8R8A8.
+  /// Errors:   InvalidArgument when nothing was drawn, a handle is null, the image has no size, the picture does not
+  ///           lie within it, or `layout_after` is none; Unsupported for other formats, naming the format;
+  ///           LimitExceeded when a memory is full. After an error nothing was recorded.
   [[nodiscard]] Status record_copy(VkCommandBuffer_T* commands, const VulkanImageTarget& target) const;
 
   /// The same at once, on the renderer's queue: comes back when the image has the picture.
