@@ -52,7 +52,7 @@ const char* Api::load_instance(VkInstance instance) {
   const char* missing = nullptr;
 #define QUOIN_VULKAN_LOAD(name)                                                \
   name = reinterpret_cast<PFN_##name>(vkGetInstanceProcAddr(instance, #name)); \
-  if (name == nullptr && missing == nullptr) missing = #name;
+  if ((name) == nullptr && missing == nullptr) missing = #name;
   QUOIN_VULKAN_OF_INSTANCE(QUOIN_VULKAN_LOAD)
 #undef QUOIN_VULKAN_LOAD
   return missing;
@@ -62,7 +62,7 @@ const char* Api::load_device(VkDevice device) {
   const char* missing = nullptr;
 #define QUOIN_VULKAN_LOAD(name)                                            \
   name = reinterpret_cast<PFN_##name>(vkGetDeviceProcAddr(device, #name)); \
-  if (name == nullptr && missing == nullptr) missing = #name;
+  if ((name) == nullptr && missing == nullptr) missing = #name;
   QUOIN_VULKAN_OF_DEVICE(QUOIN_VULKAN_LOAD)
 #undef QUOIN_VULKAN_LOAD
   return missing;

@@ -73,6 +73,7 @@ Status WindowDevice::open(const WindowDeviceOptions& options) {
   const std::vector<Candidate> all = candidates();
   if (all.empty()) return refuse("there is no driver for any graphics device here");
   std::vector<VulkanDevice> descriptions;
+  descriptions.reserve(all.size());
   for (const Candidate& one : all) descriptions.push_back(one.description);
   const auto chosen = choose_vulkan_device(descriptions, options.device);
   if (!chosen) return chosen.error();
