@@ -34,12 +34,12 @@ class Subject {
   std::optional<vulkan::Placement> detailed_;
 };
 
-bool is_same(const Camera& a, const Camera& b) {
+[[maybe_unused]] bool is_same(const Camera& a, const Camera& b) {
   return a.position == b.position && a.right == b.right && a.up == b.up && a.forward == b.forward &&
          a.projection == b.projection && a.vertical_fov == b.vertical_fov && a.view_height == b.view_height;
 }
 
-bool is_same(const LightOptions& a, const LightOptions& b) {
+[[maybe_unused]] bool is_same(const LightOptions& a, const LightOptions& b) {
   return a.sun == b.sun && a.lit == b.lit && a.shadows == b.shadows && a.occlusion == b.occlusion &&
          a.occlusion_affects == b.occlusion_affects && a.occlusion_rays == b.occlusion_rays &&
          a.occlusion_distance == b.occlusion_distance && a.shadow_distance == b.shadow_distance &&
