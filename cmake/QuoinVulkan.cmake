@@ -15,43 +15,45 @@ if(quoin_vulkan_missing)
   message(STATUS "Building without Vulkan: there was no ${quoin_vulkan_missing}")
 endif()
 
-# Leaves in the list the sources for what there is.
+# Leaves in the list the sources for what there is: what lies in rooms of src/render_vk needs Vulkan.
 function(quoin_choose_vulkan_sources sources)
   set(all ${${sources}})
   if(quoin_vulkan_missing)
-    set(absent ${all})
-    list(FILTER absent INCLUDE REGEX "/render_vk/vulkan_absent\\.cpp$")
-    list(FILTER all EXCLUDE REGEX "/render_vk/")
-    list(APPEND all ${absent})
+    list(FILTER all EXCLUDE REGEX "/render_vk/[^/]+/")
   else()
     list(FILTER all EXCLUDE REGEX "/render_vk/vulkan_absent\\.cpp$")
   endif()
   set(${sources} ${all} PARENT_SCOPE)
 endfunction()
 
-# Compiles the shaders into lists of numbers that the sources include.
+# Compiles the shaders in a folder into lists of numbers that sources of the target include: those named after `USERS`.
+function(quoin_add_shaders target folder)
+  cmake_parse_arguments(PARSE_ARGV 2 shaders "" "" "USERS")
+  set(outputs)
+  set(binary "${CMAKE_CURRENT_BINARY_DIR}/shaders")
+  file(MAKE_DIRECTORY "${binary}")
+  file(GLOB all CONFIGURE_DEPENDS "${folder}/*.comp" "${folder}/*.vert" "${folder}/*.frag")
+  foreach(shader ${all})
+    cmake_path(GET shader FILENAME name)
+    set(output "${binary}/${name}.inc")
+    add_custom_command(OUTPUT "${output}"
+      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 -O -mfmt=num -MD -MF "${output}.d" -o "${output}" "${shader}"
+      DEPENDS "${shader}" DEPFILE "${output}.d" VERBATIM COMMENT "Compiling shader ${name}")
+    list(APPEND outputs "${output}")
+  endforeach()
+  set_source_files_properties(${shaders_USERS} PROPERTIES OBJECT_DEPENDS "${outputs}")
+  target_sources(${target} PRIVATE ${outputs})
+  target_include_directories(${target} PRIVATE "${binary}" "${QUOIN_VULKAN_INCLUDE}")
+endfunction()
+
 function(quoin_add_vulkan target)
   if(quoin_vulkan_missing)
     set_source_files_properties(src/render_vk/vulkan_absent.cpp PROPERTIES COMPILE_DEFINITIONS
       "QUOIN_VULKAN_MISSING=\"there was no ${quoin_vulkan_missing}\"")
     return()
   endif()
-  set(folder "${CMAKE_CURRENT_BINARY_DIR}/shaders")
-  file(MAKE_DIRECTORY "${folder}")
-  file(GLOB shaders CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/render_vk/shaders/*.comp"
-    "${CMAKE_CURRENT_SOURCE_DIR}/src/render_vk/shaders/*.vert" "${CMAKE_CURRENT_SOURCE_DIR}/src/render_vk/shaders/*.frag")
-  foreach(shader ${shaders})
-    cmake_path(GET shader FILENAME name)
-    set(output "${folder}/${name}.inc")
-    add_custom_command(OUTPUT "${output}"
-      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 -O -mfmt=num -MD -MF "${output}.d" -o "${output}" "${shader}"
-      DEPENDS "${shader}" DEPFILE "${output}.d" VERBATIM COMMENT "Compiling shader ${name}")
-    list(APPEND outputs "${output}")
-  endforeach()
   file(GLOB_RECURSE users CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/src/render_vk/*pipeline*.cpp")
-  set_source_files_properties(${users} PROPERTIES OBJECT_DEPENDS "${outputs}")
-  target_sources(${target} PRIVATE ${outputs})
-  target_include_directories(${target} PRIVATE "${folder}" "${QUOIN_VULKAN_INCLUDE}")
+  quoin_add_shaders(${target} "${CMAKE_CURRENT_SOURCE_DIR}/src/render_vk/shaders" USERS ${users})
   target_link_libraries(${target} PRIVATE ${CMAKE_DL_LIBS})
   target_compile_definitions(${target} PRIVATE QUOIN_HAVE_VULKAN)
 endfunction()

@@ -60,7 +60,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
 
 // A folder with more files is several rooms in one.
 constexpr int kMaxFiles = 32;
-const std::map<std::string, int> kLargerFolders = {{"apps/viewer/window", 33}};
+const std::map<std::string, int> kLargerFolders = {};
 
 // Why a file of `folder` may not include `path`, if so. Paths are as written: <quoin/grid/grid.h> or "grid/x.h".
 std::optional<std::string> breach(const std::string& folder, int level, const std::string& path) {

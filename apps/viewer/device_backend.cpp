@@ -197,8 +197,9 @@ Status DeviceBackend::Impl::draw_stage() {
   if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   // What is shown for a moment does not wait for impostors.
   if (divisor > 1) wanted.impostor_seconds = kImpostorSeconds;
+  const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
   const Clock::time_point start = Clock::now();
-  if (Status drawn = renderer->draw(*picture, request->camera, wanted, is_new); !drawn) return drawn;
+  if (Status drawn = renderer->draw(*picture, request->camera, wanted, accumulation); !drawn) return drawn;
   seconds_per_sample = seconds_since(start) / (static_cast<double>(wanted.width) * wanted.height * wanted.samples);
   is_settled = divisor == 1 && picture->samples() >= request->samples;
   return {};

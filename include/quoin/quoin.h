@@ -41,10 +41,12 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor.h>
 #include <quoin/render/impostor_cache.h>
+#include <quoin/render_vk/vulkan_device.h>
+#include <quoin/render_vk/vulkan_handles.h>
+#include <quoin/render_vk/vulkan_image.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
-#include <quoin/render_vk/vulkan_window.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>

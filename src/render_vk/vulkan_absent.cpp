@@ -1,9 +1,9 @@
-// In place of everything else in this folder where the library is built without Vulkan.
+// In place of all that lies in this folder's rooms where the library is built without Vulkan.
 
+#include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
-#include <quoin/render_vk/vulkan_window.h>
 
 namespace quoin {
 namespace {
@@ -26,7 +26,16 @@ VulkanRenderer::~VulkanRenderer() = default;
 Result<std::vector<VulkanDevice>> vulkan_devices() {
   return refusal();
 }
+Result<VulkanDevice> describe_vulkan_device(VkInstance_T*, VkPhysicalDevice_T*, VulkanFunctionFinder) {
+  return refusal();
+}
+Status enable_vulkan_features(VkDeviceCreateInfo&, VulkanFeatureStorage&) {
+  return refusal();
+}
 Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions&) {
+  return refusal();
+}
+Result<VulkanRenderer> VulkanRenderer::create(const BorrowedVulkanDevice&, std::uint64_t) {
   return refusal();
 }
 const VulkanDevice& VulkanRenderer::device() const {
@@ -41,7 +50,7 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, const Progress&) {
   return refusal();
 }
-Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, bool, const Progress&) {
+Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, Accumulation, const Progress&) {
   return refusal();
 }
 
@@ -74,6 +83,12 @@ Result<Image> VulkanPicture::read() const {
 Status VulkanPicture::write(const Image&) {
   return refusal();
 }
+Status VulkanPicture::record_copy(VkCommandBuffer_T*, const VulkanImageTarget&) const {
+  return refusal();
+}
+Status VulkanPicture::copy_to(const VulkanImageTarget&) const {
+  return refusal();
+}
 
 struct VulkanMeshRenderer::Impl {};
 
@@ -97,23 +112,6 @@ Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPicture
 }
 VulkanMeshRenderer::Stats VulkanMeshRenderer::stats() const {
   return {};
-}
-
-struct VulkanWindow::Impl {};
-
-VulkanWindow::VulkanWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-VulkanWindow::VulkanWindow(VulkanWindow&&) noexcept = default;
-VulkanWindow& VulkanWindow::operator=(VulkanWindow&&) noexcept = default;
-VulkanWindow::~VulkanWindow() = default;
-
-Result<VulkanWindow> VulkanWindow::create(VulkanRenderer&, bool) {
-  return refusal();
-}
-Status VulkanWindow::set_font(int, int, std::span<const std::uint8_t>) {
-  return refusal();
-}
-Status VulkanWindow::present(int, int, const VulkanPicture*, const PixelRect&, const Overlay&) {
-  return refusal();
 }
 
 }  // namespace quoin

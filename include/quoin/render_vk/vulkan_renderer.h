@@ -4,51 +4,38 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
 
-/// A device that Vulkan offers.
-struct VulkanDevice {
-  std::string name;
-  std::string kind;     ///< discrete, integrated, virtual, cpu or other
-  std::string missing;  ///< what it lacks of what Quoin needs; empty: nothing
-};
-
-/// The devices of this machine, in Vulkan's order.
-///
-/// Errors: Unsupported when the library was built without Vulkan, when there is no loader, or no driver.
-[[nodiscard]] Result<std::vector<VulkanDevice>> vulkan_devices();
-
-/// A window that a device is to show pictures in, as a library for windows knows it.
-struct VulkanSurface {
-  std::vector<std::string> extensions;  ///< that the library wants of Vulkan's instance
-  /// Makes the window's VkSurfaceKHR for a VkInstance; 0 where that fails. The renderer destroys it.
-  std::function<std::uint64_t(void* instance)> make;
-};
+/// Of a renderer's blocks of device memory, where nothing else is said.
+inline constexpr std::uint64_t kVulkanBlockBytes = std::uint64_t{64} << 20;
 
 struct VulkanOptions {
-  /// A number counts in `vulkan_devices`, anything else is a part of a name, in capitals or not. Empty: the first of
-  /// the best kind (discrete, integrated, virtual, cpu, other) that lacks nothing.
+  /// Of `vulkan_devices`, as `choose_vulkan_device` understands it.
   std::string device;
-  /// Voxels lie in blocks of device memory of this size, as many as it takes. At least 64 KiB.
-  std::uint64_t block_bytes = std::uint64_t{64} << 20;
+  /// Voxels lie in blocks of device memory of this size, as many as it takes. Requires: at least 64 KiB.
+  std::uint64_t block_bytes = kVulkanBlockBytes;
   /// Told what the validation layer says, which is then loaded: each message is a mistake in Quoin. May be called from
   /// any thread that uses the renderer.
   std::function<void(const std::string& message)> on_validation_message;
-  /// For VulkanWindow: only devices that can show pictures there will do. Without `make`, none.
-  VulkanSurface surface;
 };
 
-/// Takes the pictures that CpuRenderer takes, on a graphics device.
+/// What becomes of the samples that a picture has when more are drawn.
+enum class Accumulation : std::uint8_t {
+  Continue,  ///< new ones are added to them
+  Restart,   ///< they are forgotten
+};
+
+/// Takes the pictures that CpuRenderer takes, on a graphics device: one of its own, or a program's.
 ///
 /// Equal:   every option means the same, and so does every error; a channel of a pixel differs by 2 at most but at
 ///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
@@ -65,6 +52,14 @@ class VulkanRenderer {
   /// Errors: Unsupported, saying what is missing: Vulkan in this build, its loader, a driver, a device of that number
   ///         or name, a feature of the device, the validation layer.
   [[nodiscard]] static Result<VulkanRenderer> create(const VulkanOptions& options = {});
+
+  /// On a program's own device, beside which any number of renderers may stand. The renderer submits to `device.queue`,
+  /// guarded by `device.with_queue`, and waits for what it submits, never for the whole device.
+  ///
+  /// Requires: instance and device were made as `vulkan_requirements` says; `block_bytes` as in VulkanOptions.
+  /// Errors:   InvalidArgument when a handle is null or there is no such queue family; Unsupported as above.
+  [[nodiscard]] static Result<VulkanRenderer> create(const BorrowedVulkanDevice& device,
+                                                     std::uint64_t block_bytes = kVulkanBlockBytes);
   VulkanRenderer(VulkanRenderer&&) noexcept;
   VulkanRenderer& operator=(VulkanRenderer&&) noexcept;
   ~VulkanRenderer();
@@ -87,18 +82,19 @@ class VulkanRenderer {
                                        const Progress& progress = {});
 
   /// Draws into a picture that stays on the device: adds `options.samples` samples a pixel to those that it has, or
-  /// begins it anew where `is_new`, the size is another, or what it shows was not drawn by this. Sample after sample it
-  /// becomes the picture that `render` takes with as many; after an error, Cancelled too, it has none.
+  /// begins it anew, with Accumulation::Restart, if the size is another, or if what it shows was not drawn by this.
+  /// Sample after sample it becomes the picture that `render` takes with as many; after an error, Cancelled too, it has
+  /// none.
   ///
   /// Requires: unless it begins anew, camera, light and scene are those of its other samples.
-  /// Errors:   those of `render`, and LimitExceeded for more than 4,096 samples; `options.depth` means nothing.
-  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
-                            const Progress& progress = {});
-
-  struct Impl;
-  [[nodiscard]] Impl& impl() { return *impl_; }
+  /// Errors:   those of `render`, LimitExceeded for more than 4,096 samples, and InvalidArgument for a picture of
+  ///           another renderer; `options.depth` means nothing.
+  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
+                            Accumulation accumulation, const Progress& progress = {});
 
  private:
+  friend struct vulkan::Access;
+  struct Impl;
   explicit VulkanRenderer(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

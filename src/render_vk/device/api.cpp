@@ -17,34 +17,55 @@ PFN_vkGetInstanceProcAddr find_loader() {
   return nullptr;
 }
 
+PFN_vkGetInstanceProcAddr loader() {
+  static const PFN_vkGetInstanceProcAddr entry = find_loader();
+  return entry;
+}
+
+Error no_loader() {
+  return fail(ErrorCode::Unsupported, "vulkan: there is no loader (libvulkan.so.1) of version 1.1 or newer here");
+}
+
 }  // namespace
 
 Result<Api> Api::load() {
-  static const PFN_vkGetInstanceProcAddr entry = find_loader();
   Api api;
-  api.vkGetInstanceProcAddr = entry;
-  bool is_complete = entry != nullptr;
+  api.vkGetInstanceProcAddr = loader();
+  bool is_complete = api.vkGetInstanceProcAddr != nullptr;
 #define QUOIN_VULKAN_LOAD(name)                                                                        \
   if (is_complete) api.name = reinterpret_cast<PFN_##name>(api.vkGetInstanceProcAddr(nullptr, #name)); \
   is_complete = is_complete && api.name != nullptr;
   QUOIN_VULKAN_OF_LOADER(QUOIN_VULKAN_LOAD)
 #undef QUOIN_VULKAN_LOAD
-  if (!is_complete) {
-    return fail(ErrorCode::Unsupported, "vulkan: there is no loader (libvulkan.so.1) of version 1.1 or newer here");
-  }
+  if (!is_complete) return no_loader();
   return api;
 }
 
-void Api::load_instance(VkInstance instance) {
-#define QUOIN_VULKAN_LOAD(name) name = reinterpret_cast<PFN_##name>(vkGetInstanceProcAddr(instance, #name));
-  QUOIN_VULKAN_OF_INSTANCE(QUOIN_VULKAN_LOAD)
-#undef QUOIN_VULKAN_LOAD
+Result<Api> Api::find(PFN_vkGetInstanceProcAddr entry) {
+  Api api;
+  api.vkGetInstanceProcAddr = entry == nullptr ? loader() : entry;
+  if (api.vkGetInstanceProcAddr == nullptr) return no_loader();
+  return api;
 }
 
-void Api::load_device(VkDevice device) {
-#define QUOIN_VULKAN_LOAD(name) name = reinterpret_cast<PFN_##name>(vkGetDeviceProcAddr(device, #name));
+const char* Api::load_instance(VkInstance instance) {
+  const char* missing = nullptr;
+#define QUOIN_VULKAN_LOAD(name)                                                \
+  name = reinterpret_cast<PFN_##name>(vkGetInstanceProcAddr(instance, #name)); \
+  if ((name) == nullptr && missing == nullptr) missing = #name;
+  QUOIN_VULKAN_OF_INSTANCE(QUOIN_VULKAN_LOAD)
+#undef QUOIN_VULKAN_LOAD
+  return missing;
+}
+
+const char* Api::load_device(VkDevice device) {
+  const char* missing = nullptr;
+#define QUOIN_VULKAN_LOAD(name)                                            \
+  name = reinterpret_cast<PFN_##name>(vkGetDeviceProcAddr(device, #name)); \
+  if ((name) == nullptr && missing == nullptr) missing = #name;
   QUOIN_VULKAN_OF_DEVICE(QUOIN_VULKAN_LOAD)
 #undef QUOIN_VULKAN_LOAD
+  return missing;
 }
 
 }  // namespace quoin::vulkan

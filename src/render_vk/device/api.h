@@ -14,26 +14,19 @@ namespace quoin::vulkan {
   X(vkEnumerateInstanceLayerProperties)     \
   X(vkEnumerateInstanceVersion)
 
-#define QUOIN_VULKAN_OF_INSTANCE(X)            \
-  X(vkCreateDevice)                            \
-  X(vkDestroyInstance)                         \
-  X(vkDestroySurfaceKHR)                       \
-  X(vkEnumerateDeviceExtensionProperties)      \
-  X(vkEnumeratePhysicalDevices)                \
-  X(vkGetDeviceProcAddr)                       \
-  X(vkGetPhysicalDeviceFeatures)               \
-  X(vkGetPhysicalDeviceFeatures2)              \
-  X(vkGetPhysicalDeviceFormatProperties)       \
-  X(vkGetPhysicalDeviceMemoryProperties)       \
-  X(vkGetPhysicalDeviceProperties)             \
-  X(vkGetPhysicalDeviceQueueFamilyProperties)  \
-  X(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
-  X(vkGetPhysicalDeviceSurfaceFormatsKHR)      \
-  X(vkGetPhysicalDeviceSurfacePresentModesKHR) \
-  X(vkGetPhysicalDeviceSurfaceSupportKHR)
+#define QUOIN_VULKAN_OF_INSTANCE(X)      \
+  X(vkCreateDevice)                      \
+  X(vkDestroyInstance)                   \
+  X(vkEnumeratePhysicalDevices)          \
+  X(vkGetDeviceProcAddr)                 \
+  X(vkGetPhysicalDeviceFeatures)         \
+  X(vkGetPhysicalDeviceFeatures2)        \
+  X(vkGetPhysicalDeviceFormatProperties) \
+  X(vkGetPhysicalDeviceMemoryProperties) \
+  X(vkGetPhysicalDeviceProperties)       \
+  X(vkGetPhysicalDeviceQueueFamilyProperties)
 
 #define QUOIN_VULKAN_OF_DEVICE(X)  \
-  X(vkAcquireNextImageKHR)         \
   X(vkAllocateCommandBuffers)      \
   X(vkAllocateMemory)              \
   X(vkBeginCommandBuffer)          \
@@ -43,6 +36,7 @@ namespace quoin::vulkan {
   X(vkCmdBindIndexBuffer)          \
   X(vkCmdBindPipeline)             \
   X(vkCmdCopyBuffer)               \
+  X(vkCmdCopyBufferToImage)        \
   X(vkCmdCopyImageToBuffer)        \
   X(vkCmdDispatch)                 \
   X(vkCmdDraw)                     \
@@ -64,9 +58,7 @@ namespace quoin::vulkan {
   X(vkCreateImageView)             \
   X(vkCreatePipelineLayout)        \
   X(vkCreateRenderPass)            \
-  X(vkCreateSemaphore)             \
   X(vkCreateShaderModule)          \
-  X(vkCreateSwapchainKHR)          \
   X(vkDestroyBuffer)               \
   X(vkDestroyCommandPool)          \
   X(vkDestroyDevice)               \
@@ -77,9 +69,7 @@ namespace quoin::vulkan {
   X(vkDestroyPipeline)             \
   X(vkDestroyPipelineLayout)       \
   X(vkDestroyRenderPass)           \
-  X(vkDestroySemaphore)            \
   X(vkDestroyShaderModule)         \
-  X(vkDestroySwapchainKHR)         \
   X(vkDeviceWaitIdle)              \
   X(vkEndCommandBuffer)            \
   X(vkFreeMemory)                  \
@@ -87,9 +77,7 @@ namespace quoin::vulkan {
   X(vkGetBufferMemoryRequirements) \
   X(vkGetDeviceQueue)              \
   X(vkGetImageMemoryRequirements)  \
-  X(vkGetSwapchainImagesKHR)       \
   X(vkMapMemory)                   \
-  X(vkQueuePresentKHR)             \
   X(vkQueueSubmit)                 \
   X(vkResetCommandPool)            \
   X(vkResetFences)                 \
@@ -116,8 +104,11 @@ struct Api {
 
   /// Those of the loader. Errors: Unsupported when there is none.
   [[nodiscard]] static Result<Api> load();
-  void load_instance(VkInstance instance);
-  void load_device(VkDevice device);
+  /// The way to those of an instance that others made, by `entry` if that is not null. Errors: as `load`.
+  [[nodiscard]] static Result<Api> find(PFN_vkGetInstanceProcAddr entry);
+  /// Return the first function that is not there; null: none.
+  [[nodiscard]] const char* load_instance(VkInstance instance);
+  [[nodiscard]] const char* load_device(VkDevice device);
 };
 
 }  // namespace quoin::vulkan

@@ -1,11 +1,34 @@
 #include "render_vk/device/device.h"
 
+#include <array>
 #include <limits>
+#include <utility>
+
+#include <quoin/core/assert.h>
 
 namespace quoin::vulkan {
+namespace {
+
+Error refuse(std::string message) {
+  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+}
+
+Status check_handles(const BorrowedVulkanDevice& lent) {
+  const std::array<std::pair<const void*, const char*>, 4> handles = {
+      std::pair{static_cast<const void*>(lent.instance), "instance"},
+      std::pair{static_cast<const void*>(lent.physical_device), "physical device"},
+      std::pair{static_cast<const void*>(lent.device), "device"},
+      std::pair{static_cast<const void*>(lent.queue), "queue"}};
+  for (const auto& [handle, name] : handles) {
+    if (handle == nullptr) return fail(ErrorCode::InvalidArgument, std::string("vulkan: the ") + name + " is null");
+  }
+  return {};
+}
+
+}  // namespace
 
 Result<std::unique_ptr<Device>> Device::create(const VulkanOptions& options) {
-  auto instance = VulkanInstance::create(options.on_validation_message, options.surface);
+  auto instance = VulkanInstance::create(options.on_validation_message);
   if (!instance) return instance.error();
   const auto physical = (*instance)->choose(options.device);
   if (!physical) return physical.error();
@@ -15,34 +38,63 @@ Result<std::unique_ptr<Device>> Device::create(const VulkanOptions& options) {
   return device;
 }
 
+Result<std::unique_ptr<Device>> Device::borrow(const BorrowedVulkanDevice& lent) {
+  std::unique_ptr<Device> device(new Device());
+  if (Status adopted = device->adopt(lent); !adopted) return adopted.error();
+  return device;
+}
+
 Status Device::open(const PhysicalDevice& physical) {
   api_ = instance_->api();
   physical_ = physical;
-  api_.vkGetPhysicalDeviceMemoryProperties(physical.handle, &memory_);
   const float priority = 1.0F;
   auto queue = info_of<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
   queue.queueFamilyIndex = physical.queue_family;
   queue.queueCount = 1;
   queue.pQueuePriorities = &priority;
-  auto addresses = info_of<VkPhysicalDeviceBufferDeviceAddressFeatures>(
-      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES);
-  addresses.bufferDeviceAddress = VK_TRUE;
   auto info = info_of<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
-  info.pNext = &addresses;
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
   VkPhysicalDeviceFeatures features{};
   features.fillModeNonSolid = physical.draws_lines ? VK_TRUE : VK_FALSE;
   info.pEnabledFeatures = &features;
-  const char* const swapchain = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
-  if (surface() != VK_NULL_HANDLE) {
-    info.enabledExtensionCount = 1;
-    info.ppEnabledExtensionNames = &swapchain;
-  }
+  VulkanFeatureStorage storage;
+  if (Status enabled = enable_vulkan_features(info, storage); !enabled) return enabled;
   const VkResult result = api_.vkCreateDevice(physical.handle, &info, nullptr, &handle_);
   if (result != VK_SUCCESS) return check(result, "starting");
-  api_.load_device(handle_);
-  api_.vkGetDeviceQueue(handle_, physical.queue_family, 0, &queue_);
+  return start();
+}
+
+Status Device::adopt(const BorrowedVulkanDevice& lent) {
+  if (Status whole = check_handles(lent); !whole) return whole;
+  auto api = Api::find(lent.find_function);
+  if (!api) return api.error();
+  api_ = *api;
+  if (const char* missing = api_.load_instance(lent.instance))
+    return refuse(std::string("the instance lacks ") + missing);
+  physical_ = describe(api_, lent.physical_device);
+  const VulkanDevice& description = physical_.description;
+  if (!description.missing.empty()) return refuse(description.name + " lacks " + description.missing);
+  const VkQueueFlags can = queue_flags(api_, lent.physical_device, lent.queue_family);
+  if (can == 0) {
+    const std::string family = std::to_string(lent.queue_family);
+    return fail(ErrorCode::InvalidArgument, "vulkan: " + description.name + " has no queue family " + family);
+  }
+  if ((can & VK_QUEUE_COMPUTE_BIT) == 0) return refuse(description.name + ": the queue does not compute");
+  physical_.queue_family = lent.queue_family;
+  physical_.draws_triangles = (can & VK_QUEUE_GRAPHICS_BIT) != 0;
+  physical_.draws_lines = physical_.draws_triangles && lent.fill_mode_non_solid;
+  queue_ = lent.queue;
+  with_queue_ = lent.with_queue;
+  handle_ = lent.device;
+  return start();
+}
+
+// Whatever the device comes from.
+Status Device::start() {
+  if (const char* missing = api_.load_device(handle_)) return refuse(description().name + " lacks " + missing);
+  api_.vkGetPhysicalDeviceMemoryProperties(physical_.handle, &memory_);
+  if (instance_) api_.vkGetDeviceQueue(handle_, physical_.queue_family, 0, &queue_);
   return check(make_commands(), "starting");
 }
 
@@ -63,10 +115,11 @@ VkResult Device::make_commands() {
 
 Device::~Device() {
   if (handle_ == VK_NULL_HANDLE) return;
-  api_.vkDeviceWaitIdle(handle_);
+  // Whoever else uses a device that is lent must not be in the way, and what was submitted here has been waited for.
+  if (instance_) api_.vkDeviceWaitIdle(handle_);
   if (fence_ != VK_NULL_HANDLE) api_.vkDestroyFence(handle_, fence_, nullptr);
   if (pool_ != VK_NULL_HANDLE) api_.vkDestroyCommandPool(handle_, pool_, nullptr);
-  api_.vkDestroyDevice(handle_, nullptr);
+  if (instance_) api_.vkDestroyDevice(handle_, nullptr);
 }
 
 Error Device::error_of(VkResult result, const std::string& doing) const {
@@ -80,12 +133,22 @@ Error Device::error_of(VkResult result, const std::string& doing) const {
       return {ErrorCode::LimitExceeded, who + "out of blocks of memory while " + doing, {}, {}};
     case VK_ERROR_DEVICE_LOST:
       return {ErrorCode::Unsupported, who + "the device was lost while " + doing, {}, {}};
-    case VK_ERROR_SURFACE_LOST_KHR:
-      return {ErrorCode::Unsupported, who + "the window was lost while " + doing, {}, {}};
     default:
       return {
           ErrorCode::Unsupported, who + "failed while " + doing + " (VkResult " + std::to_string(result) + ")", {}, {}};
   }
+}
+
+VkResult Device::submit(const VkSubmitInfo& info) {
+  VkResult result = VK_NOT_READY;  // unless it is done
+  const auto use = [&] { result = api_.vkQueueSubmit(queue_, 1, &info, fence_); };
+  if (with_queue_) {
+    with_queue_(use);
+  } else {
+    use();
+  }
+  QUOIN_ASSERT(result != VK_NOT_READY, "BorrowedVulkanDevice::with_queue must call what it is given");
+  return result;
 }
 
 Status Device::run(const std::string& doing, const std::function<void(VkCommandBuffer)>& record) {
@@ -97,10 +160,10 @@ Status Device::run(const std::string& doing, const std::function<void(VkCommandB
   record(commands_);
   separate(commands_);
   result = api_.vkEndCommandBuffer(commands_);
-  auto submit = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
-  submit.commandBufferCount = 1;
-  submit.pCommandBuffers = &commands_;
-  if (result == VK_SUCCESS) result = api_.vkQueueSubmit(queue_, 1, &submit, fence_);
+  auto info = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
+  info.commandBufferCount = 1;
+  info.pCommandBuffers = &commands_;
+  if (result == VK_SUCCESS) result = submit(info);
   if (result != VK_SUCCESS) return check(result, doing);
   result = api_.vkWaitForFences(handle_, 1, &fence_, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
   if (result == VK_SUCCESS) result = api_.vkResetFences(handle_, 1, &fence_);
@@ -115,6 +178,22 @@ void Device::separate(VkCommandBuffer commands) const {
                           VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_HOST_READ_BIT;
   api_.vkCmdPipelineBarrier(commands, kDevice, kDevice | VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0, nullptr, 0,
                             nullptr);
+}
+
+VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, VkShaderModule& shader) {
+  auto info = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+  info.codeSize = code.size_bytes();
+  info.pCode = code.data();
+  return device.api().vkCreateShaderModule(device.handle(), &info, nullptr, &shader);
+}
+
+VkResult make_push_layout(const Device& device, VkShaderStageFlags stages, std::uint32_t bytes,
+                          VkPipelineLayout& layout) {
+  const VkPushConstantRange range{stages, 0, bytes};
+  auto info = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+  info.pushConstantRangeCount = 1;
+  info.pPushConstantRanges = &range;
+  return device.api().vkCreatePipelineLayout(device.handle(), &info, nullptr, &layout);
 }
 
 }  // namespace quoin::vulkan

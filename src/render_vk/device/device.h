@@ -13,8 +13,10 @@ namespace quoin::vulkan {
 /// A device, its one queue, and one batch of commands at a time.
 class Device {
  public:
-  /// Errors: Unsupported, LimitExceeded.
+  /// A device of its own. Errors: Unsupported, LimitExceeded.
   [[nodiscard]] static Result<std::unique_ptr<Device>> create(const VulkanOptions& options);
+  /// Another's device, which is not destroyed. Errors: as VulkanRenderer::create.
+  [[nodiscard]] static Result<std::unique_ptr<Device>> borrow(const BorrowedVulkanDevice& lent);
   ~Device();
   Device(const Device&) = delete;
   Device& operator=(const Device&) = delete;
@@ -25,9 +27,6 @@ class Device {
   /// What it can do, and how it is known to Vulkan.
   [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
   [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
-  [[nodiscard]] VkQueue queue() const { return queue_; }
-  /// Of the window that pictures are shown in; null where there is none.
-  [[nodiscard]] VkSurfaceKHR surface() const { return instance_->surface(); }
 
   /// What a failed call comes to. `doing`: as in "drawing".
   [[nodiscard]] Error error_of(VkResult result, const std::string& doing) const;
@@ -47,9 +46,13 @@ class Device {
  private:
   Device() = default;
   Status open(const PhysicalDevice& physical);
+  Status adopt(const BorrowedVulkanDevice& lent);
+  Status start();
   VkResult make_commands();
+  VkResult submit(const VkSubmitInfo& info);
 
-  std::unique_ptr<VulkanInstance> instance_;
+  std::unique_ptr<VulkanInstance> instance_;  // null: the device is another's
+  std::function<void(const std::function<void()>&)> with_queue_;
   Api api_;
   PhysicalDevice physical_;
   VkPhysicalDeviceMemoryProperties memory_{};
@@ -59,5 +62,11 @@ class Device {
   VkCommandBuffer commands_ = VK_NULL_HANDLE;
   VkFence fence_ = VK_NULL_HANDLE;
 };
+
+/// A shader, to be destroyed once pipelines were made of it.
+[[nodiscard]] VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, VkShaderModule& shader);
+/// How shaders are given what they read: `bytes` that are pushed, in which the rest is found by address.
+[[nodiscard]] VkResult make_push_layout(const Device& device, VkShaderStageFlags stages, std::uint32_t bytes,
+                                        VkPipelineLayout& layout);
 
 }  // namespace quoin::vulkan

@@ -1,8 +1,6 @@
 #include "render_vk/device/instance.h"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cstring>
 #include <optional>
 
@@ -56,19 +54,18 @@ std::string kind_of(VkPhysicalDeviceType type) {
   }
 }
 
-// The better a device, the less.
-int rank_of(const PhysicalDevice& device) {
-  constexpr std::array kOrder = {VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU, VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU,
-                                 VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU, VK_PHYSICAL_DEVICE_TYPE_CPU};
-  return static_cast<int>(std::find(kOrder.begin(), kOrder.end(), device.type) - kOrder.begin());
-}
-
-// The first family whose queues can do all that `wanted` says.
-std::optional<std::uint32_t> queue_family(const Api& api, VkPhysicalDevice device, VkQueueFlags wanted) {
+std::vector<VkQueueFamilyProperties> queue_families(const Api& api, VkPhysicalDevice device) {
   std::uint32_t count = 0;
   api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
   api.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  families.resize(count);
+  return families;
+}
+
+// The first family whose queues can do all that `wanted` says.
+std::optional<std::uint32_t> queue_family(const Api& api, VkPhysicalDevice device, VkQueueFlags wanted) {
+  const std::vector<VkQueueFamilyProperties> families = queue_families(api, device);
   const auto found = std::find_if(families.begin(), families.end(), [=](const VkQueueFamilyProperties& family) {
     return (family.queueFlags & wanted) == wanted && family.queueCount > 0;
   });
@@ -84,21 +81,14 @@ bool has_addresses(const Api& api, VkPhysicalDevice device) {
   return addresses.bufferDeviceAddress != VK_FALSE;
 }
 
-// Whether queues of the family can show pictures in the window.
-bool can_present(const Api& api, VkPhysicalDevice device, std::uint32_t family, VkSurfaceKHR surface) {
-  std::uint32_t count = 0;
-  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
-  std::vector<VkExtensionProperties> extensions(count);
-  api.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
-  const bool has_swapchain = std::any_of(extensions.begin(), extensions.end(), [](const VkExtensionProperties& one) {
-    return std::strcmp(one.extensionName, VK_KHR_SWAPCHAIN_EXTENSION_NAME) == 0;
-  });
-  VkBool32 can = VK_FALSE;
-  return has_swapchain && api.vkGetPhysicalDeviceSurfaceSupportKHR(device, family, surface, &can) == VK_SUCCESS &&
-         can != VK_FALSE;
+}  // namespace
+
+VkQueueFlags queue_flags(const Api& api, VkPhysicalDevice device, std::uint32_t family) {
+  const std::vector<VkQueueFamilyProperties> families = queue_families(api, device);
+  return family < families.size() ? families[family].queueFlags : 0;
 }
 
-PhysicalDevice describe(const Api& api, VkPhysicalDevice handle, VkSurfaceKHR surface) {
+PhysicalDevice describe(const Api& api, VkPhysicalDevice handle) {
   VkPhysicalDeviceProperties properties{};
   api.vkGetPhysicalDeviceProperties(handle, &properties);
   PhysicalDevice device;
@@ -114,8 +104,6 @@ PhysicalDevice describe(const Api& api, VkPhysicalDevice handle, VkSurfaceKHR su
     device.description.missing = "a queue that computes";
   } else if (!has_addresses(api, handle)) {
     device.description.missing = "bufferDeviceAddress";
-  } else if (surface != VK_NULL_HANDLE && !(device.draws_triangles && can_present(api, handle, *family, surface))) {
-    device.description.missing = "a way to show pictures in this window";
   }
   VkPhysicalDeviceFeatures features{};
   api.vkGetPhysicalDeviceFeatures(handle, &features);
@@ -124,30 +112,17 @@ PhysicalDevice describe(const Api& api, VkPhysicalDevice handle, VkSurfaceKHR su
   return device;
 }
 
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-bool is_number(const std::string& text) {
-  return !text.empty() && text.size() < 9 &&
-         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
-}
-
-}  // namespace
-
-Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener, const VulkanSurface& window) {
+Result<std::unique_ptr<VulkanInstance>> VulkanInstance::create(MessageListener listener) {
   auto api = Api::load();
   if (!api) return api.error();
   std::unique_ptr<VulkanInstance> instance(new VulkanInstance(*api, std::move(listener)));
-  if (Status opened = instance->open(window); !opened) return opened.error();
+  if (Status opened = instance->open(); !opened) return opened.error();
   if (Status listed = instance->list_devices(); !listed) return listed.error();
   return instance;
 }
 
 VulkanInstance::~VulkanInstance() {
   if (handle_ == VK_NULL_HANDLE) return;
-  if (surface_ != VK_NULL_HANDLE) api_.vkDestroySurfaceKHR(handle_, surface_, nullptr);
   if (messenger_ != VK_NULL_HANDLE) {
     const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
         api_.vkGetInstanceProcAddr(handle_, "vkDestroyDebugUtilsMessengerEXT"));
@@ -156,7 +131,7 @@ VulkanInstance::~VulkanInstance() {
   api_.vkDestroyInstance(handle_, nullptr);
 }
 
-Status VulkanInstance::open(const VulkanSurface& window) {
+Status VulkanInstance::open() {
   std::uint32_t version = 0;
   if (api_.vkEnumerateInstanceVersion(&version) != VK_SUCCESS || version < VK_API_VERSION_1_2) {
     return refuse("the loader here is older than version 1.2");
@@ -166,7 +141,6 @@ Status VulkanInstance::open(const VulkanSurface& window) {
   application.pApplicationName = application.pEngineName = "quoin";
   application.apiVersion = VK_API_VERSION_1_2;
   std::vector<const char*> extensions;
-  for (const std::string& name : window.extensions) extensions.push_back(name.c_str());
   VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(listener_);
   auto info = info_of<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
   info.pApplicationInfo = &application;
@@ -180,15 +154,10 @@ Status VulkanInstance::open(const VulkanSurface& window) {
   info.ppEnabledExtensionNames = extensions.data();
   if (const VkResult result = api_.vkCreateInstance(&info, nullptr, &handle_); result != VK_SUCCESS) {
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER) return refuse("there is no driver for any graphics device here");
-    if (result == VK_ERROR_EXTENSION_NOT_PRESENT) return refuse("no driver here shows pictures in windows");
     return refuse("no instance can be made (VkResult " + std::to_string(result) + ")");
   }
-  api_.load_instance(handle_);
-  if (Status heard = listen(); !heard || !window.make) return heard;
-  const std::uint64_t surface = window.make(handle_);
-  if (surface == 0) return refuse("the window cannot show pictures");
-  std::memcpy(&surface_, &surface, sizeof surface_);
-  return {};
+  if (const char* missing = api_.load_instance(handle_)) return refuse(std::string("the loader here lacks ") + missing);
+  return listen();
 }
 
 Status VulkanInstance::listen() {
@@ -209,32 +178,16 @@ Status VulkanInstance::list_devices() {
     handles.resize(count);
   }
   if (handles.empty()) return refuse("there is no driver for any graphics device here");
-  for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle, surface_));
+  for (const VkPhysicalDevice handle : handles) devices_.push_back(describe(api_, handle));
   return {};
 }
 
 Result<PhysicalDevice> VulkanInstance::choose(const std::string& wanted) const {
-  const PhysicalDevice* chosen = nullptr;
-  if (is_number(wanted)) {
-    const auto index = static_cast<std::size_t>(std::stoul(wanted));
-    if (index < devices_.size()) chosen = &devices_[index];
-  } else {
-    for (const PhysicalDevice& device : devices_) {
-      if (!wanted.empty() && lower(device.description.name).find(lower(wanted)) == std::string::npos) continue;
-      const auto score = [](const PhysicalDevice& d) { return std::pair(!d.description.missing.empty(), rank_of(d)); };
-      if (chosen == nullptr || score(device) < score(*chosen)) chosen = &device;
-    }
-  }
-  if (chosen == nullptr) {
-    std::string all;
-    for (std::size_t i = 0; i < devices_.size(); ++i) {
-      all += (i == 0 ? "" : ", ") + std::to_string(i) + " " + devices_[i].description.name;
-    }
-    return refuse("there is no device \"" + wanted + "\"; there is " + all);
-  }
-  const VulkanDevice& description = chosen->description;
-  if (!description.missing.empty()) return refuse(description.name + " lacks " + description.missing);
-  return *chosen;
+  std::vector<VulkanDevice> descriptions;
+  for (const PhysicalDevice& device : devices_) descriptions.push_back(device.description);
+  const auto chosen = choose_vulkan_device(descriptions, wanted);
+  if (!chosen) return chosen.error();
+  return devices_[*chosen];
 }
 
 }  // namespace quoin::vulkan

@@ -23,26 +23,28 @@ struct PhysicalDevice {
   VulkanDevice description;
 };
 
-/// Vulkan as this program sees it.
+/// A device as it is, with the first queue family that will do best.
+[[nodiscard]] PhysicalDevice describe(const Api& api, VkPhysicalDevice handle);
+/// What queues of a family can do; none where there is no such family.
+[[nodiscard]] VkQueueFlags queue_flags(const Api& api, VkPhysicalDevice device, std::uint32_t family);
+
+/// Vulkan as this library sees it when nobody lends it a device.
 class VulkanInstance {
  public:
-  /// With `listener` the validation layer is loaded; with `window`, a surface is made. Errors: Unsupported.
-  [[nodiscard]] static Result<std::unique_ptr<VulkanInstance>> create(MessageListener listener,
-                                                                      const VulkanSurface& window = {});
+  /// With `listener` the validation layer is loaded. Errors: Unsupported.
+  [[nodiscard]] static Result<std::unique_ptr<VulkanInstance>> create(MessageListener listener);
   ~VulkanInstance();
   VulkanInstance(const VulkanInstance&) = delete;
   VulkanInstance& operator=(const VulkanInstance&) = delete;
 
   [[nodiscard]] const Api& api() const { return api_; }
   [[nodiscard]] const std::vector<PhysicalDevice>& devices() const { return devices_; }
-  /// Of the window; null where there is none.
-  [[nodiscard]] VkSurfaceKHR surface() const { return surface_; }
   /// As VulkanOptions::device says. Errors: Unsupported.
   [[nodiscard]] Result<PhysicalDevice> choose(const std::string& wanted) const;
 
  private:
   explicit VulkanInstance(const Api& api, MessageListener listener) : api_(api), listener_(std::move(listener)) {}
-  Status open(const VulkanSurface& window);
+  Status open();
   Status listen();
   Status list_devices();
 
@@ -50,7 +52,6 @@ class VulkanInstance {
   MessageListener listener_;
   VkInstance handle_ = VK_NULL_HANDLE;
   VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
-  VkSurfaceKHR surface_ = VK_NULL_HANDLE;
   std::vector<PhysicalDevice> devices_;
 };
 

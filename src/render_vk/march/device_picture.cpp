@@ -13,7 +13,8 @@ const char* const kDoing = "making room for a picture";
 
 }  // namespace
 
-VulkanPicture::VulkanPicture(VulkanRenderer& renderer) : impl_(std::make_unique<Impl>(*renderer.impl().device)) {}
+VulkanPicture::VulkanPicture(VulkanRenderer& renderer)
+    : impl_(std::make_unique<Impl>(*vulkan::Access::of(renderer).device, *vulkan::Access::of(renderer).pipelines)) {}
 VulkanPicture::VulkanPicture(VulkanPicture&&) noexcept = default;
 VulkanPicture& VulkanPicture::operator=(VulkanPicture&&) noexcept = default;
 VulkanPicture::~VulkanPicture() = default;
@@ -23,6 +24,7 @@ Status VulkanPicture::Impl::resize(int new_width, int new_height) {
   width = height = samples = 0;
   rays = 0;
   colours = {};
+  swapped = {};
   sums = {};
   const VkDeviceSize bytes =
       VkDeviceSize{4} * static_cast<VkDeviceSize>(new_width) * static_cast<VkDeviceSize>(new_height);
@@ -34,9 +36,11 @@ Status VulkanPicture::Impl::resize(int new_width, int new_height) {
   return {};
 }
 
-Status VulkanPicture::Impl::begin_sums() {
+Status VulkanPicture::Impl::begin_sums(const Camera& of_camera, const LightOptions& in_light) {
   samples = 0;
   rays = 0;
+  camera = of_camera;
+  light = in_light;
   if (sums.handle() != VK_NULL_HANDLE) return {};
   auto made = vulkan::Buffer::create(*device, colours.size() * 4, vulkan::Buffer::Where::Device, kDoing);
   if (!made) return made.error();
@@ -57,7 +61,7 @@ std::int64_t VulkanPicture::rays() const {
   return impl_->rays;
 }
 std::size_t VulkanPicture::bytes() const {
-  return static_cast<std::size_t>(impl_->colours.size() + impl_->sums.size());
+  return static_cast<std::size_t>(impl_->colours.size() + impl_->swapped.size() + impl_->sums.size());
 }
 
 Result<Image> VulkanPicture::read() const {
@@ -91,6 +95,7 @@ Status VulkanPicture::write(const Image& image) {
   vulkan::Device& device = *impl_->device;
   auto staging = vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Upload, kDoing);
   if (!staging) return staging.error();
+  std::memset(staging->mapped(), 0xFF, 4 * pixels);  // opaque
   for (std::size_t i = 0; i < pixels; ++i) std::memcpy(staging->mapped() + 4 * i, image.rgb.data() + 3 * i, 3);
   Status done = device.run("uploading a picture", [&](VkCommandBuffer commands) {
     const VkBufferCopy all{0, 0, staging->size()};

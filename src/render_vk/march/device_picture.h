@@ -2,27 +2,41 @@
 
 #include <cstdint>
 
+#include <quoin/light/light_options.h>
 #include <quoin/render_vk/vulkan_picture.h>
+#include <quoin/scene/camera.h>
 
+#include "render_vk/device/access.h"
 #include "render_vk/device/memory.h"
+#include "render_vk/march/pipelines.h"
 
 namespace quoin {
 
 /// What VulkanPicture is to those who draw it: a word a pixel, row by row, sRGB bytes with red the lowest.
 struct VulkanPicture::Impl {
-  explicit Impl(vulkan::Device& of_device) : device(&of_device) {}
+  Impl(vulkan::Device& of_device, const vulkan::Pipelines& with_pipelines)
+      : device(&of_device), pipelines(&with_pipelines) {}
 
   /// Room for that many pixels, whose contents mean nothing then if the size is another. Errors: LimitExceeded.
   [[nodiscard]] Status resize(int new_width, int new_height);
-  /// The same for `sums`, and nothing was drawn so far. Errors: LimitExceeded.
-  [[nodiscard]] Status begin_sums();
+  /// The same for `sums`, and nothing was drawn so far; what will be is of this camera. Errors: LimitExceeded.
+  [[nodiscard]] Status begin_sums(const Camera& of_camera, const LightOptions& in_light);
+  /// As VulkanPicture::record_copy, of what `prepare_copy` has found right.
+  void record_copy(VkCommandBuffer commands, const VulkanImageTarget& target) const;
+  /// Errors: those of VulkanPicture::record_copy.
+  [[nodiscard]] Status prepare_copy(const VulkanImageTarget& target);
 
   vulkan::Device* device;
+  const vulkan::Pipelines* pipelines;
   int width = 0;
   int height = 0;
   int samples = 0;
   std::int64_t rays = 0;
   vulkan::Buffer colours;
+  vulkan::Buffer swapped;  ///< the colours with blue the lowest; only where images wanted them
+  /// What its samples were drawn with.
+  Camera camera;
+  LightOptions light;
   vulkan::Buffer sums;  ///< of the samples' light, four floats a pixel; only where samples are added one by one
 };
 

@@ -295,7 +295,7 @@ Status PicturePass::resolve(std::span<const Tile> tiles) {
   });
 }
 
-Status PicturePass::add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress) {
+Status PicturePass::add_samples(PictureImpl& picture, const RenderOptions& options, const Progress& progress) {
   const std::vector<Tile> tiles = tiles_of(options);
   const std::int64_t rays_of_tile = rays_of_pixel(options) * tile_edge_ * tile_edge_;
   const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMaxRaysAtOnce / rays_of_tile, 1));
@@ -312,7 +312,7 @@ Status PicturePass::add_samples(VulkanPicture::Impl& picture, const RenderOption
   return resolve(tiles);
 }
 
-Status PicturePass::draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+Status PicturePass::draw(PictureImpl& picture, const Camera& camera, const RenderOptions& options,
                          const Progress& progress) {
   target_ = &picture;
   RenderOptions all = options;

@@ -30,7 +30,7 @@ class PicturePass {
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, const Progress& progress);
 
   /// As VulkanRenderer::draw, of what is right.
-  [[nodiscard]] Status draw(VulkanPicture::Impl& picture, const Camera& camera, const RenderOptions& options,
+  [[nodiscard]] Status draw(PictureImpl& picture, const Camera& camera, const RenderOptions& options,
                             const Progress& progress);
 
  private:
@@ -50,7 +50,7 @@ class PicturePass {
   [[nodiscard]] std::vector<Tile> tiles_of(const RenderOptions& options) const;
   [[nodiscard]] ShaderPush push_for_sample(const Tile& tile, int sample) const;
   Status take_sample(const Tile& tile, int sample);
-  Status add_samples(VulkanPicture::Impl& picture, const RenderOptions& options, const Progress& progress);
+  Status add_samples(PictureImpl& picture, const RenderOptions& options, const Progress& progress);
   Status take_sample(std::span<const Tile> tiles, int sample);
   Status resolve(std::span<const Tile> tiles);
   Status finish_glass(ShaderPush push);
@@ -63,7 +63,7 @@ class PicturePass {
   const Pipelines* pipelines_;
   const DeviceScene* scene_;
   const Placement* placement_;
-  const VulkanPicture::Impl* target_ = nullptr;  // null: what is drawn is read
+  const PictureImpl* target_ = nullptr;  // null: what is drawn is read
   std::vector<Place> places_;
   ShaderFrame frame_;
   std::uint64_t frame_address_ = 0;

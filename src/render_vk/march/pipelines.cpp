@@ -21,6 +21,18 @@ constexpr std::uint32_t kLight[] = {
 constexpr std::uint32_t kResolve[] = {
 #include "resolve.comp.inc"
 };
+constexpr std::uint32_t kSwap[] = {
+#include "swap.comp.inc"
+};
+
+// Every device takes as many in each direction.
+constexpr std::uint32_t kMaxAcross = 32768;
+
+template <class T>
+std::span<const std::byte> bytes_of(const T& push) {
+  static_assert(sizeof(T) <= sizeof(ShaderPush));
+  return std::as_bytes(std::span(&push, 1));
+}
 
 std::span<const std::uint32_t> code_of(Pass pass) {
   switch (pass) {
@@ -33,6 +45,8 @@ std::span<const std::uint32_t> code_of(Pass pass) {
       return kGlass;
     case Pass::Resolve:
       return kResolve;
+    case Pass::Swap:
+      return kSwap;
     default:
       return kLight;
   }
@@ -42,11 +56,7 @@ std::span<const std::uint32_t> code_of(Pass pass) {
 
 Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   std::unique_ptr<Pipelines> made(new Pipelines(device));
-  const VkPushConstantRange range{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(ShaderPush)};
-  auto layout = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
-  layout.pushConstantRangeCount = 1;
-  layout.pPushConstantRanges = &range;
-  VkResult result = device.api().vkCreatePipelineLayout(device.handle(), &layout, nullptr, &made->layout_);
+  VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(ShaderPush), made->layout_);
   for (std::size_t pass = 0; pass < kPassCount && result == VK_SUCCESS; ++pass) {
     result = made->make(static_cast<Pass>(pass));
   }
@@ -64,10 +74,6 @@ Pipelines::~Pipelines() {
 
 VkResult Pipelines::make(Pass pass) {
   const Api& api = device_->api();
-  const std::span<const std::uint32_t> code = code_of(pass);
-  auto module = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-  module.codeSize = code.size_bytes();
-  module.pCode = code.data();
   auto info = info_of<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
   info.layout = layout_;
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
@@ -79,7 +85,7 @@ VkResult Pipelines::make(Pass pass) {
   const VkSpecializationInfo constants{1, &entry, sizeof is_second, &is_second};
   const bool has_constant = is_second == VK_TRUE || pass == Pass::Light || pass == Pass::FarDepths;
   if (has_constant) info.stage.pSpecializationInfo = &constants;
-  VkResult result = api.vkCreateShaderModule(device_->handle(), &module, nullptr, &info.stage.module);
+  VkResult result = make_shader(*device_, code_of(pass), info.stage.module);
   if (result != VK_SUCCESS) return result;
   result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr,
                                         &pipelines_[static_cast<std::size_t>(pass)]);
@@ -90,20 +96,29 @@ VkResult Pipelines::make(Pass pass) {
 void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
   constexpr std::int32_t kGroup = 8;
   const auto groups = [](std::int32_t pixels) { return static_cast<std::uint32_t>((pixels + kGroup - 1) / kGroup); };
-  dispatch(commands, pass, push, groups(push.size_x), groups(push.size_y));
+  dispatch(commands, pass, bytes_of(push), groups(push.size_x), groups(push.size_y));
 }
 
 void Pipelines::dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {
-  constexpr std::uint32_t kMaxAcross = 32768;
   const std::uint32_t across = std::min(push.far_groups, kMaxAcross);
-  dispatch(commands, pass, push, across, (push.far_groups + across - 1) / across);
+  dispatch(commands, pass, bytes_of(push), across, (push.far_groups + across - 1) / across);
 }
 
-void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, std::uint32_t across,
+void Pipelines::swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const {
+  constexpr std::uint32_t kGroup = 256;
+  const std::uint32_t groups = (push.pixels + kGroup - 1) / kGroup;
+  const std::uint32_t across = std::min(groups, kMaxAcross);
+  SwapPush whole = push;
+  whole.across = across * kGroup;
+  dispatch(commands, Pass::Swap, bytes_of(whole), across, (groups + across - 1) / across);
+}
+
+void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
                          std::uint32_t down) const {
   const Api& api = device_->api();
   api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[static_cast<std::size_t>(pass)]);
-  api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof push, &push);
+  api.vkCmdPushConstants(commands, layout_, VK_SHADER_STAGE_COMPUTE_BIT, 0, static_cast<std::uint32_t>(push.size()),
+                         push.data());
   api.vkCmdDispatch(commands, across, down, 1);
   device_->separate(commands);
 }

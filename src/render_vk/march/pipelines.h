@@ -1,7 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 
 #include "render_vk/device/device.h"
 #include "render_vk/march/shader_data.h"
@@ -17,8 +20,9 @@ enum class Pass : std::uint8_t {
   Light,
   LightWithGlass,
   Resolve,  ///< the samples' mean as bytes
+  Swap,     ///< red and blue change places, of a whole picture
 };
-constexpr std::size_t kPassCount = 7;
+constexpr std::size_t kPassCount = 8;
 
 class Pipelines {
  public:
@@ -31,11 +35,13 @@ class Pipelines {
   void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
   /// The same over impostors: ShaderPush::far_groups workgroups.
   void dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
+  /// Records a copy of a picture's words with red and blue swapped, after which it may be read.
+  void swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const;
 
  private:
   explicit Pipelines(Device& device) : device_(&device) {}
   VkResult make(Pass pass);
-  void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push, std::uint32_t across,
+  void dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
                 std::uint32_t down) const;
 
   Device* device_;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -8,6 +7,7 @@
 #include <quoin/render_vk/vulkan_renderer.h>
 
 #include "render/picture_detail.h"
+#include "render_vk/device/access.h"
 #include "render_vk/device/device.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/march/device_detail.h"
@@ -16,15 +16,19 @@
 
 namespace quoin {
 
-/// What the renderers and pictures of one device share.
+/// What a renderer, its pictures and its mesh renderers share.
 struct VulkanRenderer::Impl {
   static constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
+
+  /// Requires: `block_bytes` is at least `kLeastBlock`.
+  [[nodiscard]] static Result<std::unique_ptr<Impl>> create(Result<std::unique_ptr<vulkan::Device>> device,
+                                                            std::uint64_t block_bytes);
 
   Impl(std::unique_ptr<vulkan::Device> of_device, std::unique_ptr<vulkan::Pipelines> with_pipelines,
        std::uint64_t block_bytes)
       : device(std::move(of_device)),
         pipelines(std::move(with_pipelines)),
-        memory(*device, std::max(block_bytes, kLeastBlock)),
+        memory(*device, block_bytes),
         scene(memory),
         detail(memory) {}
 

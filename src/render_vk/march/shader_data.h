@@ -195,6 +195,15 @@ struct ShaderPush {
   std::uint32_t far_groups = 0;
 };
 
+// What src/render_vk/shaders/swap.comp declares.
+struct SwapPush {
+  std::uint64_t from = 0;
+  std::uint64_t to = 0;
+  std::uint32_t pixels = 0;
+  std::uint32_t across = 0;
+};
+
+static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
 static_assert(sizeof(ShaderPlaced) == 368 && sizeof(ShaderFrame) == 15 * 16 + 20 * 8 + 16 * 4);

@@ -73,7 +73,8 @@ void on_device(benchmark::State& state, const World& world, const RenderOptions&
   fail_unless(renderer->update(world.scene).has_value(), "the update's success", 0);
   VulkanPicture picture(*renderer);
   for (auto _ : state) {
-    fail_unless(renderer->draw(picture, world.camera, options, true).has_value(), "the picture's success", 0);
+    fail_unless(renderer->draw(picture, world.camera, options, Accumulation::Restart).has_value(),
+                "the picture's success", 0);
   }
   state.SetLabel(renderer->device().name);
   count(state, picture.rays());

@@ -220,7 +220,9 @@ TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
   // More than a tile.
   RenderOptions options = in_detail(300, 100, 128);
   VulkanPicture picture(*renderer_);
-  for (int sample = 0; sample < 3; ++sample) ASSERT_TRUE(renderer_->draw(picture, camera, options, sample == 0));
+  for (int sample = 0; sample < 3; ++sample)
+    ASSERT_TRUE(
+        renderer_->draw(picture, camera, options, sample == 0 ? Accumulation::Restart : Accumulation::Continue));
   options.samples = 3;
   const Picture whole = taken_as_is(camera, options);
   EXPECT_EQ(picture.read()->rgb, whole.colour.rgb);

@@ -16,10 +16,10 @@ class VulkanPictures : public VulkanTest {
     ASSERT_TRUE(renderer_->update(golden::terrain_scene()));
   }
 
-  void add(VulkanPicture& picture, int samples, bool is_new, int width = 200) {
+  void add(VulkanPicture& picture, int samples, Accumulation accumulation, int width = 200) {
     options_.width = width;
     options_.samples = samples;
-    const Status drawn = renderer_->draw(picture, golden::camera_for(golden::kViews[0]), options_, is_new);
+    const Status drawn = renderer_->draw(picture, golden::camera_for(golden::kViews[0]), options_, accumulation);
     ASSERT_TRUE(drawn) << to_string(drawn.error());
   }
   Picture rendered(int samples) {
@@ -41,10 +41,10 @@ class VulkanPictures : public VulkanTest {
 
 TEST_F(VulkanPictures, SamplesAddUpToTheRenderedPicture) {
   VulkanPicture picture(*renderer_);
-  add(picture, 1, true);
+  add(picture, 1, Accumulation::Restart);
   EXPECT_EQ(bytes_of(picture), rendered(1).colour.rgb);
-  add(picture, 1, false);
-  add(picture, 3, false);
+  add(picture, 1, Accumulation::Continue);
+  add(picture, 3, Accumulation::Continue);
   EXPECT_EQ(picture.samples(), 5);
   const Picture whole = rendered(5);
   EXPECT_EQ(bytes_of(picture), whole.colour.rgb);
@@ -53,11 +53,11 @@ TEST_F(VulkanPictures, SamplesAddUpToTheRenderedPicture) {
 
 TEST_F(VulkanPictures, BeginAnewWhenAskedAndForAnotherSize) {
   VulkanPicture picture(*renderer_);
-  add(picture, 2, true);
-  add(picture, 1, true);
+  add(picture, 2, Accumulation::Restart);
+  add(picture, 1, Accumulation::Restart);
   EXPECT_EQ(picture.samples(), 1);
   EXPECT_EQ(bytes_of(picture), rendered(1).colour.rgb);
-  add(picture, 1, false, 64);
+  add(picture, 1, Accumulation::Continue, 64);
   EXPECT_EQ(picture.samples(), 1);
   EXPECT_EQ(picture.width(), 64);
   EXPECT_EQ(bytes_of(picture), rendered(1).colour.rgb);
@@ -69,9 +69,9 @@ TEST_F(VulkanPictures, AddNothingToWhatIsNoSumOfSamples) {
   VulkanPicture picture(*renderer_);
   Image grey{200, 130, std::vector<std::uint8_t>(std::size_t{3} * 200 * 130, 128)};
   for (const bool was_drawn : {false, true}) {
-    if (was_drawn) add(picture, 2, true);
+    if (was_drawn) add(picture, 2, Accumulation::Restart);
     ASSERT_TRUE(picture.write(grey));
-    add(picture, 1, false);
+    add(picture, 1, Accumulation::Continue);
     EXPECT_EQ(picture.samples(), 1);
     EXPECT_EQ(bytes_of(picture), alone);
   }
@@ -80,15 +80,17 @@ TEST_F(VulkanPictures, AddNothingToWhatIsNoSumOfSamples) {
 TEST_F(VulkanPictures, SayWhatCannotBe) {
   VulkanPicture picture(*renderer_);
   EXPECT_EQ(picture.read().error().code, ErrorCode::InvalidArgument);
-  add(picture, 1, true);
+  add(picture, 1, Accumulation::Restart);
   const Camera camera = golden::camera_for(golden::kViews[0]);
   options_.samples = 4096;
-  EXPECT_EQ(renderer_->draw(picture, camera, options_, false).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(renderer_->draw(picture, camera, options_, Accumulation::Continue).error().code, ErrorCode::LimitExceeded);
   options_.samples = 0;
-  EXPECT_EQ(renderer_->draw(picture, camera, options_, false).error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(renderer_->draw(picture, camera, options_, Accumulation::Continue).error().code,
+            ErrorCode::InvalidArgument);
   EXPECT_EQ(picture.samples(), 1) << "a refusal changes nothing";
   options_.samples = 1;
-  const Status stopped = renderer_->draw(picture, camera, options_, false, [](double) { return false; });
+  const Status stopped =
+      renderer_->draw(picture, camera, options_, Accumulation::Continue, [](double) { return false; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(picture.samples(), 0);

@@ -1,3 +1,4 @@
+#include <quoin/core/assert.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
 #include <optional>
@@ -13,7 +14,7 @@ namespace {
 // What a picture is taken of: the instances as the scene has them, or in their detail.
 class Subject {
  public:
-  [[nodiscard]] static Result<Subject> of(VulkanRenderer::Impl& impl, const Camera& camera,
+  [[nodiscard]] static Result<Subject> of(vulkan::RendererImpl& impl, const Camera& camera,
                                           const RenderOptions& options) {
     Subject subject(impl.scene.placement());
     if (!options.detail || impl.voxels == nullptr) return subject;
@@ -33,14 +34,27 @@ class Subject {
   std::optional<vulkan::Placement> detailed_;
 };
 
+[[maybe_unused]] bool is_same(const Camera& a, const Camera& b) {
+  return a.position == b.position && a.right == b.right && a.up == b.up && a.forward == b.forward &&
+         a.projection == b.projection && a.vertical_fov == b.vertical_fov && a.view_height == b.view_height;
+}
+
+[[maybe_unused]] bool is_same(const LightOptions& a, const LightOptions& b) {
+  return a.sun == b.sun && a.lit == b.lit && a.shadows == b.shadows && a.occlusion == b.occlusion &&
+         a.occlusion_affects == b.occlusion_affects && a.occlusion_rays == b.occlusion_rays &&
+         a.occlusion_distance == b.occlusion_distance && a.shadow_distance == b.shadow_distance &&
+         a.exposure == b.exposure;
+}
+
 }  // namespace
 
-Result<std::vector<VulkanDevice>> vulkan_devices() {
-  const auto instance = vulkan::VulkanInstance::create({});
-  if (!instance) return instance.error();
-  std::vector<VulkanDevice> devices;
-  for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
-  return devices;
+Result<std::unique_ptr<VulkanRenderer::Impl>> VulkanRenderer::Impl::create(
+    Result<std::unique_ptr<vulkan::Device>> device, std::uint64_t block_bytes) {
+  QUOIN_ASSERT(block_bytes >= kLeastBlock, "blocks of at least 64 KiB");
+  if (!device) return device.error();
+  auto pipelines = vulkan::Pipelines::create(**device);
+  if (!pipelines) return pipelines.error();
+  return std::make_unique<Impl>(std::move(*device), std::move(*pipelines), block_bytes);
 }
 
 VulkanRenderer::VulkanRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -49,11 +63,15 @@ VulkanRenderer& VulkanRenderer::operator=(VulkanRenderer&&) noexcept = default;
 VulkanRenderer::~VulkanRenderer() = default;
 
 Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions& options) {
-  auto device = vulkan::Device::create(options);
-  if (!device) return device.error();
-  auto pipelines = vulkan::Pipelines::create(**device);
-  if (!pipelines) return pipelines.error();
-  return VulkanRenderer(std::make_unique<Impl>(std::move(*device), std::move(*pipelines), options.block_bytes));
+  auto impl = Impl::create(vulkan::Device::create(options), options.block_bytes);
+  if (!impl) return impl.error();
+  return VulkanRenderer(std::move(*impl));
+}
+
+Result<VulkanRenderer> VulkanRenderer::create(const BorrowedVulkanDevice& device, std::uint64_t block_bytes) {
+  auto impl = Impl::create(vulkan::Device::borrow(device), block_bytes);
+  if (!impl) return impl.error();
+  return VulkanRenderer(std::move(*impl));
 }
 
 const VulkanDevice& VulkanRenderer::device() const {
@@ -80,16 +98,22 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
   return pass.render(camera, options, progress);
 }
 
-Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options, bool is_new,
-                            const Progress& progress) {
+Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
+                            Accumulation accumulation, const Progress& progress) {
   constexpr int kMaxSamples = 4096;
   if (Status status = check(camera, options); !status) return status;
-  VulkanPicture::Impl& target = picture.impl();
+  vulkan::PictureImpl& target = vulkan::Access::of(picture);
+  if (target.device != impl_->device.get()) {
+    return fail(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
+  }
   if (Status status = target.resize(options.width, options.height); !status) return status;
   // Samples of meshes, and of pictures that were written, have no sums to add to.
-  if (is_new || target.samples == 0 || target.sums.handle() == VK_NULL_HANDLE) {
-    if (Status status = target.begin_sums(); !status) return status;
+  const bool is_new = accumulation == Accumulation::Restart || target.samples == 0;
+  if (is_new || target.sums.handle() == VK_NULL_HANDLE) {
+    if (Status status = target.begin_sums(camera, options.light); !status) return status;
   }
+  QUOIN_ASSERT(is_same(target.camera, camera), "a picture's samples are of one camera");
+  QUOIN_ASSERT(is_same(target.light, options.light), "a picture's samples are of one light");
   if (target.samples + options.samples > kMaxSamples) {
     return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }

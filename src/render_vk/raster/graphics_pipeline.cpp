@@ -3,39 +3,6 @@
 #include <array>
 
 namespace quoin::vulkan {
-namespace {
-
-/// A shader, as long as pipelines are made of it.
-class Module {
- public:
-  Module(const Device& device, std::span<const std::uint32_t> code) : device_(&device) {
-    auto info = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-    info.codeSize = code.size_bytes();
-    info.pCode = code.data();
-    result_ = device.api().vkCreateShaderModule(device.handle(), &info, nullptr, &handle_);
-  }
-  ~Module() {
-    if (handle_ != VK_NULL_HANDLE) device_->api().vkDestroyShaderModule(device_->handle(), handle_, nullptr);
-  }
-  Module(const Module&) = delete;
-  Module& operator=(const Module&) = delete;
-
-  [[nodiscard]] VkResult result() const { return result_; }
-  [[nodiscard]] VkPipelineShaderStageCreateInfo stage(VkShaderStageFlagBits at) const {
-    auto info = info_of<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
-    info.stage = at;
-    info.module = handle_;
-    info.pName = "main";
-    return info;
-  }
-
- private:
-  const Device* device_;
-  VkShaderModule handle_ = VK_NULL_HANDLE;
-  VkResult result_ = VK_SUCCESS;
-};
-
-}  // namespace
 
 GraphicsPipelineInfo::GraphicsPipelineInfo() {
   raster = info_of<VkPipelineRasterizationStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO);
@@ -43,17 +10,6 @@ GraphicsPipelineInfo::GraphicsPipelineInfo() {
   depth = info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
   blend.colorWriteMask =
       VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
-}
-
-VkResult make_graphics_pipeline(const Device& device, std::span<const std::uint32_t> vertex_shader,
-                                std::span<const std::uint32_t> fragment_shader, const GraphicsPipelineInfo& wanted,
-                                VkPipeline& pipeline) {
-  const Module vertex(device, vertex_shader);
-  const Module fragment(device, fragment_shader);
-  if (vertex.result() != VK_SUCCESS) return vertex.result();
-  if (fragment.result() != VK_SUCCESS) return fragment.result();
-  const std::array stages = {vertex.stage(VK_SHADER_STAGE_VERTEX_BIT), fragment.stage(VK_SHADER_STAGE_FRAGMENT_BIT)};
-  return make_graphics_pipeline(device, stages, wanted, pipeline);
 }
 
 VkResult make_graphics_pipeline(const Device& device, std::span<const VkPipelineShaderStageCreateInfo, 2> stages,

@@ -24,9 +24,5 @@ struct GraphicsPipelineInfo {
 [[nodiscard]] VkResult make_graphics_pipeline(const Device& device,
                                               std::span<const VkPipelineShaderStageCreateInfo, 2> stages,
                                               const GraphicsPipelineInfo& info, VkPipeline& pipeline);
-/// Of shaders that nothing else is made of.
-[[nodiscard]] VkResult make_graphics_pipeline(const Device& device, std::span<const std::uint32_t> vertex_shader,
-                                              std::span<const std::uint32_t> fragment_shader,
-                                              const GraphicsPipelineInfo& info, VkPipeline& pipeline);
 
 }  // namespace quoin::vulkan

@@ -130,7 +130,8 @@ struct Stages {
       all[i].module = shaders[i];
       all[i].pName = "main";
     }
-    if (way.what == MeshWay::What::Blocky) all[0].pSpecializationInfo = &constants;
+    if (way.what != MeshWay::What::Blocky) return;
+    for (VkPipelineShaderStageCreateInfo& stage : all) stage.pSpecializationInfo = &constants;
   }
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
@@ -140,18 +141,11 @@ struct Stages {
 
 Result<std::unique_ptr<MeshPipelines>> MeshPipelines::create(Device& device) {
   static_assert(kCode.size() == kShaders);
-  const Api& api = device.api();
   std::unique_ptr<MeshPipelines> made(new MeshPipelines(device));
-  const VkPushConstantRange range{VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0, sizeof(ShaderMeshPush)};
-  auto layout = info_of<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
-  layout.pushConstantRangeCount = 1;
-  layout.pPushConstantRanges = &range;
-  VkResult result = api.vkCreatePipelineLayout(device.handle(), &layout, nullptr, &made->layout_);
+  constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
+  VkResult result = make_push_layout(device, kStages, sizeof(ShaderMeshPush), made->layout_);
   for (std::size_t i = 0; i < kShaders && result == VK_SUCCESS; ++i) {
-    auto module = info_of<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
-    module.codeSize = kCode[i].size_bytes();
-    module.pCode = kCode[i].data();
-    result = api.vkCreateShaderModule(device.handle(), &module, nullptr, &made->shaders_[i]);
+    result = make_shader(device, kCode[i], made->shaders_[i]);
   }
   if (Status status = device.check(result, kDoing); !status) return status.error();
   return made;

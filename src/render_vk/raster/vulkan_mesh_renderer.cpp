@@ -17,7 +17,7 @@ namespace quoin {
 using vulkan::Vec4;
 
 struct VulkanMeshRenderer::Impl {
-  Impl(VulkanRenderer::Impl& of_renderer, std::unique_ptr<vulkan::MeshPass> with_pass)
+  Impl(vulkan::RendererImpl& of_renderer, std::unique_ptr<vulkan::MeshPass> with_pass)
       : device(of_renderer.device.get()),
         memory(&of_renderer.memory),
         pass(std::move(with_pass)),
@@ -78,7 +78,7 @@ VulkanMeshRenderer& VulkanMeshRenderer::operator=(VulkanMeshRenderer&&) noexcept
 VulkanMeshRenderer::~VulkanMeshRenderer() = default;
 
 Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) {
-  VulkanRenderer::Impl& shared = renderer.impl();
+  vulkan::RendererImpl& shared = vulkan::Access::of(renderer);
   auto pass = vulkan::MeshPass::create(*shared.device, shared.memory);
   if (!pass) return pass.error();
   return VulkanMeshRenderer(std::make_unique<Impl>(shared, std::move(*pass)));
@@ -133,7 +133,7 @@ void VulkanMeshRenderer::clear() {
 }
 
 Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options) {
-  VulkanPicture::Impl& target = picture.impl();
+  vulkan::PictureImpl& target = vulkan::Access::of(picture);
   vulkan::Device& device = *impl_->device;
   const std::string who = "vulkan: " + device.description().name;
   if (Status right = check(camera, options); !right) return right;

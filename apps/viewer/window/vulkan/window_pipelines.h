@@ -5,13 +5,13 @@
 
 #include <glm/vec2.hpp>
 
-#include "render_vk/device/device.h"
+#include "window_device.h"
 
-namespace quoin::vulkan {
+namespace quoin::viewer {
 
-// What src/render_vk/shaders/window.glsl declares, field by field.
+// What shaders/window.glsl declares, field by field.
 struct WindowPush {
-  std::uint64_t data = 0;
+  std::uint64_t corners = 0;
   std::uint64_t font = 0;
   glm::ivec2 source{0};
   glm::vec2 origin{0.0F};
@@ -24,27 +24,34 @@ static_assert(sizeof(WindowPush) == 48);
 class WindowPipelines {
  public:
   /// Errors: those of Swapchain::format_of, LimitExceeded.
-  [[nodiscard]] static Result<std::unique_ptr<WindowPipelines>> create(Device& device);
+  [[nodiscard]] static Result<std::unique_ptr<WindowPipelines>> create(const WindowDevice& device);
   ~WindowPipelines();
   WindowPipelines(const WindowPipelines&) = delete;
   WindowPipelines& operator=(const WindowPipelines&) = delete;
 
   /// Clears, and leaves images ready to be shown.
   [[nodiscard]] VkRenderPass pass() const { return pass_; }
-  void bind_picture(VkCommandBuffer commands, const WindowPush& push) const { bind(commands, picture_, push); }
+  /// What `bind_picture` draws from now on. Requires: no commands that draw another run.
+  void set_picture(VkImageView view) const;
+  void bind_picture(VkCommandBuffer commands, const WindowPush& push) const;
   void bind_overlay(VkCommandBuffer commands, const WindowPush& push) const { bind(commands, overlay_, push); }
 
  private:
-  explicit WindowPipelines(Device& device) : device_(&device) {}
+  explicit WindowPipelines(const WindowDevice& device) : device_(&device) {}
   VkResult make_pass(VkFormat format);
   VkResult make_layout();
+  VkResult make_set();
   void bind(VkCommandBuffer commands, VkPipeline pipeline, const WindowPush& push) const;
 
-  Device* device_;
+  const WindowDevice* device_;
   VkRenderPass pass_ = VK_NULL_HANDLE;
+  VkSampler sampler_ = VK_NULL_HANDLE;
+  VkDescriptorSetLayout set_layout_ = VK_NULL_HANDLE;
+  VkDescriptorPool sets_ = VK_NULL_HANDLE;
+  VkDescriptorSet set_ = VK_NULL_HANDLE;  // one picture
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPipeline picture_ = VK_NULL_HANDLE;
   VkPipeline overlay_ = VK_NULL_HANDLE;
 };
 
-}  // namespace quoin::vulkan
+}  // namespace quoin::viewer

@@ -6,9 +6,10 @@
 
 #include <quoin/core/result.h>
 #include <quoin/render_vk/vulkan_picture.h>
-#include <quoin/render_vk/vulkan_renderer.h>
 
-namespace quoin {
+#include "window_device.h"
+
+namespace quoin::viewer {
 
 /// In pixels of a window, from its upper left corner.
 struct PixelRect {
@@ -42,15 +43,14 @@ struct Overlay {
   std::span<const OverlayDraw> draws;
 };
 
-/// Shows pictures of one renderer in a window.
+/// Shows pictures in a device's window: those of a renderer on that device.
 ///
 /// Colours: a picture's bytes are the window's.
-/// Must not outlive its renderer. Threads: the renderer's. Errors: as there.
+/// Threads: the renderer's. Errors: Unsupported when the device or the window was lost; LimitExceeded.
 class VulkanWindow {
  public:
-  /// Requires: `renderer` was created with VulkanOptions::surface. Errors also: InvalidArgument where it was not.
-  /// `vsync`: pictures wait for the display; without, where the device can, they do not.
-  [[nodiscard]] static Result<VulkanWindow> create(VulkanRenderer& renderer, bool vsync = true);
+  /// `vsync`: pictures wait for the display; without, where the device can, they do not. Shares `device`.
+  [[nodiscard]] static Result<VulkanWindow> create(std::shared_ptr<WindowDevice> device, bool vsync = true);
   VulkanWindow(VulkanWindow&&) noexcept;
   VulkanWindow& operator=(VulkanWindow&&) noexcept;
   ~VulkanWindow();
@@ -73,4 +73,4 @@ class VulkanWindow {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace quoin
+}  // namespace quoin::viewer

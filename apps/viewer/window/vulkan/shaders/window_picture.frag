@@ -2,11 +2,12 @@
 // A picture's bytes as they are, or stretched.
 #include "window.glsl"
 
+layout(binding = 0) uniform sampler2D picture;
 layout(location = 0) out vec4 colour;
 
 vec3 pixel(ivec2 at) {
   ivec2 inside = clamp(at, ivec2(0), push.source - 1);
-  return unpacked(Words(push.data).at[inside.y * push.source.x + inside.x]).rgb;
+  return texelFetch(picture, inside, 0).rgb;
 }
 
 void main() {

@@ -6,7 +6,7 @@ layout(location = 0) out vec2 place;
 layout(location = 1) out vec4 tint;
 
 void main() {
-  Words corners = Words(push.data);
+  Words corners = Words(push.corners);
   uint first = uint(gl_VertexIndex) * 5;
   vec2 at = vec2(uintBitsToFloat(corners.at[first]), uintBitsToFloat(corners.at[first + 1]));
   place = vec2(uintBitsToFloat(corners.at[first + 2]), uintBitsToFloat(corners.at[first + 3]));

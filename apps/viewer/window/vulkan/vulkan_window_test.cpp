@@ -1,19 +1,20 @@
 // Windows of Vulkan on a display, small and short-lived; tests/viewer/window.sh looks at a large one. The validation
 // layer watches where it is installed.
 
+#include "vulkan_window.h"
+
 #include <SDL.h>
-#include <SDL_vulkan.h>
 #include <array>
 #include <cstdlib>
-#include <cstring>
 
 #include <gtest/gtest.h>
-#include <quoin/render_vk/vulkan_window.h>
 
-#include "screen.h"
-#include "viewer.h"
+#include "core/death_for_tests.h"
 #include "viewer/viewer_fixture.h"
 #include "viewer/window/process_facts.h"
+#include "viewer/window/screen.h"
+#include "viewer/window/viewer.h"
+#include "vulkan_screen.h"
 
 namespace quoin::viewer {
 namespace {
@@ -28,35 +29,29 @@ class VulkanWindowTest : public ::testing::Test {
     video_ = std::move(*video);
     window_.reset(SDL_CreateWindow("test", 0, 0, 160, 90, SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE));
     if (!window_) GTEST_SKIP() << sdl_says();
-    auto made = VulkanRenderer::create(options(true));
-    if (!made) made = VulkanRenderer::create(options(false));
+    auto made = WindowDevice::create(options(true));
+    if (!made) made = WindowDevice::create(options(false));
     if (!made) GTEST_SKIP() << made.error().message;
-    renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+    device_ = std::move(*made);
+    auto renderer = make_renderer(device_);
+    ASSERT_TRUE(renderer) << to_string(renderer.error());
+    renderer_ = std::move(*renderer);
     scene_ = small_scene();
     ASSERT_TRUE(renderer_->update(scene_.scene));
   }
   void TearDown() override {
     renderer_.reset();
+    device_.reset();
     window_.reset();
     for (const std::string& message : messages_) ADD_FAILURE() << message;
   }
 
-  [[nodiscard]] VulkanOptions options(bool is_validated) {
-    VulkanOptions options;
-    if (is_validated) options.on_validation_message = [this](const std::string& text) { messages_.push_back(text); };
-    unsigned count = 0;
-    SDL_Vulkan_GetInstanceExtensions(window_.get(), &count, nullptr);
-    std::vector<const char*> names(count);
-    SDL_Vulkan_GetInstanceExtensions(window_.get(), &count, names.data());
-    options.surface.extensions.assign(names.begin(), names.end());
-    options.surface.make = [this](void* instance) {
-      VkSurfaceKHR surface{};
-      SDL_Vulkan_CreateSurface(window_.get(), static_cast<VkInstance>(instance), &surface);
-      std::uint64_t number = 0;
-      std::memcpy(&number, &surface, sizeof surface);
-      return number;
-    };
-    return options;
+  [[nodiscard]] WindowDeviceOptions options(bool is_validated) {
+    auto options = device_options(window_.get());
+    EXPECT_TRUE(options) << to_string(options.error());
+    if (!options) return {};
+    if (is_validated) options->on_validation_message = [this](const std::string& text) { messages_.push_back(text); };
+    return *options;
   }
 
   [[nodiscard]] VulkanPicture drawn(int width, int height) {
@@ -65,14 +60,15 @@ class VulkanWindowTest : public ::testing::Test {
     wanted.width = width;
     wanted.height = height;
     const Camera camera = frame_scene(scene_.scene, View::Iso, 16.0 / 9.0);
-    const Status status = renderer_->draw(picture, camera, wanted, true);
+    const Status status = renderer_->draw(picture, camera, wanted, Accumulation::Restart);
     EXPECT_TRUE(status) << to_string(status.error());
     return picture;
   }
 
   std::unique_ptr<SdlVideo> video_;
   SdlPointer<SDL_Window> window_;
-  std::unique_ptr<VulkanRenderer> renderer_;
+  std::shared_ptr<WindowDevice> device_;
+  std::shared_ptr<VulkanRenderer> renderer_;
   LoadedScene scene_;
   std::vector<std::string> messages_;
 };
@@ -83,7 +79,7 @@ constexpr std::array kCorners = {OverlayVertex{0, 0, 0, 0, 0xFF0000FFU}, Overlay
 constexpr std::array<std::uint16_t, 3> kIndices = {0, 1, 2};
 
 TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
-  auto window = VulkanWindow::create(*renderer_);
+  auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 0, 3, 0}, OverlayDraw{{-50, -50, 10, 10}, 0, 3, 0},
                             OverlayDraw{{100, 50, 5000, 5000}, 0, 3, 0}};
@@ -102,7 +98,7 @@ TEST_F(VulkanWindowTest, ShowsPicturesOfEverySizeAndOverlays) {
 }
 
 TEST_F(VulkanWindowTest, PicturesMayGoOnceTheyAreShown) {
-  auto window = VulkanWindow::create(*renderer_);
+  auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   for (int i = 0; i < 40; ++i) {
     VulkanPicture picture(*renderer_);
@@ -118,7 +114,7 @@ TEST_F(VulkanWindowTest, PicturesMayGoOnceTheyAreShown) {
 }
 
 TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
-  auto window = VulkanWindow::create(*renderer_, false);
+  auto window = VulkanWindow::create(device_, false);
   ASSERT_TRUE(window) << to_string(window.error());
   const VulkanPicture picture = drawn(64, 64);
   for (const auto& [width, height] : {std::pair{64, 64}, {300, 20}, {0, 0}, {640, 480}, {64, 0}, {64, 64}}) {
@@ -134,7 +130,7 @@ TEST_F(VulkanWindowTest, FollowsTheWindowsSizeAndRestsWhileMinimised) {
 TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
   const VulkanPicture picture = drawn(32, 32);
   for (int i = 0; i < 50; ++i) {
-    auto window = VulkanWindow::create(*renderer_);
+    auto window = VulkanWindow::create(device_);
     ASSERT_TRUE(window) << to_string(window.error());
     ASSERT_TRUE(window->present(160, 90, &picture, {0, 0, 32, 32}, {}));
   }
@@ -143,6 +139,7 @@ TEST_F(VulkanWindowTest, OpensAndClosesFiftyTimes) {
 TEST_F(VulkanWindowTest, FiftyStartsOfTheViewerLeaveNothingBehind) {
   // The viewer starts and ends SDL itself.
   renderer_.reset();
+  device_.reset();
   window_.reset();
   video_.reset();
   const ScratchFolder folder("vulkan_starts");
@@ -179,27 +176,38 @@ TEST_F(VulkanWindowTest, PicturesOfTheProcessorAreShownToo) {
   const auto read = picture.read();
   ASSERT_TRUE(read);
   EXPECT_EQ(read->rgb, image.rgb);
-  auto window = VulkanWindow::create(*renderer_);
+  auto window = VulkanWindow::create(device_);
   ASSERT_TRUE(window) << to_string(window.error());
   EXPECT_TRUE(window->present(160, 90, &picture, {0, 0, 160, 90}, {}));
 }
 
 TEST_F(VulkanWindowTest, WhatCannotBeIsTold) {
-  VulkanOptions wrong = options(false);
-  wrong.surface.extensions = {"VK_QUOIN_no_such_thing"};
-  auto made = VulkanRenderer::create(wrong);
-  ASSERT_FALSE(made);
-  EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
+  const auto expect_refusal = [](const WindowDeviceOptions& wrong, const std::string& why) {
+    const auto made = WindowDevice::create(wrong);
+    ASSERT_FALSE(made);
+    EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
+    EXPECT_NE(made.error().message.find(why), std::string::npos) << made.error().message;
+  };
+  WindowDeviceOptions wrong = options(false);
+  wrong.instance_extensions = {"VK_QUOIN_no_such_thing"};
+  expect_refusal(wrong, "no driver here shows pictures in windows");
   wrong = options(false);
-  wrong.surface.make = [](void*) { return std::uint64_t{0}; };
-  made = VulkanRenderer::create(wrong);
-  ASSERT_FALSE(made);
-  EXPECT_EQ(made.error().code, ErrorCode::Unsupported);
-  auto plain = VulkanRenderer::create();
-  ASSERT_TRUE(plain) << to_string(plain.error());
-  const auto window = VulkanWindow::create(*plain);
-  ASSERT_FALSE(window);
-  EXPECT_EQ(window.error().code, ErrorCode::InvalidArgument);
+  wrong.make_surface = [](VkInstance) { return VkSurfaceKHR{VK_NULL_HANDLE}; };
+  expect_refusal(wrong, "the window cannot show pictures");
+  wrong = options(false);
+  wrong.device = "no such device";
+  expect_refusal(wrong, "there is no device \"no such device\"; there is 0 ");
+  wrong = options(false);
+  wrong.find_function = nullptr;
+  expect_refusal(wrong, "there is no loader");
+}
+
+TEST_F(VulkanWindowTest, RequiresAFontOfItsSizeAndCornersThatAreThere) {
+  auto window = VulkanWindow::create(device_);
+  ASSERT_TRUE(window) << to_string(window.error());
+  const std::array draws = {OverlayDraw{{0, 0, 40, 40}, 1, 3, 0}};
+  QUOIN_EXPECT_MISTAKE((void)window->present(160, 90, nullptr, {}, {kCorners, kIndices, draws}), "that are there");
+  QUOIN_EXPECT_MISTAKE((void)window->set_font(3, 2, kFont), "a byte of opacity a pixel");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the shaders of a window read: src/render_vk/window_pipelines.h says the same.
+// What the shaders of a window read: window_pipelines.h says the same.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 
@@ -7,7 +7,7 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Wor
 };
 
 layout(push_constant) uniform Push {
-  uvec2 data;    // a picture's colours, or the overlay's corners
+  uvec2 corners; // the overlay's
   uvec2 font;    // its opacity, four pixels a word
   ivec2 source;  // the size of the picture, or of the font's
   vec2 origin;   // of the picture in the window

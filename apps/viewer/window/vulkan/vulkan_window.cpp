@@ -1,21 +1,18 @@
-#include <quoin/render_vk/vulkan_window.h>
+#include "vulkan_window.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <utility>
 
-#include "render_vk/march/device_picture.h"
-#include "render_vk/march/renderer_impl.h"
-#include "render_vk/window/swapchain.h"
-#include "render_vk/window/window_pipelines.h"
+#include <quoin/core/assert.h>
 
-namespace quoin {
+#include "swapchain.h"
+#include "window_memory.h"
+#include "window_pipelines.h"
+
+namespace quoin::viewer {
+
 namespace {
-
-using vulkan::Buffer;
-using vulkan::info_of;
-using vulkan::WindowPush;
 
 static_assert(sizeof(OverlayVertex) == 20, "what window_overlay.vert reads");
 
@@ -33,6 +30,16 @@ VkRect2D within(const PixelRect& rect, VkExtent2D window) {
   return {{left, top}, {static_cast<std::uint32_t>(right - left), static_cast<std::uint32_t>(bottom - top)}};
 }
 
+[[maybe_unused]] bool are_there(const Overlay& overlay) {
+  return std::all_of(overlay.draws.begin(), overlay.draws.end(), [&](const OverlayDraw& draw) {
+    if (std::uint64_t{draw.first_index} + draw.index_count > overlay.indices.size()) return false;
+    const auto indices = overlay.indices.subspan(draw.first_index, draw.index_count);
+    return std::all_of(indices.begin(), indices.end(), [&](std::uint16_t index) {
+      return std::uint64_t{draw.first_vertex} + index < overlay.vertices.size();
+    });
+  });
+}
+
 glm::vec2 as_vector(VkExtent2D size) {
   return {static_cast<float>(size.width), static_cast<float>(size.height)};
 }
@@ -40,7 +47,13 @@ glm::vec2 as_vector(VkExtent2D size) {
 }  // namespace
 
 struct VulkanWindow::Impl {
-  explicit Impl(vulkan::Device& of_device, bool with_vsync) : device(&of_device), vsync(with_vsync) {}
+  Impl(std::shared_ptr<WindowDevice> of_device, bool with_vsync)
+      : device(std::move(of_device)),
+        vsync(with_vsync),
+        image(*device),
+        vertices(*device),
+        indices(*device),
+        font(*device) {}
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -48,33 +61,33 @@ struct VulkanWindow::Impl {
   VkResult make_objects();
   Status fit(int width, int height);
   Status write(const Overlay& overlay);
-  Status put(Buffer& buffer, std::span<const std::byte> bytes) const;
-  VkResult record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place, const Overlay& overlay);
-  void draw_picture(const VulkanPicture::Impl& picture, const PixelRect& place) const;
+  Status begin(const VulkanPicture* picture);
+  Status record(std::uint32_t shown, const VulkanPicture* picture, const PixelRect& place, const Overlay& overlay);
+  void draw_picture(const VulkanPicture& picture, const PixelRect& place) const;
   void draw_overlay(const Overlay& overlay) const;
-  void let_pictures_be_read() const;
-  VkResult show(std::uint32_t image);
+  VkResult show(std::uint32_t shown);
   VkResult wait();
 
-  vulkan::Device* device;
+  std::shared_ptr<WindowDevice> device;
   bool vsync;
-  std::unique_ptr<vulkan::WindowPipelines> pipelines;
-  std::unique_ptr<vulkan::Swapchain> swapchain;  // null until there is a size
+  std::unique_ptr<WindowPipelines> pipelines;
+  std::unique_ptr<Swapchain> swapchain;  // null until there is a size
   bool is_stale = true;
   VkCommandPool pool = VK_NULL_HANDLE;
   VkCommandBuffer commands = VK_NULL_HANDLE;
   VkFence done = VK_NULL_HANDLE;
   VkSemaphore handed = VK_NULL_HANDLE;
-  Buffer vertices;
-  Buffer indices;
-  Buffer font;
+  PictureImage image;
+  WindowBuffer vertices;
+  WindowBuffer indices;
+  WindowBuffer font;
   glm::ivec2 font_size{0};
 };
 
 VkResult VulkanWindow::Impl::make_objects() {
-  const vulkan::Api& api = device->api();
+  const VulkanFunctions& api = device->api();
   auto pool_info = info_of<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-  pool_info.queueFamilyIndex = device->physical().queue_family;
+  pool_info.queueFamilyIndex = device->queue_family();
   VkResult result = api.vkCreateCommandPool(device->handle(), &pool_info, nullptr, &pool);
   if (result != VK_SUCCESS) return result;
   auto buffer = info_of<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
@@ -90,7 +103,7 @@ VkResult VulkanWindow::Impl::make_objects() {
 }
 
 VulkanWindow::Impl::~Impl() {
-  const vulkan::Api& api = device->api();
+  const VulkanFunctions& api = device->api();
   api.vkDeviceWaitIdle(device->handle());
   swapchain.reset();
   if (handed != VK_NULL_HANDLE) api.vkDestroySemaphore(device->handle(), handed, nullptr);
@@ -100,7 +113,7 @@ VulkanWindow::Impl::~Impl() {
 
 // Until the last frame is drawn.
 VkResult VulkanWindow::Impl::wait() {
-  const vulkan::Api& api = device->api();
+  const VulkanFunctions& api = device->api();
   const VkResult result =
       api.vkWaitForFences(device->handle(), 1, &done, VK_TRUE, std::numeric_limits<std::uint64_t>::max());
   return result == VK_SUCCESS ? api.vkResetFences(device->handle(), 1, &done) : result;
@@ -113,34 +126,22 @@ Status VulkanWindow::Impl::fit(int width, int height) {
   }
   // What is still being shown must not go; resizing is rare enough to wait for all.
   device->api().vkDeviceWaitIdle(device->handle());
-  const std::unique_ptr<vulkan::Swapchain> old = std::move(swapchain);
-  auto made = vulkan::Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
+  const std::unique_ptr<Swapchain> old = std::move(swapchain);
+  auto made = Swapchain::create(*device, pipelines->pass(), width, height, vsync, old.get());
   if (!made) return made.error();
   swapchain = std::move(*made);
   is_stale = false;
   return {};
 }
 
-Status VulkanWindow::Impl::put(Buffer& buffer, std::span<const std::byte> bytes) const {
-  if (bytes.empty()) return {};
-  if (buffer.size() < bytes.size()) {
-    auto made = Buffer::create(*device, bytes.size() * 3 / 2, Buffer::Where::Upload, kDoing);
-    if (!made) return made.error();
-    buffer = std::move(*made);
-  }
-  std::memcpy(buffer.mapped(), bytes.data(), bytes.size());
-  return {};
-}
-
 Status VulkanWindow::Impl::write(const Overlay& overlay) {
-  Status written = put(vertices, std::as_bytes(overlay.vertices));
-  return written ? put(indices, std::as_bytes(overlay.indices)) : written;
+  Status written = vertices.put(std::as_bytes(overlay.vertices));
+  return written ? indices.put(std::as_bytes(overlay.indices)) : written;
 }
 
-void VulkanWindow::Impl::draw_picture(const VulkanPicture::Impl& picture, const PixelRect& place) const {
+void VulkanWindow::Impl::draw_picture(const VulkanPicture& picture, const PixelRect& place) const {
   WindowPush push;
-  push.data = picture.colours.address();
-  push.source = {picture.width, picture.height};
+  push.source = {picture.width(), picture.height()};
   push.origin = {static_cast<float>(place.x), static_cast<float>(place.y)};
   push.scale = glm::vec2(push.source) / glm::vec2(static_cast<float>(place.width), static_cast<float>(place.height));
   pipelines->bind_picture(commands, push);
@@ -151,7 +152,7 @@ void VulkanWindow::Impl::draw_picture(const VulkanPicture::Impl& picture, const 
 
 void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
   WindowPush push;
-  push.data = vertices.address();
+  push.corners = vertices.address();
   push.font = font.address();
   push.source = font_size;
   push.window = as_vector(swapchain->extent());
@@ -166,29 +167,32 @@ void VulkanWindow::Impl::draw_overlay(const Overlay& overlay) const {
   }
 }
 
-// What commands before these wrote, is seen by shaders that draw the window.
-void VulkanWindow::Impl::let_pictures_be_read() const {
-  auto barrier = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-  barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
-  device->api().vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT,
-                                     VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+// Commands, and the picture's way into an image that shaders read.
+Status VulkanWindow::Impl::begin(const VulkanPicture* picture) {
+  const VulkanFunctions& api = device->api();
+  if (picture != nullptr) {
+    const auto is_another = image.fit(picture->width(), picture->height());
+    if (!is_another) return is_another.error();
+    if (*is_another) pipelines->set_picture(image.view());
+  }
+  auto info = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
+  info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
+  VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
+  if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &info);
+  if (result != VK_SUCCESS) return device->check(result, kDoing);
+  return picture == nullptr ? Status{} : picture->record_copy(commands, image.target());
 }
 
-VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* picture, const PixelRect& place,
-                                    const Overlay& overlay) {
-  const vulkan::Api& api = device->api();
-  auto begin = info_of<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
-  begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
-  if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &begin);
-  if (result != VK_SUCCESS) return result;
-  let_pictures_be_read();
+Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanPicture* picture, const PixelRect& place,
+                                  const Overlay& overlay) {
+  const VulkanFunctions& api = device->api();
+  const bool is_seen = picture != nullptr && picture->samples() > 0 && place.width > 0 && place.height > 0;
+  if (Status begun = begin(is_seen ? picture : nullptr); !begun) return begun;
   const VkExtent2D size = swapchain->extent();
   auto pass = info_of<VkRenderPassBeginInfo>(VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO);
   const VkClearValue ground{kGround};
   pass.renderPass = pipelines->pass();
-  pass.framebuffer = swapchain->framebuffer(image);
+  pass.framebuffer = swapchain->framebuffer(shown);
   pass.renderArea = {{0, 0}, size};
   pass.clearValueCount = 1;
   pass.pClearValues = &ground;
@@ -196,17 +200,16 @@ VkResult VulkanWindow::Impl::record(std::uint32_t image, const VulkanPicture* pi
   const glm::vec2 all = as_vector(size);
   const VkViewport viewport{0.0F, 0.0F, all.x, all.y, 0.0F, 1.0F};
   api.vkCmdSetViewport(commands, 0, 1, &viewport);
-  const bool is_seen = picture != nullptr && picture->samples() > 0 && place.width > 0 && place.height > 0;
-  if (is_seen) draw_picture(picture->impl(), place);
+  if (is_seen) draw_picture(*picture, place);
   const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
   if (has_overlay) draw_overlay(overlay);
   api.vkCmdEndRenderPass(commands);
-  return api.vkEndCommandBuffer(commands);
+  return device->check(api.vkEndCommandBuffer(commands), kDoing);
 }
 
-VkResult VulkanWindow::Impl::show(std::uint32_t image) {
+VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
   const VkPipelineStageFlags stage = VK_PIPELINE_STAGE_COLOR_ATTACHMENT_OUTPUT_BIT;
-  const VkSemaphore drawn = swapchain->drawn(image);
+  const VkSemaphore drawn = swapchain->drawn(shown);
   auto submit = info_of<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.waitSemaphoreCount = submit.commandBufferCount = submit.signalSemaphoreCount = 1;
   submit.pWaitSemaphores = &handed;
@@ -221,11 +224,11 @@ VkResult VulkanWindow::Impl::show(std::uint32_t image) {
   present.waitSemaphoreCount = present.swapchainCount = 1;
   present.pWaitSemaphores = &drawn;
   present.pSwapchains = &chain;
-  present.pImageIndices = &image;
-  const VkResult shown = device->api().vkQueuePresentKHR(device->queue(), &present);
+  present.pImageIndices = &shown;
+  const VkResult presented = device->api().vkQueuePresentKHR(device->queue(), &present);
   // Nobody else knows of these commands: what they read could be given back while they run.
   const VkResult waited = wait();
-  return waited == VK_SUCCESS ? shown : waited;
+  return waited == VK_SUCCESS ? presented : waited;
 }
 
 VulkanWindow::VulkanWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -233,47 +236,47 @@ VulkanWindow::VulkanWindow(VulkanWindow&&) noexcept = default;
 VulkanWindow& VulkanWindow::operator=(VulkanWindow&&) noexcept = default;
 VulkanWindow::~VulkanWindow() = default;
 
-Result<VulkanWindow> VulkanWindow::create(VulkanRenderer& renderer, bool vsync) {
-  vulkan::Device& device = *renderer.impl().device;
-  if (device.surface() == VK_NULL_HANDLE) {
-    return fail(ErrorCode::InvalidArgument, "vulkan: the renderer was created without a window");
-  }
-  auto impl = std::make_unique<Impl>(device, vsync);
-  auto pipelines = vulkan::WindowPipelines::create(device);
+Result<VulkanWindow> VulkanWindow::create(std::shared_ptr<WindowDevice> device, bool vsync) {
+  auto impl = std::make_unique<Impl>(std::move(device), vsync);
+  auto pipelines = WindowPipelines::create(*impl->device);
   if (!pipelines) return pipelines.error();
   impl->pipelines = std::move(*pipelines);
-  if (Status made = device.check(impl->make_objects(), "opening a window"); !made) return made.error();
+  if (Status made = impl->device->check(impl->make_objects(), "opening a window"); !made) return made.error();
   return VulkanWindow(std::move(impl));
 }
 
 Status VulkanWindow::set_font(int width, int height, std::span<const std::uint8_t> opacity) {
-  const Status put = impl_->put(impl_->font, std::as_bytes(opacity));
+  QUOIN_ASSERT(
+      width > 0 && height > 0 && opacity.size() == static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+      "a byte of opacity a pixel");
+  Status put = impl_->font.put(std::as_bytes(opacity));
   impl_->font_size = put ? glm::ivec2(width, height) : glm::ivec2(0);
   return put;
 }
 
 Status VulkanWindow::present(int width, int height, const VulkanPicture* picture, const PixelRect& place,
                              const Overlay& overlay) {
+  QUOIN_ASSERT(are_there(overlay), "draws name indices, and these vertices, that are there");
   if (width <= 0 || height <= 0) return {};
   Impl& window = *impl_;
-  const vulkan::Api& api = window.device->api();
+  const VulkanFunctions& api = window.device->api();
   if (Status written = window.write(overlay); !written) return written;
   constexpr int kTries = 3;  // the size may change under one's hands
   for (int attempt = 0; attempt < kTries; ++attempt) {
     if (Status fits = window.fit(width, height); !fits || !window.swapchain) return fits;
-    std::uint32_t image = 0;
+    std::uint32_t shown = 0;
     VkResult result =
         api.vkAcquireNextImageKHR(window.device->handle(), window.swapchain->handle(),
-                                  std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &image);
+                                  std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
     if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kDoing);
-    result = window.record(image, picture, place, overlay);
-    if (result == VK_SUCCESS) result = window.show(image);
+    if (Status recorded = window.record(shown, picture, place, overlay); !recorded) return recorded;
+    result = window.show(shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
     return window.is_stale ? Status{} : window.device->check(result, kDoing);
   }
   return {};  // another frame will fit
 }
 
-}  // namespace quoin
+}  // namespace quoin::viewer

@@ -1,9 +1,9 @@
-#include "render_vk/window/swapchain.h"
+#include "swapchain.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace quoin::vulkan {
+namespace quoin::viewer {
 namespace {
 
 const char* const kDoing = "making a window's images";
@@ -25,8 +25,8 @@ VkCompositeAlphaFlagBitsKHR opaque(VkCompositeAlphaFlagsKHR supported) {
 
 }  // namespace
 
-Result<VkSurfaceFormatKHR> Swapchain::format_of(const Device& device) {
-  const VkPhysicalDevice physical = device.physical().handle;
+Result<VkSurfaceFormatKHR> Swapchain::format_of(const WindowDevice& device) {
+  const VkPhysicalDevice physical = device.physical();
   std::uint32_t count = 0;
   device.api().vkGetPhysicalDeviceSurfaceFormatsKHR(physical, device.surface(), &count, nullptr);
   std::vector<VkSurfaceFormatKHR> formats(count);
@@ -35,11 +35,11 @@ Result<VkSurfaceFormatKHR> Swapchain::format_of(const Device& device) {
     const bool has_bytes = format.format == VK_FORMAT_B8G8R8A8_UNORM || format.format == VK_FORMAT_R8G8B8A8_UNORM;
     if (has_bytes && format.colorSpace == VK_COLOR_SPACE_SRGB_NONLINEAR_KHR) return format;
   }
-  return fail(ErrorCode::Unsupported, "vulkan: " + device.description().name + ": the window takes no bytes of sRGB");
+  return fail(ErrorCode::Unsupported, "vulkan: " + device.name() + ": the window takes no bytes of sRGB");
 }
 
-Result<std::unique_ptr<Swapchain>> Swapchain::create(Device& device, VkRenderPass pass, int width, int height,
-                                                     bool vsync, const Swapchain* old) {
+Result<std::unique_ptr<Swapchain>> Swapchain::create(const WindowDevice& device, VkRenderPass pass, int width,
+                                                     int height, bool vsync, const Swapchain* old) {
   std::unique_ptr<Swapchain> made(new Swapchain(device));
   const VkExtent2D wanted{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
   const VkResult result = made->open(pass, wanted, vsync, old == nullptr ? VK_NULL_HANDLE : old->handle());
@@ -49,7 +49,7 @@ Result<std::unique_ptr<Swapchain>> Swapchain::create(Device& device, VkRenderPas
 }
 
 Swapchain::~Swapchain() {
-  const Api& api = device_->api();
+  const VulkanFunctions& api = device_->api();
   for (const OneImage& image : images_) {
     if (image.drawn != VK_NULL_HANDLE) api.vkDestroySemaphore(device_->handle(), image.drawn, nullptr);
     if (image.framebuffer != VK_NULL_HANDLE) api.vkDestroyFramebuffer(device_->handle(), image.framebuffer, nullptr);
@@ -60,7 +60,7 @@ Swapchain::~Swapchain() {
 
 VkPresentModeKHR Swapchain::mode(bool vsync) const {
   std::uint32_t count = 0;
-  const VkPhysicalDevice physical = device_->physical().handle;
+  const VkPhysicalDevice physical = device_->physical();
   device_->api().vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, nullptr);
   std::vector<VkPresentModeKHR> modes(count);
   device_->api().vkGetPhysicalDeviceSurfacePresentModesKHR(physical, device_->surface(), &count, modes.data());
@@ -71,9 +71,9 @@ VkPresentModeKHR Swapchain::mode(bool vsync) const {
 }
 
 VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwapchainKHR old) {
-  const Api& api = device_->api();
+  const VulkanFunctions& api = device_->api();
   VkSurfaceCapabilitiesKHR can{};
-  VkResult result = api.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device_->physical().handle, device_->surface(), &can);
+  VkResult result = api.vkGetPhysicalDeviceSurfaceCapabilitiesKHR(device_->physical(), device_->surface(), &can);
   if (result != VK_SUCCESS) return result;
   const auto format = format_of(*device_);
   if (!format) return VK_ERROR_FORMAT_NOT_SUPPORTED;
@@ -106,7 +106,7 @@ VkResult Swapchain::open(VkRenderPass pass, VkExtent2D wanted, bool vsync, VkSwa
 }
 
 VkResult Swapchain::add_image(VkImage image, VkFormat format, VkRenderPass pass) {
-  const Api& api = device_->api();
+  const VulkanFunctions& api = device_->api();
   OneImage& one = images_.emplace_back();
   auto view = info_of<VkImageViewCreateInfo>(VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO);
   view.image = image;
@@ -128,4 +128,4 @@ VkResult Swapchain::add_image(VkImage image, VkFormat format, VkRenderPass pass)
   return api.vkCreateSemaphore(device_->handle(), &semaphore, nullptr, &one.drawn);
 }
 
-}  // namespace quoin::vulkan
+}  // namespace quoin::viewer

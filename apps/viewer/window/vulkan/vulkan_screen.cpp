@@ -1,15 +1,45 @@
-#include <SDL_vulkan.h>
+#include "vulkan_screen.h"
+
 #include <imgui.h>
 
 #include <cmath>
-#include <cstring>
 #include <vector>
 
-#include <quoin/render_vk/vulkan_window.h>
+#include "viewer/window/screen.h"
+#include "vulkan_window.h"
 
-#include "screen.h"
+// After Vulkan's own headers, whose types it would declare else.
+#include <SDL_vulkan.h>
 
 namespace quoin::viewer {
+
+Result<WindowDeviceOptions> device_options(SDL_Window* window) {
+  unsigned count = 0;
+  if (SDL_Vulkan_GetInstanceExtensions(window, &count, nullptr) == SDL_FALSE) {
+    return fail(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
+  }
+  std::vector<const char*> names(count);
+  SDL_Vulkan_GetInstanceExtensions(window, &count, names.data());
+  WindowDeviceOptions options;
+  options.instance_extensions.assign(names.begin(), names.end());
+  options.find_function = reinterpret_cast<PFN_vkGetInstanceProcAddr>(SDL_Vulkan_GetVkGetInstanceProcAddr());
+  options.make_surface = [window](VkInstance instance) {
+    VkSurfaceKHR surface = VK_NULL_HANDLE;
+    return SDL_Vulkan_CreateSurface(window, instance, &surface) == SDL_TRUE ? surface : VK_NULL_HANDLE;
+  };
+  return options;
+}
+
+Result<std::shared_ptr<VulkanRenderer>> make_renderer(std::shared_ptr<WindowDevice> device) {
+  struct Both {
+    std::shared_ptr<WindowDevice> device;
+    VulkanRenderer renderer;  // goes first
+  };
+  auto renderer = VulkanRenderer::create(device->lent());
+  if (!renderer) return renderer.error();
+  const auto both = std::make_shared<Both>(Both{std::move(device), std::move(*renderer)});
+  return std::shared_ptr<VulkanRenderer>(both, &both->renderer);
+}
 
 namespace {
 
@@ -40,27 +70,15 @@ class VulkanScreen final : public Screen {
 
 Status VulkanScreen::open(int width, int height, const std::string& device) {
   if (Status opened = open_window(width, height, SDL_WINDOW_VULKAN); !opened) return opened;
-  VulkanOptions options;
-  options.device = device;
-  unsigned count = 0;
-  if (SDL_Vulkan_GetInstanceExtensions(window(), &count, nullptr) == SDL_FALSE) {
-    return fail(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
-  }
-  std::vector<const char*> names(count);
-  SDL_Vulkan_GetInstanceExtensions(window(), &count, names.data());
-  options.surface.extensions.assign(names.begin(), names.end());
-  options.surface.make = [this](void* instance) {
-    VkSurfaceKHR surface{};
-    std::uint64_t number = 0;
-    if (SDL_Vulkan_CreateSurface(window(), static_cast<VkInstance>(instance), &surface) == SDL_FALSE) return number;
-    static_assert(sizeof surface == sizeof number);
-    std::memcpy(&number, &surface, sizeof number);
-    return number;
-  };
-  auto made = VulkanRenderer::create(options);
+  auto options = device_options(window());
+  if (!options) return options.error();
+  options->device = device;
+  auto made = WindowDevice::create(*options);
   if (!made) return made.error();
-  renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
-  auto shown = VulkanWindow::create(*renderer_);
+  auto renderer = make_renderer(*made);
+  if (!renderer) return renderer.error();
+  renderer_ = std::move(*renderer);
+  auto shown = VulkanWindow::create(std::move(*made));
   if (!shown) return shown.error();
   shown_in_ = std::make_unique<VulkanWindow>(std::move(*shown));
   return {};

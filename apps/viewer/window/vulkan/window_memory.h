@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <quoin/render_vk/vulkan_image.h>
+
+#include "window_device.h"
+
+namespace quoin::viewer {
+
+/// Bytes that the processor writes and shaders read by address.
+class WindowBuffer {
+ public:
+  explicit WindowBuffer(const WindowDevice& device) : device_(&device) {}
+  ~WindowBuffer() { free(); }
+  WindowBuffer(const WindowBuffer&) = delete;
+  WindowBuffer& operator=(const WindowBuffer&) = delete;
+
+  /// Grows where they do not fit. Requires: no commands that read it run. Errors: LimitExceeded.
+  [[nodiscard]] Status put(std::span<const std::byte> bytes);
+
+  [[nodiscard]] VkBuffer handle() const { return handle_; }
+  [[nodiscard]] VkDeviceAddress address() const { return address_; }
+
+ private:
+  VkResult grow(VkDeviceSize size);
+  void free();
+
+  const WindowDevice* device_;
+  VkBuffer handle_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkDeviceSize size_ = 0;
+  VkDeviceAddress address_ = 0;
+  std::byte* mapped_ = nullptr;
+};
+
+/// An image that Quoin's pictures are put into and shaders read from.
+class PictureImage {
+ public:
+  static constexpr VkFormat kFormat = VK_FORMAT_R8G8B8A8_UNORM;  // bytes as they are
+
+  explicit PictureImage(const WindowDevice& device) : device_(&device) {}
+  ~PictureImage() { free(); }
+  PictureImage(const PictureImage&) = delete;
+  PictureImage& operator=(const PictureImage&) = delete;
+
+  /// Becomes another image where the size is another; its pixels mean nothing then. Returns whether it did.
+  /// Requires: no commands that read it run. Errors: LimitExceeded.
+  [[nodiscard]] Result<bool> fit(int width, int height);
+
+  [[nodiscard]] VkImageView view() const { return view_; }
+  /// For VulkanPicture::record_copy: leaves it to be read by shaders.
+  [[nodiscard]] VulkanImageTarget target() const;
+
+ private:
+  VkResult make(int width, int height);
+  void free();
+
+  const WindowDevice* device_;
+  VkImage image_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  VkImageView view_ = VK_NULL_HANDLE;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+}  // namespace quoin::viewer

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/render_vk/vulkan_handles.h>
+
+namespace quoin {
+
+/// A device that Vulkan offers.
+struct VulkanDevice {
+  std::string name;
+  std::string kind;     ///< discrete, integrated, virtual, cpu or other
+  std::string missing;  ///< what it lacks of what Quoin needs; empty: nothing
+};
+
+/// The devices of this machine, in Vulkan's order.
+///
+/// Errors: Unsupported when the library was built without Vulkan, when there is no loader, or no driver.
+[[nodiscard]] Result<std::vector<VulkanDevice>> vulkan_devices();
+
+/// Returns the index of the device that `wanted` names: a number is an index, anything else a part of a name, in
+/// capitals or not; empty: the first of the best kind (discrete, integrated, virtual, cpu, other) that lacks nothing.
+///
+/// Errors: Unsupported when there is no such device, naming those there are, and when it lacks something, saying what.
+[[nodiscard]] Result<std::size_t> choose_vulkan_device(std::span<const VulkanDevice> devices,
+                                                       const std::string& wanted);
+
+/// What an instance and a device that a program makes by itself need for Quoin's renderers.
+struct VulkanRequirements {
+  /// At least, of the instance (VkApplicationInfo::apiVersion) and of the device: VK_API_VERSION_1_2.
+  std::uint32_t api_version = 0;
+  std::span<const char* const> instance_extensions;  ///< none so far
+  std::span<const char* const> device_extensions;    ///< none so far
+  /// Members of Vulkan's structures of features that must be true; `enable_vulkan_features` sets them.
+  std::span<const char* const> features;
+  /// The same of features without which some pictures are refused; BorrowedVulkanDevice says which are enabled.
+  std::span<const char* const> optional_features;
+};
+
+/// The same for every device; also in builds without Vulkan.
+[[nodiscard]] VulkanRequirements vulkan_requirements();
+
+/// Returns how a physical device of a program's own instance is called, and what it lacks. `instance` must have been
+/// made with at least `vulkan_requirements().api_version`. `find_function` is vkGetInstanceProcAddr; null: that of the
+/// loader that the library finds (libvulkan.so.1).
+///
+/// Errors: InvalidArgument when a handle is null; Unsupported when the library was built without Vulkan, or when there
+///         is no loader.
+[[nodiscard]] Result<VulkanDevice> describe_vulkan_device(VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
+                                                          VulkanFunctionFinder find_function = nullptr);
+
+/// Memory for a structure that `enable_vulkan_features` chains.
+struct VulkanFeatureStorage {
+  alignas(8) std::array<std::byte, 64> bytes{};
+};
+
+/// Enables what `vulkan_requirements().features` names: in the structures that are chained to `info` already
+/// (VkPhysicalDeviceVulkan12Features or VkPhysicalDeviceBufferDeviceAddressFeatures), whose other members stay as they
+/// are, or else in one more, which is put in `storage` and chained first.
+///
+/// Requires: `info.sType` says what it is; what is chained to it may be written to; `storage` stays in its place until
+///           vkCreateDevice has returned.
+/// Errors:   Unsupported when the library was built without Vulkan.
+[[nodiscard]] Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& storage);
+
+/// A program's own device, for VulkanRenderer::create. Quoin destroys none of these; all must outlive the renderer.
+struct BorrowedVulkanDevice {
+  VkInstance_T* instance = nullptr;               ///< VkInstance, made as `vulkan_requirements` says
+  VkPhysicalDevice_T* physical_device = nullptr;  ///< VkPhysicalDevice
+  VkDevice_T* device = nullptr;                   ///< VkDevice, made as `vulkan_requirements` says
+  VkQueue_T* queue = nullptr;                     ///< VkQueue that computes; for meshes it must draw too
+  std::uint32_t queue_family = 0;                 ///< of that queue
+  bool fill_mode_non_solid = false;               ///< that feature is enabled: wireframes need it
+  VulkanFunctionFinder find_function = nullptr;   ///< vkGetInstanceProcAddr; null: the loader's (libvulkan.so.1)
+  /// Vulkan wants one thread at a time to use a queue. Quoin submits from the thread that calls it, and only while it
+  /// runs `use`, which this must do once, before it returns: with the lock held that guards the queue. Empty: nobody
+  /// else uses the queue during calls of Quoin's that may draw, upload or read.
+  std::function<void(const std::function<void()>& use)> with_queue;
+};
+
+}  // namespace quoin

@@ -1,0 +1,61 @@
+#include <cstring>
+#include <new>
+#include <type_traits>
+
+#include <quoin/core/assert.h>
+#include <quoin/render_vk/vulkan_device.h>
+
+#include "render_vk/device/instance.h"
+
+namespace quoin {
+
+using vulkan::Api;
+
+static_assert(std::is_same_v<VulkanImageHandle, VkImage>);
+static_assert(std::is_same_v<VulkanFunctionFinder, PFN_vkGetInstanceProcAddr>);
+static_assert(std::is_same_v<VulkanFunction, PFN_vkVoidFunction>);
+
+Result<std::vector<VulkanDevice>> vulkan_devices() {
+  const auto instance = vulkan::VulkanInstance::create({});
+  if (!instance) return instance.error();
+  std::vector<VulkanDevice> devices;
+  for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
+  return devices;
+}
+
+Result<VulkanDevice> describe_vulkan_device(VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
+                                            VulkanFunctionFinder find_function) {
+  if (instance == nullptr) return fail(ErrorCode::InvalidArgument, "vulkan: the instance is null");
+  if (physical_device == nullptr) return fail(ErrorCode::InvalidArgument, "vulkan: the physical device is null");
+  auto api = Api::find(find_function);
+  if (!api) return api.error();
+  if (const char* missing = api->load_instance(instance)) {
+    return fail(ErrorCode::Unsupported, std::string("vulkan: the instance lacks ") + missing);
+  }
+  return vulkan::describe(*api, physical_device).description;
+}
+
+Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& storage) {
+  using Addresses = VkPhysicalDeviceBufferDeviceAddressFeatures;
+  static_assert(sizeof(Addresses) <= sizeof storage.bytes && alignof(Addresses) <= 8);
+  QUOIN_ASSERT(info.sType == VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, "a VkDeviceCreateInfo that says what it is");
+  // Vulkan declares chains constant, but only reads them where it says so.
+  for (auto* one = static_cast<VkBaseOutStructure*>(const_cast<void*>(info.pNext)); one != nullptr; one = one->pNext) {
+    if (one->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES) {
+      reinterpret_cast<VkPhysicalDeviceVulkan12Features*>(one)->bufferDeviceAddress = VK_TRUE;
+      return {};
+    }
+    if (one->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES) {
+      reinterpret_cast<Addresses*>(one)->bufferDeviceAddress = VK_TRUE;
+      return {};
+    }
+  }
+  auto* addresses = new (storage.bytes.data()) Addresses{};
+  addresses->sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES;
+  addresses->pNext = const_cast<void*>(info.pNext);
+  addresses->bufferDeviceAddress = VK_TRUE;
+  info.pNext = addresses;
+  return {};
+}
+
+}  // namespace quoin

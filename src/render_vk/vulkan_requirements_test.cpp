@@ -1,0 +1,43 @@
+// How a device is chosen of those there are.
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+#include <quoin/render_vk/vulkan_device.h>
+
+namespace quoin {
+namespace {
+
+const std::array<VulkanDevice, 4> kDevices = {
+    VulkanDevice{"llvmpipe (LLVM 15)", "cpu", ""}, VulkanDevice{"Old Card", "discrete", "bufferDeviceAddress"},
+    VulkanDevice{"Card 1", "integrated", ""}, VulkanDevice{"Card 2", "integrated", ""}};
+
+TEST(ChooseVulkanDevice, TakesTheFirstOfTheBestKindThatLacksNothing) {
+  EXPECT_EQ(choose_vulkan_device(kDevices, "").value(), 2U);
+  EXPECT_EQ(choose_vulkan_device(std::span(kDevices).first(1), "").value(), 0U);
+}
+
+TEST(ChooseVulkanDevice, TakesNumbersAndPartsOfNames) {
+  EXPECT_EQ(choose_vulkan_device(kDevices, "3").value(), 3U);
+  EXPECT_EQ(choose_vulkan_device(kDevices, "CARD 2").value(), 3U);
+  EXPECT_EQ(choose_vulkan_device(kDevices, "card").value(), 2U);
+  EXPECT_EQ(choose_vulkan_device(kDevices, "LlvmPipe").value(), 0U);
+}
+
+TEST(ChooseVulkanDevice, SaysWhatThereIsAndWhatIsMissing) {
+  const auto expect_refusal = [](std::span<const VulkanDevice> devices, const char* wanted, const char* message) {
+    const auto chosen = choose_vulkan_device(devices, wanted);
+    ASSERT_FALSE(chosen);
+    EXPECT_EQ(chosen.error().code, ErrorCode::Unsupported);
+    EXPECT_EQ(chosen.error().message, message);
+  };
+  expect_refusal(kDevices, "old", "vulkan: Old Card lacks bufferDeviceAddress");
+  expect_refusal(kDevices, "1", "vulkan: Old Card lacks bufferDeviceAddress");
+  expect_refusal(std::span(kDevices).first(2), "7",
+                 "vulkan: there is no device \"7\"; there is 0 llvmpipe (LLVM 15), 1 Old Card");
+  expect_refusal({}, "", "vulkan: there is no device \"\", nor any other");
+}
+
+}  // namespace
+}  // namespace quoin
