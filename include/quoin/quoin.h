@@ -6,6 +6,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/half.h>
 #include <quoin/core/image.h>
+#include <quoin/core/oriented_box.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -48,6 +49,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_edit.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
