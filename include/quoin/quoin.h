@@ -2,6 +2,7 @@
 
 /// All of Quoin. Including one folder's headers instead builds faster.
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/buffer.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/half.h>
@@ -13,6 +14,7 @@
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/copy_box.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/downsample.h>
