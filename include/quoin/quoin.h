@@ -14,6 +14,7 @@
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/connected.h>
 #include <quoin/grid/copy_box.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
