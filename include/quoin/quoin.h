@@ -38,9 +38,11 @@
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/quad_triangles.h>
 #include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/mesh/vertex_writer.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor.h>

@@ -1,0 +1,366 @@
+// Vertices are made a block at a time, an element after the other, in memory that stays in the cache; then the block is
+// copied to where the caller wants it.
+
+#include <quoin/mesh/vertex_writer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "core/srgb.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kBlockBytes = 16'384;
+static_assert(kBlockBytes >= 4 * VertexLayout::kMaxStride);
+
+// Where one element of a block's vertices lies.
+struct Column {
+  std::byte* at;
+  std::size_t stride;
+
+  template <class Value>
+  void put(std::size_t vertex, const Value& value) const {
+    std::memcpy(at + vertex * stride, &value, sizeof value);
+  }
+  template <class Value, class ValueOf>
+  void put_all(std::size_t count, ValueOf&& value_of) const {
+    for (std::size_t i = 0; i < count; ++i) put<Value>(i, value_of(i));
+  }
+};
+
+using Float3 = std::array<float, 3>;
+using Float4 = std::array<float, 4>;
+using Byte4 = std::array<std::uint8_t, 4>;
+using SignedByte4 = std::array<std::int8_t, 4>;
+using Short4 = std::array<std::int16_t, 4>;
+
+std::int8_t snorm8(float value) {
+  return static_cast<std::int8_t>(std::lround(std::clamp(value, -1.0F, 1.0F) * 127.0F));
+}
+std::uint8_t unorm8(float value) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
+}
+
+Float3 float3(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+Float4 float4(Vec3 v, float w) {
+  return {v.x, v.y, v.z, w};
+}
+SignedByte4 snorm8x4(Vec3 v) {
+  return {snorm8(v.x), snorm8(v.y), snorm8(v.z), 0};
+}
+
+const std::array<Vec3, 6>& face_normals() {
+  static const std::array<Vec3, 6> normals = [] {
+    std::array<Vec3, 6> made{};
+    for (const Direction d : kDirections) made[static_cast<std::size_t>(d)] = Vec3(normal_of(d));
+    return made;
+  }();
+  return normals;
+}
+
+// Of what vertices have by number: `positions(i)` and so on.
+template <class PositionOf>
+void put_positions(VertexFormat format, std::size_t count, const Column& column, PositionOf&& position_of) {
+  if (format == VertexFormat::Float32x3)
+    return column.put_all<Float3>(count, [&](auto i) { return float3(position_of(i)); });
+  column.put_all<Float4>(count, [&](auto i) { return float4(position_of(i), 1.0F); });
+}
+
+template <class NormalOf>
+void put_normals(VertexFormat format, std::size_t count, const Column& column, NormalOf&& normal_of_vertex) {
+  switch (format) {
+    case VertexFormat::Float32x3:
+      return column.put_all<Float3>(count, [&](auto i) { return float3(normal_of_vertex(i)); });
+    case VertexFormat::Float32x4:
+      return column.put_all<Float4>(count, [&](auto i) { return float4(normal_of_vertex(i), 0.0F); });
+    default:
+      return column.put_all<SignedByte4>(count, [&](auto i) { return snorm8x4(normal_of_vertex(i)); });
+  }
+}
+
+template <class LevelOf>
+void put_levels(VertexFormat format, std::size_t count, const Column& column, LevelOf&& level_of) {
+  const std::array<float, 4> brightness = {occlusion_brightness(0), occlusion_brightness(1), occlusion_brightness(2),
+                                           occlusion_brightness(3)};
+  std::array<std::uint8_t, 4> bytes{};
+  std::transform(brightness.begin(), brightness.end(), bytes.begin(), unorm8);
+  switch (format) {
+    case VertexFormat::Float32:
+      return column.put_all<float>(count, [&](auto i) { return brightness[level_of(i) & 3U]; });
+    case VertexFormat::Unorm8:
+      return column.put_all<std::uint8_t>(count, [&](auto i) { return bytes[level_of(i) & 3U]; });
+    default:
+      return column.put_all<std::uint8_t>(count, level_of);
+  }
+}
+
+// Numbers, in as many bytes as the format has.
+template <class NumberOf>
+void put_numbers(VertexFormat format, std::size_t count, const Column& column, NumberOf&& number_of) {
+  switch (format) {
+    case VertexFormat::Uint8:
+      return column.put_all<std::uint8_t>(count, [&](auto i) { return static_cast<std::uint8_t>(number_of(i)); });
+    case VertexFormat::Uint16:
+      return column.put_all<std::uint16_t>(count, [&](auto i) { return static_cast<std::uint16_t>(number_of(i)); });
+    default:
+      return column.put_all<std::uint32_t>(count, [&](auto i) { return static_cast<std::uint32_t>(number_of(i)); });
+  }
+}
+
+// Colours that were encoded before.
+template <class ColourOf>
+void put_encoded(VertexFormat format, std::size_t count, const Column& column, ColourOf&& colour_of) {
+  const auto put = [&]<std::size_t kSize>() {
+    column.put_all<std::array<std::byte, kSize>>(count, [&](auto i) {
+      std::array<std::byte, kSize> bytes;
+      std::memcpy(bytes.data(), colour_of(i).data(), kSize);
+      return bytes;
+    });
+  };
+  switch (size_of(format)) {
+    case 4:
+      return put.template operator()<4>();
+    case 8:
+      return put.template operator()<8>();
+    default:
+      return put.template operator()<16>();
+  }
+}
+
+std::array<std::byte, 16> encoded(const LinearRgba16& linear, VertexFormat format) {
+  std::array<std::byte, 16> bytes{};
+  const auto share = [&](std::size_t i) { return static_cast<float>(linear[i]) / 65'535.0F; };
+  const auto put = [&](const auto& value) { std::memcpy(bytes.data(), &value, sizeof value); };
+  if (format == VertexFormat::Float32x4) {
+    put(Float4{share(0), share(1), share(2), share(3)});
+  } else if (format == VertexFormat::Unorm16x4) {
+    put(linear);
+  } else if (format == VertexFormat::Unorm8x4) {
+    put(Byte4{unorm8(share(0)), unorm8(share(1)), unorm8(share(2)), unorm8(share(3))});
+  } else {
+    const SrgbEncoder& encode = SrgbEncoder::shared();
+    put(Byte4{encode(share(0)), encode(share(1)), encode(share(2)), unorm8(share(3))});
+  }
+  return bytes;
+}
+
+std::array<std::byte, 16> encoded(Rgba8 colour, VertexFormat format) {
+  std::array<std::byte, 16> bytes{};
+  const Float4 linear = {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b),
+                         static_cast<float>(colour.a) / 255.0F};
+  const auto put = [&](const auto& value) { std::memcpy(bytes.data(), &value, sizeof value); };
+  if (format == VertexFormat::Float32x4) {
+    put(linear);
+  } else if (format == VertexFormat::Unorm8x4Srgb) {
+    put(Byte4{colour.r, colour.g, colour.b, colour.a});
+  } else if (format == VertexFormat::Unorm8x4) {
+    put(Byte4{unorm8(linear[0]), unorm8(linear[1]), unorm8(linear[2]), colour.a});
+  } else {
+    LinearRgba16 wide{};
+    for (std::size_t i = 0; i < 4; ++i) wide[i] = static_cast<std::uint16_t>(std::lround(linear[i] * 65'535.0F));
+    put(wide);
+  }
+  return bytes;
+}
+
+// Calls `make(first, count, block)` for blocks of at most `per_block` of something that has `vertices` vertices each.
+template <class Make>
+void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
+  alignas(64) std::array<std::byte, kBlockBytes> block{};
+  const std::size_t per_block = kBlockBytes / (vertices * stride);
+  for (std::size_t first = 0; first < count; first += per_block) {
+    const std::size_t here = std::min(per_block, count - first);
+    make(first, here, block.data());
+    std::memcpy(out, block.data(), here * vertices * stride);
+    out += here * vertices * stride;
+  }
+}
+
+template <class Value>
+void put_whole_positions(std::span<const Quad> quads, IVec3 origin, const Column& column) {
+  using Component = typename Value::value_type;
+  std::size_t vertex = 0;
+  for (const Quad& quad : quads) {
+    for (const IVec3 corner : corners_of(quad)) {
+      const IVec3 at = corner + origin;
+      column.put(vertex++, Value{static_cast<Component>(at.x), static_cast<Component>(at.y),
+                                 static_cast<Component>(at.z), Component{1}});
+    }
+  }
+}
+
+void put_quad_positions(VertexFormat format, std::span<const Quad> quads, Vec3 origin, const Column& column) {
+  if (format == VertexFormat::Sint16x4) return put_whole_positions<Short4>(quads, IVec3(origin), column);
+  if (format == VertexFormat::Uint8x4) return put_whole_positions<Byte4>(quads, IVec3(origin), column);
+  std::size_t vertex = 0;
+  for (const Quad& quad : quads) {
+    for (const IVec3 corner : corners_of(quad)) {
+      const Vec3 at = Vec3(corner) + origin;
+      if (format == VertexFormat::Float32x3) {
+        column.put(vertex++, float3(at));
+      } else {
+        column.put(vertex++, float4(at, 1.0F));
+      }
+    }
+  }
+}
+
+void put_uvs(VertexFormat format, std::span<const Quad> quads, const Column& column) {
+  std::size_t vertex = 0;
+  for (const Quad& quad : quads) {
+    for (int corner = 0; corner < 4; ++corner) {
+      const int u = corner == 1 || corner == 2 ? quad.size_u() : 0;
+      const int v = corner >= 2 ? quad.size_v() : 0;
+      if (format == VertexFormat::Float32x2) {
+        column.put(vertex++, std::array<float, 2>{static_cast<float>(u), static_cast<float>(v)});
+      } else {
+        column.put(vertex++, std::array<std::uint8_t, 2>{static_cast<std::uint8_t>(u), static_cast<std::uint8_t>(v)});
+      }
+    }
+  }
+}
+
+bool is_whole(Vec3 origin, float low, float high) {
+  const auto fits = [&](float c) { return c == std::floor(c) && c >= low && c <= high; };
+  return fits(origin.x) && fits(origin.y) && fits(origin.z);
+}
+
+// Corners are at 0 to 64.
+[[maybe_unused]] bool origin_fits(const VertexLayout& layout, Vec3 origin) {
+  return std::all_of(layout.elements.begin(), layout.elements.end(), [&](const VertexElement& element) {
+    if (element.format == VertexFormat::Sint16x4) return is_whole(origin, -32'768.0F, 32'767.0F - kChunkEdge);
+    if (element.format == VertexFormat::Uint8x4) return is_whole(origin, 0.0F, 255.0F - kChunkEdge);
+    return true;
+  });
+}
+
+[[maybe_unused]] bool some_source_has(const VertexLayout& layout) {
+  using enum VertexSource;
+  return can_write(layout, Quads) || can_write(layout, Blocks) || can_write(layout, SmoothChunk) ||
+         can_write(layout, Smooth);
+}
+
+}  // namespace
+
+VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types) : layout_(std::move(layout)) {
+  QUOIN_ASSERT(some_source_has(layout_), "a layout that can be written");
+  colours_.resize(layout_.elements.size());
+  for (std::size_t i = 0; i < colours_.size(); ++i) {
+    const VertexElement& element = layout_.elements[i];
+    if (element.attribute != VertexAttribute::Colour) continue;
+    colours_[i].reserve(types.size() + 1);
+    for (std::size_t type = 0; type < types.size(); ++type) {
+      colours_[i].push_back(encoded(types[static_cast<VoxelType>(type)].colour, element.format));
+    }
+    colours_[i].push_back(encoded(Rgba8{255, 255, 255, 255}, element.format));
+  }
+}
+
+void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, VertexSource::Quads), "a layout for quads");
+  QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(quads.size())), "room for four vertices a quad");
+  QUOIN_ASSERT(origin_fits(layout_, origin), "positions are whole and within the format's range");
+  by_blocks(quads.size(), 4, layout_.stride, out.data(), [&](std::size_t first, std::size_t count, std::byte* block) {
+    for (std::size_t i = 0; i < layout_.elements.size(); ++i)
+      write_element(i, quads.subspan(first, count), origin, block);
+  });
+}
+
+void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const {
+  const VertexElement& element = layout_.elements[index];
+  const Column column{block + element.offset, layout_.stride};
+  const std::size_t count = vertices_needed(quads.size());
+  const VertexFormat format = element.format;
+  switch (element.attribute) {
+    case VertexAttribute::Position:
+      return put_quad_positions(format, quads, origin, column);
+    case VertexAttribute::Normal:
+      return put_normals(format, count, column,
+                         [&](auto i) { return face_normals()[static_cast<std::size_t>(quads[i / 4].direction())]; });
+    case VertexAttribute::Face:
+      return put_numbers(format, count, column, [&](auto i) { return quads[i / 4].direction(); });
+    case VertexAttribute::Colour:
+      return put_encoded(format, count, column, [&](auto i) { return colour(index, quads[i / 4].type()); });
+    case VertexAttribute::Occlusion:
+      return put_levels(format, count, column, [&](auto i) { return quads[i / 4].level(static_cast<int>(i % 4)); });
+    case VertexAttribute::Type:
+      return put_numbers(format, count, column, [&](auto i) { return quads[i / 4].type(); });
+    case VertexAttribute::Uv:
+      return put_uvs(format, quads, column);
+  }
+}
+
+void VertexWriter::write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, VertexSource::SmoothChunk), "a layout for smooth chunks");
+  MeshView view;
+  view.positions = {mesh.positions.data(), mesh.positions.size()};
+  view.normals = {mesh.normals.data(), mesh.normals.size()};
+  view.openness = {mesh.openness.data(), mesh.openness.size()};
+  write_view(view, origin, out);
+}
+
+void VertexWriter::write(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, mesh.has_albedo() ? VertexSource::Smooth : VertexSource::Blocks),
+               "a layout for this kind of mesh");
+  write_view(mesh, origin, out);
+}
+
+void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(out.size() >= bytes_needed(mesh.positions.size()), "room for the vertices");
+  by_blocks(mesh.positions.size(), 1, layout_.stride, out.data(),
+            [&](std::size_t first, std::size_t count, std::byte* block) {
+              for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
+                write_element(i, mesh, first, count, origin, block);
+              }
+            });
+}
+
+void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::size_t first, std::size_t count,
+                                 Vec3 origin, std::byte* block) const {
+  const VertexElement& element = layout_.elements[index];
+  const Column column{block + element.offset, layout_.stride};
+  const VertexFormat format = element.format;
+  switch (element.attribute) {
+    case VertexAttribute::Position:
+      return put_positions(format, count, column, [&](auto i) { return mesh.positions[first + i] + origin; });
+    case VertexAttribute::Normal:
+      if (!mesh.normals.empty()) {
+        return put_normals(format, count, column, [&](auto i) { return mesh.normals[first + i]; });
+      }
+      return put_normals(format, count, column,
+                         [&](auto i) { return face_normals()[static_cast<std::size_t>(mesh.directions[first + i])]; });
+    case VertexAttribute::Face:
+      return put_numbers(format, count, column, [&](auto i) { return mesh.directions[first + i]; });
+    case VertexAttribute::Colour:
+      if (mesh.has_albedo()) {
+        return put_encoded(format, count, column, [&](auto i) { return encoded(mesh.albedo[first + i], format); });
+      }
+      return put_encoded(format, count, column, [&](auto i) { return colour(index, mesh.types[first + i]); });
+    case VertexAttribute::Occlusion:
+      return write_occlusion(format, mesh, first, count, column.at);
+    case VertexAttribute::Type:
+      return put_numbers(format, count, column, [&](auto i) { return mesh.types[first + i]; });
+    case VertexAttribute::Uv:
+      return;  // no view has any
+  }
+}
+
+void VertexWriter::write_occlusion(VertexFormat format, const MeshView& mesh, std::size_t first, std::size_t count,
+                                   std::byte* at) const {
+  const Column column{at, layout_.stride};
+  if (mesh.openness.empty()) {
+    return put_levels(format, count, column,
+                      [&](auto i) { return mesh.levels.empty() ? std::uint8_t{0} : mesh.levels[first + i]; });
+  }
+  if (format == VertexFormat::Float32) {
+    return column.put_all<float>(count, [&](auto i) { return mesh.openness[first + i]; });
+  }
+  column.put_all<std::uint8_t>(count, [&](auto i) { return unorm8(mesh.openness[first + i]); });
+}
+
+}  // namespace quoin
