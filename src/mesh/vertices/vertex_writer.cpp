@@ -20,14 +20,58 @@ static_assert(kBlockBytes >= 4 * VertexLayout::kMaxStride);
 struct Column {
   std::byte* at;
   std::size_t stride;
+};
 
-  template <class Value>
-  void put(std::size_t vertex, const Value& value) const {
-    std::memcpy(at + vertex * stride, &value, sizeof value);
+// What one element of the vertices is made from: a value a vertex, a quad, or a corner of a quad. `put<Value>(convert)`
+// writes what `convert` makes of each.
+template <class ValueOf>
+struct PerVertex {
+  Column column;
+  std::size_t count;
+  ValueOf value_of;
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (std::size_t i = 0; i < count; ++i, at += column.stride) {
+      const Value value = convert(value_of(i));
+      std::memcpy(at, &value, sizeof value);
+    }
   }
-  template <class Value, class ValueOf>
-  void put_all(std::size_t count, ValueOf&& value_of) const {
-    for (std::size_t i = 0; i < count; ++i) put<Value>(i, value_of(i));
+};
+
+template <class ValueOf>
+struct PerQuad {
+  Column column;
+  std::span<const Quad> quads;
+  ValueOf value_of;
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (const Quad quad : quads) {
+      const Value value = convert(value_of(quad));
+      for (int corner = 0; corner < 4; ++corner, at += column.stride) std::memcpy(at, &value, sizeof value);
+    }
+  }
+};
+
+template <class ValuesOf>
+struct PerCorner {
+  Column column;
+  std::span<const Quad> quads;
+  ValuesOf values_of;  // four
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (const Quad quad : quads) {
+      for (const auto& of_corner : values_of(quad)) {
+        const Value value = convert(of_corner);
+        std::memcpy(at, &value, sizeof value);
+        at += column.stride;
+      }
+    }
   }
 };
 
@@ -63,72 +107,71 @@ const std::array<Vec3, 6>& face_normals() {
   return normals;
 }
 
-// Of what vertices have by number: `positions(i)` and so on.
-template <class PositionOf>
-void put_positions(VertexFormat format, std::size_t count, const Column& column, PositionOf&& position_of) {
-  if (format == VertexFormat::Float32x3)
-    return column.put_all<Float3>(count, [&](auto i) { return float3(position_of(i)); });
-  column.put_all<Float4>(count, [&](auto i) { return float4(position_of(i), 1.0F); });
+// Each takes one of the three above.
+template <class Source>
+void put_positions(VertexFormat format, const Source& positions) {
+  if (format == VertexFormat::Float32x3) return positions.template put<Float3>([](Vec3 v) { return float3(v); });
+  positions.template put<Float4>([](Vec3 position) { return float4(position, 1.0F); });
 }
 
-template <class NormalOf>
-void put_normals(VertexFormat format, std::size_t count, const Column& column, NormalOf&& normal_of_vertex) {
+template <class Source>
+void put_normals(VertexFormat format, const Source& normals) {
   switch (format) {
     case VertexFormat::Float32x3:
-      return column.put_all<Float3>(count, [&](auto i) { return float3(normal_of_vertex(i)); });
+      return normals.template put<Float3>([](Vec3 v) { return float3(v); });
     case VertexFormat::Float32x4:
-      return column.put_all<Float4>(count, [&](auto i) { return float4(normal_of_vertex(i), 0.0F); });
+      return normals.template put<Float4>([](Vec3 normal) { return float4(normal, 0.0F); });
     default:
-      return column.put_all<SignedByte4>(count, [&](auto i) { return snorm8x4(normal_of_vertex(i)); });
+      return normals.template put<SignedByte4>([](Vec3 v) { return snorm8x4(v); });
   }
 }
 
-template <class LevelOf>
-void put_levels(VertexFormat format, std::size_t count, const Column& column, LevelOf&& level_of) {
+template <class Source>
+void put_levels(VertexFormat format, const Source& levels) {
   const std::array<float, 4> brightness = {occlusion_brightness(0), occlusion_brightness(1), occlusion_brightness(2),
                                            occlusion_brightness(3)};
   std::array<std::uint8_t, 4> bytes{};
   std::transform(brightness.begin(), brightness.end(), bytes.begin(), unorm8);
   switch (format) {
     case VertexFormat::Float32:
-      return column.put_all<float>(count, [&](auto i) { return brightness[level_of(i) & 3U]; });
+      return levels.template put<float>([&](std::uint8_t level) { return brightness[level & 3U]; });
     case VertexFormat::Unorm8:
-      return column.put_all<std::uint8_t>(count, [&](auto i) { return bytes[level_of(i) & 3U]; });
+      return levels.template put<std::uint8_t>([&](std::uint8_t level) { return bytes[level & 3U]; });
     default:
-      return column.put_all<std::uint8_t>(count, level_of);
+      return levels.template put<std::uint8_t>([](std::uint8_t level) { return level; });
   }
 }
 
 // Numbers, in as many bytes as the format has.
-template <class NumberOf>
-void put_numbers(VertexFormat format, std::size_t count, const Column& column, NumberOf&& number_of) {
+template <class Source>
+void put_numbers(VertexFormat format, const Source& numbers) {
   switch (format) {
     case VertexFormat::Uint8:
-      return column.put_all<std::uint8_t>(count, [&](auto i) { return static_cast<std::uint8_t>(number_of(i)); });
+      return numbers.template put<std::uint8_t>([](auto number) { return static_cast<std::uint8_t>(number); });
     case VertexFormat::Uint16:
-      return column.put_all<std::uint16_t>(count, [&](auto i) { return static_cast<std::uint16_t>(number_of(i)); });
+      return numbers.template put<std::uint16_t>([](auto number) { return static_cast<std::uint16_t>(number); });
     default:
-      return column.put_all<std::uint32_t>(count, [&](auto i) { return static_cast<std::uint32_t>(number_of(i)); });
+      return numbers.template put<std::uint32_t>([](auto number) { return static_cast<std::uint32_t>(number); });
   }
 }
 
-// Colours that were encoded before.
-template <class ColourOf>
-void put_encoded(VertexFormat format, std::size_t count, const Column& column, ColourOf&& colour_of) {
-  const auto put = [&]<std::size_t kSize>() {
-    column.put_all<std::array<std::byte, kSize>>(count, [&](auto i) {
-      std::array<std::byte, kSize> bytes;
-      std::memcpy(bytes.data(), colour_of(i).data(), kSize);
-      return bytes;
-    });
-  };
+// Colours that were encoded before, or are now.
+template <std::size_t kSize>
+std::array<std::byte, kSize> first_bytes(const std::array<std::byte, 16>& bytes) {
+  std::array<std::byte, kSize> first;
+  std::memcpy(first.data(), bytes.data(), kSize);
+  return first;
+}
+
+template <class Source>
+void put_encoded(VertexFormat format, const Source& colours) {
   switch (size_of(format)) {
     case 4:
-      return put.template operator()<4>();
+      return colours.template put<std::array<std::byte, 4>>([](const auto& bytes) { return first_bytes<4>(bytes); });
     case 8:
-      return put.template operator()<8>();
+      return colours.template put<std::array<std::byte, 8>>([](const auto& bytes) { return first_bytes<8>(bytes); });
     default:
-      return put.template operator()<16>();
+      return colours.template put<std::array<std::byte, 16>>([](const auto& bytes) { return first_bytes<16>(bytes); });
   }
 }
 
@@ -168,6 +211,10 @@ std::array<std::byte, 16> encoded(Rgba8 colour, VertexFormat format) {
   return bytes;
 }
 
+std::size_t face_of(Direction direction) {
+  return static_cast<std::size_t>(direction);
+}
+
 // Calls `make(first, count, block)` for blocks of at most `per_block` of something that has `vertices` vertices each.
 template <class Make>
 void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
@@ -181,48 +228,46 @@ void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std:
   }
 }
 
-template <class Value>
-void put_whole_positions(std::span<const Quad> quads, IVec3 origin, const Column& column) {
-  using Component = typename Value::value_type;
-  std::size_t vertex = 0;
-  for (const Quad& quad : quads) {
-    for (const IVec3 corner : corners_of(quad)) {
-      const IVec3 at = corner + origin;
-      column.put(vertex++, Value{static_cast<Component>(at.x), static_cast<Component>(at.y),
-                                 static_cast<Component>(at.z), Component{1}});
-    }
+void put_quad_positions(VertexFormat format, std::span<const Quad> quads, Vec3 origin, const Column& column) {
+  const PerCorner corners{column, quads, [](Quad quad) { return corners_of(quad); }};
+  const IVec3 whole(origin);
+  switch (format) {
+    case VertexFormat::Sint16x4:
+      return corners.put<Short4>([&](IVec3 corner) {
+        const IVec3 at = corner + whole;
+        return Short4{static_cast<std::int16_t>(at.x), static_cast<std::int16_t>(at.y), static_cast<std::int16_t>(at.z),
+                      1};
+      });
+    case VertexFormat::Uint8x4:
+      return corners.put<Byte4>([&](IVec3 corner) {
+        const IVec3 at = corner + whole;
+        return Byte4{static_cast<std::uint8_t>(at.x), static_cast<std::uint8_t>(at.y), static_cast<std::uint8_t>(at.z),
+                     1};
+      });
+    case VertexFormat::Float32x3:
+      return corners.put<Float3>([&](IVec3 corner) { return float3(Vec3(corner) + origin); });
+    default:
+      return corners.put<Float4>([&](IVec3 corner) { return float4(Vec3(corner) + origin, 1.0F); });
   }
 }
 
-void put_quad_positions(VertexFormat format, std::span<const Quad> quads, Vec3 origin, const Column& column) {
-  if (format == VertexFormat::Sint16x4) return put_whole_positions<Short4>(quads, IVec3(origin), column);
-  if (format == VertexFormat::Uint8x4) return put_whole_positions<Byte4>(quads, IVec3(origin), column);
-  std::size_t vertex = 0;
-  for (const Quad& quad : quads) {
-    for (const IVec3 corner : corners_of(quad)) {
-      const Vec3 at = Vec3(corner) + origin;
-      if (format == VertexFormat::Float32x3) {
-        column.put(vertex++, float3(at));
-      } else {
-        column.put(vertex++, float4(at, 1.0F));
-      }
-    }
-  }
+// Voxels from corner 0 along u and v.
+std::array<std::array<int, 2>, 4> uvs_of(const Quad& quad) {
+  const int u = quad.size_u();
+  const int v = quad.size_v();
+  return {{{0, 0}, {u, 0}, {u, v}, {0, v}}};
 }
 
 void put_uvs(VertexFormat format, std::span<const Quad> quads, const Column& column) {
-  std::size_t vertex = 0;
-  for (const Quad& quad : quads) {
-    for (int corner = 0; corner < 4; ++corner) {
-      const int u = corner == 1 || corner == 2 ? quad.size_u() : 0;
-      const int v = corner >= 2 ? quad.size_v() : 0;
-      if (format == VertexFormat::Float32x2) {
-        column.put(vertex++, std::array<float, 2>{static_cast<float>(u), static_cast<float>(v)});
-      } else {
-        column.put(vertex++, std::array<std::uint8_t, 2>{static_cast<std::uint8_t>(u), static_cast<std::uint8_t>(v)});
-      }
-    }
+  const PerCorner uvs{column, quads, [](Quad quad) { return uvs_of(quad); }};
+  if (format == VertexFormat::Float32x2) {
+    return uvs.put<std::array<float, 2>>([](const std::array<int, 2>& uv) {
+      return std::array<float, 2>{static_cast<float>(uv[0]), static_cast<float>(uv[1])};
+    });
   }
+  uvs.put<std::array<std::uint8_t, 2>>([](const std::array<int, 2>& uv) {
+    return std::array<std::uint8_t, 2>{static_cast<std::uint8_t>(uv[0]), static_cast<std::uint8_t>(uv[1])};
+  });
 }
 
 bool is_whole(Vec3 origin, float low, float high) {
@@ -274,22 +319,23 @@ void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std
 void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const {
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
-  const std::size_t count = vertices_needed(quads.size());
   const VertexFormat format = element.format;
   switch (element.attribute) {
     case VertexAttribute::Position:
       return put_quad_positions(format, quads, origin, column);
-    case VertexAttribute::Normal:
-      return put_normals(format, count, column,
-                         [&](auto i) { return face_normals()[static_cast<std::size_t>(quads[i / 4].direction())]; });
+    case VertexAttribute::Normal: {
+      const std::array<Vec3, 6>& normals = face_normals();
+      return put_normals(format, PerQuad{column, quads, [&](Quad quad) { return normals[face_of(quad.direction())]; }});
+    }
     case VertexAttribute::Face:
-      return put_numbers(format, count, column, [&](auto i) { return quads[i / 4].direction(); });
+      return put_numbers(format, PerQuad{column, quads, [](Quad quad) { return quad.direction(); }});
     case VertexAttribute::Colour:
-      return put_encoded(format, count, column, [&](auto i) { return colour(index, quads[i / 4].type()); });
+      return put_encoded(
+          format, PerQuad{column, quads, [&](Quad quad) -> const Colour& { return colour(index, quad.type()); }});
     case VertexAttribute::Occlusion:
-      return put_levels(format, count, column, [&](auto i) { return quads[i / 4].level(static_cast<int>(i % 4)); });
+      return put_levels(format, PerCorner{column, quads, [](Quad quad) { return quad.levels(); }});
     case VertexAttribute::Type:
-      return put_numbers(format, count, column, [&](auto i) { return quads[i / 4].type(); });
+      return put_numbers(format, PerQuad{column, quads, [](Quad quad) { return quad.type(); }});
     case VertexAttribute::Uv:
       return put_uvs(format, quads, column);
   }
@@ -325,26 +371,25 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
   const VertexFormat format = element.format;
+  const auto vertices = [&](auto value_of) { return PerVertex<decltype(value_of)>{column, count, value_of}; };
   switch (element.attribute) {
     case VertexAttribute::Position:
-      return put_positions(format, count, column, [&](auto i) { return mesh.positions[first + i] + origin; });
+      return put_positions(format, vertices([&](auto i) { return mesh.positions[first + i] + origin; }));
     case VertexAttribute::Normal:
-      if (!mesh.normals.empty()) {
-        return put_normals(format, count, column, [&](auto i) { return mesh.normals[first + i]; });
-      }
-      return put_normals(format, count, column,
-                         [&](auto i) { return face_normals()[static_cast<std::size_t>(mesh.directions[first + i])]; });
+      if (!mesh.normals.empty()) return put_normals(format, vertices([&](auto i) { return mesh.normals[first + i]; }));
+      return put_normals(format, vertices([&](auto i) { return face_normals()[face_of(mesh.directions[first + i])]; }));
     case VertexAttribute::Face:
-      return put_numbers(format, count, column, [&](auto i) { return mesh.directions[first + i]; });
+      return put_numbers(format, vertices([&](auto i) { return mesh.directions[first + i]; }));
     case VertexAttribute::Colour:
       if (mesh.has_albedo()) {
-        return put_encoded(format, count, column, [&](auto i) { return encoded(mesh.albedo[first + i], format); });
+        return put_encoded(format, vertices([&](auto i) { return encoded(mesh.albedo[first + i], format); }));
       }
-      return put_encoded(format, count, column, [&](auto i) { return colour(index, mesh.types[first + i]); });
+      return put_encoded(format,
+                         vertices([&](auto i) -> const Colour& { return colour(index, mesh.types[first + i]); }));
     case VertexAttribute::Occlusion:
       return write_occlusion(format, mesh, first, count, column.at);
     case VertexAttribute::Type:
-      return put_numbers(format, count, column, [&](auto i) { return mesh.types[first + i]; });
+      return put_numbers(format, vertices([&](auto i) { return mesh.types[first + i]; }));
     case VertexAttribute::Uv:
       return;  // no view has any
   }
@@ -354,13 +399,13 @@ void VertexWriter::write_occlusion(VertexFormat format, const MeshView& mesh, st
                                    std::byte* at) const {
   const Column column{at, layout_.stride};
   if (mesh.openness.empty()) {
-    return put_levels(format, count, column,
-                      [&](auto i) { return mesh.levels.empty() ? std::uint8_t{0} : mesh.levels[first + i]; });
+    const auto level_of = [&](auto i) { return mesh.levels.empty() ? std::uint8_t{0} : mesh.levels[first + i]; };
+    return put_levels(format, PerVertex<decltype(level_of)>{column, count, level_of});
   }
-  if (format == VertexFormat::Float32) {
-    return column.put_all<float>(count, [&](auto i) { return mesh.openness[first + i]; });
-  }
-  column.put_all<std::uint8_t>(count, [&](auto i) { return unorm8(mesh.openness[first + i]); });
+  const auto openness_of = [&](auto i) { return mesh.openness[first + i]; };
+  const PerVertex<decltype(openness_of)> openness{column, count, openness_of};
+  if (format == VertexFormat::Float32) return openness.template put<float>([](float share) { return share; });
+  openness.template put<std::uint8_t>([](float share) { return unorm8(share); });
 }
 
 }  // namespace quoin
