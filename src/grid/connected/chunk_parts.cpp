@@ -80,7 +80,7 @@ void ChunkParts::read_rows(Scratch& scratch) const {
   for (std::size_t i = 0; i < kRows; ++i) {
     scratch.rows[i] = row(static_cast<int>(i % kChunkEdge), static_cast<int>(i / kChunkEdge));
     scratch.first_runs[i] = runs;
-    runs += static_cast<std::uint32_t>(std::popcount(run_starts(scratch.rows[i])));
+    runs += count_runs(scratch.rows[i]);
   }
   scratch.runs.reset(runs);
 }

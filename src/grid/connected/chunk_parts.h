@@ -19,10 +19,18 @@ namespace quoin {
 inline std::uint64_t run_starts(std::uint64_t row) {
   return row & ~(row << 1);
 }
+/// How many ones; quick where there is at most one, as in most rows of runs, since counting may be a call.
+inline std::uint32_t count_ones(std::uint64_t word) {
+  if ((word & (word - 1)) == 0) return static_cast<std::uint32_t>(word != 0);
+  return static_cast<std::uint32_t>(std::popcount(word));
+}
+inline std::uint32_t count_runs(std::uint64_t row) {
+  return count_ones(run_starts(row));
+}
 /// Which run of the row holds a voxel. Requires: one does.
 inline std::uint32_t run_of(std::uint64_t row, int x) {
   const std::uint64_t up_to_x = (std::uint64_t{2} << x) - 1;
-  return static_cast<std::uint32_t>(std::popcount(run_starts(row) & up_to_x)) - 1;
+  return count_ones(run_starts(row) & up_to_x) - 1;
 }
 /// The row without its lowest run.
 inline std::uint64_t without_lowest_run(std::uint64_t row) {
