@@ -76,6 +76,8 @@ TEST(AxisOrientationDeathTest, AnAxisOrAnIndexThatIsNotThereIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::quarter_turns(3, 1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::mirror(-1), "0 <= axis < 3");
   QUOIN_EXPECT_MISTAKE((void)AxisOrientation::at(48), "0 <= index < kCount");
+  QUOIN_EXPECT_MISTAKE((void)AxisOrientation().source_axis(3), "0 <= axis < 3");
+  QUOIN_EXPECT_MISTAKE((void)AxisOrientation().is_negated(-1), "0 <= axis < 3");
 }
 
 }  // namespace

@@ -59,8 +59,14 @@ class AxisOrientation {
   }
 
   /// The axis that becomes `axis`, 0 to 2, and whether it is negated on the way. Requires: 0 <= axis < 3.
-  [[nodiscard]] constexpr int source_axis(int axis) const { return source_[static_cast<std::size_t>(axis)]; }
-  [[nodiscard]] constexpr bool is_negated(int axis) const { return is_negated_[static_cast<std::size_t>(axis)]; }
+  [[nodiscard]] constexpr int source_axis(int axis) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    return source_[static_cast<std::size_t>(axis)];
+  }
+  [[nodiscard]] constexpr bool is_negated(int axis) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    return is_negated_[static_cast<std::size_t>(axis)];
+  }
   /// Whether it makes left hands of right ones.
   [[nodiscard]] constexpr bool is_mirrored() const {
     return (is_negated_[0] != is_negated_[1]) != (is_negated_[2] == is_cyclic());

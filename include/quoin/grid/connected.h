@@ -21,7 +21,7 @@ enum class Connectivity : std::uint8_t { Faces6, Corners26 };
 struct ConnectedOptions {
   Connectivity connectivity = Connectivity::Faces6;
   /// Whether voxels of a type belong to pieces; empty: all do. Asked for each type of a chunk whenever that is looked
-  /// at, possibly on several threads; never for air, which belongs to none.
+  /// at, possibly on several threads, so it has to say the same each time; never for air, which belongs to none.
   std::function<bool(VoxelType)> belongs;
 };
 
@@ -49,6 +49,7 @@ struct ConnectedPiece {
 ///          of voxels along x. Measured: 9 KiB a chunk of terrain full of caves, 1.3 MB for a chunk of noise of 12,000
 ///          parts. Beside that it shares the chunks of the grid as it was at the last update, as a snapshot does, so
 ///          that the first edit of each afterwards copies it.
+/// Threads: any number may read at once; an update needs it to itself.
 /// Source:  runs and union-find: L. He, Y. Chao, K. Suzuki, "A Run-Based Two-Scan Labeling Algorithm" (2008).
 class ConnectedPieces {
  public:

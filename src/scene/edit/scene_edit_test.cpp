@@ -218,6 +218,8 @@ TEST(SceneEditDeathTest, AnInstanceOfAGridThatIsNotThereIsAMistake) {
 TEST(SceneEditDeathTest, AnInstanceThatIsNotThereIsAMistake) {
   Scene scene;
   QUOIN_EXPECT_MISTAKE(set_voxel(scene, {}, {0, 0, 0}, 1), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE(fill_sphere(scene, {}, {0, 0, 0}, 1.0, 1), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE(fill_box(scene, {}, {}, 1), "the handle names an element");
 }
 
 }  // namespace
