@@ -6,7 +6,6 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kRows = std::size_t{kChunkEdge} * kChunkEdge;
-constexpr std::uint64_t kAllVoxels = ~std::uint64_t{0};
 // So many types are looked for one by one, in words.
 constexpr std::size_t kFewTypes = 4;
 

@@ -39,6 +39,8 @@ struct PerVertex {
     }
   }
 };
+template <class ValueOf>
+PerVertex(Column, std::size_t, ValueOf) -> PerVertex<ValueOf>;
 
 template <class ValueOf>
 struct PerQuad {
@@ -55,6 +57,8 @@ struct PerQuad {
     }
   }
 };
+template <class ValueOf>
+PerQuad(Column, std::span<const Quad>, ValueOf) -> PerQuad<ValueOf>;
 
 template <class ValuesOf>
 struct PerCorner {
@@ -74,6 +78,8 @@ struct PerCorner {
     }
   }
 };
+template <class ValuesOf>
+PerCorner(Column, std::span<const Quad>, ValuesOf) -> PerCorner<ValuesOf>;
 
 using Float3 = std::array<float, 3>;
 using Float4 = std::array<float, 4>;
@@ -371,7 +377,7 @@ void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::s
   const VertexElement& element = layout_.elements[index];
   const Column column{block + element.offset, layout_.stride};
   const VertexFormat format = element.format;
-  const auto vertices = [&](auto value_of) { return PerVertex<decltype(value_of)>{column, count, value_of}; };
+  const auto vertices = [&](auto value_of) { return PerVertex{column, count, value_of}; };
   switch (element.attribute) {
     case VertexAttribute::Position:
       return put_positions(format, vertices([&](auto i) { return mesh.positions[first + i] + origin; }));
@@ -400,12 +406,12 @@ void VertexWriter::write_occlusion(VertexFormat format, const MeshView& mesh, st
   const Column column{at, layout_.stride};
   if (mesh.openness.empty()) {
     const auto level_of = [&](auto i) { return mesh.levels.empty() ? std::uint8_t{0} : mesh.levels[first + i]; };
-    return put_levels(format, PerVertex<decltype(level_of)>{column, count, level_of});
+    return put_levels(format, PerVertex{column, count, level_of});
   }
   const auto openness_of = [&](auto i) { return mesh.openness[first + i]; };
-  const PerVertex<decltype(openness_of)> openness{column, count, openness_of};
-  if (format == VertexFormat::Float32) return openness.template put<float>([](float share) { return share; });
-  openness.template put<std::uint8_t>([](float share) { return unorm8(share); });
+  const PerVertex openness{column, count, openness_of};
+  if (format == VertexFormat::Float32) return openness.put<float>([](float share) { return share; });
+  openness.put<std::uint8_t>([](float share) { return unorm8(share); });
 }
 
 }  // namespace quoin
