@@ -43,8 +43,8 @@ struct ConnectedPiece {
 /// Order:   pieces are numbered by their first voxel (z, then y, then x), whatever the threads or the edits that led
 ///          there. An update may number them anew.
 /// Cost:    of the first update O(rows of 64 voxels), of later ones O(rows of the chunks that changed and of the sides
-///          of those next to them + parts of pieces in all chunks). Chunks of one type take no time by the voxel. A part
-///          is what of a piece lies connected in one chunk.
+///          of those next to them + parts of pieces in all chunks). Chunks of one type take no time by the voxel.
+///          A part is what of a piece lies connected in one chunk.
 /// Memory:  about 0.3 KiB a chunk and 110 bytes a part; of chunks with several parts also 8 KiB and 1 to 4 bytes a run
 ///          of voxels along x. Measured: 9 KiB a chunk of terrain full of caves, 1.3 MB for a chunk of noise of 12,000
 ///          parts. Beside that it shares the chunks of the grid as it was at the last update, as a snapshot does, so
@@ -74,8 +74,8 @@ class ConnectedPieces {
   /// that nothing holds any more. Cost: as `touching`, and O(pieces).
   [[nodiscard]] std::vector<std::size_t> apart_from(const IBox& box) const;
 
-  /// Calls `visit(row, voxels)` for the rows of 64 voxels in which a piece has some: `row` is the row's first voxel, whose
-  /// x is a multiple of 64, bit i of `voxels` stands for its voxel i. Chunks by z, y, x, then rows by z, y.
+  /// Calls `visit(row, voxels)` for the rows of 64 voxels in which a piece has some: `row` is the row's first voxel,
+  /// whose x is a multiple of 64, bit i of `voxels` stands for its voxel i. Chunks by z, y, x, then rows by z, y.
   /// Requires: piece < size().
   void for_each_row(std::size_t piece, FunctionRef<void(IVec3 row, std::uint64_t voxels)> visit) const;
   /// A piece as a grid of its own, where it was. Chunks that hold nothing else are shared. Requires: piece < size().

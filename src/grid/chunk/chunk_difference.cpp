@@ -62,9 +62,9 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
 }
 
 ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
-  static const Chunk kAllAir;
-  const Chunk& a = before == nullptr ? kAllAir : *before;
-  const Chunk& b = after == nullptr ? kAllAir : *after;
+  static const Chunk all_air;
+  const Chunk& a = before == nullptr ? all_air : *before;
+  const Chunk& b = after == nullptr ? all_air : *after;
   ChunkDifference found;
   for_each_other_row(a, b, within, [&](int y, int z, const auto& old_row, const auto& new_row) {
     std::uint64_t solid = 0;
