@@ -2,16 +2,20 @@
 
 /// All of Quoin. Including one folder's headers instead builds faster.
 
+#include <quoin/core/axis_orientation.h>
 #include <quoin/core/buffer.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/half.h>
 #include <quoin/core/image.h>
+#include <quoin/core/oriented_box.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/connected.h>
+#include <quoin/grid/copy_box.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/downsample.h>
@@ -34,9 +38,11 @@
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>
+#include <quoin/mesh/quad_triangles.h>
 #include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/mesh/vertex_writer.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/impostor.h>
@@ -50,6 +56,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_edit.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>

@@ -271,17 +271,18 @@ std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, s
   });
 }
 
-void Grid::put_chunk(IVec3 at, Chunk voxels) {
-  if (!is_inside_world(at)) return;
+std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
+  if (!is_inside_world(at)) return 0;
   const ChunkEntry* present = impl_->entries.find(at);
-  if (present == nullptr && voxels.non_air_count() == 0) return;
-  if (present != nullptr && present->chunk.shares_storage_with(voxels)) return;
+  if (present == nullptr && voxels.non_air_count() == 0) return 0;
+  if (present != nullptr && present->chunk.shares_storage_with(voxels)) return 0;
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
   VoxelEdit edit;
   difference_of_types(slot.entry->chunk, voxels, edit);
   slot.entry->chunk = std::move(voxels);
   impl_->finish_edit(at, slot, edit);
   notice_.give();
+  return edit.voxels;
 }
 
 void Grid::clear() {

@@ -73,8 +73,9 @@ class Grid {
   /// Likewise a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
   /// box along x in one chunk, from `first` on, and changes them in place.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change);
-  /// Puts a whole chunk in place; counts as an edit of whatever differs. The outermost chunks are ignored.
-  void put_chunk(IVec3 chunk, Chunk voxels);
+  /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many voxels changed. The outermost
+  /// chunks are ignored.
+  std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
   void clear();
 
   /// Null where all is air. Lifetime: the grid owns the chunk, and its next edit may end it; a copy of the chunk costs

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -124,5 +125,17 @@ class Scene {
 
 /// A point of the instance's grid (voxels) in the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);
+/// A point of the world in the instance's grid (voxels): the inverse of `world_from_grid`, to the rounding of the
+/// point's own doubles. NaN in every component where the instance has no place, which `Instance::rotation` describes.
+[[nodiscard]] DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world);
+/// A displacement in the instance's grid (voxels) as one in the world (world units): turned, mirrored and scaled, not
+/// moved; and its inverse, NaN where the instance has no place.
+[[nodiscard]] DVec3 world_from_grid_direction(const Instance& instance, DVec3 direction_in_grid);
+[[nodiscard]] DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world);
+/// The voxel that fills the place of a point of the world, whether it is air or not; of a point between two voxels the
+/// greater one on each axis. Nothing where the instance has no place, the point is not finite, or the voxel's
+/// coordinates are no int32.
+[[nodiscard]] std::optional<IVec3> voxel_from_world(const Instance& instance, const SceneGrid& grid,
+                                                    DVec3 point_in_world);
 
 }  // namespace quoin

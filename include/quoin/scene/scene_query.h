@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/oriented_box.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
@@ -41,13 +42,6 @@ struct SceneHit {
 /// off at most. Nothing when there is none at that distance.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x,
                                                      double y, int width, int height, float depth);
-
-/// A box anywhere in the world.
-struct OrientedBox {
-  DVec3 centre{0.0};
-  DVec3 half_size{0.5};
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; a zero one counts as no rotation
-};
 
 /// A voxel that collides (VoxelProperties::collides) and meets a shape.
 struct SceneOverlap {

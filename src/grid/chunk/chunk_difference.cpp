@@ -48,6 +48,16 @@ std::uint64_t other_types(const std::array<VoxelType, kChunkEdge>& a, const std:
 }  // namespace
 
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit) {
+  if (before.uniform().has_value() || after.uniform().has_value()) {
+    // As of a chunk that was not there: words of bits instead of types.
+    const Chunk& one = before.uniform().has_value() ? before : after;
+    const Chunk& other = before.uniform().has_value() ? after : before;
+    if (one.shares_storage_with(other)) return;
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) edit.add(y, z, ~other.row_mask(y, z, *one.uniform()));
+    }
+    return;
+  }
   for_each_other_row(before, after, kWholeChunk, [&](int y, int z, const auto& old_row, const auto& new_row) {
     edit.add(y, z, other_types(old_row, new_row));
   });

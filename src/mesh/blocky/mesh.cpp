@@ -5,6 +5,7 @@
 #include <memory>
 
 #include <quoin/mesh/blocky.h>
+#include <quoin/mesh/quad_triangles.h>
 
 #include "core/progress_steps.h"
 #include "mesh/blocky/watertight.h"
@@ -14,15 +15,13 @@ namespace {
 
 void append_quad(const Quad& quad, IVec3 origin, BlockyTriangles& out) {
   const auto base = static_cast<std::uint32_t>(out.positions.size());
-  for (int corner = 0; corner < 4; ++corner) {
-    out.positions.emplace_back(origin + quad.corner(corner));
-    out.directions.push_back(quad.direction());
-    out.occlusion.push_back(quad.occlusion(corner));
-    out.types.push_back(quad.type());
-  }
-  constexpr std::array<std::uint32_t, 6> kPlain = {0, 1, 2, 0, 2, 3};
-  constexpr std::array<std::uint32_t, 6> kFlipped = {1, 2, 3, 0, 1, 3};
-  for (const std::uint32_t index : quad.flipped() ? kFlipped : kPlain) out.indices.push_back(base + index);
+  for_each_vertex({&quad, 1}, [&](std::size_t, const QuadVertex& vertex) {
+    out.positions.emplace_back(origin + vertex.position);
+    out.directions.push_back(vertex.direction);
+    out.occlusion.push_back(vertex.occlusion);
+    out.types.push_back(vertex.type);
+  });
+  for (const std::uint8_t corner : triangle_corners(quad.flipped())) out.indices.push_back(base + corner);
 }
 
 void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <glm/mat3x3.hpp>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// One of the 48 orientations that take the axes onto each other: a signed permutation of them. 24 are rotations by
+/// quarter turns, the others such a rotation of the mirror image.
+///
+/// Usage: const auto turned = AxisOrientation::quarter_turns(1, 1) * AxisOrientation::mirror(0);  // the mirror first
+class AxisOrientation {
+ public:
+  static constexpr int kCount = 48;
+
+  /// Leaves everything as it is.
+  constexpr AxisOrientation() = default;
+  /// The rotation about an axis (0 x, 1 y, 2 z) by that many quarter turns, counter-clockwise seen from the axis'
+  /// positive end: one about z takes +x to +y. Negative ones turn back. Requires: 0 <= axis < 3.
+  [[nodiscard]] static constexpr AxisOrientation quarter_turns(int axis, int turns) {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    AxisOrientation quarter;
+    const auto u = static_cast<std::size_t>((axis + 1) % 3);
+    const auto v = static_cast<std::size_t>((axis + 2) % 3);
+    quarter.source_[u] = static_cast<std::uint8_t>(v);
+    quarter.source_[v] = static_cast<std::uint8_t>(u);
+    quarter.is_negated_[u] = true;
+    AxisOrientation all;
+    for (int i = (turns % 4 + 4) % 4; i > 0; --i) all = quarter * all;
+    return all;
+  }
+  /// Negates an axis (0 x, 1 y, 2 z). Requires: 0 <= axis < 3.
+  [[nodiscard]] static constexpr AxisOrientation mirror(int axis) {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    AxisOrientation mirrored;
+    mirrored.is_negated_[static_cast<std::size_t>(axis)] = true;
+    return mirrored;
+  }
+  /// The orientation of that `index()`; 0 is the one that leaves everything as it is. Requires: 0 <= index < kCount.
+  [[nodiscard]] static constexpr AxisOrientation at(int index) {
+    QUOIN_ASSERT(index >= 0 && index < kCount, "0 <= index < kCount");
+    constexpr std::array<std::array<std::uint8_t, 3>, 6> kOrders = {
+        {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}}};
+    AxisOrientation found;
+    found.source_ = kOrders[static_cast<std::size_t>(index / 8)];
+    for (std::size_t i = 0; i < 3; ++i) found.is_negated_[i] = (index >> i & 1) != 0;
+    return found;
+  }
+  /// 0 to 47, for files and tables.
+  [[nodiscard]] constexpr int index() const {
+    const int order = is_cyclic() ? source_[0] : 5 - source_[2];
+    return 8 * order + int{is_negated_[0]} + 2 * int{is_negated_[1]} + 4 * int{is_negated_[2]};
+  }
+
+  /// The axis that becomes `axis`, 0 to 2, and whether it is negated on the way. Requires: 0 <= axis < 3.
+  [[nodiscard]] constexpr int source_axis(int axis) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    return source_[static_cast<std::size_t>(axis)];
+  }
+  [[nodiscard]] constexpr bool is_negated(int axis) const {
+    QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
+    return is_negated_[static_cast<std::size_t>(axis)];
+  }
+  /// Whether it makes left hands of right ones.
+  [[nodiscard]] constexpr bool is_mirrored() const {
+    return (is_negated_[0] != is_negated_[1]) != (is_negated_[2] == is_cyclic());
+  }
+
+  /// A vector from the origin, turned.
+  [[nodiscard]] IVec3 apply(IVec3 v) const { return applied(v); }
+  [[nodiscard]] DVec3 apply(DVec3 v) const { return applied(v); }
+  [[nodiscard]] Direction apply(Direction direction) const {
+    const FaceFrame& frame = frame_of(direction);
+    std::size_t axis = 0;
+    while (source_[axis] != frame.axis) ++axis;
+    return static_cast<Direction>(2 * axis + std::size_t{is_negated_[axis] == (frame.sign > 0)});
+  }
+  /// A box of that size, turned.
+  [[nodiscard]] IVec3 size_of(IVec3 size) const { return {size[source_[0]], size[source_[1]], size[source_[2]]}; }
+
+  [[nodiscard]] constexpr AxisOrientation inverse() const {
+    AxisOrientation back;
+    for (std::size_t i = 0; i < 3; ++i) {
+      back.source_[source_[i]] = static_cast<std::uint8_t>(i);
+      back.is_negated_[source_[i]] = is_negated_[i];
+    }
+    return back;
+  }
+  /// `second` after `first`, as of matrices.
+  [[nodiscard]] friend constexpr AxisOrientation operator*(const AxisOrientation& second,
+                                                           const AxisOrientation& first) {
+    AxisOrientation both;
+    for (std::size_t i = 0; i < 3; ++i) {
+      both.source_[i] = first.source_[second.source_[i]];
+      both.is_negated_[i] = second.is_negated_[i] != first.is_negated_[second.source_[i]];
+    }
+    return both;
+  }
+  [[nodiscard]] glm::dmat3 matrix() const {
+    glm::dmat3 columns(0.0);
+    for (int i = 0; i < 3; ++i) columns[source_axis(i)][i] = is_negated(i) ? -1.0 : 1.0;
+    return columns;
+  }
+  constexpr bool operator==(const AxisOrientation&) const = default;
+
+ private:
+  [[nodiscard]] constexpr bool is_cyclic() const { return source_[1] == (source_[0] + 1) % 3; }
+  template <class Vector>
+  [[nodiscard]] Vector applied(const Vector& v) const {
+    Vector turned = v;
+    for (int i = 0; i < 3; ++i) turned[i] = is_negated(i) ? -v[source_axis(i)] : v[source_axis(i)];
+    return turned;
+  }
+
+  std::array<std::uint8_t, 3> source_ = {0, 1, 2};  // [axis]: which one becomes it
+  std::array<bool, 3> is_negated_ = {};
+};
+
+}  // namespace quoin

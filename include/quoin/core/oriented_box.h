@@ -1,0 +1,14 @@
+#pragma once
+
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// A box anywhere in the world.
+struct OrientedBox {
+  DVec3 centre{0.0};
+  DVec3 half_size{0.5};
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; a zero one counts as no rotation
+};
+
+}  // namespace quoin

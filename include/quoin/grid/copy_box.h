@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include <quoin/core/axis_orientation.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+
+namespace quoin {
+
+struct CopyOptions {
+  bool copy_air = true;  ///< false: air in the box leaves what is there
+  /// [type]: what becomes of it, also air. Types beyond its end stay as they are, and air stays air whatever [0] is.
+  /// Empty: all stay as they are. Borrowed for the call.
+  std::span<const VoxelType> type_map;
+};
+
+/// Copies the voxels of a box into another grid, or another place of the same: turned and mirrored by `orientation`,
+/// so that the least corner of the turned box is at `to_min`. Returns how many voxels changed.
+///
+/// Space:   voxel coordinates of each grid. Voxel `v` of the box arrives at `to_min` + (the turned v - box.min, moved
+///          so that the turned box begins at 0). The turned box's size is `orientation.size_of(box.size())`.
+/// Overlap: `from` and `to` may be one grid, and the boxes may overlap: as if all were copied at once.
+/// Ends:    what would come to lie outside the world (see Grid) is left out; an empty box copies nothing.
+/// Cost:    O(chunks of the box) where it is moved by whole chunks and not turned: these are shared with `from`, no
+///          voxel is copied until one is edited. Where chunks of one type lie, likewise. Otherwise O(rows of 64 voxels
+///          of the box), turned or not, and 0.5 MiB of memory for the call. Of a box larger than what the grids hold
+///          only their chunks are looked at.
+std::int64_t copy_box(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation = {},
+                      const CopyOptions& options = {});
+
+}  // namespace quoin

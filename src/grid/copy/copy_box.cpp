@@ -1,0 +1,238 @@
+#include <quoin/grid/copy_box.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "grid/chunk_order.h"
+#include "grid/copy/turned_block.h"
+#include "grid/long_box.h"
+
+namespace quoin {
+namespace {
+
+LongBox common_part(const LongBox& a, const LongBox& b) {
+  LongBox part;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    part.min[axis] = std::max(a.min[axis], b.min[axis]);
+    part.max[axis] = std::min(a.max[axis], b.max[axis]);
+  }
+  return part;
+}
+
+LongBox box_of_chunk(IVec3 chunk) {
+  LongBox box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<std::size_t>(axis);
+    box.min[i] = std::int64_t{chunk[axis]} * kChunkEdge;
+    box.max[i] = box.min[i] + kChunkEdge;
+  }
+  return box;
+}
+
+// Requires: it lies in the int32 range.
+IBox narrowed(const LongBox& box) {
+  IBox narrow;
+  for (int axis = 0; axis < 3; ++axis) {
+    narrow.min[axis] = static_cast<int>(box.min[static_cast<std::size_t>(axis)]);
+    narrow.max[axis] = static_cast<int>(box.max[static_cast<std::size_t>(axis)]);
+  }
+  return narrow;
+}
+
+double volume(const IBox& box) {
+  const DVec3 size = DVec3(box.max) - DVec3(box.min);
+  return size.x * size.y * size.z;
+}
+
+// One copy, from a grid that does not change meanwhile.
+class BoxCopy {
+ public:
+  BoxCopy(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation,
+          const CopyOptions& options)
+      : from_(from), to_(to), options_(options), orientation_(orientation), source_(box_from(box)) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t along = source_axis(axis);
+      origin_[axis] = to_min[static_cast<int>(axis)];
+      target_.min[axis] = origin_[axis];
+      target_.max[axis] = origin_[axis] + source_.max[along] - source_.min[along];
+    }
+    target_ = clipped(target_);
+  }
+
+  std::int64_t run() {
+    if (is_empty(target_)) return 0;
+    for (const IVec3 chunk : chunks_to_write()) copy_chunk(chunk);
+    return changed_;
+  }
+
+ private:
+  [[nodiscard]] std::size_t source_axis(std::size_t axis) const {
+    return static_cast<std::size_t>(orientation_.source_axis(static_cast<int>(axis)));
+  }
+  // Where a part of the turned box comes from, and where a part of the box goes.
+  [[nodiscard]] LongBox source_of(const LongBox& part) const {
+    LongBox source;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t along = source_axis(axis);
+      const bool is_negated = orientation_.is_negated(static_cast<int>(axis));
+      const std::int64_t first = part.min[axis] - origin_[axis];
+      const std::int64_t end = part.max[axis] - origin_[axis];
+      source.min[along] = is_negated ? source_.max[along] - end : source_.min[along] + first;
+      source.max[along] = is_negated ? source_.max[along] - first : source_.min[along] + end;
+    }
+    return source;
+  }
+  [[nodiscard]] LongBox target_of(const LongBox& part) const {
+    LongBox target;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t along = source_axis(axis);
+      const bool is_negated = orientation_.is_negated(static_cast<int>(axis));
+      const std::int64_t first =
+          is_negated ? source_.max[along] - part.max[along] : part.min[along] - source_.min[along];
+      target.min[axis] = origin_[axis] + first;
+      target.max[axis] = target.min[axis] + part.max[along] - part.min[along];
+    }
+    return target;
+  }
+
+  // All chunks of the turned box, or, where there are fewer, those that something comes to or is taken from.
+  [[nodiscard]] std::vector<IVec3> chunks_to_write() const {
+    const IBox all = chunks_of(target_);
+    std::vector<IVec3> chunks;
+    const auto append = [&chunks](const IBox& box) {
+      for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+          for (int x = box.min.x; x < box.max.x; ++x) chunks.emplace_back(x, y, z);
+        }
+      }
+    };
+    const std::size_t present = 8 * from_.chunk_count() + (options_.copy_air ? to_.chunk_count() : 0);
+    if (volume(all) <= static_cast<double>(present)) {
+      append(all);
+      return chunks;
+    }
+    for (const IVec3 chunk : from_.chunks()) {
+      const LongBox part = common_part(source_, box_of_chunk(chunk));
+      if (is_empty(part)) continue;
+      const LongBox target = common_part(target_, target_of(part));
+      if (!is_empty(target)) append(chunks_of(target));
+    }
+    if (options_.copy_air) {
+      for (const IVec3 chunk : to_.chunks()) {
+        if (all.contains(chunk)) chunks.push_back(chunk);
+      }
+    }
+    sort_and_unite(chunks);
+    return chunks;
+  }
+
+  [[nodiscard]] VoxelType mapped(VoxelType type) const {
+    return type != kAir && type < options_.type_map.size() ? options_.type_map[type] : type;
+  }
+  [[nodiscard]] bool keeps_types(const Chunk& chunk) const {
+    if (options_.type_map.empty()) return true;
+    const std::vector<VoxelType> types = chunk.types();
+    return std::all_of(types.begin(), types.end(), [this](VoxelType type) { return mapped(type) == type; });
+  }
+  // The type of all voxels of a part of the box, where its chunks are of one type each.
+  [[nodiscard]] std::optional<VoxelType> one_type(const IBox& chunks) const {
+    std::optional<VoxelType> all;
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const Chunk* chunk = from_.find_chunk(x, y, z);
+          const std::optional<VoxelType> one = chunk == nullptr ? kAir : chunk->uniform();
+          if (!one.has_value() || mapped(*one) != mapped(all.value_or(*one))) return std::nullopt;
+          all = one;
+        }
+      }
+    }
+    return mapped(*all);
+  }
+
+  void copy_chunk(IVec3 at) {
+    const LongBox part = common_part(target_, box_of_chunk(at));
+    const LongBox source = source_of(part);
+    const IBox chunks = chunks_of(source);
+    const IBox place = narrowed(part);
+    const bool is_whole = place.size() == IVec3(kChunkEdge);
+    if (const auto type = one_type(chunks)) {
+      if (*type == kAir && !options_.copy_air) return;
+      changed_ += is_whole ? to_.put_chunk(at, Chunk(*type)) : to_.fill_box(place.min, place.max - 1, *type);
+      return;
+    }
+    if (is_whole && orientation_ == AxisOrientation() && chunks.size() == IVec3(1)) {
+      const Chunk& chunk = *from_.find_chunk(chunks.min);
+      const bool replaces = options_.copy_air || chunk.is_full() || to_.find_chunk(at) == nullptr;
+      if (replaces && keeps_types(chunk)) {
+        changed_ += to_.put_chunk(at, chunk);
+        return;
+      }
+    }
+    block_.begin(orientation_, part_of(part, at));
+    const bool is_new = to_.find_chunk(at) == nullptr;
+    if (is_new && !is_whole) block_.clear();
+    gather(source, chunks);
+    if (is_new || (is_whole && options_.copy_air)) {
+      changed_ += to_.put_chunk(at, Chunk::from_dense(block_.types()));
+    } else {
+      write_rows(at, place);
+    }
+  }
+
+  // Puts what comes from the chunks that a part of the box meets into the block, turned.
+  void gather(const LongBox& source, const IBox& chunks) {
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const LongBox part = common_part(source, box_of_chunk({x, y, z}));
+          IVec3 offset{0};
+          for (int axis = 0; axis < 3; ++axis) {
+            const auto i = static_cast<std::size_t>(axis);
+            offset[axis] = static_cast<int>(part.min[i] - source.min[i]);
+          }
+          block_.put(from_.find_chunk(x, y, z), part_of(part, {x, y, z}), offset);
+        }
+      }
+    }
+    if (options_.type_map.empty()) return;
+    block_.change_types([this](VoxelType type) { return mapped(type); });
+  }
+
+  void write_rows(IVec3 chunk, const IBox& place) {
+    changed_ += to_.edit_rows(place, [&](IVec3 first, std::span<VoxelType> types) {
+      const IVec3 local = first - chunk * kChunkEdge;
+      const VoxelType* row = block_.at(local.x, local.y, local.z);
+      if (options_.copy_air) {
+        std::copy_n(row, types.size(), types.begin());
+        return;
+      }
+      for (std::size_t i = 0; i < types.size(); ++i) types[i] = row[i] == kAir ? types[i] : row[i];
+    });
+  }
+
+  const Grid& from_;
+  Grid& to_;
+  const CopyOptions& options_;
+  AxisOrientation orientation_;
+  LongBox source_;
+  std::array<std::int64_t, 3> origin_{};
+  LongBox target_;
+  TurnedBlock block_;
+  std::int64_t changed_ = 0;
+};
+
+}  // namespace
+
+std::int64_t copy_box(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation,
+                      const CopyOptions& options) {
+  if (box.empty()) return 0;
+  if (&from != &to) return BoxCopy(from, box, to, to_min, orientation, options).run();
+  const Grid before = from.snapshot();
+  return BoxCopy(before, box, to, to_min, orientation, options).run();
+}
+
+}  // namespace quoin

@@ -1,0 +1,421 @@
+// Vertices are made a block at a time, an element after the other, in memory that stays in the cache; then the block is
+// copied to where the caller wants it.
+
+#include <quoin/mesh/vertex_writer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "core/srgb.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kBlockBytes = 16'384;
+static_assert(kBlockBytes >= 4 * VertexLayout::kMaxStride);
+
+// Where one element of a block's vertices lies.
+struct Column {
+  std::byte* at;
+  std::size_t stride;
+};
+
+// What one element of the vertices is made from: a value a vertex, a quad, or a corner of a quad. `put<Value>(convert)`
+// writes what `convert` makes of each.
+template <class ValueOf>
+struct PerVertex {
+  Column column;
+  std::size_t count;
+  ValueOf value_of;
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (std::size_t i = 0; i < count; ++i, at += column.stride) {
+      const Value value = convert(value_of(i));
+      std::memcpy(at, &value, sizeof value);
+    }
+  }
+};
+template <class ValueOf>
+PerVertex(Column, std::size_t, ValueOf) -> PerVertex<ValueOf>;
+
+template <class ValueOf>
+struct PerQuad {
+  Column column;
+  std::span<const Quad> quads;
+  ValueOf value_of;
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (const Quad quad : quads) {
+      const Value value = convert(value_of(quad));
+      for (int corner = 0; corner < 4; ++corner, at += column.stride) std::memcpy(at, &value, sizeof value);
+    }
+  }
+};
+template <class ValueOf>
+PerQuad(Column, std::span<const Quad>, ValueOf) -> PerQuad<ValueOf>;
+
+template <class ValuesOf>
+struct PerCorner {
+  Column column;
+  std::span<const Quad> quads;
+  ValuesOf values_of;  // four
+
+  template <class Value, class Convert>
+  void put(Convert&& convert) const {
+    std::byte* at = column.at;
+    for (const Quad quad : quads) {
+      for (const auto& of_corner : values_of(quad)) {
+        const Value value = convert(of_corner);
+        std::memcpy(at, &value, sizeof value);
+        at += column.stride;
+      }
+    }
+  }
+};
+template <class ValuesOf>
+PerCorner(Column, std::span<const Quad>, ValuesOf) -> PerCorner<ValuesOf>;
+
+using Float3 = std::array<float, 3>;
+using Float4 = std::array<float, 4>;
+using Byte4 = std::array<std::uint8_t, 4>;
+using SignedByte4 = std::array<std::int8_t, 4>;
+using Short4 = std::array<std::int16_t, 4>;
+
+std::int8_t snorm8(float value) {
+  return static_cast<std::int8_t>(std::lround(std::clamp(value, -1.0F, 1.0F) * 127.0F));
+}
+std::uint8_t unorm8(float value) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
+}
+
+Float3 float3(Vec3 v) {
+  return {v.x, v.y, v.z};
+}
+Float4 float4(Vec3 v, float w) {
+  return {v.x, v.y, v.z, w};
+}
+SignedByte4 snorm8x4(Vec3 v) {
+  return {snorm8(v.x), snorm8(v.y), snorm8(v.z), 0};
+}
+
+const std::array<Vec3, 6>& face_normals() {
+  static const std::array<Vec3, 6> normals = [] {
+    std::array<Vec3, 6> made{};
+    for (const Direction d : kDirections) made[static_cast<std::size_t>(d)] = Vec3(normal_of(d));
+    return made;
+  }();
+  return normals;
+}
+
+// Each takes one of the three above.
+template <class Source>
+void put_positions(VertexFormat format, const Source& positions) {
+  if (format == VertexFormat::Float32x3) return positions.template put<Float3>([](Vec3 v) { return float3(v); });
+  positions.template put<Float4>([](Vec3 position) { return float4(position, 1.0F); });
+}
+
+template <class Source>
+void put_normals(VertexFormat format, const Source& normals) {
+  switch (format) {
+    case VertexFormat::Float32x3:
+      return normals.template put<Float3>([](Vec3 v) { return float3(v); });
+    case VertexFormat::Float32x4:
+      return normals.template put<Float4>([](Vec3 normal) { return float4(normal, 0.0F); });
+    default:
+      return normals.template put<SignedByte4>([](Vec3 v) { return snorm8x4(v); });
+  }
+}
+
+template <class Source>
+void put_block_occlusion(VertexFormat format, const Source& occlusion) {
+  const std::array<float, 4> brightness = {occlusion_brightness(0), occlusion_brightness(1), occlusion_brightness(2),
+                                           occlusion_brightness(3)};
+  std::array<std::uint8_t, 4> bytes{};
+  std::transform(brightness.begin(), brightness.end(), bytes.begin(), unorm8);
+  switch (format) {
+    case VertexFormat::Float32:
+      return occlusion.template put<float>([&](std::uint8_t level) { return brightness[level & 3U]; });
+    case VertexFormat::Unorm8:
+      return occlusion.template put<std::uint8_t>([&](std::uint8_t level) { return bytes[level & 3U]; });
+    default:
+      return occlusion.template put<std::uint8_t>([](std::uint8_t level) { return level; });
+  }
+}
+
+// Numbers, in as many bytes as the format has.
+template <class Source>
+void put_numbers(VertexFormat format, const Source& numbers) {
+  switch (format) {
+    case VertexFormat::Uint8:
+      return numbers.template put<std::uint8_t>([](auto number) { return static_cast<std::uint8_t>(number); });
+    case VertexFormat::Uint16:
+      return numbers.template put<std::uint16_t>([](auto number) { return static_cast<std::uint16_t>(number); });
+    default:
+      return numbers.template put<std::uint32_t>([](auto number) { return static_cast<std::uint32_t>(number); });
+  }
+}
+
+// Colours that were encoded before, or are now.
+template <std::size_t kSize>
+std::array<std::byte, kSize> first_bytes(const std::array<std::byte, 16>& bytes) {
+  std::array<std::byte, kSize> first;
+  std::memcpy(first.data(), bytes.data(), kSize);
+  return first;
+}
+
+template <class Source>
+void put_encoded(VertexFormat format, const Source& colours) {
+  switch (size_of(format)) {
+    case 4:
+      return colours.template put<std::array<std::byte, 4>>([](const auto& bytes) { return first_bytes<4>(bytes); });
+    case 8:
+      return colours.template put<std::array<std::byte, 8>>([](const auto& bytes) { return first_bytes<8>(bytes); });
+    default:
+      return colours.template put<std::array<std::byte, 16>>([](const auto& bytes) { return first_bytes<16>(bytes); });
+  }
+}
+
+std::array<std::byte, 16> encoded(const LinearRgba16& linear, VertexFormat format) {
+  std::array<std::byte, 16> bytes{};
+  const auto share = [&](std::size_t i) { return static_cast<float>(linear[i]) / 65'535.0F; };
+  const auto put = [&](const auto& value) { std::memcpy(bytes.data(), &value, sizeof value); };
+  if (format == VertexFormat::Float32x4) {
+    put(Float4{share(0), share(1), share(2), share(3)});
+  } else if (format == VertexFormat::Unorm16x4) {
+    put(linear);
+  } else if (format == VertexFormat::Unorm8x4) {
+    put(Byte4{unorm8(share(0)), unorm8(share(1)), unorm8(share(2)), unorm8(share(3))});
+  } else {
+    const SrgbEncoder& encode = SrgbEncoder::shared();
+    put(Byte4{encode(share(0)), encode(share(1)), encode(share(2)), unorm8(share(3))});
+  }
+  return bytes;
+}
+
+std::array<std::byte, 16> encoded(Rgba8 colour, VertexFormat format) {
+  std::array<std::byte, 16> bytes{};
+  const Float4 linear = {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b),
+                         static_cast<float>(colour.a) / 255.0F};
+  const auto put = [&](const auto& value) { std::memcpy(bytes.data(), &value, sizeof value); };
+  if (format == VertexFormat::Float32x4) {
+    put(linear);
+  } else if (format == VertexFormat::Unorm8x4Srgb) {
+    put(Byte4{colour.r, colour.g, colour.b, colour.a});
+  } else if (format == VertexFormat::Unorm8x4) {
+    put(Byte4{unorm8(linear[0]), unorm8(linear[1]), unorm8(linear[2]), colour.a});
+  } else {
+    LinearRgba16 wide{};
+    for (std::size_t i = 0; i < 4; ++i) wide[i] = static_cast<std::uint16_t>(std::lround(linear[i] * 65'535.0F));
+    put(wide);
+  }
+  return bytes;
+}
+
+std::size_t face_of(Direction direction) {
+  return static_cast<std::size_t>(direction);
+}
+
+// Calls `make(first, count, block)` for blocks of at most `per_block` of something that has `vertices` vertices each.
+template <class Make>
+void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
+  alignas(64) std::array<std::byte, kBlockBytes> block{};
+  const std::size_t per_block = kBlockBytes / (vertices * stride);
+  for (std::size_t first = 0; first < count; first += per_block) {
+    const std::size_t here = std::min(per_block, count - first);
+    make(first, here, block.data());
+    std::memcpy(out, block.data(), here * vertices * stride);
+    out += here * vertices * stride;
+  }
+}
+
+void put_quad_positions(VertexFormat format, std::span<const Quad> quads, Vec3 origin, const Column& column) {
+  const PerCorner corners{column, quads, [](Quad quad) { return corners_of(quad); }};
+  const IVec3 whole(origin);
+  switch (format) {
+    case VertexFormat::Sint16x4:
+      return corners.put<Short4>([&](IVec3 corner) {
+        const IVec3 at = corner + whole;
+        return Short4{static_cast<std::int16_t>(at.x), static_cast<std::int16_t>(at.y), static_cast<std::int16_t>(at.z),
+                      1};
+      });
+    case VertexFormat::Uint8x4:
+      return corners.put<Byte4>([&](IVec3 corner) {
+        const IVec3 at = corner + whole;
+        return Byte4{static_cast<std::uint8_t>(at.x), static_cast<std::uint8_t>(at.y), static_cast<std::uint8_t>(at.z),
+                     1};
+      });
+    case VertexFormat::Float32x3:
+      return corners.put<Float3>([&](IVec3 corner) { return float3(Vec3(corner) + origin); });
+    default:
+      return corners.put<Float4>([&](IVec3 corner) { return float4(Vec3(corner) + origin, 1.0F); });
+  }
+}
+
+// Voxels from corner 0 along u and v.
+std::array<std::array<int, 2>, 4> uvs_of(const Quad& quad) {
+  const int u = quad.size_u();
+  const int v = quad.size_v();
+  return {{{0, 0}, {u, 0}, {u, v}, {0, v}}};
+}
+
+void put_uvs(VertexFormat format, std::span<const Quad> quads, const Column& column) {
+  const PerCorner uvs{column, quads, [](Quad quad) { return uvs_of(quad); }};
+  if (format == VertexFormat::Float32x2) {
+    return uvs.put<std::array<float, 2>>([](const std::array<int, 2>& uv) {
+      return std::array<float, 2>{static_cast<float>(uv[0]), static_cast<float>(uv[1])};
+    });
+  }
+  uvs.put<std::array<std::uint8_t, 2>>([](const std::array<int, 2>& uv) {
+    return std::array<std::uint8_t, 2>{static_cast<std::uint8_t>(uv[0]), static_cast<std::uint8_t>(uv[1])};
+  });
+}
+
+bool is_whole(Vec3 origin, float low, float high) {
+  const auto fits = [&](float c) { return c == std::floor(c) && c >= low && c <= high; };
+  return fits(origin.x) && fits(origin.y) && fits(origin.z);
+}
+
+// Corners are at 0 to 64.
+[[maybe_unused]] bool origin_fits(const VertexLayout& layout, Vec3 origin) {
+  return std::all_of(layout.elements.begin(), layout.elements.end(), [&](const VertexElement& element) {
+    if (element.format == VertexFormat::Sint16x4) return is_whole(origin, -32'768.0F, 32'767.0F - kChunkEdge);
+    if (element.format == VertexFormat::Uint8x4) return is_whole(origin, 0.0F, 255.0F - kChunkEdge);
+    return true;
+  });
+}
+
+[[maybe_unused]] bool some_source_has(const VertexLayout& layout) {
+  using enum VertexSource;
+  return can_write(layout, Quads) || can_write(layout, Blocks) || can_write(layout, SmoothChunk) ||
+         can_write(layout, Smooth);
+}
+
+}  // namespace
+
+VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types) : layout_(std::move(layout)) {
+  QUOIN_ASSERT(some_source_has(layout_), "a layout that can be written");
+  colours_.resize(layout_.elements.size());
+  for (std::size_t i = 0; i < colours_.size(); ++i) {
+    const VertexElement& element = layout_.elements[i];
+    if (element.attribute != VertexAttribute::Colour) continue;
+    colours_[i].reserve(types.size() + 1);
+    for (std::size_t type = 0; type < types.size(); ++type) {
+      colours_[i].push_back(encoded(types[static_cast<VoxelType>(type)].colour, element.format));
+    }
+    colours_[i].push_back(encoded(Rgba8{255, 255, 255, 255}, element.format));
+  }
+}
+
+void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, VertexSource::Quads), "a layout for quads");
+  QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(quads.size())), "room for four vertices a quad");
+  QUOIN_ASSERT(origin_fits(layout_, origin), "positions are whole and within the format's range");
+  by_blocks(quads.size(), 4, layout_.stride, out.data(), [&](std::size_t first, std::size_t count, std::byte* block) {
+    for (std::size_t i = 0; i < layout_.elements.size(); ++i)
+      write_element(i, quads.subspan(first, count), origin, block);
+  });
+}
+
+void VertexWriter::write_element(std::size_t index, std::span<const Quad> quads, Vec3 origin, std::byte* block) const {
+  const VertexElement& element = layout_.elements[index];
+  const Column column{block + element.offset, layout_.stride};
+  const VertexFormat format = element.format;
+  switch (element.attribute) {
+    case VertexAttribute::Position:
+      return put_quad_positions(format, quads, origin, column);
+    case VertexAttribute::Normal: {
+      const std::array<Vec3, 6>& normals = face_normals();
+      return put_normals(format, PerQuad{column, quads, [&](Quad quad) { return normals[face_of(quad.direction())]; }});
+    }
+    case VertexAttribute::Face:
+      return put_numbers(format, PerQuad{column, quads, [](Quad quad) { return quad.direction(); }});
+    case VertexAttribute::Colour:
+      return put_encoded(
+          format, PerQuad{column, quads, [&](Quad quad) -> const Colour& { return colour(index, quad.type()); }});
+    case VertexAttribute::Occlusion:
+    case VertexAttribute::Brightness:
+      return put_block_occlusion(format, PerCorner{column, quads, [](Quad quad) { return quad.occlusion(); }});
+    case VertexAttribute::Type:
+      return put_numbers(format, PerQuad{column, quads, [](Quad quad) { return quad.type(); }});
+    case VertexAttribute::Uv:
+      return put_uvs(format, quads, column);
+  }
+}
+
+void VertexWriter::write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, VertexSource::SmoothChunk), "a layout for smooth chunks");
+  MeshView view;
+  view.positions = {mesh.positions.data(), mesh.positions.size()};
+  view.normals = {mesh.normals.data(), mesh.normals.size()};
+  view.occlusion = {mesh.occlusion.data(), mesh.occlusion.size()};
+  write_view(view, origin, out);
+}
+
+void VertexWriter::write(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(can_write(layout_, mesh.has_albedo() ? VertexSource::Smooth : VertexSource::Blocks),
+               "a layout for this kind of mesh");
+  write_view(mesh, origin, out);
+}
+
+void VertexWriter::write_view(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const {
+  QUOIN_ASSERT(out.size() >= bytes_needed(mesh.positions.size()), "room for the vertices");
+  by_blocks(mesh.positions.size(), 1, layout_.stride, out.data(),
+            [&](std::size_t first, std::size_t count, std::byte* block) {
+              for (std::size_t i = 0; i < layout_.elements.size(); ++i) {
+                write_element(i, mesh, first, count, origin, block);
+              }
+            });
+}
+
+void VertexWriter::write_element(std::size_t index, const MeshView& mesh, std::size_t first, std::size_t count,
+                                 Vec3 origin, std::byte* block) const {
+  const VertexElement& element = layout_.elements[index];
+  const Column column{block + element.offset, layout_.stride};
+  const VertexFormat format = element.format;
+  const auto vertices = [&](auto value_of) { return PerVertex{column, count, value_of}; };
+  switch (element.attribute) {
+    case VertexAttribute::Position:
+      return put_positions(format, vertices([&](auto i) { return mesh.positions[first + i] + origin; }));
+    case VertexAttribute::Normal:
+      if (!mesh.normals.empty()) return put_normals(format, vertices([&](auto i) { return mesh.normals[first + i]; }));
+      return put_normals(format, vertices([&](auto i) { return face_normals()[face_of(mesh.directions[first + i])]; }));
+    case VertexAttribute::Face:
+      return put_numbers(format, vertices([&](auto i) { return mesh.directions[first + i]; }));
+    case VertexAttribute::Colour:
+      if (mesh.has_albedo()) {
+        return put_encoded(format, vertices([&](auto i) { return encoded(mesh.albedo[first + i], format); }));
+      }
+      return put_encoded(format,
+                         vertices([&](auto i) -> const Colour& { return colour(index, mesh.types[first + i]); }));
+    case VertexAttribute::Occlusion:
+    case VertexAttribute::Brightness:
+      return write_shading(format, mesh, first, count, column.at);
+    case VertexAttribute::Type:
+      return put_numbers(format, vertices([&](auto i) { return mesh.types[first + i]; }));
+    case VertexAttribute::Uv:
+      return;  // no view has any
+  }
+}
+
+void VertexWriter::write_shading(VertexFormat format, const MeshView& mesh, std::size_t first, std::size_t count,
+                                 std::byte* at) const {
+  const Column column{at, layout_.stride};
+  if (mesh.occlusion.empty()) {
+    const auto occlusion_of = [&](auto i) {
+      return mesh.block_occlusion.empty() ? std::uint8_t{0} : mesh.block_occlusion[first + i];
+    };
+    return put_block_occlusion(format, PerVertex{column, count, occlusion_of});
+  }
+  const auto brightness_of = [&](auto i) { return 1.0F - mesh.occlusion[first + i]; };
+  const PerVertex brightness{column, count, brightness_of};
+  if (format == VertexFormat::Float32) return brightness.put<float>([](float share) { return share; });
+  brightness.put<std::uint8_t>([](float share) { return unorm8(share); });
+}
+
+}  // namespace quoin

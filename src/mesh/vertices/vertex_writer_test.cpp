@@ -1,0 +1,305 @@
+#include <quoin/mesh/vertex_writer.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <quoin/grid/density_grid.h>
+#include <quoin/mesh/blocky.h>
+
+#include "core/death_for_tests.h"
+#include "mesh/mesh_oracle.h"
+
+namespace quoin {
+namespace {
+
+using enum VertexFormat;
+
+template <class Value>
+Value read(const std::vector<std::byte>& bytes, std::size_t at) {
+  Value value;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+// All that a vertex of blocks can have; some of it twice, oddly placed.
+VertexLayout full_layout() {
+  return {60,
+          {{VertexAttribute::Position, Float32x3, 0},
+           {VertexAttribute::Normal, Float32x3, 13},
+           {VertexAttribute::Face, Uint8, 25},
+           {VertexAttribute::Occlusion, Uint8, 26},
+           {VertexAttribute::Type, Uint16, 27},
+           {VertexAttribute::Colour, Unorm8x4Srgb, 30},
+           {VertexAttribute::Uv, Uint8x2, 34},
+           {VertexAttribute::Brightness, Unorm8, 36},
+           {VertexAttribute::Normal, Snorm8x4, 37},
+           {VertexAttribute::Position, Sint16x4, 41}}};
+}
+
+// The vertices of a grid by a VertexWriter, and its triangles.
+struct Written {
+  std::vector<std::byte> vertices;
+  std::vector<std::uint32_t> indices;
+};
+
+// Of those quads whose types are of one class, chunk by chunk.
+Written written(const Grid& grid, const VoxelRegistry& types, const VertexWriter& writer, SurfaceClass surface) {
+  Written all;
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  for (const IVec3 chunk : grid.chunks()) {
+    mesher.mesh(grid.neighbourhood(chunk), types, {}, quads);
+    std::erase_if(quads, [&](const Quad& quad) { return surface_class(types[quad.type()]) != surface; });
+    const std::size_t before = all.vertices.size() / writer.layout().stride;
+    all.vertices.resize(all.vertices.size() + writer.bytes_needed(vertices_needed(quads.size())));
+    writer.write(quads, Vec3(chunk * kChunkEdge), std::span(all.vertices).subspan(writer.bytes_needed(before)));
+    const std::size_t indices = all.indices.size();
+    all.indices.resize(indices + indices_needed(quads.size()));
+    write_indices<std::uint32_t>(std::span<const Quad>(quads), before, std::span(all.indices).subspan(indices));
+  }
+  return all;
+}
+
+TEST(VertexWriter, WritesTheTrianglesOfTheWholeMesh) {
+  const VoxelRegistry types = oracle::mixed_types();
+  const VertexWriter writer(full_layout(), types);
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Grid grid = oracle::random_world(seed, {IVec3{-90, -70, -20}, IVec3{40, 20, 75}}, 5, 0.004);
+    const auto mesh = build_blocky_mesh(grid, types, {});
+    ASSERT_TRUE(mesh.has_value());
+    for (const SurfaceClass surface : {SurfaceClass::Opaque, SurfaceClass::Transparent}) {
+      const BlockyTriangles& expected = mesh->surfaces[static_cast<std::size_t>(surface)];
+      const Written found = written(grid, types, writer, surface);
+      EXPECT_EQ(found.indices, expected.indices);
+      ASSERT_EQ(found.vertices.size(), writer.bytes_needed(expected.positions.size()));
+      for (std::size_t i = 0; i < expected.positions.size(); ++i) {
+        const std::size_t at = i * writer.layout().stride;
+        ASSERT_EQ(read<Vec3>(found.vertices, at), expected.positions[i]);
+        const Vec3 normal(normal_of(expected.directions[i]));
+        ASSERT_EQ(read<Vec3>(found.vertices, at + 13), normal);
+        ASSERT_EQ(read<Direction>(found.vertices, at + 25), expected.directions[i]);
+        ASSERT_EQ(read<std::uint8_t>(found.vertices, at + 26), expected.occlusion[i]);
+        ASSERT_EQ(read<VoxelType>(found.vertices, at + 27), expected.types[i]);
+        ASSERT_EQ(read<Rgba8>(found.vertices, at + 30), types[expected.types[i]].colour);
+        constexpr std::array<std::uint8_t, 4> kGrey = {255, 191, 128, 64};
+        ASSERT_EQ(read<std::uint8_t>(found.vertices, at + 36), kGrey[expected.occlusion[i]]);
+        const auto snorm = read<std::array<std::int8_t, 4>>(found.vertices, at + 37);
+        for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(snorm[static_cast<std::size_t>(axis)], 127 * int(normal[axis]));
+        const auto whole = read<std::array<std::int16_t, 4>>(found.vertices, at + 41);
+        ASSERT_EQ(IVec3(whole[0], whole[1], whole[2]), IVec3(expected.positions[i]));
+        ASSERT_EQ(whole[3], 1);
+        for (std::size_t rest = 49; rest < 60; ++rest) ASSERT_EQ(found.vertices[at + rest], std::byte{0});
+      }
+    }
+  }
+}
+
+TEST(VertexWriter, OfAViewWritesTheSameAsOfItsQuads) {
+  const VoxelRegistry types = oracle::mixed_types();
+  VertexLayout layout = full_layout();
+  std::erase_if(layout.elements, [](const VertexElement& element) {
+    return element.attribute == VertexAttribute::Uv || element.format == Sint16x4;
+  });
+  ASSERT_TRUE(can_write(layout, VertexSource::Blocks));
+  const VertexWriter writer(layout, types);
+  const Grid grid = oracle::random_world(3, {IVec3{-30}, IVec3{70}}, 5, 0.01);
+  const auto mesh = build_blocky_mesh(grid, types, {});
+  const MeshView view = view_of(mesh->surfaces[0], SurfaceClass::Opaque);
+  std::vector<std::byte> found(writer.bytes_needed(view.positions.size()));
+  writer.write(view, Vec3(0.0F), found);
+  EXPECT_EQ(found, written(grid, types, writer, SurfaceClass::Opaque).vertices);
+}
+
+TEST(VertexWriter, AgreesWithALayoutThatTheCompilerKnows) {
+  struct Vertex {
+    Vec3 position;
+    std::uint16_t type;
+    std::uint8_t face;
+    std::uint8_t level;
+    float u;
+    float v;
+  };
+  static_assert(sizeof(Vertex) == 24);
+  const VoxelRegistry types = oracle::mixed_types();
+  const Grid grid = oracle::random_world(4, {IVec3{0}, IVec3{64}}, 5, 0.01);
+  QuadBuffer quads;
+  BlockyMesher().mesh(grid.neighbourhood(IVec3(0)), types, {}, quads);
+  ASSERT_GT(quads.size(), 1'000U);
+  const Vec3 origin(0.25F, -100.0F, 7.5F);
+  std::vector<Vertex> expected(vertices_needed(quads.size()));
+  for_each_vertex(quads, [&](std::size_t i, const QuadVertex& vertex) {
+    expected[i] = {Vec3(vertex.position) + origin,
+                   vertex.type,
+                   static_cast<std::uint8_t>(vertex.direction),
+                   vertex.occlusion,
+                   static_cast<float>(vertex.u),
+                   static_cast<float>(vertex.v)};
+  });
+  const VertexWriter writer({sizeof(Vertex),
+                             {{VertexAttribute::Uv, Float32x2, offsetof(Vertex, u)},
+                              {VertexAttribute::Position, Float32x3, offsetof(Vertex, position)},
+                              {VertexAttribute::Type, Uint16, offsetof(Vertex, type)},
+                              {VertexAttribute::Face, Uint8, offsetof(Vertex, face)},
+                              {VertexAttribute::Occlusion, Uint8, offsetof(Vertex, level)}}},
+                            types);
+  std::vector<std::byte> found(writer.bytes_needed(expected.size()));
+  writer.write(quads, origin, found);
+  EXPECT_EQ(std::memcmp(found.data(), expected.data(), found.size()), 0);
+}
+
+TEST(VertexWriter, CornersAreThoseOfTheQuad) {
+  std::mt19937_64 random(1);
+  for (int i = 0; i < 1'000; ++i) {
+    Quad quad{random() & 0x3FF'FFFF'FFFF'FFFFU};
+    quad.bits &= ~(std::uint64_t{7} << Quad::kDirectionShift);
+    quad.bits |= random() % 6 << Quad::kDirectionShift;
+    const std::array<IVec3, 4> corners = corners_of(quad);
+    for (int corner = 0; corner < 4; ++corner) {
+      EXPECT_EQ(corners[static_cast<std::size_t>(corner)], quad.corner(corner));
+    }
+  }
+}
+
+TEST(VertexWriter, WritesColoursInEveryFormat) {
+  VoxelRegistry types;
+  VoxelProperties properties;
+  properties.colour = {255, 128, 1, 51};
+  properties.visibility = Visibility::Transparent;
+  ASSERT_TRUE(types.add(properties).has_value());
+  const VertexWriter writer({32,
+                             {{VertexAttribute::Colour, Float32x4, 0},
+                              {VertexAttribute::Colour, Unorm16x4, 16},
+                              {VertexAttribute::Colour, Unorm8x4, 24},
+                              {VertexAttribute::Colour, Unorm8x4Srgb, 28}}},
+                            types);
+  std::vector<std::byte> found(writer.bytes_needed(8));
+  // The second is of a type that nobody registered.
+  const QuadBuffer quads = {{std::uint64_t{1} << Quad::kTypeShift}, {std::uint64_t{9} << Quad::kTypeShift}};
+  writer.write(quads, Vec3(0.0F), found);
+  const auto linear = read<std::array<float, 4>>(found, 0);
+  const double green = std::pow((128.0 / 255.0 + 0.055) / 1.055, 2.4);
+  const double blue = 1.0 / 255.0 / 12.92;
+  EXPECT_FLOAT_EQ(linear[0], 1.0F);
+  EXPECT_NEAR(linear[1], green, 1e-6);
+  EXPECT_NEAR(linear[2], blue, 1e-7);
+  EXPECT_FLOAT_EQ(linear[3], 0.2F);
+  const auto wide = read<std::array<std::uint16_t, 4>>(found, 16);
+  EXPECT_EQ(wide, (std::array<std::uint16_t, 4>{65'535, static_cast<std::uint16_t>(std::lround(green * 65'535.0)),
+                                                static_cast<std::uint16_t>(std::lround(blue * 65'535.0)), 13'107}));
+  const auto bytes = read<std::array<std::uint8_t, 4>>(found, 24);
+  EXPECT_EQ(bytes, (std::array<std::uint8_t, 4>{255, 55, 0, 51}));
+  EXPECT_EQ(read<Rgba8>(found, 28), properties.colour);
+  for (std::size_t i = 16; i < 32; ++i) EXPECT_EQ(found[4 * 32 + i], std::byte{255});
+}
+
+TEST(VertexWriter, WritesSmoothMeshes) {
+  DensityGrid field;
+  field.add_sphere({30.0, 31.0, 29.0}, 12.5, 1);
+  VoxelRegistry types = oracle::mixed_types();
+  const VertexLayout layout = {24,
+                               {{VertexAttribute::Position, Float32x3, 0},
+                                {VertexAttribute::Normal, Snorm8x4, 12},
+                                {VertexAttribute::Brightness, Unorm8, 16},
+                                {VertexAttribute::Brightness, Float32, 20}}};
+  ASSERT_TRUE(can_write(layout, VertexSource::SmoothChunk));
+  const VertexWriter writer(layout, types);
+  SmoothChunkMesh chunk;
+  SmoothMesher().mesh(field.neighbourhood(IVec3(0)), {}, chunk);
+  ASSERT_GT(chunk.positions.size(), 1'000U);
+  std::vector<std::byte> found(writer.bytes_needed(chunk.positions.size()));
+  const Vec3 origin(1.5F, -20.0F, 64.0F);
+  writer.write(chunk, origin, found);
+  for (std::size_t i = 0; i < chunk.positions.size(); ++i) {
+    const std::size_t at = i * 24;
+    ASSERT_EQ(read<Vec3>(found, at), chunk.positions[i] + origin);
+    const auto normal = read<std::array<std::int8_t, 4>>(found, at + 12);
+    for (int axis = 0; axis < 3; ++axis) {
+      ASSERT_NEAR(normal[static_cast<std::size_t>(axis)] / 127.0, chunk.normals[i][axis], 0.5 / 127.0 + 1e-6);
+    }
+    ASSERT_NEAR(read<std::uint8_t>(found, at + 16) / 255.0, 1.0F - chunk.occlusion[i], 0.5 / 255.0 + 1e-6);
+    ASSERT_EQ(read<float>(found, at + 20), 1.0F - chunk.occlusion[i]);
+  }
+
+  const auto mesh = build_smooth_mesh(field, types, {});
+  ASSERT_TRUE(mesh.has_value());
+  const VertexWriter coloured({8, {{VertexAttribute::Colour, Unorm16x4, 0}}}, types);
+  std::vector<std::byte> colours(coloured.bytes_needed(mesh->positions.size()));
+  coloured.write(view_of(*mesh), Vec3(0.0F), colours);
+  EXPECT_EQ(std::memcmp(colours.data(), mesh->albedo.data(), colours.size()), 0);
+
+  std::vector<std::uint16_t> indices(chunk.indices.size());
+  write_indices<std::uint16_t>(std::span<const std::uint32_t>(chunk.indices.data(), chunk.indices.size()), 100,
+                               indices);
+  std::vector<std::uint16_t> turned(indices.size());
+  write_indices<std::uint16_t>(std::span<const std::uint32_t>(chunk.indices.data(), chunk.indices.size()), 100, turned,
+                               Winding::Clockwise);
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    for (std::size_t k = 0; k < 3; ++k) ASSERT_EQ(indices[i + k], chunk.indices[i + k] + 100);
+    ASSERT_EQ(turned[i], indices[i]);
+    ASSERT_EQ(turned[i + 1], indices[i + 2]);
+    ASSERT_EQ(turned[i + 2], indices[i + 1]);
+  }
+}
+
+TEST(VertexWriter, ClockwiseTrianglesAreTheOthersTurnedOver) {
+  for (const bool flipped : {false, true}) {
+    const auto& plain = triangle_corners(flipped);
+    const auto& turned = triangle_corners(flipped, Winding::Clockwise);
+    for (std::size_t i = 0; i < 6; i += 3) {
+      EXPECT_EQ(turned[i], plain[i]);
+      EXPECT_EQ(turned[i + 1], plain[i + 2]);
+      EXPECT_EQ(turned[i + 2], plain[i + 1]);
+    }
+  }
+}
+
+TEST(VertexLayout, IsRefusedWhereItCannotBeWritten) {
+  const VertexElement position{VertexAttribute::Position, Float32x3, 0};
+  EXPECT_TRUE(can_write({12, {position}}, VertexSource::Quads));
+  EXPECT_TRUE(can_write({2'048, {position}}, VertexSource::Smooth));
+  EXPECT_TRUE(can_write({1, {}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({0, {}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({2'049, {position}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({11, {position}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({16, {position, {VertexAttribute::Type, Uint16, 11}}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Type, Uint16, 0xFFFF'FFFFU}}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Position, Snorm8x4, 0}}}, VertexSource::Quads));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Position, Sint16x4, 0}}}, VertexSource::SmoothChunk));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Type, Uint16, 0}}}, VertexSource::Smooth));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Colour, Unorm8x4, 0}}}, VertexSource::SmoothChunk));
+  EXPECT_FALSE(can_write({16, {{VertexAttribute::Uv, Uint8x2, 0}}}, VertexSource::Blocks));
+}
+
+TEST(VertexWriterDeathTest, ALayoutThatCannotBeWrittenIsAMistake) {
+  QUOIN_EXPECT_MISTAKE(VertexWriter({4, {{VertexAttribute::Position, Float32x3, 0}}}, {}),
+                       "a layout that can be written");
+}
+
+TEST(VertexWriterDeathTest, WhatDoesNotFitIsAMistake) {
+  const VertexWriter writer({16, {{VertexAttribute::Position, Sint16x4, 0}, {VertexAttribute::Uv, Uint8x2, 8}}}, {});
+  const QuadBuffer quads(2);
+  std::vector<std::byte> out(8 * 16 - 1);
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.0F), out), "room for four vertices a quad");
+  out.resize(8 * 16);
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(0.5F), out), "positions are whole and within the format's range");
+  QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(32'704.0F), out), "positions are whole and within the format's range");
+  QUOIN_EXPECT_MISTAKE(writer.write(SmoothChunkMesh(), Vec3(0.0F), out), "a layout for smooth chunks");
+  QUOIN_EXPECT_MISTAKE(writer.write(MeshView(), Vec3(0.0F), out), "a layout for this kind of mesh");
+  std::vector<std::uint16_t> indices(11);
+  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 0, indices), "room for six indices a quad");
+  indices.resize(12);
+  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 65'528, indices), "indices fit their type");
+  const std::vector<std::uint32_t> far = {0, 1, 65'535};
+  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(far), 0, indices), "indices fit their type");
+  indices.resize(2);
+  QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(far), 0, indices), "whole triangles");
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,47 @@
+// From the world into an instance's grid.
+
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/matrix.hpp>
+#include <quoin/scene/scene.h>
+
+#include "scene/instance_axes.h"
+
+namespace quoin {
+namespace {
+
+constexpr DVec3 kNowhere{std::numeric_limits<double>::quiet_NaN()};
+
+}  // namespace
+
+// The inverse rather than the transpose: a quaternion may be a little longer than 1, and far from the pivot that shows.
+DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
+  if (!has_place(instance)) return kNowhere;
+  // The difference of two far positions is taken first: it is small, and mostly exact.
+  const DVec3 offset = glm::inverse(world_axes(instance)) * (point_in_world - instance.position);
+  return offset / instance.voxel_size + grid.pivot;
+}
+
+DVec3 world_from_grid_direction(const Instance& instance, DVec3 direction_in_grid) {
+  return world_axes(instance) * (direction_in_grid * instance.voxel_size);
+}
+
+DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world) {
+  if (!has_place(instance)) return kNowhere;
+  return glm::inverse(world_axes(instance)) * direction_in_world / instance.voxel_size;
+}
+
+std::optional<IVec3> voxel_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
+  const DVec3 voxel = glm::floor(grid_from_world(instance, grid, point_in_world));
+  for (int axis = 0; axis < 3; ++axis) {
+    // NaN is in no range.
+    if (!(voxel[axis] >= std::numeric_limits<int>::min() && voxel[axis] <= std::numeric_limits<int>::max())) {
+      return std::nullopt;
+    }
+  }
+  return IVec3(voxel);
+}
+
+}  // namespace quoin
