@@ -211,7 +211,7 @@ std::optional<ScalarType> scalar_type(const std::string& name) {
   return std::nullopt;
 }
 
-/// Reads the options of volumes; answers what is wrong with them, or "".
+/// Reads the options of volumes; returns what is wrong with them, or "".
 std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
   if (command.count("--iso") > 0) {
     options.iso = parse_number(texts.iso);

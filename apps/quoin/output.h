@@ -29,7 +29,7 @@ void print_error(std::string_view message);
 void print_error(const Error& error);
 void print_warnings(const std::vector<std::string>& warnings);
 
-/// Prints text, or one JSON object and a line end, on standard output; answers the exit status: kFailed when that
+/// Prints text, or one JSON object and a line end, on standard output; returns the exit status: kFailed when that
 /// cannot be written.
 [[nodiscard]] int print(std::string_view text);
 [[nodiscard]] int print_json(const Json& object);

@@ -16,7 +16,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// A listener for one piece of work, called `label` in the bar, which answers false once the user has interrupted.
+  /// A listener for one piece of work, called `label` in the bar, which returns false once the user has interrupted.
   /// Requires: this outlives it.
   [[nodiscard]] Progress listener(std::string label);
 

@@ -21,7 +21,7 @@ CLI::Option* add_text_option(CLI::App& command, const std::string& name, const s
   return command.add_option(name, description)->type_name(type);
 }
 
-/// Reads the text of such an option, if it was given, into `value`; answers what is wrong with it, or "".
+/// Reads the text of such an option, if it was given, into `value`; returns what is wrong with it, or "".
 template <class Read, class Value>
 std::string read_option(const CLI::App& command, const std::string& name, Read read, const std::string& must_be,
                         Value& value) {
@@ -171,7 +171,7 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   return "";
 }
 
-/// Reads the options that are texts to CLI11; answers what is wrong with the first wrong one, or "".
+/// Reads the options that are texts to CLI11; returns what is wrong with the first wrong one, or "".
 std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   const std::string three = "three numbers, as in 1,-2.5,3";
   LightOptions& light = arguments.render.light;

@@ -35,7 +35,7 @@ struct RenderArguments {
 /// Adds the command's options, which fill in what CLI11 can read by itself.
 void add_render_options(CLI::App& command, RenderArguments& arguments);
 
-/// Once all are parsed: reads the rest, settles what several options decide together, and answers what is wrong with
+/// Once all are parsed: reads the rest, settles what several options decide together, and returns what is wrong with
 /// the usage, or "".
 [[nodiscard]] std::string settle(const CLI::App& command, RenderArguments& arguments);
 

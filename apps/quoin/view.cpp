@@ -81,7 +81,7 @@ int run_view(const ViewArguments&) {
 
 #endif
 
-/// Answers what is wrong with the usage, or "".
+/// Returns what is wrong with the usage, or "".
 std::string settle(const CLI::App& command, ViewArguments& arguments) {
   constexpr PictureSize kSmallest{320, 240};
   constexpr int kLongestSide = 16'384;

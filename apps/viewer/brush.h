@@ -32,7 +32,7 @@ struct Brush {
 /// The box of voxels that a brush can change about a voxel; cut off where coordinates end.
 [[nodiscard]] IBox reach_of(const Brush& brush, IVec3 centre);
 
-/// Applies a brush. Answers how many voxels changed.
+/// Applies a brush. Returns how many voxels changed.
 std::int64_t apply(const Brush& brush, IVec3 centre, Grid& grid);
 
 /// Where the first touch of a stroke lands: beside the voxel that was hit for placing, in it otherwise.

@@ -154,7 +154,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   return true;
 }
 
-// Answers whether there is another picture.
+// Returns whether there is another picture.
 Result<bool> DeviceBackend::Impl::draw() {
   try {
     if (Status ready = prepare(); !ready) return ready.error();

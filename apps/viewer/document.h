@@ -40,7 +40,7 @@ class Document {
   /// grid is gone, or the brush's type is not registered.
   bool begin_stroke(const Brush& brush, const SceneHit& hit);
   /// Goes on to where a ray of the world meets the layer of the first touch, without gaps; to `hit` when painting.
-  /// Answers how many voxels changed.
+  /// Returns how many voxels changed.
   std::int64_t drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit);
   /// The whole stroke is one step to undo.
   void end_stroke();

@@ -89,7 +89,7 @@ class ViewBackend {
   /// What went wrong with the last request, if anything.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;
 
-  /// Stops what is under way and answers once nothing reads the scene any more, which may then be edited. Answers how
+  /// Stops what is under way and returns once nothing reads the scene any more, which may then be edited. Returns how
   /// many seconds that took.
   virtual double pause() = 0;
   /// The scene is left alone again, until the next `pause`; everything is drawn anew if it `changed`.

@@ -21,7 +21,7 @@ inline void check_hits(const std::string& name, int hits, int expected) {
   std::exit(1);
 }
 
-/// Registers `count_hits(rays)`, which traces them all and answers how many hit. It is called once, and checked, before
+/// Registers `count_hits(rays)`, which traces them all and returns how many hit. It is called once, and checked, before
 /// it is timed.
 template <class CountHits>
 void add_rays(const std::string& name, const std::vector<workloads::RayQuery>& (*rays)(), int (*expected)(),

@@ -47,9 +47,9 @@ class Lighting {
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
            bool detail_colours = false);
 
-  /// Linear light of each point, not clamped; answers how many rays that took.
+  /// Linear light of each point, not clamped; returns how many rays that took.
   ///
-  /// Requires: as many places in `colours` as points. The answer for a point does not depend on the others; neighbours
+  /// Requires: as many places in `colours` as points. The result for a point does not depend on the others; neighbours
   /// should lie side by side, since sixteen are traced together.
   std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
 

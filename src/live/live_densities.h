@@ -78,7 +78,7 @@ class DensityCache {
   void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
   /// Of the grid as `follow` saw it last.
   [[nodiscard]] LiveDensities around(IVec3 chunk);
-  /// Keeps what workers made, as far as it holds still. Answers a bit for each that is new.
+  /// Keeps what workers made, as far as it holds still. Returns a bit for each that is new.
   std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
 
  private:

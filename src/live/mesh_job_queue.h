@@ -70,7 +70,7 @@ class MeshJobQueue {
   void push(std::unique_ptr<LiveJob> job);
   /// Takes back what no worker has started of the jobs for which `is_unwanted`.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
-  /// Gives the jobs that wait new distances; answers these, the least first.
+  /// Gives the jobs that wait new distances; returns these, the least first.
   [[nodiscard]] std::vector<double> measure(const std::function<double(const LiveJob&)>& distance);
   /// The jobs that were done since the last call, in the order in which they were.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();

@@ -123,7 +123,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
   return ring;
 }
 
-/// Appends a copy of a vertex and answers its number.
+/// Appends a copy of a vertex and returns its number.
 std::uint32_t add_copy(SmoothMesh& mesh, std::uint32_t vertex) {
   const auto copy = static_cast<std::uint32_t>(mesh.positions.size());
   const auto append = [vertex](auto& values) {

@@ -131,7 +131,7 @@ void SmoothColumn::Impl::measure_overhangs() {
   }
 }
 
-// Answers false where all is so far above or below the ground that caves alone can matter.
+// Returns false where all is so far above or below the ground that caves alone can matter.
 bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
   const auto most = static_cast<float>(largest_amplitude * kMaxNoise);
   const auto first = static_cast<float>(corner.y - 1);
@@ -160,7 +160,7 @@ bool SmoothColumn::Impl::fill_ground(IVec3 corner) {
   return true;
 }
 
-// Answers whether a cave comes near the chunk.
+// Returns whether a cave comes near the chunk.
 bool SmoothColumn::Impl::fill_caves(IVec3 corner) {
   if (!has_caves ||
       static_cast<float>(corner.y) > highest + kFarHeight + static_cast<float>(largest_amplitude * kMaxNoise))

@@ -39,7 +39,7 @@ void tell_of_copies(ViewState& state, const SceneHit& hit) {
   if (copies > 1) state.tell("this model stands at " + std::to_string(copies) + " places: all of them change");
 }
 
-/// Runs `edit` on the document while nothing draws it. `edit` answers whether it changed anything.
+/// Runs `edit` on the document while nothing draws it. `edit` returns whether it changed anything.
 template <class Edit>
 void edit_paused(ViewState& state, Edit edit) {
   ScenePause pause(*state.open.backend);

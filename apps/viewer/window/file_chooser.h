@@ -17,7 +17,7 @@ class FileChooser {
   [[nodiscard]] bool is_shown() const { return is_shown_; }
   [[nodiscard]] Purpose purpose() const { return purpose_; }
 
-  /// Draws it, if shown. Answers the file once the user has chosen.
+  /// Draws it, if shown. Returns the file once the user has chosen.
   [[nodiscard]] std::optional<std::filesystem::path> draw(float scale);
 
  private:
@@ -29,7 +29,7 @@ class FileChooser {
 
   void enter(const std::filesystem::path& folder);
   void draw_folder_line();
-  /// Answers true when an entry was chosen for good.
+  /// Returns true when an entry was chosen for good.
   [[nodiscard]] bool draw_entries(float height);
   [[nodiscard]] std::optional<std::filesystem::path> accept();
   [[nodiscard]] bool is_listed(const Entry& entry) const;

@@ -18,7 +18,7 @@ namespace quoin::viewer {
 
 namespace {
 
-/// A heading that can be folded. Answers whether what follows is shown.
+/// A heading that can be folded. Returns whether what follows is shown.
 bool heading(const char* name) {
   return ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
 }

@@ -34,7 +34,7 @@ class PlainField {
     }
   }
 
-  /// Gives every sample a new value, rounded and clamped as the grid must; answers which changed.
+  /// Gives every sample a new value, rounded and clamped as the grid must; returns which changed.
   template <class Pick>
   std::vector<IVec3> edit(Pick&& pick) {
     std::vector<IVec3> changed;

@@ -60,7 +60,7 @@ std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
   return chunk == nullptr ? 0 : ~chunk->row_mask(y & (kChunkEdge - 1), z & (kChunkEdge - 1), kAir);
 }
 
-// Answers whether all voxels of the region are solid, none is, or neither.
+// Returns whether all voxels of the region are solid, none is, or neither.
 std::optional<bool> read_region(const Neighbourhood& chunks, Scratch& scratch) {
   bool is_all_solid = true;
   bool is_all_air = true;

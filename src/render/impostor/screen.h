@@ -42,7 +42,7 @@ class ImpostorScreen {
  public:
   ImpostorScreen(const Camera& camera, int width, int height);
 
-  /// Nothing for what draw_impostors leaves out, or what cannot show. `impostor` must outlive what is answered.
+  /// Nothing for what draw_impostors leaves out, or what cannot show. `impostor` must outlive the result.
   [[nodiscard]] std::optional<DrawnImpostor> drawn(const PlacedGrid& placed, std::int32_t index,
                                                    const Impostor& impostor) const;
 

@@ -30,7 +30,7 @@ class DeviceDetail {
   void look_at(const Scene& scene);
   void clear();
 
-  /// Answers the scene's instances in their detail: traced in grids halved as often as `detail` says, or less often
+  /// Returns the scene's instances in their detail: traced in grids halved as often as `detail` says, or less often
   /// where that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
   /// `max_bytes` of device memory, of each of both, those are released that pictures have not asked for longest; what
   /// this one asks for stays.

@@ -40,7 +40,7 @@ struct BodyList {
   float dropped_t;  // where the first begins for which there was no room
 };
 
-// Puts a body in its place; when the list is full the furthest gives way, and is answered.
+// Puts a body in its place; when the list is full the furthest gives way, and is returned.
 bool insert_body(inout BodyList list, Body body, out Body dropped) {
   Bodies bodies = Bodies(list.address);
   bool is_full = list.count == kBodies;

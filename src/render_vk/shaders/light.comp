@@ -239,7 +239,7 @@ Point point_of(Body body) {
   return point;
 }
 
-// Lights what this round has of a pixel, and answers whether that was all.
+// Lights what this round has of a pixel, and returns whether that was all.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = picture_point();
   Point opaque = Points(frame().points).at[slot];

@@ -48,7 +48,7 @@ class InstanceTree {
   void change(std::span<const Change> changes);
 
   /// Calls `visit(index)` for every box that the ray may meet from 0 to `max_t`, nearer ones mostly first, until it
-  /// answers false. It may lower `max_t` on the way.
+  /// returns false. It may lower `max_t` on the way.
   template <class Visit>
   void visit(const Ray& ray, double& max_t, Visit&& visit) const {
     if (nodes_.empty()) return;

@@ -140,7 +140,7 @@ class PacketTree::Builder {
   Builder(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out, std::vector<Node>& nodes)
       : tree_(tree), origin_(origin), left_out_(left_out), nodes_(nodes) {}
 
-  // Answers the box around what is in the node; an empty one, and no node, when that is nothing.
+  // Returns the box around what is in the node; an empty one, and no node, when that is nothing.
   DBox make(std::size_t from) {
     const std::size_t at = nodes_.size();
     nodes_.emplace_back().boxes.fill(Four{} - kInfinity);

@@ -123,7 +123,7 @@ class PacketTree {
   /// Leaves out the boxes for which `left_out` (one for each box, or empty) is set. Cost: O(n).
   PacketTree(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out = {});
 
-  /// Calls `visit(index, boxes, box)` for every box that the rays may meet, nearer ones first, until it answers false:
+  /// Calls `visit(index, boxes, box)` for every box that the rays may meet, nearer ones first, until it returns false:
   /// the box is that one of the four. It may lower how far the rays reach.
   template <class Visit>
   void visit(const PacketBounds& rays, Visit&& visit) const {

@@ -1,6 +1,6 @@
 // Rays of one packet that go the same way, together, in AVX2: the units that any of them may pass are found once for
 // all, in an order in which each of them passes those that it does; which rays pass an occupied voxel is then asked of
-// all lanes. The same answers as the walk in lockstep.
+// all lanes. The same results as the walk in lockstep.
 //
 //     start ______                       origin, inverse: least and greatest of all lanes, mirrored
 //     |  ___/   | \___                    -> chunks, bricks, cells, voxels that any lane may pass (BeamPaths)

@@ -10,7 +10,7 @@
 
 namespace quoin::trace {
 
-// Every kernel gives the same answers, those of a walk from one lattice plane to the next where the plane P of an axis
+// Every kernel gives the same results, those of a walk from one lattice plane to the next where the plane P of an axis
 // is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
 // of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
 struct Kernel {

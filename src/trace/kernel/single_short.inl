@@ -1,5 +1,5 @@
 // Whether one short ray is blocked, in sixteen lanes: all its crossings at once instead of one after the other, so that
-// nothing waits and the answer decides no branch. The same answers as the walk in trace/kernel/kernel_plain.cpp.
+// nothing waits and the answer decides no branch. The same results as the walk in trace/kernel/kernel_plain.cpp.
 //
 //   lane       | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 |10 |11 |12 |13 |14 |15 |
 //   crossing   | planes of x   | planes of y       | planes of z   | none  |start|
