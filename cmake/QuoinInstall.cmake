@@ -7,6 +7,7 @@ install(TARGETS quoin EXPORT quoin_targets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}" LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(DIRECTORY include/quoin DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(EXPORT quoin_targets NAMESPACE quoin:: DESTINATION "${quoin_package_dir}")
+get_target_property(quoin_library_type quoin TYPE)
 configure_package_config_file(cmake/quoin-config.cmake.in "${CMAKE_CURRENT_BINARY_DIR}/quoin-config.cmake"
   INSTALL_DESTINATION "${quoin_package_dir}")
 write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/quoin-config-version.cmake" COMPATIBILITY SameMinorVersion)

@@ -24,8 +24,8 @@ namespace quoin {
 
 /// One chunk of `halved(grid, types)`: `chunk` is among its chunks.
 ///
-/// Reads the grid's chunks from 2 * chunk - 1 to 2 * chunk + 2: an edit of chunk c changes the result's chunks from
-/// (c - 1) / 2 to (c + 1) / 2, rounded down, and no others.
+/// Reads the voxels that its cells stand for and two past them on each side, and no others: an edit elsewhere leaves it
+/// as it was.
 [[nodiscard]] Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
 /// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was edited.

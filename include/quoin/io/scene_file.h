@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -41,6 +42,16 @@ struct SceneFile {
 ///         ("instances[3].rotation: ..."); unknown keys are refused; Unsupported for a later version; LimitExceeded
 ///         beyond 64 MiB, 32 levels of nesting, 65,536 files or 4,194,304 instances.
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
+
+/// The text of a scene file; `parse_scene_file` reads the same from it, but for the last bits of rotations and cameras.
+///
+/// Errors: InvalidArgument for what `parse_scene_file` would refuse (ids given twice or that no file has, numbers that
+///         are not finite ...) and text that is not UTF-8; LimitExceeded as there; Unsupported for cameras that are
+///         orthographic or not upright.
+[[nodiscard]] Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene);
+/// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the
+/// file.
+[[nodiscard]] Result<std::uint64_t> write_scene_file(const SceneFile& scene, const std::filesystem::path& path);
 
 /// Reads a scene file and everything that it names. Each file is read once, however often it is placed; its own
 /// instances are placed as one body. Types that are equal in everything become one.

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include <glm/vector_relational.hpp>
+
 #include <quoin/core/assert.h>
 
 #include "grid/chunk_order.h"
@@ -24,6 +26,19 @@ void remake(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec
   for (std::size_t i = 0; i < chunks.size(); ++i) coarse.put_chunk(chunks[i], std::move(made[i]));
 }
 
+// Adds the halved chunks that read a voxel of the change: their own voxels and those of one cell past them.
+void add_readers(const ChunkChange& change, std::vector<IVec3>& chunks) {
+  constexpr int kReach = 2;
+  const IVec3 low = halved_coordinates(change.chunk - IVec3(glm::lessThan(change.box.min, IVec3(kReach))));
+  const IVec3 high =
+      halved_coordinates(change.chunk + IVec3(glm::greaterThan(change.box.max, IVec3(kChunkEdge - kReach))));
+  for (int z = low.z; z <= high.z; ++z) {
+    for (int y = low.y; y <= high.y; ++y) {
+      for (int x = low.x; x <= high.x; ++x) chunks.emplace_back(x, y, z);
+    }
+  }
+}
+
 // What is kept of a level: how far it has followed the finer grid.
 struct Level {
   Grid grid;
@@ -40,9 +55,7 @@ void Level::update(const Grid& finer, const VoxelRegistry& types, Threads thread
     dirty = grid.chunks();
     for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
   }
-  for (const ChunkChange& change : changes.items) {
-    for (int i = 0; i < 27; ++i) dirty.push_back(halved_coordinates(change.chunk + IVec3{i % 3, i / 3 % 3, i / 9} - 1));
-  }
+  for (const ChunkChange& change : changes.items) add_readers(change, dirty);
   sort_and_unite(dirty);
   std::erase_if(dirty, [&](IVec3 chunk) {
     for (int i = 0; i < 8; ++i) {

@@ -234,6 +234,40 @@ TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
   EXPECT_EQ(changes.items[0].chunk, IVec3(0));
 }
 
+TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
+  const VoxelRegistry types = some_types();
+  Grid grid;
+  grid.fill_box({-150, -150, -150}, {150, 150, 150}, 3);
+  GridPyramid pyramid;
+  pyramid.update(grid, types, 1);
+  const auto made_anew = [&](IVec3 voxel) {
+    std::vector<Chunk> before;
+    const std::vector<IVec3> chunks = pyramid.level(1).chunks();
+    for (const IVec3 chunk : chunks) before.push_back(*pyramid.level(1).find_chunk(chunk));
+    grid.fill_box(voxel, voxel, 4);
+    pyramid.update(grid, types, 1);
+    int anew = 0;
+    for (std::size_t i = 0; i < chunks.size(); ++i) {
+      anew += static_cast<int>(!before[i].shares_storage_with(*pyramid.level(1).find_chunk(chunks[i])));
+    }
+    return anew;
+  };
+  grid.set({0, 0, 0}, 4);  // chunks of one type share nothing that could tell
+  grid.fill_box({-1, -1, -1}, {-1, -1, -1}, 4);
+  for (const int x : {-40, 40}) {
+    for (const int y : {-40, 40}) {
+      for (const int z : {-40, 40}) grid.fill_box({x, y, z}, {x + 2, y + 2, z + 2}, 4);
+    }
+  }
+  pyramid.update(grid, types, 1);
+  EXPECT_EQ(made_anew({60, 60, 60}), 1);
+  EXPECT_EQ(made_anew({64, 60, 60}), 1) << "both chunks of voxels are halved into one";
+  EXPECT_EQ(made_anew({2, 60, 60}), 1);
+  EXPECT_EQ(made_anew({1, 60, 60}), 2);
+  EXPECT_EQ(made_anew({-2, 60, 60}), 2);
+  EXPECT_EQ(made_anew({-2, 1, -2}), 8);
+}
+
 TEST(Downsample, AGridOfWhichNothingWouldBeLeftHasFewerLevels) {
   const VoxelRegistry types = some_types();
   Grid grid;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <random>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -44,6 +46,95 @@ TEST(SceneFile, ReadsEveryKey) {
   EXPECT_NEAR(glm::length(first.rotation * DVec3(0, 0, 1) - DVec3(0.5, 0, std::sqrt(0.75))), 0.0, 1e-12);
   EXPECT_NEAR(glm::length(*scene->sun - glm::normalize(DVec3(1, 2, 3))), 0.0, 1e-15);
   EXPECT_EQ(scene->camera->position, DVec3(9));
+}
+
+bool is_near(const DQuat& a, const DQuat& b) {
+  return std::abs(a.w - b.w) + std::abs(a.x - b.x) + std::abs(a.y - b.y) + std::abs(a.z - b.z) < 1e-14;
+}
+
+TEST(SceneFile, WhatIsWrittenReadsAsItWas) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(-1e6, 1e6);
+  for (int seed = 0; seed < 50; ++seed) {
+    SceneFile scene;
+    for (int i = 0; i < seed % 5; ++i) scene.sources.push_back({"id " + std::to_string(i), "models/\"\xC3\xA9\".vox"});
+    for (std::size_t i = 0; i < scene.sources.size() * 3; ++i) {
+      SceneFile::Placement placement;
+      placement.source = scene.sources[i % scene.sources.size()].id;
+      if (random() % 2 == 0) placement.name = "n\n" + std::to_string(i);
+      if (random() % 2 == 0) placement.position = {number(random), number(random) * 1e-12, 0.1};
+      if (random() % 2 == 0) {
+        placement.rotation = glm::normalize(DQuat(number(random), number(random), number(random), number(random)));
+      }
+      if (random() % 2 == 0) placement.scale = std::abs(number(random)) + 1e-9;
+      placement.mirrored = random() % 2 == 0;
+      placement.visible = random() % 2 == 0;
+      scene.placements.push_back(placement);
+    }
+    if (seed % 2 == 0) scene.sun = glm::normalize(DVec3(number(random), number(random), number(random)));
+    if (seed % 3 == 0) scene.camera = look_at({number(random), 4, 5}, {number(random), 7, 8}, 0.8).value();
+    const auto bytes = write_scene_file(scene);
+    ASSERT_TRUE(bytes) << to_string(bytes.error());
+    EXPECT_TRUE(is_scene_file(*bytes));
+    const auto read = parse_scene_file(*bytes);
+    ASSERT_TRUE(read) << to_string(read.error());
+    ASSERT_EQ(read->sources.size(), scene.sources.size());
+    for (std::size_t i = 0; i < scene.sources.size(); ++i) {
+      EXPECT_EQ(read->sources[i].id, scene.sources[i].id);
+      EXPECT_EQ(read->sources[i].file, scene.sources[i].file);
+    }
+    ASSERT_EQ(read->placements.size(), scene.placements.size());
+    for (std::size_t i = 0; i < scene.placements.size(); ++i) {
+      const SceneFile::Placement& a = scene.placements[i];
+      const SceneFile::Placement& b = read->placements[i];
+      EXPECT_EQ(b.source, a.source);
+      EXPECT_EQ(b.name, a.name);
+      EXPECT_EQ(b.position, a.position);
+      EXPECT_TRUE(is_near(b.rotation, a.rotation));
+      EXPECT_EQ(b.scale, a.scale);
+      EXPECT_EQ(b.mirrored, a.mirrored);
+      EXPECT_EQ(b.visible, a.visible);
+    }
+    ASSERT_EQ(read->sun.has_value(), scene.sun.has_value());
+    if (scene.sun) {
+      EXPECT_LT(glm::distance(*read->sun, *scene.sun), 1e-15);
+    }
+    ASSERT_EQ(read->camera.has_value(), scene.camera.has_value());
+    if (scene.camera) {
+      EXPECT_EQ(read->camera->position, scene.camera->position);
+      EXPECT_LT(glm::distance(read->camera->forward, scene.camera->forward), 1e-8);
+      EXPECT_NEAR(read->camera->vertical_fov, 0.8, 1e-12);
+    }
+  }
+}
+
+TEST(SceneFile, WhatTheReaderWouldRefuseIsNotWritten) {
+  const auto code_of = [](const std::function<void(SceneFile&)>& change) {
+    SceneFile scene;
+    scene.sources = {{"a", "a.vox"}};
+    scene.placements.emplace_back().source = "a";
+    EXPECT_TRUE(write_scene_file(scene));
+    change(scene);
+    const auto written = write_scene_file(scene);
+    return written ? std::optional<ErrorCode>() : written.error().code;
+  };
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].source = "b"; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.sources.push_back(s.sources[0]); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].position.y = NAN; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].scale = 0.0; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].rotation = {0, 0, 0, 0}; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.placements[0].name = "\xFF"; }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) { s.sources[0].file.clear(); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(code_of([](SceneFile& s) {
+              s.camera = look_at({0, 0, 5}, {0, 0, 0}, 1.0).value();
+              s.camera->projection = Camera::Projection::Orthographic;
+            }),
+            ErrorCode::Unsupported);
+  EXPECT_EQ(code_of([](SceneFile& s) {
+              s.camera = look_at({0, 0, 5}, {0, 0, 0}, 1.0).value();
+              std::swap(s.camera->right, s.camera->up);
+            }),
+            ErrorCode::Unsupported);
 }
 
 TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {

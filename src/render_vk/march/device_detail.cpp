@@ -52,12 +52,21 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
   ++picture_;
   Placement placement = device.placement();
   const ImpostorScreen screen(camera, options.width, options.height);
-  Status done = put_halved(device, scene, detail.selected, options.threads, placement);
-  if (done) done = impostors_.draw(scene, detail.far, screen, options.width, options.height, placement);
-  if (done) done = memory_->flush();
-  if (!done) {
+  const auto put = [&]() -> Status {
+    if (Status done = put_halved(device, scene, detail.selected, options.threads, placement); !done) return done;
+    const FarImpostors& far = detail.far;
+    if (Status done = impostors_.draw(scene, far, screen, options.width, options.height, placement); !done) return done;
+    return memory_->flush();
+  };
+  // What was half put in place is not kept, whether the device's memory ran out or ours.
+  try {
+    if (Status done = put(); !done) {
+      clear();
+      return done.error();
+    }
+  } catch (...) {
     clear();
-    return done.error();
+    throw;
   }
   drop_unused(max_bytes);
   impostors_.drop_unused(max_bytes);
@@ -86,8 +95,8 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
   }
   placement.instances.change(halved);
   if (!is_same(table, table_)) {
+    if (Status done = put_table(*memory_, table_place_, std::as_bytes(std::span(table))); !done) return done;
     table_ = std::move(table);
-    if (Status done = put_table(*memory_, table_place_, std::as_bytes(std::span(table_))); !done) return done;
   }
   placement.grids = table_place_.address;
   return {};
