@@ -36,12 +36,12 @@ void take(const World& world, bool lit) {
 
 std::vector<Counted> scene_work() {
   const auto world = std::make_shared<World>();
-  const auto grid = [world]() -> Grid& { return world->scene.grids()[world->scene.grids().handles().front()].grid; };
+  Grid* const grid = &world->scene.edit(world->scene.grids().handles().front()).grid;  // it stays where it is
   return {{"picture/lit", [=] { take(*world, true); }},
           {"picture/unlit", [=] { take(*world, false); }},
           {"grid/get",
            [=] {
-             GridReader reader(grid());
+             GridReader reader(*grid);
              std::int64_t sum = 0;
              for (int z = 0; z < 64; ++z) {
                for (int y = 0; y < 64; ++y) {
@@ -63,7 +63,7 @@ std::vector<Counted> scene_work() {
              edited.fill_sphere({40, 40, 40}, 37.5, 1);
            }},
           {"scene/update_after_one_voxel", [=] {
-             Grid& edited = grid();
+             Grid& edited = *grid;
              edited.set({100, 60, 100}, edited.get({100, 60, 100}) == kAir ? VoxelType{1} : kAir);
              world->renderer.update({1});
            }}};

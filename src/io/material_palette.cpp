@@ -68,6 +68,7 @@ const char* material_name(SurfaceClass surface) {
 MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.types) {
   const auto rows = static_cast<std::uint32_t>((types_.size() + kPaletteWidth - 1) / kPaletteWidth);
   rows_ = std::bit_ceil(std::max(rows, 1U));
+  row_height_ = 1.0F / static_cast<float>(rows_);
   Usage used;
   for (auto& types : used) types.resize(types_.size());
   for (const MeshPart& part : meshes.parts) {
@@ -133,13 +134,6 @@ std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) c
 
 bool MaterialPalette::has_emission() const {
   return std::any_of(materials_.begin(), materials_.end(), [](const SurfaceMaterial& m) { return m.is_emissive(); });
-}
-
-std::array<float, 2> MaterialPalette::texel_centre(VoxelType type) const {
-  const std::uint32_t column = type % kPaletteWidth;
-  const std::uint32_t row = type / kPaletteWidth;
-  return {(static_cast<float>(column) + 0.5F) / static_cast<float>(kPaletteWidth),
-          (static_cast<float>(row) + 0.5F) / static_cast<float>(rows_)};
 }
 
 PngImage MaterialPalette::blank(std::uint32_t channels) const {

@@ -52,7 +52,11 @@ class MaterialPalette {
   /// Rows of every texture, a power of two.
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   /// The centre of a type's texel, from the top left; exact in float.
-  [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const;
+  [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const {
+    // Both sizes are powers of two, so that products are as exact as quotients.
+    return {(static_cast<float>(type % kPaletteWidth) + 0.5F) * (1.0F / static_cast<float>(kPaletteWidth)),
+            (static_cast<float>(type / kPaletteWidth) + 0.5F) * row_height_};
+  }
 
   /// sRGB colour and linear alpha (255 for opaque types).
   [[nodiscard]] PngImage base_colour() const;
@@ -71,6 +75,7 @@ class MaterialPalette {
 
   const VoxelRegistry& types_;
   std::uint32_t rows_ = 1;
+  float row_height_ = 1.0F;   // of the texture's
   std::vector<float> bands_;  ///< strongest of each, descending
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;

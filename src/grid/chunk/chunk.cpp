@@ -143,9 +143,10 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   if (storage_ == nullptr) make_mixed();
-  own();
-  const std::uint32_t index = index_for(type);
-  ChunkStorage& m = *storage_;
+  ChunkStorage& m = own();
+  // As `index_for`, without a call for every voxel.
+  if (!m.direct() && m.palette[m.recent] != type) m.recent = find_or_add(type);
+  const std::uint32_t index = m.direct() ? type : m.recent;
   std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   const std::uint32_t first = packed_row::read(row, m.bits, 0);
   if (packed_row::all_equal(row, m.bits, 1, first)) {
@@ -204,12 +205,13 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
 
 // Also where the slab has no voxels of its own yet, and for types that were not the last to be written.
 bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
-  const VoxelType old = get(x, y, z);
+  const VoxelType old = storage_ == nullptr ? uniform_ : storage_->type(x, y, z);
   if (old == type) return false;
   if (storage_ == nullptr) make_mixed();
-  own();
-  const std::uint32_t index = index_for(type);
-  ChunkStorage& m = *storage_;
+  ChunkStorage& m = own();
+  // As `index_for`, without a call for every voxel.
+  if (!m.direct() && m.palette[m.recent] != type) m.recent = find_or_add(type);
+  const std::uint32_t index = m.direct() ? type : m.recent;
   std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);

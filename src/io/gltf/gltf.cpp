@@ -25,8 +25,8 @@ constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
 
 /// Linear, as glTF says of COLOR_0.
-std::uint8_t occlusion_grey(std::uint8_t level) {
-  return static_cast<std::uint8_t>(std::lround(occlusion_brightness(level) * 255.0F));
+std::uint8_t occlusion_grey(std::uint8_t occlusion) {
+  return static_cast<std::uint8_t>(std::lround(occlusion_brightness(occlusion) * 255.0F));
 }
 
 void write_normals(const VertexTransform& transform, const MeshView& view, BlockWriter& out) {
@@ -43,10 +43,12 @@ void write_colours(const MeshView& view, BlockWriter& out) {
   if (view.has_albedo()) {
     for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(linear_colour(view, i));
   }
-  for (const std::uint8_t level : view.block_occlusion) {
-    const std::uint8_t grey = occlusion_grey(level);
-    out.put(std::array<std::uint8_t, 4>{grey, grey, grey, 255});
+  std::array<std::array<std::uint8_t, 4>, 4> greys;
+  for (std::uint8_t i = 0; i < greys.size(); ++i) {
+    const std::uint8_t grey = occlusion_grey(i);
+    greys[i] = {grey, grey, grey, 255};
   }
+  for (const std::uint8_t occlusion : view.block_occlusion) out.put(greys[occlusion]);
 }
 
 template <class Index>
