@@ -74,8 +74,8 @@ class ChangeJournal {
     return is_known;
   }
 
-  /// What every `changes_since` returns: the changes since the cursor, each key once, in the order of `less(a, b)`, which
-  /// compares records by their keys. Records tell of a change by `change()`.
+  /// What every `changes_since` returns: the changes since the cursor, each key once, in the order of `less(a, b)`,
+  /// which compares records by their keys. Records tell of a change by `change()`.
   template <class Change, class Less>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
     std::vector<Record> records;

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -234,7 +235,7 @@ std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
-  if (!(radius >= 0.0) || !is_finite(centre)) return 0;
+  if (!(radius >= 0.0) || !std::isfinite(radius) || !is_finite(centre)) return 0;
   const LongBox box = box_around(centre - radius, centre + radius);
   notice_.give();
   return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {

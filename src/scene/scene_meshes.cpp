@@ -46,7 +46,7 @@ Status check_instances(const Scene& scene, InstanceFilter filter) {
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
-    if (has_place(instance) && glm::length(instance.rotation) > 0.0) continue;
+    if (has_place(instance)) continue;
     return fail(ErrorCode::InvalidArgument,
                 "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
   }
@@ -73,7 +73,9 @@ std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<G
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    const Similarity place{instance.position, instance.rotation, instance.voxel_size, instance.mirrored};
+    const bool is_turned = glm::length(instance.rotation) > 0.0;  // a zero rotation is none
+    const DQuat rotation = is_turned ? instance.rotation : DQuat{1.0, 0.0, 0.0, 0.0};
+    const Similarity place{instance.position, rotation, instance.voxel_size, instance.mirrored};
     placements.push_back({static_cast<std::size_t>(part), instance.name, place});
   }
   return placements;

@@ -23,15 +23,20 @@ AssertHandler set_assert_handler(AssertHandler handler);
 
 }  // namespace quoin
 
-/// Checks a `Requires:` in debug builds and wherever QUOIN_CHECKED is defined (CMake: -DQUOIN_CHECKED=ON); elsewhere
-/// the condition is compiled but never evaluated. Usage: QUOIN_ASSERT(i < size(), "the type must be registered").
+/// 1 where `Requires:` are checked: in debug builds and wherever QUOIN_CHECKED is defined (CMake: -DQUOIN_CHECKED=ON).
 #if defined(QUOIN_CHECKED) || !defined(NDEBUG)
 #define QUOIN_ASSERT_ENABLED 1
+#else
+#define QUOIN_ASSERT_ENABLED 0
+#endif
+
+/// Checks a `Requires:` where that is enabled; elsewhere the condition is compiled but never evaluated.
+/// Usage: QUOIN_ASSERT(i < size(), "the type must be registered").
+#if QUOIN_ASSERT_ENABLED
 #define QUOIN_ASSERT(condition, ...) \
   (static_cast<bool>(condition)      \
        ? static_cast<void>(0)        \
        : ::quoin::fail_assert({#condition, "" __VA_ARGS__, ::std::source_location::current()}))
 #else
-#define QUOIN_ASSERT_ENABLED 0
 #define QUOIN_ASSERT(condition, ...) static_cast<void>(sizeof(static_cast<bool>(condition)))
 #endif

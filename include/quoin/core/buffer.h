@@ -16,6 +16,20 @@ class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
+  Buffer() = default;
+  /// Leaves the other empty, without memory.
+  Buffer(Buffer&& other) noexcept
+      : values_(std::move(other.values_)),
+        size_(std::exchange(other.size_, 0)),
+        capacity_(std::exchange(other.capacity_, 0)) {}
+  Buffer& operator=(Buffer&& other) noexcept {
+    values_ = std::move(other.values_);
+    size_ = std::exchange(other.size_, 0);
+    capacity_ = std::exchange(other.capacity_, 0);
+    return *this;
+  }
+  ~Buffer() = default;
+
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] T* data() { return values_.get(); }

@@ -7,8 +7,8 @@ namespace quoin {
 /// A box anywhere in the world.
 struct OrientedBox {
   DVec3 centre{0.0};
-  DVec3 half_size{0.5};
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< unit; a zero one counts as no rotation
+  DVec3 half_size{0.5};                ///< more than 0; edits take 0 too, queries then meet nothing
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length; a zero one counts as no rotation
 };
 
 }  // namespace quoin

@@ -11,8 +11,8 @@ namespace quoin {
 
 struct CopyOptions {
   bool copy_air = true;  ///< false: air in the box leaves what is there
-  /// [type]: what becomes of it, also air. Types beyond its end stay as they are, and air stays air whatever [0] is.
-  /// Empty: all stay as they are. Borrowed for the call.
+  /// [type]: the type that takes its place, which may be air. [0] means nothing: air stays air. Types beyond its end
+  /// stay as they are. Lifetime: it must outlive the call.
   std::span<const VoxelType> type_map;
 };
 

@@ -16,8 +16,9 @@
 namespace quoin {
 
 /// The stored form of a density: never NaN, never -0, at most `band` from 0, and of the sign that was given, however
-/// small: 0 alone is stored as 0, the rest as 2^-14 at least, since smaller halves are slow on many processors. NaN
-/// counts as far outside (`band`). A band between two halves counts as the lesser, but as 2^-24 at least.
+/// small: 0 alone is stored as 0, the rest as 2^-14 at least (or `band`, if that is less), since smaller halves are
+/// slow on many processors. NaN counts as far outside (`band`). A band between two halves counts as the lesser, but as
+/// 2^-24 at least.
 /// Requires: 0 < band.
 [[nodiscard]] Half stored_density(float density, float band);
 

@@ -28,7 +28,8 @@ namespace quoin {
 /// as it was.
 [[nodiscard]] Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
-/// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was edited.
+/// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was
+/// edited.
 ///
 /// Threads: any number may read; an update needs it to itself.
 class GridPyramid {

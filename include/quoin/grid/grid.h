@@ -55,7 +55,8 @@ class Grid {
   /// cancelled: a box of millions of chunks is better filled piece by piece.
   std::int64_t fill_box(IVec3 first, IVec3 last, VoxelType type);
   /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
-  /// A negative or NaN radius or centre changes nothing.
+  /// A radius that is negative or not finite, or a centre that is not finite, changes nothing.
+  /// Cost: O(voxels of the box around the sphere); of air, of those in chunks that there are.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
   /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max`
   /// excluded), x fastest, then y, then z within a chunk, chunks likewise. Returns how many changed. Requires: `pick`
@@ -112,7 +113,8 @@ class Grid {
       }
     });
   }
-  /// Likewise a row of a chunk at a time, from its first non-air voxels on; rows of air are left out.
+  /// Calls `visit(first voxel, types)` for the rows along x of the tight bounds of each chunk, in the same order; there
+  /// may be air among the types. They are good within the call.
   void for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType> types)> visit) const;
   /// Bytes held, also those that snapshots share.
   [[nodiscard]] std::size_t bytes() const;

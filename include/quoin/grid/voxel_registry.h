@@ -85,7 +85,7 @@ class VoxelRegistry {
   /// Requires: type is not air and is registered; visibility is not Air.
   void replace(VoxelType type, VoxelProperties properties);
 
-  /// Requires: `type < size()`.
+  /// Lifetime: until a type is added or replaced. Requires: `type < size()`.
   [[nodiscard]] const VoxelProperties& operator[](VoxelType type) const {
     QUOIN_ASSERT(type < size(), "a registered type");
     return content_->properties[type];

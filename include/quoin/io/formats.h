@@ -50,7 +50,8 @@ struct FormatInfo {
 /// Reads a file of any readable format that holds voxels.
 ///
 /// The content decides; the name only helps to say what is wrong with a file that is of no known format.
-/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; `path` is
+/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; those of
+///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
 ///         set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 

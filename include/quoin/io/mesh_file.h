@@ -33,8 +33,8 @@ struct MeshFileOptions {
 ///            transparent (blended, alpha in the palette), and emissive: texture times emissiveFactor times
 ///            KHR_materials_emissive_strength; strengths within a factor of two share a material and are scaled in the
 ///            texture, so that its 8 bits cost them at most one more bit.
-///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo darkened by occlusion (times 1 - occlusion), and one rough,
-///            opaque material.
+///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
+///            and one rough, opaque material.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
 ///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Smooth meshes: nine
@@ -50,13 +50,14 @@ struct MeshFileOptions {
 ///            GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine
 ///            or singular, when a vertex comes to lie beyond the range of floats, or when a mesh contradicts itself
 ///            (arrays of different lengths, indices of no vertex, types that are not registered, numbers that are not
-///            finite). Files appear whole or not at all.
+///            finite). Each file appears whole or not at all; of several, those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength; Alias/Wavefront's
 ///            OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 
-/// The same as bytes, for formats that are one file: GLB, PLY and OBJ of smooth meshes.
+/// The same as bytes, for formats that are one file: GLB, PLY and OBJ of smooth meshes. `options.format` means nothing
+/// here.
 ///
 /// Errors: also Unsupported for what takes several files.
 [[nodiscard]] Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format,

@@ -43,7 +43,8 @@ struct SceneFile {
 ///         beyond 64 MiB, 32 levels of nesting, 65,536 files or 4,194,304 instances.
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
 
-/// The text of a scene file; `parse_scene_file` reads the same from it, but for the last bits of rotations and cameras.
+/// The text of a scene file; `parse_scene_file` reads the same from it, but for the last bits of
+/// rotations and cameras, and the sun's length, which becomes 1.
 ///
 /// Errors: InvalidArgument for what `parse_scene_file` would refuse (ids given twice or that no file has, numbers that
 ///         are not finite ...) and text that is not UTF-8; LimitExceeded as there; Unsupported for cameras that are

@@ -44,7 +44,7 @@ struct LiveMeshOptions {
   bool merge = true;                                   ///< blocky: neighbouring faces become one quad
   SmoothOcclusionOptions occlusion;                    ///< of smooth surfaces
   InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
-  Threads threads;                                     ///< workers; 0: one less than the machine has, at least one
+  Threads threads;  ///< the workers. Unlike elsewhere 0 means one less than the machine has, at least 1
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
   /// room for more chunks. May be empty. It must not throw or call the meshes.
   std::function<void()> on_ready;

@@ -48,12 +48,12 @@ struct BlockyMeshOptions {
 
 /// Meshes a whole grid, chunk by chunk.
 ///
-/// Space:   grid coordinates (voxel (i,j,k) spans i..i+1 and so on). Coordinates beyond 2^24 lose precision; use
-///          BlockyMesher chunk by chunk for those.
-/// Order:   chunks as in Grid::chunks; the same bytes at any thread count.
+/// Space:    grid coordinates (voxel (i,j,k) spans i..i+1 and so on). Coordinates beyond 2^24 lose precision; use
+///           BlockyMesher chunk by chunk for those.
+/// Order:    chunks as in Grid::chunks; the same bytes at any thread count.
 /// Progress: once a chunk while faces are found, and once more while they become triangles; each is half of the whole.
-/// Types:   those that are not registered count as opaque.
-/// Errors:  Cancelled; LimitExceeded when a surface class needs more than 2^32 - 2 vertices.
+/// Types:    those that are not registered count as opaque.
+/// Errors:   Cancelled; LimitExceeded when a surface class needs more than about 2^32 vertices.
 [[nodiscard]] Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types,
                                                    const BlockyMeshOptions& options, Threads threads = {},
                                                    const Progress& progress = {});

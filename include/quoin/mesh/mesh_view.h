@@ -11,8 +11,8 @@ namespace quoin {
 /// Triangles of one surface of any mesh, for whoever reads them without minding who made them. Arrays of vertices have
 /// one entry a vertex. A view is one of two kinds:
 ///
-/// Blocks: `directions` and `types`, whose properties say how it looks, and `block_occlusion` unless there is no occlusion.
-/// Smooth: `normals` and `albedo`, and `occlusion` unless there is no occlusion.
+/// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or none.
+/// Smooth: `normals` and `albedo`; `occlusion`, or none.
 ///
 /// Lifetime: owns nothing; the arrays must outlive it, unchanged.
 struct MeshView {

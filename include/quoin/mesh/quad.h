@@ -13,8 +13,8 @@ namespace quoin {
 /// One merged face, packed into a word.
 ///
 /// bits 0-5 x, 6-11 y, 12-17 z of the lowest voxel it covers (chunk coordinates); 18-23 and 24-29 size along the
-/// direction's u and v, less one; 30-37 occlusion of the four corners, corner 0 lowest; 38 diagonal flipped; 39-41 direction;
-/// 42-57 type; the rest 0.
+/// direction's u and v, less one; 30-37 occlusion of the four corners, corner 0 lowest; 38 diagonal flipped; 39-41
+/// direction; 42-57 type; the rest 0.
 struct Quad {
   std::uint64_t bits = 0;
 

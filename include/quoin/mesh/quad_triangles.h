@@ -15,7 +15,7 @@ namespace quoin {
 
 // How quads become triangles: everything that makes triangles of them does it by these functions.
 
-/// Of the front of a triangle.
+/// The order of a triangle's corners, seen from its front.
 enum class Winding : std::uint8_t { CounterClockwise, Clockwise };
 
 [[nodiscard]] constexpr std::size_t vertices_needed(std::size_t quads) {
@@ -29,8 +29,8 @@ enum class Winding : std::uint8_t { CounterClockwise, Clockwise };
 inline constexpr std::array<std::array<std::uint8_t, 6>, 4> kTriangleCorners = {
     {{0, 1, 2, 0, 2, 3}, {1, 2, 3, 0, 1, 3}, {0, 2, 1, 0, 3, 2}, {1, 3, 2, 0, 3, 1}}};
 
-/// Which corners (0..3, as in FaceOcclusion) the two triangles of a quad join, in the order of their indices; `flipped` as
-/// in Quad.
+/// Which corners (0..3, as in FaceOcclusion) the two triangles of a quad join, in the order of their indices; `flipped`
+/// as in Quad.
 [[nodiscard]] constexpr const std::array<std::uint8_t, 6>& triangle_corners(
     bool flipped, Winding winding = Winding::CounterClockwise) {
   return kTriangleCorners[std::size_t{flipped} + 2 * std::size_t{winding == Winding::Clockwise}];

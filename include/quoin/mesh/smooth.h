@@ -10,8 +10,8 @@
 
 namespace quoin {
 
-/// How the occlusion of a vertex is estimated from 3x3x3 samples of the field around it: 0 where all is open, 1 where all
-/// is solid.
+/// How the occlusion of a vertex is estimated from 3x3x3 samples of the field around it: 0 where all is open, 1 where
+/// all is solid.
 enum class SmoothOcclusion : std::uint8_t {
   None,
   SolidShare,         ///< the share of the samples that are solid
@@ -24,8 +24,8 @@ enum class SmoothOcclusion : std::uint8_t {
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted forms:
-/// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest end,
-/// NaN as the default.
+/// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest
+/// end, NaN as the default.
 struct SmoothOcclusionOptions {
   SmoothOcclusion form = SmoothOcclusion::SolidShare;
   float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2; 1 and 2 are several times faster than others

@@ -31,7 +31,7 @@ struct SmoothMesh {
 
 struct SmoothMeshOptions {
   SmoothOcclusionOptions occlusion;
-  bool split_sheets = true;  ///< as in SmoothOptions
+  bool split_sheets = true;  ///< as in SmoothOptions, where it is off
   /// The level of detail of a chunk, 0 to kMaxSmoothLevel; empty: 0 everywhere. Asked once a chunk, from the calling
   /// thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of;
@@ -44,7 +44,7 @@ struct SmoothMeshOptions {
 /// Order:   chunks as in DensityGrid::chunks; the same bytes at any thread count.
 /// Types:   materials that are not registered, and air, count as opaque white.
 /// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices; InvalidArgument for a level out of
-/// range.
+///          range.
 [[nodiscard]] Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                                    const SmoothMeshOptions& options, Threads threads = {},
                                                    const Progress& progress = {});

@@ -87,7 +87,7 @@ enum class VertexSource : std::uint8_t {
 /// front to back, each byte once, and never read. Bytes of a vertex that no element names become 0.
 ///
 /// Usage:    std::byte* mapped = map(writer.bytes_needed(vertices_needed(quads.size())));
-///           writer.write(quads, Vec3(chunk * kChunkEdge - eye), {mapped, ...});
+///           writer.write(quads, Vec3(DVec3(chunk * kChunkEdge) - eye), {mapped, ...});
 ///           write_indices<std::uint16_t>(quads, 0, mapped_indices);
 /// Order:    the vertices' order is that of `write_indices` (quad_triangles.h): four a quad, or those of the mesh.
 /// Threads:  any number may write with one writer.

@@ -61,7 +61,8 @@ struct Picture {
 class CpuRenderer {
  public:
   /// Copies nothing of the voxels but what traversal and shading need. Draws the instances that `filter` lets pass.
-  CpuRenderer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
+  explicit CpuRenderer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
+  explicit CpuRenderer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // it must outlive it
   CpuRenderer(CpuRenderer&&) noexcept;
   CpuRenderer& operator=(CpuRenderer&&) noexcept;
   ~CpuRenderer();

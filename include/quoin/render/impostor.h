@@ -14,8 +14,8 @@
 
 namespace quoin {
 
-/// Directions from which an impostor is seen: the faces +X -X +Y -Y +Z -Z; the edges, for a in (-1, 1), for b in
-/// (-1, 1): (a,b,0), (a,0,b), (0,a,b); the corners, x outermost, then y, z, each -1 then 1.
+/// Directions from which an impostor is seen: the faces +X -X +Y -Y +Z -Z; the edges, for a in {-1, 1}, for b in
+/// {-1, 1}: (a,b,0), (a,0,b), (0,a,b); the corners, x outermost, then y, z, each -1 then 1.
 inline constexpr int kImpostorViews = 26;
 
 struct ImpostorFaces;

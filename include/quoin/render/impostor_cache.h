@@ -29,12 +29,12 @@ struct ImpostorCacheStats {
 ///   cache.build_some(scene, 0.002);  // once a frame
 ///
 /// An edit of a grid, or another in its place, asks for a new impostor; the old one is returned until that is ready.
-/// When there is no room, the ones that were asked for longest ago are dropped. What
-/// is asked for within one round, up to the end of a `build_some`, is never dropped for something else of that round,
-/// which then has none.
+/// When there is no room, the ones that were asked for longest ago are dropped. What is asked for within one round, up
+/// to the end of a `build_some`, is never dropped for something else of that round, which then has none.
+///
 /// Lifetime: shares impostors with whoever was given one; the scene is only read within calls.
-/// Threads: any number may call `find`, `stats` and `build_some` at once, as long as nobody edits the scene
-///          meanwhile. One that finds nothing waiting does not wait for what others are building.
+/// Threads:  any number may call `find`, `stats` and `build_some` at once, as long as nobody edits the scene meanwhile.
+///           One that finds nothing waiting does not wait for what others are building.
 class ImpostorCache {
  public:
   explicit ImpostorCache(const ImpostorCacheOptions& options = {});

@@ -82,8 +82,9 @@ class DetailSelector {
   DetailSelector& operator=(DetailSelector&&) noexcept;
   ~DetailSelector();
 
-  /// Replaces `out` by the visible instances whose content sphere meets the camera's frustum, in the order of their
-  /// handles. Empty grids and instances whose numbers are not finite or whose size is not positive are left out.
+  /// Replaces `out` by the instances of `policy.instances` whose content sphere meets the camera's frustum, in the
+  /// order of their handles. Empty grids and instances whose numbers are not finite or whose size is not positive are
+  /// left out.
   ///
   /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
   ///

@@ -68,8 +68,9 @@ struct SceneChanges {
 /// Axes:      right-handed, +Y up, one world unit a voxel unless an instance says otherwise.
 /// Addresses: a grid stays where it is until it is removed, also when the scene is moved: a reference to it may be
 ///            kept.
-/// Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, but for edits of
-///            different grids, which may happen at once. A snapshot is a scene of its own.
+/// Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, `edit` too. But
+///            grids to which references were taken before may be edited at once, each on one thread. A snapshot is a
+///            scene of its own.
 /// Moving:    a scene that was moved from may only be assigned to or destroyed.
 class Scene {
  public:
@@ -120,7 +121,7 @@ class Scene {
   std::unique_ptr<Book> book_;
 };
 
-/// Whether an instance is drawn: its grid exists, and `filter` lets it pass.
+/// Whether an instance is to be drawn: its grid exists, and `filter` lets it pass; whatever its numbers are.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
 
 /// A point of the instance's grid (voxels) in the world.

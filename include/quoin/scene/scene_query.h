@@ -52,7 +52,8 @@ struct SceneOverlap {
 /// For each instance that has a colliding voxel within a sphere or a box, the first of these (z, then y, then x), in
 /// the order of the instances. To touch is not to overlap. Numbers that are not finite or negative meet nothing.
 ///
-/// Cost: O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
+/// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
+/// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre,
                                                  double radius);
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types,

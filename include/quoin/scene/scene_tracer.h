@@ -44,6 +44,7 @@ class SceneTracer {
   /// whose size is not positive.
   /// Cost: O(chunks of the grids that are placed), on several threads.
   explicit SceneTracer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
+  explicit SceneTracer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // it must outlive it
   SceneTracer(SceneTracer&&) noexcept;
   SceneTracer& operator=(SceneTracer&&) noexcept;
   ~SceneTracer();

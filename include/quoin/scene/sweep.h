@@ -29,8 +29,10 @@ struct SweepHit {
 struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
-  int max_contacts = 5;    ///< after which what is left of the displacement is dropped
-  bool pushes_out = true;  ///< a box that starts inside is moved out first
+  int max_contacts = 5;  ///< after which what is left of the displacement is dropped
+  /// A box that starts inside is moved out first. Without, it stays where it is: `is_blocked`, with the displacement as
+  /// it was.
+  bool pushes_out = true;
 };
 
 struct SlideResult {
@@ -42,6 +44,9 @@ struct SlideResult {
 
 /// Moves a box and lets it slide along what it meets: the part of the displacement that goes into a face is dropped, in
 /// a crease of two faces what does not run along it, in a corner all.
+///
+/// Cost:    a sweep for each contact, `max_contacts` at most.
+/// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
                                          DVec3 displacement, const SlideOptions& options = {});
 

@@ -10,7 +10,8 @@
 
 namespace quoin {
 
-/// A ray in grid space (voxels). `direction` is not zero and finite; distances are in multiples of its length.
+/// A ray in the space of whatever is asked: of a grid (voxels) for an OccupancyTree, of the world for a scene.
+/// `direction` is not zero and finite; distances are in multiples of its length.
 struct Ray {
   DVec3 origin{0.0};
   DVec3 direction{0.0, 0.0, 1.0};
@@ -55,8 +56,8 @@ struct VoxelSpan {
 };
 
 /// Calls `visit` for every occupied voxel along a ray that is entered up to and including `max_t`, in the order in
-/// which the ray passes them, until it returns false. `t_exit` is not cut at `max_t`;
-/// where that is negative or not a number there is none.
+/// which the ray passes them, until it returns false. `t_exit` is not cut at `max_t`; where that is negative or not a
+/// number there is none.
 void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
                 const std::function<bool(const VoxelSpan&)>& visit);
 

@@ -252,7 +252,8 @@ TEST(DrawImpostorsDeathTest, WantsAPictureOfTheSizeThatIsAskedFor) {
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 32);
   [[maybe_unused]] const auto draw = [&](const RenderOptions& options) {
     Picture picture;
-    draw_impostors(SceneTracer(Scene()), VoxelRegistry(), {}, camera, options, picture);
+    const Scene empty;
+    draw_impostors(SceneTracer(empty), VoxelRegistry(), {}, camera, options, picture);
   };
   QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "a picture of the options' size");
   QUOIN_EXPECT_MISTAKE(draw(sized(0, 32)), "that CpuRenderer accepts");

@@ -1,0 +1,36 @@
+#include <quoin/core/buffer.h>
+
+#include <utility>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+TEST(Buffer, ABufferThatWasMovedFromIsEmptyAndGrowsAgain) {
+  Buffer<int> from;
+  for (int i = 0; i < 100; ++i) from.push_back(i);
+  Buffer<int> to = std::move(from);
+  EXPECT_EQ(from.size(), 0U);  // NOLINT(bugprone-use-after-move): what is promised
+  EXPECT_EQ(from.capacity(), 0U);
+  for (int i = 0; i < 10; ++i) from.push_back(-i);
+  EXPECT_EQ(from[9], -9);
+  EXPECT_EQ(to[99], 99);
+  from = std::move(to);
+  EXPECT_EQ(from.size(), 100U);
+  EXPECT_EQ(to.capacity(), 0U);  // NOLINT(bugprone-use-after-move)
+  to.resize(3);
+  EXPECT_EQ(to.size(), 3U);
+}
+
+TEST(Buffer, KeepsWhatItHoldsWhenItGrows) {
+  Buffer<int> buffer;
+  for (int i = 0; i < 10'000; ++i) buffer.push_back(i);
+  buffer.resize(20'000);
+  for (int i = 0; i < 10'000; ++i) ASSERT_EQ(buffer[static_cast<std::size_t>(i)], i);
+  buffer.push_back(buffer[7]);
+  EXPECT_EQ(buffer[20'000], 7);
+}
+
+}  // namespace
+}  // namespace quoin
