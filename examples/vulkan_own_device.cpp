@@ -139,6 +139,10 @@ quoin::Status record(const Program& program, const quoin::VulkanPicture& picture
   all.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
   all.imageExtent = {kWidth, kHeight, 1};
   vkCmdCopyImageToBuffer(commands, program.image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, program.buffer, 1, &all);
+  VkMemoryBarrier to_host{VK_STRUCTURE_TYPE_MEMORY_BARRIER, nullptr, VK_ACCESS_TRANSFER_WRITE_BIT,
+                          VK_ACCESS_HOST_READ_BIT};
+  vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &to_host, 0, nullptr,
+                       0, nullptr);
   return {};
 }
 

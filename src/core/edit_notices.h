@@ -20,7 +20,9 @@ class EditNotices {
   /// Has room for that number, so that neither following nor giving a notice of it allocates.
   void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
-    if (index >= given_.capacity()) given_.reserve(std::size_t{2} * index + 1);
+    if (index < is_given_.size()) return;
+    given_.reserve(std::size_t{2} * index + 1);
+    is_given_.resize(std::size_t{2} * index + 1);
   }
   /// From now on the notice is given to this, under a number. Requires: this outlives it.
   void follow(EditNotice& notice, std::uint32_t index) {
@@ -34,6 +36,7 @@ class EditNotices {
   void take(std::vector<std::uint32_t>& taken) {
     const std::lock_guard lock(mutex_);
     taken.insert(taken.end(), given_.begin(), given_.end());
+    for (const std::uint32_t index : given_) is_given_[index] = false;
     given_.clear();
   }
 
@@ -41,11 +44,15 @@ class EditNotices {
   friend class EditNotice;
   void give(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
+    // A number stands there once, also when what had it has gone and something else has it now.
+    if (is_given_[index]) return;
+    is_given_[index] = true;
     given_.push_back(index);
   }
 
   std::mutex mutex_;
   std::vector<std::uint32_t> given_;  // with room for every number
+  std::vector<bool> is_given_;        // by number
 };
 
 }  // namespace quoin

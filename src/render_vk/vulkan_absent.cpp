@@ -41,7 +41,7 @@ Result<VulkanRenderer> VulkanRenderer::create(const BorrowedVulkanDevice&, std::
 const VulkanDevice& VulkanRenderer::device() const {
   return impl_->device;
 }
-Status VulkanRenderer::update(const Scene&, bool, Threads) {
+Status VulkanRenderer::update(const Scene&, InstanceFilter, Threads) {
   return refusal();
 }
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
@@ -100,7 +100,7 @@ VulkanMeshRenderer::~VulkanMeshRenderer() = default;
 Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer&) {
   return refusal();
 }
-Status VulkanMeshRenderer::update(const Scene&, bool) {
+Status VulkanMeshRenderer::update(const Scene&, InstanceFilter) {
   return refusal();
 }
 Status VulkanMeshRenderer::put(std::span<const SurfaceUpdate>) {

@@ -73,8 +73,7 @@ std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<G
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    const bool is_turned = glm::length(instance.rotation) > 0.0;  // a zero rotation is none
-    const DQuat rotation = is_turned ? instance.rotation : DQuat{1.0, 0.0, 0.0, 0.0};
+    const DQuat rotation = unit_rotation(instance.rotation);
     const Similarity place{instance.position, rotation, instance.voxel_size, instance.mirrored};
     placements.push_back({static_cast<std::size_t>(part), instance.name, place});
   }

@@ -144,9 +144,7 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
-  // As `index_for`, without a call for every voxel.
-  if (!m.direct() && m.palette[m.recent] != type) m.recent = find_or_add(type);
-  const std::uint32_t index = m.direct() ? type : m.recent;
+  const std::uint32_t index = index_for(type);
   std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   const std::uint32_t first = packed_row::read(row, m.bits, 0);
   if (packed_row::all_equal(row, m.bits, 1, first)) {

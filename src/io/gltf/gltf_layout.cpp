@@ -30,7 +30,7 @@ bool needs_wide_indices(std::uint64_t vertices) {
 }
 
 GltfTransform transform_of(const Similarity& place) {
-  return {place.position, glm::normalize(place.rotation), DVec3(place.scale),
+  return {place.position, glm::normalize(unit_rotation(place.rotation)), DVec3(place.scale),
           place.mirrored ? kReflection : glm::dmat3(1.0)};
 }
 

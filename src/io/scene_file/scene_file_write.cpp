@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <numbers>
 
 #include <glm/geometric.hpp>
@@ -30,10 +31,16 @@ Json json_of(const SceneFile::Placement& placement) {
 
 // A camera of the file is upright: a point that it looks at and an angle say all of it.
 Result<Json> json_of(const Camera& camera) {
-  const DVec3 target = camera.position + camera.forward;
+  // So far that the sum's rounding turns nothing.
+  const DVec3 reach = glm::abs(camera.position);
+  const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
+  if (camera.projection != Camera::Projection::Perspective) {
+    return fail(ErrorCode::Unsupported, "a scene file holds perspective cameras only");
+  }
   const auto again = look_at(camera.position, target, camera.vertical_fov);
-  if (camera.projection != Camera::Projection::Perspective || !again || glm::distance(again->up, camera.up) > 1e-6) {
-    return fail(ErrorCode::Unsupported, "a scene file holds upright perspective cameras only");
+  if (!again) return again.error();
+  if (glm::distance(again->up, camera.up) > 1e-6) {
+    return fail(ErrorCode::Unsupported, "a scene file holds upright cameras only");
   }
   return Json{{"position", triple(camera.position)},
               {"look_at", triple(target)},

@@ -236,16 +236,15 @@ void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std:
 
 void put_quad_positions(VertexFormat format, std::span<const Quad> quads, Vec3 origin, const Column& column) {
   const PerCorner corners{column, quads, [](Quad quad) { return corners_of(quad); }};
-  const IVec3 whole(origin);
   switch (format) {
     case VertexFormat::Sint16x4:
-      return corners.put<Short4>([&](IVec3 corner) {
+      return corners.put<Short4>([whole = IVec3(origin)](IVec3 corner) {
         const IVec3 at = corner + whole;
         return Short4{static_cast<std::int16_t>(at.x), static_cast<std::int16_t>(at.y), static_cast<std::int16_t>(at.z),
                       1};
       });
     case VertexFormat::Uint8x4:
-      return corners.put<Byte4>([&](IVec3 corner) {
+      return corners.put<Byte4>([whole = IVec3(origin)](IVec3 corner) {
         const IVec3 at = corner + whole;
         return Byte4{static_cast<std::uint8_t>(at.x), static_cast<std::uint8_t>(at.y), static_cast<std::uint8_t>(at.z),
                      1};

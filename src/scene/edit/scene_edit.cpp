@@ -97,7 +97,8 @@ class BoxInGrid {
   }
 
  private:
-  static int whole(double coordinate) { return static_cast<int>(std::clamp(coordinate, kMinVoxel, kMaxVoxel)); }
+  // One past the last voxel too, for the ends of boxes.
+  static int whole(double coordinate) { return static_cast<int>(std::clamp(coordinate, kMinVoxel, kMaxVoxel + 1.0)); }
 
   DVec3 centre_;
   DVec3 reach_;
@@ -111,13 +112,16 @@ class BoxFiller {
   BoxFiller(Grid& grid, const BoxInGrid& box, VoxelType type) : grid_(grid), box_(box), type_(type) {}
 
   std::int64_t fill() {
-    IBox voxels = box_.bounds();
+    const IBox voxels = box_.bounds();
     const DVec3 chunks = DVec3(voxels.max) / double{kChunkEdge} - DVec3(voxels.min) / double{kChunkEdge};
-    // Where nothing is there is nothing to take away.
-    if (type_ == kAir && chunks.x * chunks.y * chunks.z > static_cast<double>(grid_.chunk_count())) {
-      voxels = intersect(voxels, grid_.bounds());
+    if (type_ != kAir || chunks.x * chunks.y * chunks.z <= static_cast<double>(grid_.chunk_count())) {
+      fill_part(voxels);
+      return changed_;
     }
-    fill_part(voxels);
+    // Where nothing is there is nothing to take away.
+    for (const IVec3 chunk : grid_.chunks()) {
+      fill_part(intersect(voxels, {chunk * kChunkEdge, chunk * kChunkEdge + kChunkEdge}));
+    }
     return changed_;
   }
 

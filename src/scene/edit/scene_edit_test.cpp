@@ -147,6 +147,40 @@ TEST(SceneEdit, ABeamCrossesOnlyTheChunksOnItsWay) {
   EXPECT_LT(scene.grids()[instance.grid].grid.chunk_count(), 150U);
 }
 
+TEST(SceneEdit, ClearingALargePartOfTheWorldCostsWhatIsThere) {
+  Scene scene;
+  SceneGrid made;
+  constexpr int kFar = 1'000'000'000;
+  for (const int x : {-kFar, 0, kFar}) {
+    for (const int y : {-kFar, kFar}) made.grid.set({x, y, x / 2}, 1);
+  }
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(made));
+  const InstanceHandle handle = scene.add_instance(instance);
+  const DQuat askew = glm::angleAxis(0.3, glm::normalize(DVec3(1, 2, 3)));
+  // Were chunks asked that are not there, this would take years.
+  EXPECT_EQ(fill_box(scene, handle, {{0, 0, 0}, DVec3(0.2 * kFar), askew}, kAir), 0);
+  EXPECT_EQ(fill_box(scene, handle, {{0, kFar, 0}, DVec3(0.2 * kFar), askew}, kAir), 1);
+  EXPECT_EQ(fill_box(scene, handle, {{0, 0, 0}, DVec3(3.0 * kFar), askew}, kAir), 5);
+}
+
+TEST(SceneEdit, TheWorldsLastVoxelsCanBeReached) {
+  Scene scene;
+  SceneGrid made;
+  made.grid.set({0, 0, 0}, 1);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(made));
+  const InstanceHandle handle = scene.add_instance(instance);
+  const int first = std::numeric_limits<int>::min() + kChunkEdge;
+  const int last = std::numeric_limits<int>::max() - kChunkEdge;
+  for (const int x : {first, last}) {
+    const DVec3 centre(x + 0.5, 0.5, 0.5);
+    EXPECT_EQ(fill_box(scene, handle, {centre, DVec3(0.25), {1, 0, 0, 0}}, 3), 1) << x;
+    EXPECT_FALSE(set_voxel(scene, handle, centre, 3)) << "it is there";
+    EXPECT_EQ(fill_box(scene, handle, {centre, DVec3(2.25), {1, 0, 0, 0}}, kAir), 1) << x;
+  }
+}
+
 TEST(SceneEdit, AVoxelIsSetAtAPoint) {
   for (unsigned seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

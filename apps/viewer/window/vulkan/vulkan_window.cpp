@@ -67,6 +67,7 @@ struct VulkanWindow::Impl {
   void draw_overlay(const Overlay& overlay) const;
   VkResult show(std::uint32_t shown);
   VkResult wait();
+  void give_up_image();
 
   std::shared_ptr<WindowDevice> device;
   bool vsync;
@@ -100,6 +101,18 @@ VkResult VulkanWindow::Impl::make_objects() {
   if (result != VK_SUCCESS) return result;
   const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
   return api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed);
+}
+
+// After an image was handed out that is not drawn: nobody waits for its semaphore, and the swapchain lacks the image.
+// Both are made anew.
+void VulkanWindow::Impl::give_up_image() {
+  const VulkanFunctions& api = device->api();
+  api.vkDeviceWaitIdle(device->handle());
+  swapchain.reset();
+  is_stale = true;
+  api.vkDestroySemaphore(device->handle(), handed, nullptr);
+  const auto semaphore = info_of<VkSemaphoreCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO);
+  if (api.vkCreateSemaphore(device->handle(), &semaphore, nullptr, &handed) != VK_SUCCESS) handed = VK_NULL_HANDLE;
 }
 
 VulkanWindow::Impl::~Impl() {
@@ -271,7 +284,10 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
     if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kDoing);
-    if (Status recorded = window.record(shown, picture, place, overlay); !recorded) return recorded;
+    if (Status recorded = window.record(shown, picture, place, overlay); !recorded) {
+      window.give_up_image();
+      return recorded;
+    }
     result = window.show(shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
     return window.is_stale ? Status{} : window.device->check(result, kDoing);

@@ -1,0 +1,46 @@
+#include "core/edit_notices.h"
+
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+TEST(EditNotices, AreTakenOnceAndGivenAgainOnceFollowedAnew) {
+  EditNotices notices;
+  EditNotice a;
+  EditNotice b;
+  notices.follow(a, 4);
+  notices.follow(b, 2);
+  a.give();
+  b.give();
+  a.give();
+  std::vector<std::uint32_t> taken;
+  notices.take(taken);
+  EXPECT_EQ(taken, (std::vector<std::uint32_t>{4, 2}));
+  taken.clear();
+  a.give();
+  notices.take(taken);
+  EXPECT_TRUE(taken.empty()) << "not followed since";
+  notices.follow(a, 4);
+  a.give();
+  notices.take(taken);
+  EXPECT_EQ(taken, (std::vector<std::uint32_t>{4}));
+}
+
+TEST(EditNotices, ANumberThatOthersTookOverStandsThereOnce) {
+  EditNotices notices;
+  for (int i = 0; i < 1'000; ++i) {
+    EditNotice notice;
+    notices.follow(notice, 7);
+    notice.give();
+  }
+  std::vector<std::uint32_t> taken;
+  notices.take(taken);
+  EXPECT_EQ(taken, (std::vector<std::uint32_t>{7}));
+}
+
+}  // namespace
+}  // namespace quoin
