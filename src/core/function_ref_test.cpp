@@ -34,6 +34,14 @@ TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
   EXPECT_EQ(calls, 3);
 }
 
+TEST(FunctionRef, WhatIsReturnedToNobodyIsDropped) {
+  int sum = 0;
+  const FunctionRef<void(int)> add = [&](int i) { return sum += i; };
+  add(3);
+  add(4);
+  EXPECT_EQ(sum, 7);
+}
+
 TEST(FunctionRef, PassesReferencesOn) {
   int value = 1;
   const auto change = [](int& i) { i = 7; };

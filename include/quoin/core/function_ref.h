@@ -22,12 +22,12 @@ class FunctionRef<Result(Arguments...)> {
     if constexpr (std::is_function_v<Called>) {
       callable_.function = reinterpret_cast<void (*)()>(&callable);
       call_ = [](Place called, Arguments... arguments) -> Result {
-        return reinterpret_cast<Called*>(called.function)(std::forward<Arguments>(arguments)...);
+        return static_cast<Result>(reinterpret_cast<Called*>(called.function)(std::forward<Arguments>(arguments)...));
       };
     } else {
       callable_.object = const_cast<void*>(static_cast<const void*>(std::addressof(callable)));
       call_ = [](Place called, Arguments... arguments) -> Result {
-        return (*static_cast<Called*>(called.object))(std::forward<Arguments>(arguments)...);
+        return static_cast<Result>((*static_cast<Called*>(called.object))(std::forward<Arguments>(arguments)...));
       };
     }
   }
