@@ -8,6 +8,8 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include <quoin/mesh/simplify.h>
@@ -101,7 +103,22 @@ TEST(SceneMeshes, InstancesWithoutAPlaceAreRefused) {
   };
   EXPECT_TRUE(refuses([](Instance& i) { i.position.x = std::numeric_limits<double>::quiet_NaN(); }));
   EXPECT_TRUE(refuses([](Instance& i) { i.voxel_size = -1.0; }));
-  EXPECT_TRUE(refuses([](Instance& i) { i.rotation = DQuat(0, 0, 0, 0); }));
+  EXPECT_TRUE(refuses([](Instance& i) { i.rotation.y = std::numeric_limits<double>::infinity(); }));
+}
+
+TEST(SceneMeshes, RotationsOfAnyLengthTurnAsTheyDoInPictures) {
+  const DQuat turn = glm::angleAxis(0.9, glm::normalize(DVec3(1, 2, -1)));
+  const std::array<std::pair<DQuat, DQuat>, 4> cases = {
+      {{DQuat(0, 0, 0, 0), DQuat(1, 0, 0, 0)}, {turn * 1e200, turn}, {turn * 1e-200, turn}, {turn * -3.0, -turn}}};
+  for (const auto& [given, expected] : cases) {
+    Scene scene;
+    place(scene, add_grid(scene, 1));
+    scene.edit(scene.instances().handles()[0]).rotation = given;
+    const auto meshes = mesh_scene(scene);
+    ASSERT_TRUE(meshes);
+    const auto& placed = std::get<Similarity>(meshes->placements[0].world_from_part);
+    EXPECT_LT(glm::length(placed.rotation - expected), 1e-12);
+  }
 }
 
 /// An L of voxels with an arm up, that no turn or reflection leaves as it is.
