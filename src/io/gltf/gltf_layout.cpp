@@ -1,6 +1,7 @@
 #include <quoin/core/assert.h>
 
 #include "io/gltf/gltf_layout.h"
+#include "scene/instance_axes.h"
 
 #include <algorithm>
 #include <array>
