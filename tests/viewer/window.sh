@@ -160,6 +160,13 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   ! cmp -s blocks.png blocks_edited.png || fail "the meshes do not follow the edit"
   xdotool key --delay 80 ctrl+z
   picture_becomes blocks_undone.png blocks.png || fail "the meshes do not follow the undo"
+  if [ "$backend" = vulkan ] && [ -z "${QUOIN_NIGHTLY:-}" ]; then
+    # A processor that acts as a device takes minutes for the rest, which the other backend's run goes through too.
+    until_true 20 title_is "world.vox - Quoin" || fail "undo among meshes does not bring back the saved state"
+    stop
+    echo "short of the rest, which ./dev nightly runs"
+    exit 0
+  fi
   for key in F8 F9 F7; do
     xdotool key --delay 80 "$key"
     sleep 0.5
