@@ -36,7 +36,8 @@ TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
 
 TEST(FunctionRef, WhatIsReturnedToNobodyIsDropped) {
   int sum = 0;
-  const FunctionRef<void(int)> add = [&](int i) { return sum += i; };
+  const auto adding = [&](int i) { return sum += i; };
+  const FunctionRef<void(int)> add = adding;
   add(3);
   add(4);
   EXPECT_EQ(sum, 7);
