@@ -80,11 +80,15 @@ const VulkanDevice& VulkanRenderer::device() const {
 
 Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads threads) {
   const std::uint64_t before = impl_->memory.written();
-  impl_->look_at(nullptr, filter);  // should memory run out: the scene before may be gone by the next picture
-  Status done = impl_->scene.update(scene, filter, threads);
-  impl_->uploaded = impl_->memory.written() - before;
-  impl_->look_at(done ? &scene : nullptr, filter);
-  return done;
+  try {
+    Status done = impl_->scene.update(scene, filter, threads);
+    impl_->uploaded = impl_->memory.written() - before;
+    impl_->look_at(done ? &scene : nullptr, filter);
+    return done;
+  } catch (...) {
+    impl_->look_at(nullptr, filter);  // the scene before may be gone by the next picture
+    throw;
+  }
 }
 
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
