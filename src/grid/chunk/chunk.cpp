@@ -140,6 +140,15 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
   return packed_row::equal_mask(m.row(slab, ChunkStorage::row_in_slab(y, z)), m.bits, index);
 }
 
+// The palette index of a type, adding it where it is new; may widen the voxels. Beside its callers, so that
+// setting a voxel costs no call of it.
+std::uint32_t Chunk::index_for(VoxelType type) {
+  ChunkStorage& m = *storage_;
+  if (m.direct()) return type;
+  if (m.palette[m.recent] != type) m.recent = find_or_add(type);
+  return m.direct() ? type : m.recent;
+}
+
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   if (storage_ == nullptr) make_mixed();
@@ -207,9 +216,7 @@ bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   if (old == type) return false;
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
-  // As `index_for`, without a call for every voxel.
-  if (!m.direct() && m.palette[m.recent] != type) m.recent = find_or_add(type);
-  const std::uint32_t index = m.direct() ? type : m.recent;
+  const std::uint32_t index = index_for(type);
   std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);

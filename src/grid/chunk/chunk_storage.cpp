@@ -117,14 +117,6 @@ void Chunk::make_mixed() {
   storage_ = std::move(made);
 }
 
-// The palette index of a type, adding it where it is new; may widen the voxels.
-std::uint32_t Chunk::index_for(VoxelType type) {
-  ChunkStorage& m = *storage_;
-  if (m.direct()) return type;
-  if (m.palette[m.recent] != type) m.recent = find_or_add(type);
-  return m.direct() ? type : m.recent;
-}
-
 std::uint32_t Chunk::find_or_add(VoxelType type) {
   ChunkStorage& m = *storage_;
   const auto found = std::find(m.palette.begin(), m.palette.end(), type);
