@@ -15,7 +15,7 @@ int main() {
   if (!added) return 1;
 
   quoin::Grid grid;
-  grid.fill_box({0, 0, 0}, {31, 3, 31}, *added);
+  grid.fill_box({{0, 0, 0}, {32, 4, 32}}, *added);
   grid.fill_sphere({16.0, 8.0, 16.0}, 5.0, *added);
 
   quoin::BlockyMesher mesher;

@@ -62,9 +62,9 @@ int main() {
 
   // Half an arch; its mirror image beside it; both once more, turned by a quarter about y.
   quoin::Grid world;
-  world.fill_box({-60, 0, -60}, {60, 1, 60}, *type);
-  world.fill_box({0, 2, 0}, {3, 20, 3}, *type);
-  world.fill_box({0, 21, 0}, {9, 23, 3}, *type);
+  world.fill_box({{-60, 0, -60}, {61, 2, 61}}, *type);
+  world.fill_box({{0, 2, 0}, {4, 21, 4}}, *type);
+  world.fill_box({{0, 21, 0}, {10, 24, 4}}, *type);
   quoin::CopyOptions solid_only;
   solid_only.copy_air = false;
   const quoin::IBox half{{0, 2, 0}, {10, 24, 4}};

@@ -18,7 +18,8 @@ quoin::Result<quoin::Scene> make_staircase() {
   const auto stone = scene.types.add(properties);
   if (!stone) return stone.error();
   quoin::SceneGrid stairs;
-  for (int step = 0; step < 12; ++step) stairs.grid.fill_box({0, 0, -2 * step}, {9, step, -2 * step - 1}, *stone);
+  for (int step = 0; step < 12; ++step)
+    stairs.grid.fill_box({{0, 0, -2 * step - 1}, {10, step + 1, 1 - 2 * step}}, *stone);
   quoin::Instance placed;
   placed.grid = scene.add_grid(std::move(stairs));
   scene.add_instance(placed);

@@ -47,7 +47,7 @@ int main() {
   if (!type) return 1;
 
   quoin::Grid world;
-  world.fill_box({-128, -64, -128}, {127, 20, 127}, *type);
+  world.fill_box({{-128, -64, -128}, {128, 21, 128}}, *type);
   MeshCache meshes;
   const int all = meshes.update(world, types);
 

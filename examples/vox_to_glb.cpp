@@ -17,7 +17,7 @@ quoin::Status write_sample(const std::string& path) {
   if (!type) return type.error();
   quoin::SceneGrid stairs;
   stairs.name = "stairs";
-  for (int step = 0; step < 8; ++step) stairs.grid.fill_box({0, 0, step}, {5, step, step}, *type);
+  for (int step = 0; step < 8; ++step) stairs.grid.fill_box({{0, 0, step}, {6, step + 1, step + 1}}, *type);
   quoin::Instance placed;
   placed.grid = scene.add_grid(std::move(stairs));
   scene.add_instance(placed);

@@ -52,7 +52,7 @@ bool choose_device(Program& program) {
   vkEnumeratePhysicalDevices(program.instance, &count, nullptr);
   std::vector<VkPhysicalDevice> all(count);
   vkEnumeratePhysicalDevices(program.instance, &count, all.data());
-  std::vector<quoin::VulkanDevice> descriptions;
+  std::vector<quoin::VulkanDeviceInfo> descriptions;
   for (const VkPhysicalDevice one : all) {
     auto description = quoin::describe_vulkan_device(program.instance, one, vkGetInstanceProcAddr);
     if (!description) return false;
@@ -177,7 +177,7 @@ quoin::Result<quoin::Scene> make_tower() {
   if (!brick) return brick.error();
   quoin::SceneGrid tower;
   tower.grid.fill_sphere({0.0, 0.0, 0.0}, 9.0, *brick);
-  tower.grid.fill_box({-3, 0, -3}, {2, 20, 2}, *brick);
+  tower.grid.fill_box({{-3, 0, -3}, {3, 21, 3}}, *brick);
   quoin::Instance placed;
   placed.grid = scene.add_grid(std::move(tower));
   scene.add_instance(placed);
@@ -191,7 +191,7 @@ quoin::Status run(const Program& program, const std::string& path) {
   lent.device = program.device;
   lent.queue = program.queue;
   lent.queue_family = program.family;
-  lent.find_function = vkGetInstanceProcAddr;
+  lent.get_instance_proc_addr = vkGetInstanceProcAddr;
   auto renderer = quoin::VulkanRenderer::create(lent);
   if (!renderer) return renderer.error();
   const auto scene = make_tower();

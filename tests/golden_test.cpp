@@ -31,7 +31,7 @@ const GoldenView& view_called(const std::string& name) {
 Scene scene_without_neighbours() {
   VoxelRegistry types;
   Grid grid = terrain(types);
-  grid.fill_box({64, 0, 0}, {127, 63, 127}, kAir);
+  grid.fill_box({{64, 0, 0}, {128, 64, 128}}, kAir);
   return scene_of(std::move(types), std::move(grid));
 }
 

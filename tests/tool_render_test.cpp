@@ -283,7 +283,7 @@ TEST_F(VulkanTool, ADeviceDrawsTheSamePicture) {
     EXPECT_EQ(result.err, "quoin: " + devices.error().message + "\n");
     GTEST_SKIP() << devices.error().message;
   }
-  if (std::none_of(devices->begin(), devices->end(), [](const VulkanDevice& d) { return d.missing.empty(); })) {
+  if (std::none_of(devices->begin(), devices->end(), [](const VulkanDeviceInfo& d) { return d.missing.empty(); })) {
     GTEST_SKIP() << devices->front().name << " lacks " << devices->front().missing;
   }
   ASSERT_EQ(result.status, 0) << result.err;

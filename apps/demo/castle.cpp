@@ -42,7 +42,7 @@ void add_tower(Grid& grid, const Palette& p, IVec3 foot, int radius, int height,
   }
   for (int y = 6; y < height - 6; y += 9) {
     for (const IVec3 side : {IVec3{1, 0, 0}, IVec3{-1, 0, 0}, IVec3{0, 0, 1}, IVec3{0, 0, -1}}) {
-      grid.fill_box(foot + side * radius + IVec3{0, y, 0}, foot + side * radius + IVec3{0, y + 2, 0}, p.lamp);
+      grid.fill_box({foot + side * radius + IVec3{0, y, 0}, foot + side * radius + IVec3{1, y + 3, 1}}, p.lamp);
     }
   }
   if (!has_roof) return;
@@ -56,8 +56,8 @@ void add_tower(Grid& grid, const Palette& p, IVec3 foot, int radius, int height,
       }
     }
   }
-  grid.fill_box(foot + IVec3{0, height + roof, 0}, foot + IVec3{0, height + roof + 7, 0}, p.wood);
-  grid.fill_box(foot + IVec3{1, height + roof + 4, 0}, foot + IVec3{6, height + roof + 7, 0}, p.flag);
+  grid.fill_box({foot + IVec3{0, height + roof, 0}, foot + IVec3{1, height + roof + 8, 1}}, p.wood);
+  grid.fill_box({foot + IVec3{1, height + roof + 4, 0}, foot + IVec3{7, height + roof + 8, 1}}, p.flag);
 }
 
 void add_curtain_wall(Grid& grid, const Palette& p, IVec3 from, IVec3 to, int height) {
@@ -80,23 +80,24 @@ void add_curtain_wall(Grid& grid, const Palette& p, IVec3 from, IVec3 to, int he
 void add_keep(Grid& grid, const Palette& p) {
   const IVec3 low{kCentre - 11, kCourt, kCentre - 15};
   const IVec3 high{kCentre + 11, kCourt + 24, kCentre + 7};
-  grid.fill_box(low, high, p.wall);
-  grid.fill_box(low + IVec3{2, 1, 2}, high - IVec3{2, 1, 2}, quoin::kAir);
-  for (const int y : {8, 16, 24}) grid.fill_box(low + IVec3{-1, y, -1}, {high.x + 1, kCourt + y, high.z + 1}, p.trim);
+  grid.fill_box({low, high + 1}, p.wall);
+  grid.fill_box({low + IVec3{2, 1, 2}, high - IVec3{1, 0, 1}}, quoin::kAir);
+  for (const int y : {8, 16, 24})
+    grid.fill_box({low + IVec3{-1, y, -1}, {high.x + 2, kCourt + y + 1, high.z + 2}}, p.trim);
   for (int x = low.x + 3; x < high.x - 1; x += 5) {
     for (const int y : {kCourt + 3, kCourt + 11, kCourt + 19}) {
       for (const int z : {low.z, high.z}) {
-        grid.fill_box({x, y, z}, {x + 1, y + 3, z}, p.lamp);
+        grid.fill_box({{x, y, z}, {x + 2, y + 4, z + 1}}, p.lamp);
       }
     }
   }
   for (int i = 0; i <= 12; ++i) {
     const VoxelType tile = i % 3 == 2 ? p.roof_dark : p.roof;
-    grid.fill_box({low.x - 1 + i, high.y + 1 + i, low.z - 1}, {high.x + 1 - i, high.y + 1 + i, high.z + 1}, tile);
+    grid.fill_box({{low.x - 1 + i, high.y + 1 + i, low.z - 1}, {high.x + 2 - i, high.y + 2 + i, high.z + 2}}, tile);
   }
-  grid.fill_box({kCentre - 2, kCourt, high.z - 2}, {kCentre + 2, kCourt + 7, high.z}, quoin::kAir);
-  grid.fill_box({kCentre - 2, kCourt, high.z - 1}, {kCentre + 2, kCourt + 6, high.z - 1}, p.plank);
-  grid.fill_box({kCentre - 2, high.y + 4, high.z + 1}, {kCentre + 2, high.y + 8, high.z + 1}, p.glass);
+  grid.fill_box({{kCentre - 2, kCourt, high.z - 2}, {kCentre + 3, kCourt + 8, high.z + 1}}, quoin::kAir);
+  grid.fill_box({{kCentre - 2, kCourt, high.z - 1}, {kCentre + 3, kCourt + 7, high.z}}, p.plank);
+  grid.fill_box({{kCentre - 2, high.y + 4, high.z + 1}, {kCentre + 3, high.y + 9, high.z + 2}}, p.glass);
 }
 
 void add_castle(Grid& grid, const Palette& p) {
@@ -111,7 +112,7 @@ void add_castle(Grid& grid, const Palette& p) {
   }
   add_tower(grid, p, {kCentre - 7, kCourt - 4, high}, 4, 20, false);
   add_tower(grid, p, {kCentre + 7, kCourt - 4, high}, 4, 20, false);
-  grid.fill_box({kCentre - 3, kCourt, high - 3}, {kCentre + 3, kCourt + 8, high + 3}, quoin::kAir);
+  grid.fill_box({{kCentre - 3, kCourt, high - 3}, {kCentre + 4, kCourt + 9, high + 4}}, quoin::kAir);
   for (int y = kCourt; y <= kCourt + 8; ++y) {
     for (int x = kCentre - 3; x <= kCentre + 3; x += 2) grid.set({x, y, high}, p.wood);
   }
@@ -198,7 +199,7 @@ Grid make_island(const Palette& p) {
       const int x = kCentre + side + static_cast<int>(5.0 * std::sin(z * 0.11) * (z - kCentre - 30) / 60);
       const int h = ground_height(x, z);
       if (h <= kSeaLevel) continue;
-      grid.fill_box({x, h, z}, {x, h + 4, z}, p.wood);
+      grid.fill_box({{x, h, z}, {x + 1, h + 5, z + 1}}, p.wood);
       grid.set({x, h + 5, z}, p.lamp);
     }
   }
@@ -218,8 +219,8 @@ Grid make_tree(const Palette& p, int height) {
     if (h % 11 == 0) return quoin::kAir;
     return h % 3 == 0 ? p.leaf_light : type;
   });
-  grid.fill_box({0, 0, 0}, {0, height / 2, 0}, p.wood);
-  grid.fill_box({1, 0, 0}, {1, height / 3, 0}, p.wood);
+  grid.fill_box({{0, 0, 0}, {1, height / 2 + 1, 1}}, p.wood);
+  grid.fill_box({{1, 0, 0}, {2, height / 3 + 1, 1}}, p.wood);
   return grid;
 }
 
@@ -231,19 +232,19 @@ Grid make_ship(const Palette& p) {
     const int rail = 6 + (z < 6 ? 2 : z > 26 ? 3 : 0);
     for (int y = 0; y <= rail; ++y) {
       const int width = std::max(0, half - std::max(0, 3 - y));
-      grid.fill_box({-width, y, z}, {width, y, z}, y == rail || y % 3 == 2 ? p.plank : p.wood);
-      if (y > 4) grid.fill_box({-width + 1, y, z}, {width - 1, y, z}, quoin::kAir);
+      grid.fill_box({{-width, y, z}, {width + 1, y + 1, z + 1}}, y == rail || y % 3 == 2 ? p.plank : p.wood);
+      if (y > 4) grid.fill_box({{-width + 1, y, z}, {width, y + 1, z + 1}}, quoin::kAir);
     }
   }
   for (const int z : {11, 23}) {
-    grid.fill_box({0, 4, z}, {0, 30, z}, p.wood);
+    grid.fill_box({{0, 4, z}, {1, 31, z + 1}}, p.wood);
     for (int y = 10; y <= 27; ++y) {
       const int bulge = static_cast<int>(std::lround(2.5 * std::sin((y - 10) / 17.0 * 3.14159265)));
-      grid.fill_box({-7, y, z - 1 - bulge}, {7, y, z - 1 - bulge}, p.sail);
+      grid.fill_box({{-7, y, z - 1 - bulge}, {8, y + 1, z - bulge}}, p.sail);
     }
-    grid.fill_box({1, 29, z}, {5, 30, z}, p.flag);
+    grid.fill_box({{1, 29, z}, {6, 31, z + 1}}, p.flag);
   }
-  grid.fill_box({-1, 9, 33}, {1, 10, 33}, p.lamp);
+  grid.fill_box({{-1, 9, 33}, {2, 11, 34}}, p.lamp);
   return grid;
 }
 

@@ -56,7 +56,7 @@ void add_hull(Grid& grid, const Paint& paint, IVec3 bow, int length, double half
       VoxelType type = is_panel ? paint.plate : paint.hull;
       if (y == 0 || y == 1) type = paint.stripe;
       if (y < -static_cast<int>(height * 0.7)) type = paint.dark;
-      grid.fill_box(bow + IVec3{-half, y, z}, bow + IVec3{half, y, z}, type);
+      grid.fill_box({bow + IVec3{-half, y, z}, bow + IVec3{half + 1, y + 1, z + 1}}, type);
       if (y == 3 && half > 4 && z % 4 < 2) {
         for (const int side : {-half, half}) grid.set(bow + IVec3{side, y, z}, paint.window);
       }
@@ -69,7 +69,8 @@ void add_engine(Grid& grid, const Paint& paint, IVec3 front, int length, int rad
     for (int y = -radius; y <= radius; ++y) {
       const int half = static_cast<int>(std::sqrt(static_cast<double>(radius * radius - y * y) + 0.5));
       const bool is_nozzle = z >= length - 2;
-      grid.fill_box(front + IVec3{-half, y, z}, front + IVec3{half, y, z}, is_nozzle ? paint.engine : paint.dark);
+      grid.fill_box({front + IVec3{-half, y, z}, front + IVec3{half + 1, y + 1, z + 1}},
+                    is_nozzle ? paint.engine : paint.dark);
     }
   }
 }
@@ -80,7 +81,7 @@ void add_wings(Grid& grid, const Paint& paint, IVec3 root, int span, int chord, 
     for (const int side : {-1, 1}) {
       const IVec3 at = root + IVec3{side * x, -x / 6, front};
       const VoxelType type = x > span - 5 ? paint.stripe : paint.plate;
-      grid.fill_box(at, at + IVec3{0, thickness - 1, chord - front}, type);
+      grid.fill_box({at, at + IVec3{1, thickness, chord - front + 1}}, type);
     }
   }
 }
@@ -91,8 +92,8 @@ void add_bridge(Grid& grid, const Paint& paint, IVec3 foot, int half, int decks)
     const int h = half - 2 * deck;
     if (h < 1) break;
     const IVec3 low = foot + IVec3{-h, 5 * deck, -h - 2};
-    grid.fill_box(low, low + IVec3{2 * h, 4, 2 * h + 4}, paint.hull);
-    grid.fill_box(low + IVec3{0, 2, 0}, low + IVec3{2 * h, 3, 0}, paint.window);
+    grid.fill_box({low, low + IVec3{2 * h + 1, 5, 2 * h + 5}}, paint.hull);
+    grid.fill_box({low + IVec3{0, 2, 0}, low + IVec3{2 * h + 1, 4, 1}}, paint.window);
   }
 }
 
@@ -101,7 +102,7 @@ Grid scout(const Paint& paint) {
   add_hull(grid, paint, {0, 0, 0}, 40, 7.0, 5.0);
   add_wings(grid, paint, {0, 0, 14}, 20, 18, 2);
   for (const int x : {-6, 6}) add_engine(grid, paint, {x, 0, 32}, 12, 3);
-  grid.fill_box({-2, 4, 14}, {2, 6, 20}, paint.window);
+  grid.fill_box({{-2, 4, 14}, {3, 7, 21}}, paint.window);
   return grid;
 }
 
@@ -110,8 +111,8 @@ Grid freighter(const Paint& paint) {
   add_hull(grid, paint, {0, 0, 0}, 110, 12.0, 11.0);
   for (int z = 34; z < 96; z += 16) {
     for (const int x : {-22, 13}) {
-      grid.fill_box({x, -8, z}, {x + 9, 7, z + 13}, z % 32 == 2 ? paint.stripe : paint.plate);
-      grid.fill_box({x, -8, z + 6}, {x + 9, 7, z + 7}, paint.dark);
+      grid.fill_box({{x, -8, z}, {x + 10, 8, z + 14}}, z % 32 == 2 ? paint.stripe : paint.plate);
+      grid.fill_box({{x, -8, z + 6}, {x + 10, 8, z + 8}}, paint.dark);
     }
   }
   add_bridge(grid, paint, {0, 9, 88}, 8, 3);
@@ -126,8 +127,8 @@ Grid cruiser(const Paint& paint) {
   add_bridge(grid, paint, {0, 13, 140}, 12, 4);
   for (const int x : {-15, 0, 15}) add_engine(grid, paint, {x, 0, 190}, 24, 7);
   for (int z = 60; z < 130; z += 24) {
-    grid.fill_box({-5, 12, z}, {5, 18, z + 10}, paint.dark);
-    grid.fill_box({-2, 15, z - 14}, {1, 16, z}, paint.dark);
+    grid.fill_box({{-5, 12, z}, {6, 19, z + 11}}, paint.dark);
+    grid.fill_box({{-2, 15, z - 14}, {2, 17, z + 1}}, paint.dark);
   }
   return grid;
 }
@@ -135,9 +136,9 @@ Grid cruiser(const Paint& paint) {
 Grid carrier(const Paint& paint) {
   Grid grid;
   add_hull(grid, paint, {0, 0, 0}, 420, 46.0, 26.0);
-  grid.fill_box({-60, 20, 90}, {59, 27, 409}, paint.plate);  // the flight deck
-  for (int z = 100; z < 400; z += 20) grid.fill_box({-2, 27, z}, {1, 27, z + 9}, paint.window);
-  for (const int x : {-58, 54}) grid.fill_box({x, 27, 92}, {x + 3, 27, 407}, paint.stripe);
+  grid.fill_box({{-60, 20, 90}, {60, 28, 410}}, paint.plate);  // the flight deck
+  for (int z = 100; z < 400; z += 20) grid.fill_box({{-2, 27, z}, {2, 28, z + 10}}, paint.window);
+  for (const int x : {-58, 54}) grid.fill_box({{x, 27, 92}, {x + 4, 28, 408}}, paint.stripe);
   add_bridge(grid, paint, {42, 28, 280}, 15, 6);
   for (const int x : {-32, -11, 11, 32}) add_engine(grid, paint, {x, -4, 396}, 40, 10);
   return grid;

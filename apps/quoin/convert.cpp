@@ -22,9 +22,9 @@ Status check_companions(const std::vector<std::filesystem::path>& files, const C
   for (const auto& file : files) {
     std::error_code missing;
     if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
-    return fail(ErrorCode::InvalidArgument,
-                "the input, which " + options.output.string() + " would replace with its companion of this name",
-                file.string());
+    return make_error(ErrorCode::InvalidArgument,
+                      "the input, which " + options.output.string() + " would replace with its companion of this name",
+                      file.string());
   }
   return {};
 }
@@ -131,9 +131,10 @@ Result<bool> holds_volume(const ConvertOptions& options) {
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
   if (is_volume && !format.is_mesh) {
-    return fail(ErrorCode::Unsupported,
-                "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.extension),
-                options.common.input.string());
+    return make_error(
+        ErrorCode::Unsupported,
+        "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.extension),
+        options.common.input.string());
   }
   return is_volume ? convert_volume(options, format) : convert_scene(options, format);
 }

@@ -91,7 +91,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
     bytes.error().path = options.output.string();
     return bytes.error();
   }
-  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", options.output.string());
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
   if (auto written = write_file(options.output, *bytes); !written) return written.error();
   outcome.bytes = bytes->size();
   outcome.seconds_write = watch.lap();

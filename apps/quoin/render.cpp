@@ -48,13 +48,13 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
 }
 
 Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
-  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.output.string());
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.output.string());
   const auto png = write_png(outcome.picture.colour, arguments.output);
   if (!png) return png.error();
   outcome.files.push_back(arguments.output);
   outcome.bytes = *png;
   if (arguments.depth.empty()) return {};
-  if (was_interrupted()) return fail(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
   const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
   if (!pfm) return pfm.error();
   outcome.files.push_back(arguments.depth);
@@ -66,9 +66,9 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 Status check_input(const std::filesystem::path& path) {
   const auto format = detect_format(path);
   if (!format || !*format || !format_info(**format).is_volume) return {};
-  return fail(ErrorCode::Unsupported,
-              "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
-              path.string());
+  return make_error(ErrorCode::Unsupported,
+                    "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
+                    path.string());
 }
 
 // Takes the picture and puts it, with its times, into the outcome.
@@ -142,7 +142,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
                {"rays", outcome.picture.rays},
                {"pixels_hit", outcome.picture.pixels_hit},
                {"backend", arguments.backend},
-               {"threads", resolve(arguments.common.threads)},
+               {"threads", thread_count(arguments.common.threads)},
                {"camera",
                 {{"position", triple(camera.position)},
                  {"forward", triple(camera.forward)},

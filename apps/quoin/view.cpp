@@ -35,13 +35,13 @@ Status check_input(const std::filesystem::path& path) {
   const auto format = detect_format(path);
   if (!format) return format.error();
   if (!*format) {
-    return fail(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
-                path.string());
+    return make_error(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
+                      path.string());
   }
   if (!format_info(**format).is_volume) return {};
-  return fail(ErrorCode::Unsupported,
-              "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
-              path.string());
+  return make_error(ErrorCode::Unsupported,
+                    "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
+                    path.string());
 }
 
 int run_view(const ViewArguments& arguments) {

@@ -160,9 +160,9 @@ Result<bool> DeviceBackend::Impl::draw() {
     if (Status ready = prepare(); !ready) return ready.error();
     return request->mode == DrawMode::Rays ? draw_rays() : draw_meshes();
   } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::LimitExceeded, "out of memory");
+    return make_error(ErrorCode::LimitExceeded, "out of memory");
   } catch (const std::system_error& why) {
-    return fail(ErrorCode::LimitExceeded, std::string("cannot start another thread: ") + why.what());
+    return make_error(ErrorCode::LimitExceeded, std::string("cannot start another thread: ") + why.what());
   }
 }
 

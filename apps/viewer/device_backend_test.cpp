@@ -208,10 +208,11 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
-  DeviceBackend backend(
-      document.scene(), options,
-      []() -> Result<std::shared_ptr<VulkanRenderer>> { return fail(ErrorCode::Unsupported, "vulkan: nothing here"); },
-      {});
+  DeviceBackend backend(document.scene(), options,
+                        []() -> Result<std::shared_ptr<VulkanRenderer>> {
+                          return make_error(ErrorCode::Unsupported, "vulkan: nothing here");
+                        },
+                        {});
   backend.show(request_for(document, DrawMode::Blocks));
   EXPECT_FALSE(backend.take());
   ASSERT_TRUE(backend.fault());

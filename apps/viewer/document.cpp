@@ -48,8 +48,8 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (format && (format->format == FileFormat::Vox || format->format == FileFormat::Glb)) return format->format;
-  return fail(ErrorCode::Unsupported, "the viewer saves .vox and .glb; `quoin convert` writes the others",
-              path.string());
+  return make_error(ErrorCode::Unsupported, "the viewer saves .vox and .glb; `quoin convert` writes the others",
+                    path.string());
 }
 
 }  // namespace
@@ -61,8 +61,9 @@ bool can_write(const std::filesystem::path& path) {
 Document::Document(LoadedScene loaded, std::filesystem::path path)
     : loaded_(std::move(loaded)), path_(std::move(path)) {}
 
-Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options) {
-  auto loaded = load_scene(path, options);
+Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
+                                                 const Progress& progress) {
+  auto loaded = load_scene(path, options, progress);
   if (!loaded) return loaded.error();
   return std::make_unique<Document>(std::move(*loaded), path);
 }

@@ -26,7 +26,8 @@ class Document {
 
   /// Reads any file that `load_scene` reads. Errors: those of load_scene.
   [[nodiscard]] static Result<std::unique_ptr<Document>> open(const std::filesystem::path& path,
-                                                              const LoadOptions& options = {});
+                                                              const LoadOptions& options = {},
+                                                              const Progress& progress = {});
 
   [[nodiscard]] const Scene& scene() const { return loaded_.scene; }
   [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }

@@ -34,19 +34,17 @@ Loader::~Loader() {
 }
 
 void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
-  LoadOptions watched = options;
-  watched.progress = [this](double share) {
+  auto document = Document::open(path_, options, [this](double share) {
     fraction_ = share;
     return !is_abandoned_;
-  };
-  auto document = Document::open(path_, watched);
+  });
   if (!document) {
     result_ = document.error();
     return;
   }
   is_read_ = true;
   if (is_abandoned_) {
-    result_ = fail(ErrorCode::Cancelled, "cancelled", path_.string());
+    result_ = make_error(ErrorCode::Cancelled, "cancelled", path_.string());
     return;
   }
   OpenDocument opened;

@@ -160,7 +160,7 @@ Settings read_settings(const std::filesystem::path& path) {
 Status write_settings(const Settings& settings, const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
-  if (error) return fail(ErrorCode::CannotWrite, "cannot make the folder: " + error.message(), path.string());
+  if (error) return make_error(ErrorCode::CannotWrite, "cannot make the folder: " + error.message(), path.string());
   const std::string text = to_json(settings);
   return write_file(path, std::as_bytes(std::span(text)));
 }

@@ -29,9 +29,9 @@ inline LoadedScene small_scene() {
   (void)scene.types.add(glass).value();
   SceneGrid hill;
   hill.name = "hill";
-  hill.grid.fill_box({0, 0, 0}, {70, 3, 40}, 1);
+  hill.grid.fill_box({{0, 0, 0}, {71, 4, 41}}, 1);
   hill.grid.fill_sphere({30.0, 4.0, 20.0}, 9.0, 2);
-  hill.grid.fill_box({50, 4, 10}, {55, 9, 15}, 4);
+  hill.grid.fill_box({{50, 4, 10}, {56, 10, 16}}, 4);
   hill.canvas = hill.grid.bounds();
   const GridHandle grid = scene.add_grid(std::move(hill));
   Instance instance;

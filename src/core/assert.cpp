@@ -24,7 +24,7 @@ AssertHandler set_assert_handler(AssertHandler wanted) {
   return handler().exchange(wanted == nullptr ? &write_line : wanted);
 }
 
-void fail_assert(const AssertFailure& failure) {
+void handle_assert_failure(const AssertFailure& failure) {
   handler().load()(failure);
   std::abort();
 }

@@ -24,17 +24,17 @@ void throw_caught(const AssertFailure& failure) {
 TEST(Assert, AProgramMayReplaceTheHandler) {
   const AssertHandler before = set_assert_handler(&throw_caught);
   EXPECT_NE(before, nullptr);
-  EXPECT_THROW(fail_assert({"1 == 2", "sums must add up", std::source_location::current()}), Caught);
+  EXPECT_THROW(handle_assert_failure({"1 == 2", "sums must add up", std::source_location::current()}), Caught);
   EXPECT_EQ(set_assert_handler(before), &throw_caught);
 }
 
 TEST(AssertDeathTest, AHandlerThatReturnsEndsTheProcessAllTheSame) {
-  EXPECT_DEATH(fail_assert({"1 == 2", "sums must add up", std::source_location::current()}),
+  EXPECT_DEATH(handle_assert_failure({"1 == 2", "sums must add up", std::source_location::current()}),
                "assert_test.cpp:.*requires 1 == 2: sums must add up");
   EXPECT_DEATH(
       {
         set_assert_handler([](const AssertFailure&) {});
-        fail_assert({"1 == 2", "", std::source_location::current()});
+        handle_assert_failure({"1 == 2", "", std::source_location::current()});
       },
       "");
 }

@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-unsigned resolve(Threads threads) {
+unsigned thread_count(Threads threads) {
   return threads.count != 0 ? threads.count : std::max(1U, std::thread::hardware_concurrency());
 }
 
@@ -38,7 +38,7 @@ void parallel_for(std::size_t count, Threads threads, const std::function<void(s
   };
   {
     std::vector<std::jthread> workers;
-    const std::size_t helpers = std::min<std::size_t>(resolve(threads), count);
+    const std::size_t helpers = std::min<std::size_t>(thread_count(threads), count);
     for (std::size_t i = 1; i < helpers; ++i) workers.emplace_back(work);
     work();
   }
@@ -50,7 +50,7 @@ void parallel_for(std::size_t count, Threads threads, const std::function<void(s
 void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
   // Asked for more workers than there are processors, oneTBB starts no more but complains on standard error.
   const auto processors = static_cast<unsigned>(std::max(1, oneapi::tbb::info::default_concurrency()));
-  const unsigned workers = std::min(resolve(threads), processors);
+  const unsigned workers = std::min(thread_count(threads), processors);
   if (workers == 1 || count <= 1) {
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;

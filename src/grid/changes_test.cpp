@@ -87,7 +87,7 @@ std::vector<IVec3> random_edit(std::mt19937& random, Grid& grid) {
   for_each_touched([&](IVec3 v) { before[key_of(v)] = grid.get(v); });
   switch (random() % 6) {
     case 0:
-      grid.fill_box(at, at + size, type);
+      grid.fill_box({at, at + size + 1}, type);
       break;
     case 1:
       grid.fill_sphere(DVec3(at), 0.5 * size.x, type);
@@ -117,7 +117,7 @@ TEST(Changes, EveryConsumerIsToldExactlyWhatChangedSinceItsOwnLastTime) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     Grid grid;
-    grid.fill_box({-60, -60, -60}, {120, 120, 120}, 1);
+    grid.fill_box({{-60, -60, -60}, {121, 121, 121}}, 1);
     std::array<Consumer, 5> consumers;
     for (Consumer& each : consumers) {
       EXPECT_TRUE(grid.changes_since(each.cursor).all) << "the first time";
@@ -187,7 +187,7 @@ TEST(Changes, WhatChangesNothingLeavesASnapshotASnapshot) {
   ChangeCursor cursor = grid.cursor();
   Grid copy = grid.snapshot();
   EXPECT_FALSE(copy.set({1, 2, 3}, 4));
-  EXPECT_EQ(copy.fill_box({50, 50, 50}, {60, 60, 60}, kAir), 0);
+  EXPECT_EQ(copy.fill_box({{50, 50, 50}, {61, 61, 61}}, kAir), 0);
   EXPECT_TRUE(copy.changes_since(cursor).empty());
 }
 

@@ -208,7 +208,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   return true;
 }
 
-std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) {
+std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) {
   const IVec3 at = chunk_of(row);
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
@@ -226,10 +226,9 @@ std::int64_t Grid::set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelT
   return edit.voxels;
 }
 
-std::int64_t Grid::fill_box(IVec3 first, IVec3 last, VoxelType type) {
-  const LongBox box = box_from(glm::min(first, last), glm::max(first, last));
+std::int64_t Grid::fill_box(const IBox& box, VoxelType type) {
   notice_.give();
-  return impl_->edit_box(box, type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+  return impl_->edit_box(box_from(box), type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   });
 }
@@ -249,7 +248,7 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
           const double dx = x - local_centre.x;
           mask |= std::uint64_t{dx * dx + dy * dy + dz * dz <= radius * radius} << x;
         }
-        const std::uint64_t changed = chunk.set_row(y, z, mask, type);
+        const std::uint64_t changed = chunk.fill_row(y, z, mask, type);
         edit.add(y, z, changed);
       }
     }

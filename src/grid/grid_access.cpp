@@ -61,7 +61,7 @@ void GridWriter::go_to(int x, int y, int z) {
 void GridWriter::flush() {
   const std::uint64_t mask = packed_row::where_equal(is_set_.data(), std::uint8_t{1});
   is_set_.fill(0);
-  if (mask != 0) grid_->set_row({row_x_, row_y_, row_z_}, mask, types_);
+  if (mask != 0) grid_->write_row({row_x_, row_y_, row_z_}, mask, types_);
 }
 
 }  // namespace quoin

@@ -37,7 +37,7 @@ TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
   for (int i = 0; i < 27; ++i) {
     const IVec3 corner = Neighbourhood::offset(i) * kChunkEdge;
     const int kinds = i % 5 == 0 ? 700 : 3;
-    if (i % 3 != 0) grid.fill_box(corner, corner + 63, static_cast<VoxelType>(i));
+    if (i % 3 != 0) grid.fill_box({corner, corner + 64}, static_cast<VoxelType>(i));
     if (i % 2 == 0) continue;
     grid.edit({corner, corner + kChunkEdge}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(below(kinds)); });
   }
@@ -73,13 +73,13 @@ TEST(Grid, ARowIsSetWhereItsMaskSaysSo) {
       type = static_cast<VoxelType>(random() % kinds);
       if ((mask >> x & 1U) != 0) changed += plain.set({(row.x & ~63) + x, row.y, row.z}, type) ? 1 : 0;
     }
-    ASSERT_EQ(grid.set_row(row, mask, types), changed);
+    ASSERT_EQ(grid.write_row(row, mask, types), changed);
     ASSERT_EQ(follower.take(grid), plain_follower.take(plain));
     ASSERT_EQ(grid.chunks(), plain.chunks());
   }
   ASSERT_EQ(grid.voxel_count(), plain.voxel_count());
   plain.for_each([&](IVec3 voxel, VoxelType type) { ASSERT_EQ(grid.get(voxel), type); });
-  EXPECT_EQ(grid.set_row({std::numeric_limits<int>::max(), 0, 0}, 1, std::array<VoxelType, kChunkEdge>{1}), 0)
+  EXPECT_EQ(grid.write_row({std::numeric_limits<int>::max(), 0, 0}, 1, std::array<VoxelType, kChunkEdge>{1}), 0)
       << "the outermost chunks stay air";
 }
 

@@ -60,7 +60,8 @@ TEST(Grid, AgreesWithAMapUnderRandomEdits) {
             for (int x = a.x; x <= b.x; ++x) changed += put({x, y, z}, type);
           }
         }
-        EXPECT_EQ(grid.fill_box(b, a, type), changed);
+        EXPECT_EQ(grid.fill_box({a, b + 1}, type), changed);
+        EXPECT_EQ(grid.fill_box({b + 1, a}, type == 0 ? VoxelType{1} : kAir), 0);
         break;
       }
       case 1: {
@@ -145,7 +146,7 @@ TEST(Grid, HugeFillsOfAirCostOnlyWhatIsThere) {
   grid.set({5, 5, 5}, 1);
   constexpr int kLow = std::numeric_limits<int>::min();
   constexpr int kHigh = std::numeric_limits<int>::max();
-  EXPECT_EQ(grid.fill_box({kLow, kLow, kLow}, {kHigh, kHigh, kHigh}, kAir), 1);
+  EXPECT_EQ(grid.fill_box({IVec3(kLow), IVec3(kHigh)}, kAir), 1);
   EXPECT_EQ(grid.chunk_count(), 0U);
 }
 
@@ -154,7 +155,7 @@ TEST(Grid, TheOutermostChunksStayAir) {
   constexpr int kHigh = std::numeric_limits<int>::max();
   EXPECT_FALSE(grid.set({kHigh, 0, 0}, 1));
   EXPECT_FALSE(grid.set({0, std::numeric_limits<int>::min(), 0}, 1));
-  EXPECT_EQ(grid.fill_box({kHigh - 100, 0, 0}, {kHigh, 0, 0}, 1), 37);
+  EXPECT_EQ(grid.fill_box({{kHigh - 100, 0, 0}, {kHigh, 1, 1}}, 1), 37);
   EXPECT_EQ(grid.neighbourhood(chunk_of({kHigh - 64, 0, 0})).at(1, 0, 0), nullptr);
 }
 
@@ -223,7 +224,7 @@ std::vector<IVec3> reached_chunks(const Grid& before, const Grid& after, const I
 TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
   std::mt19937 random(3);
   Grid grid;
-  grid.fill_box({-100, -100, -100}, {100, 100, 100}, 1);
+  grid.fill_box({{-100, -100, -100}, {101, 101, 101}}, 1);
   ChangeFollower follower(grid);
   const auto near = [&] { return static_cast<int>(random() % 5) * 32 - 66 + static_cast<int>(random() % 5); };
   for (int round = 0; round < 60; ++round) {
@@ -233,7 +234,7 @@ TEST(Grid, EveryKindOfEditReachesExactlyTheNeighboursOfWhatChanged) {
     const int extent = static_cast<int>(random() % 6);
     switch (round % 4) {
       case 0:
-        grid.fill_box(a, a + extent, type);
+        grid.fill_box({a, a + extent + 1}, type);
         break;
       case 1:
         grid.fill_sphere(DVec3(a), extent, type);
@@ -271,7 +272,7 @@ TEST(Grid, AnEditMayReadWhatItChanges) {
   const IBox box{{0, 0, 0}, {64, 64, 64}};
   const auto below = [&grid](IVec3 v) { return grid.get(v - IVec3{0, 1, 0}); };
   for (const VoxelType seed : {VoxelType{7}, VoxelType{9}, kAir}) {
-    grid.fill_box({0, -1, 0}, {63, -1, 63}, seed);
+    grid.fill_box({{0, -1, 0}, {64, 0, 64}}, seed);
     // Mixed at first, of one type at the end, and the other way round.
     if (seed != kAir) grid.set({5, 6, 7}, 3);
     grid.edit(box, [&](IVec3 v, VoxelType) { return below(v); });

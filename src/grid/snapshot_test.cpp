@@ -141,7 +141,7 @@ TEST(Snapshot, OfDensitiesStaysAsItWas) {
 // Readers on other threads keep, read and let go of snapshots while the grid is edited.
 TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {255, 63, 255}, 1);
+  grid.fill_box({{0, 0, 0}, {256, 64, 256}}, 1);
   std::vector<std::jthread> readers;
   std::mt19937 random(9);
   for (int round = 0; round < 60; ++round) {

@@ -179,9 +179,10 @@ class ChunkMaker {
 
 Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOptions& options, Threads threads,
                                       const Progress& progress) {
-  if (std::isnan(options.iso)) return fail(ErrorCode::InvalidArgument, "the value of the surface is not a number");
+  if (std::isnan(options.iso))
+    return make_error(ErrorCode::InvalidArgument, "the value of the surface is not a number");
   if (!is_consistent(volume)) {
-    return fail(ErrorCode::InvalidArgument, "the volume has not as many values as its size says");
+    return make_error(ErrorCode::InvalidArgument, "the volume has not as many values as its size says");
   }
   const Samples samples(volume);
   const ChunkMaker maker(samples, options, slope_of(samples, volume, options.iso, threads));
@@ -195,7 +196,7 @@ Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOpt
   std::vector<std::optional<DensityChunk>> made(std::min(kBatch, count));
   for (std::size_t first = 0; first < count; first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(count))) {
-      return fail(ErrorCode::Cancelled, "cancelled");
+      return make_error(ErrorCode::Cancelled, "cancelled");
     }
     const auto place = [&](std::size_t i) {
       return IVec3{static_cast<int>(i % row), static_cast<int>(i % plane / row), static_cast<int>(i / plane)};

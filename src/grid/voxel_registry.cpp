@@ -66,10 +66,10 @@ void VoxelRegistry::note(TypeChange change) {
 
 Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (properties.visibility == Visibility::Air) {
-    return fail(ErrorCode::InvalidArgument, "type 0 is the only air");
+    return make_error(ErrorCode::InvalidArgument, "type 0 is the only air");
   }
   if (size() > kMaxVoxelTypes) {
-    return fail(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
+    return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
   journal_->begin_change();
   content_.make_own();
@@ -117,6 +117,10 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
 
 ChangeCursor VoxelRegistry::cursor() const {
   return journal_->present();
+}
+
+bool VoxelRegistry::has_changed_since(const ChangeCursor& cursor) const {
+  return journal_->has_changed_since(cursor);
 }
 
 TypeChanges VoxelRegistry::changes_since(ChangeCursor& cursor) const {

@@ -29,7 +29,7 @@ void BlockWriter::flush() {
   used_ = 0;
   if (!status_ || !progress_) return;
   const double done = static_cast<double>(written_) / static_cast<double>(std::max(written_, expected_bytes_));
-  if (!progress_(expected_bytes_ == 0 ? 0.0 : done)) status_ = fail(ErrorCode::Cancelled, "cancelled");
+  if (!progress_(expected_bytes_ == 0 ? 0.0 : done)) status_ = make_error(ErrorCode::Cancelled, "cancelled");
 }
 
 }  // namespace quoin

@@ -27,11 +27,11 @@ std::string reason(int error_number) {
 }
 
 Error cannot_read(std::string message, const std::filesystem::path& path) {
-  return fail(ErrorCode::CannotRead, std::move(message), path.string());
+  return make_error(ErrorCode::CannotRead, std::move(message), path.string());
 }
 
 Error cannot_write(std::string message, const std::filesystem::path& path) {
-  return fail(ErrorCode::CannotWrite, std::move(message), path.string());
+  return make_error(ErrorCode::CannotWrite, std::move(message), path.string());
 }
 
 /// Closes a descriptor at the end of its scope.
@@ -99,7 +99,7 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
   const auto held = static_cast<std::uint64_t>(info.st_size);
   const std::uint64_t wanted = std::min<std::uint64_t>(held, most.value_or(held));
   if (wanted > kMaxFileBytes) {
-    return fail(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
+    return make_error(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
   }
   std::vector<std::byte> bytes(static_cast<std::size_t>(wanted));
   std::size_t filled = 0;

@@ -61,20 +61,20 @@ Error unrecognised(std::span<const std::byte> bytes) {
 }
 
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
-                               const LoadOptions& options) {
+                               const LoadOptions& options, const Progress& progress) {
   const auto format = detect_format(bytes);
-  if (format == FileFormat::Vox) return read_vox(bytes, options);
+  if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) {
-    return fail(ErrorCode::Unsupported, "a scene file, whose other files only a path finds");
+    return make_error(ErrorCode::Unsupported, "a scene file, whose other files only a path finds");
   }
   if (format && format_info(*format).is_volume) {
-    return fail(ErrorCode::Unsupported,
-                "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
+    return make_error(ErrorCode::Unsupported,
+                      "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
   }
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
-  if (named_vox) return read_vox(bytes, options);
+  if (named_vox) return read_vox(bytes, options, progress);
   return error;
 }
 
@@ -118,18 +118,19 @@ Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
   for (const FormatInfo& info : kFormats) {
     if (info.writable && info.extension == extension) return info;
   }
-  return fail(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
+  return make_error(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
 }
 
-Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options) {
-  return read_bytes({}, bytes, options);
+Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {
+  return read_bytes({}, bytes, options, progress);
 }
 
-Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options) {
+Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options,
+                               const Progress& progress) {
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
-  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options);
-  return with_path(read_bytes(path, *bytes, options), path);
+  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, progress);
+  return with_path(read_bytes(path, *bytes, options, progress), path);
 }
 
 }  // namespace quoin

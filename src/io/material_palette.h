@@ -53,9 +53,11 @@ class MaterialPalette {
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   /// The centre of a type's texel, from the top left; exact in float.
   [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const {
+    const std::uint32_t column = type % kPaletteWidth;
+    const std::uint32_t row = type / kPaletteWidth;
     // Both sizes are powers of two, so that products are as exact as quotients.
-    return {(static_cast<float>(type % kPaletteWidth) + 0.5F) * (1.0F / static_cast<float>(kPaletteWidth)),
-            (static_cast<float>(type / kPaletteWidth) + 0.5F) * row_height_};
+    return {(static_cast<float>(column) + 0.5F) * (1.0F / static_cast<float>(kPaletteWidth)),
+            (static_cast<float>(row) + 0.5F) * row_height_};
   }
 
   /// sRGB colour and linear alpha (255 for opaque types).

@@ -34,7 +34,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Nrrd:
       break;
   }
-  return fail(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is no format of meshes");
+  return make_error(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is no format of meshes");
 }
 
 /// The same meshes without occlusion.
@@ -65,7 +65,7 @@ Result<std::uint64_t> write_files(const std::vector<MeshFile>& files, const Prog
     auto target = AtomicFile::create(file.path);
     if (!target) return target.error();
     const auto sink = [&](std::span<const std::byte> block) { return target->write(block); };
-    const auto more = write_to(sink, file, progress);
+    auto more = write_to(sink, file, progress);
     if (!more) return more;
     bytes += *more;
     written.push_back(std::move(*target));
@@ -98,7 +98,7 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
   if (!options.occlusion) return write_mesh(without_occlusion(meshes), format, {}, progress);
   const auto files = plan(meshes, format, "");
   if (!files) return files.error();
-  if (files->size() > 1) return fail(ErrorCode::Unsupported, "the meshes take several files in this format");
+  if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
   std::vector<std::byte> bytes;
   const auto sink = [&](std::span<const std::byte> block) {
     bytes.insert(bytes.end(), block.begin(), block.end());
@@ -114,7 +114,7 @@ Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
                                                       const MeshFileOptions& options) {
   const auto format = format_of(path, options);
   if (!format) return format.error();
-  if (!format_info(*format).is_mesh) return fail(ErrorCode::Unsupported, "not a mesh format", path.string());
+  if (!format_info(*format).is_mesh) return make_error(ErrorCode::Unsupported, "not a mesh format", path.string());
   std::vector<std::filesystem::path> files = {path};
   const auto beside = *format == FileFormat::Gltf  ? gltf_companions(meshes, path)
                       : *format == FileFormat::Obj ? obj_companions(meshes, path)

@@ -45,7 +45,7 @@ const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   if (!has_all) return "arrays of different lengths";
   if (largest_of(view.types) >= types) return "a type that is not registered";
   if (largest_of(view.directions) > Direction::NegZ) return "a direction that is none of the six";
-  return largest_of(view.block_occlusion) > 3 ? "an occlusion level beyond 3" : nullptr;
+  return largest_of(view.block_occlusion) > 3 ? "an occlusion beyond 3" : nullptr;
 }
 
 const char* fault_of_smooth(const MeshView& view) {
@@ -100,7 +100,7 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
 }
 
 Status unsound(const MeshPart& part, const char* fault) {
-  return fail(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
+  return make_error(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
 }
 
 /// Adds the bounds of a sound part.
@@ -127,7 +127,8 @@ Status check_meshes(const SceneMeshes& meshes) {
   }
   for (const MeshPlacement& placement : meshes.placements) {
     if (placement.part >= meshes.parts.size()) {
-      return fail(ErrorCode::InvalidArgument, "placement \"" + placement.name + "\" is of a part that is not there");
+      return make_error(ErrorCode::InvalidArgument,
+                        "placement \"" + placement.name + "\" is of a part that is not there");
     }
     const MeshPart& part = meshes.parts[placement.part];
     const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());

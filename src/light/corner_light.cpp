@@ -4,9 +4,9 @@
 
 namespace quoin {
 
-float interpolated_level(const FaceOcclusion& levels, float u, float v) {
-  const auto at = [&](std::size_t corner) { return static_cast<float>(levels[corner]); };
-  if (!flips_diagonal(levels)) {
+float interpolated_occlusion(const FaceOcclusion& corners, float u, float v) {
+  const auto at = [&](std::size_t corner) { return static_cast<float>(corners[corner]); };
+  if (!flips_diagonal(corners)) {
     // (0,1,2), below the diagonal from corner 0 to 2, and (0,2,3).
     if (u >= v) return at(0) + u * (at(1) - at(0)) + v * (at(2) - at(1));
     return at(0) + v * (at(3) - at(0)) + u * (at(2) - at(3));
@@ -16,14 +16,14 @@ float interpolated_level(const FaceOcclusion& levels, float u, float v) {
   return at(2) + (1.0F - u) * (at(3) - at(2)) + (1.0F - v) * (at(1) - at(2));
 }
 
-FaceOcclusion corner_levels(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face) {
-  return corner_levels([&](IVec3 at) { return types.is_opaque(grid.get(at)); }, voxel, face);
+FaceOcclusion corner_occlusion(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face) {
+  return corner_occlusion([&](IVec3 at) { return types.is_opaque(grid.get(at)); }, voxel, face);
 }
 
-float level_at(const FaceOcclusion& levels, IVec3 voxel, Direction face, DVec3 position) {
+float occlusion_at(const FaceOcclusion& corners, IVec3 voxel, Direction face, DVec3 position) {
   const FaceFrame& frame = frame_of(face);
   const auto within = [&](int axis) { return static_cast<float>(std::clamp(position[axis] - voxel[axis], 0.0, 1.0)); };
-  return interpolated_level(levels, within(frame.u), within(frame.v));
+  return interpolated_occlusion(corners, within(frame.u), within(frame.v));
 }
 
 }  // namespace quoin

@@ -9,18 +9,18 @@ namespace quoin {
 namespace {
 
 // By barycentric coordinates in the triangle of the mesh that holds the point.
-double level_by_triangles(const FaceOcclusion& levels, double u, double v) {
+double occlusion_by_triangles(const FaceOcclusion& corners, double u, double v) {
   constexpr double kU[] = {0, 1, 1, 0};
   constexpr double kV[] = {0, 0, 1, 1};
   const std::array<std::array<std::size_t, 3>, 2> triangles =
-      flips_diagonal(levels) ? std::array<std::array<std::size_t, 3>, 2>{{{1, 2, 3}, {0, 1, 3}}}
-                             : std::array<std::array<std::size_t, 3>, 2>{{{0, 1, 2}, {0, 2, 3}}};
+      flips_diagonal(corners) ? std::array<std::array<std::size_t, 3>, 2>{{{1, 2, 3}, {0, 1, 3}}}
+                              : std::array<std::array<std::size_t, 3>, 2>{{{0, 1, 2}, {0, 2, 3}}};
   for (const auto& [a, b, c] : triangles) {
     const double area = (kU[b] - kU[a]) * (kV[c] - kV[a]) - (kU[c] - kU[a]) * (kV[b] - kV[a]);
     const double at_b = ((u - kU[a]) * (kV[c] - kV[a]) - (kU[c] - kU[a]) * (v - kV[a])) / area;
     const double at_c = ((kU[b] - kU[a]) * (v - kV[a]) - (u - kU[a]) * (kV[b] - kV[a])) / area;
     if (at_b < -1e-9 || at_c < -1e-9 || at_b + at_c > 1.0 + 1e-9) continue;
-    return levels[a] * (1.0 - at_b - at_c) + levels[b] * at_b + levels[c] * at_c;
+    return corners[a] * (1.0 - at_b - at_c) + corners[b] * at_b + corners[c] * at_c;
   }
   ADD_FAILURE() << "no triangle holds the point";
   return 0.0;
@@ -52,23 +52,23 @@ TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
     position[frame.v] += v;
     if (frame.sign > 0) position[frame.axis] += 1.0;
     const IVec3 chunk = chunk_of(voxel);
-    const FaceOcclusion levels = face_occlusion(grid.neighbourhood(chunk), types, local_of(voxel), face);
-    ASSERT_EQ(corner_levels(reader, types, voxel, face), levels);
-    const float level = level_at(levels, voxel, face, position);
-    ASSERT_NEAR(level, level_by_triangles(levels, u, v), 1e-5);
-    sum += level;
+    const FaceOcclusion corners = face_occlusion(grid.neighbourhood(chunk), types, local_of(voxel), face);
+    ASSERT_EQ(corner_occlusion(reader, types, voxel, face), corners);
+    const float occlusion = occlusion_at(corners, voxel, face, position);
+    ASSERT_NEAR(occlusion, occlusion_by_triangles(corners, u, v), 1e-5);
+    sum += occlusion;
   }
   EXPECT_GT(sum, 10'000.0) << "the world has occlusion at all";
 }
 
 TEST(CornerLight, IsExactAtTheCorners) {
   for (int code = 0; code < 256; ++code) {
-    const FaceOcclusion levels = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
-                                  static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};
-    EXPECT_EQ(interpolated_level(levels, 0, 0), levels[0]);
-    EXPECT_EQ(interpolated_level(levels, 1, 0), levels[1]);
-    EXPECT_EQ(interpolated_level(levels, 1, 1), levels[2]);
-    EXPECT_EQ(interpolated_level(levels, 0, 1), levels[3]);
+    const FaceOcclusion corners = {static_cast<std::uint8_t>(code & 3), static_cast<std::uint8_t>(code >> 2 & 3),
+                                   static_cast<std::uint8_t>(code >> 4 & 3), static_cast<std::uint8_t>(code >> 6)};
+    EXPECT_EQ(interpolated_occlusion(corners, 0, 0), corners[0]);
+    EXPECT_EQ(interpolated_occlusion(corners, 1, 0), corners[1]);
+    EXPECT_EQ(interpolated_occlusion(corners, 1, 1), corners[2]);
+    EXPECT_EQ(interpolated_occlusion(corners, 0, 1), corners[3]);
   }
 }
 

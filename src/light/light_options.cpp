@@ -5,7 +5,7 @@
 namespace quoin {
 
 Status check(const LightOptions& options) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (!is_finite(options.sun)) return refuse("sun: must be finite");
   if (options.sun == DVec3(0.0)) return refuse("sun: must not be 0,0,0");
   if (options.occlusion_rays < 1 || options.occlusion_rays > 4096) {

@@ -178,7 +178,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (group.unknown == 0) return 0;
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
   GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
-  FaceOcclusion levels{};
+  FaceOcclusion corners{};
   const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
     if ((group.unknown >> i & 1U) == 0) continue;
@@ -186,8 +186,8 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
     // Neighbours often lie on the same face.
     const bool is_new = last == nullptr || point.voxel != last->voxel || point.face != last->face;
     last = &point;
-    if (is_new) levels = corner_levels(reader, *types_, point.voxel, point.face);
-    openness[i] = 1.0F - level_at(levels, point.voxel, point.face, point.position) / 3.0F;
+    if (is_new) corners = corner_occlusion(reader, *types_, point.voxel, point.face);
+    openness[i] = 1.0F - occlusion_at(corners, point.voxel, point.face, point.position) / 3.0F;
   }
   return 0;
 }

@@ -54,7 +54,8 @@ DVec3 OcclusionDirections::spread(std::size_t face, int ray, std::uint32_t hash)
   QUOIN_ASSERT(!is_fixed_ && ray >= 0 && ray < count_, "a ray of those that are spread");
   const Angle ring = ring_angles_[static_cast<std::size_t>(ray)];
   const Angle turn = turns_[hash % kTurns];
-  const double shift = (static_cast<double>(hash / kTurns) + 0.5) * (kTurns * 0x1p-32);
+  const std::uint32_t rest = hash / kTurns;
+  const double shift = (static_cast<double>(rest) + 0.5) * (kTurns * 0x1p-32);
   const double sine_squared = (ray + shift) / count_;
   const double radius = std::sqrt(sine_squared);
   const FaceFrame& frame = kFaceFrames[face];

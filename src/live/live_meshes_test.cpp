@@ -84,7 +84,7 @@ TEST_P(LiveMeshesOf, EditsGoOnWhileWorkersRun) {
 TEST_P(LiveMeshesOf, CanEndInTheMiddle) {
   for (int i = 0; i < (kIsSlow ? 2 : 20); ++i) {
     OneGrid one;
-    one.grid().fill_box({0, 0, 0}, {300, 20, 100}, 1);
+    one.grid().fill_box({{0, 0, 0}, {301, 21, 101}}, 1);
     LiveMeshes meshes(options());
     meshes.update(one.scene, {});
     const std::size_t pending = meshes.pending();
@@ -109,7 +109,7 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
 
 TEST_P(LiveMeshesOf, WhatIsNotDrawnGoesAndComesBack) {
   OneGrid one;
-  one.grid().fill_box({3, 3, 3}, {9, 9, 9}, 1);
+  one.grid().fill_box({{3, 3, 3}, {10, 10, 10}}, 1);
   LiveMeshes meshes(options());
   EXPECT_EQ(all_of(meshes, one.scene).size(), 1U);
   const auto expect_gone_and_back = [&](const std::function<void(bool shown)>& show) {
@@ -147,7 +147,8 @@ TEST_P(LiveMeshesOf, TheWorldsEdgeIsMeshedAsTheRest) {
   constexpr int kFirst = std::numeric_limits<int>::min() + 64;
   for (const int at : {kLast, kFirst}) {
     OneGrid one;
-    one.grid().fill_box(IVec3(at), IVec3(at == kLast ? at - 3 : at + 3), 1);
+    const int first = at == kLast ? at - 3 : at;
+    one.grid().fill_box({IVec3(first), IVec3(first + 4)}, 1);
     ASSERT_GT(one.grid().voxel_count(), 0);
     LiveMeshes meshes(options());
     ShownSurfaces shown;
@@ -161,7 +162,7 @@ TEST_P(LiveMeshesOf, TheWorldsEdgeIsMeshedAsTheRest) {
 
 TEST_P(LiveMeshesOf, AnEyeThatIsNowhereHarmsNothing) {
   OneGrid one;
-  one.grid().fill_box({-70, 0, 0}, {70, 3, 3}, 1);
+  one.grid().fill_box({{-70, 0, 0}, {71, 4, 4}}, 1);
   LiveMeshes meshes(options());
   for (const double x : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e308}) {
     one.grid().set({0, 9, 0}, one.grid().get({0, 9, 0}) == kAir ? 1 : kAir);

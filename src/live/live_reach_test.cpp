@@ -106,7 +106,7 @@ ChunkSet chunks_that_read_changes(const DensityGrid& before, const DensityGrid& 
 TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
   FollowedGrid followed(SurfaceStyle::Smooth);
   Grid& grid = followed.one.grid();
-  grid.fill_box({-40, 0, -40}, {90, 20, 90}, 1);
+  grid.fill_box({{-40, 0, -40}, {91, 21, 91}}, 1);
   grid.fill_sphere({60, 30, 60}, 24.0, 3);
   ChunkSet given;
   followed.meshed(given);
@@ -136,7 +136,7 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
 TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
   FollowedGrid followed(SurfaceStyle::Smooth);
   Grid& grid = followed.one.grid();
-  grid.fill_box({-40, -40, -40}, {100, 100, 100}, 1);
+  grid.fill_box({{-40, -40, -40}, {101, 101, 101}}, 1);
   ChunkSet given;
   EXPECT_GT(followed.meshed(given), 0);
   // Painted, far from every face: the chunk's densities are the same, and no vertex takes its type.
@@ -152,8 +152,8 @@ TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
 TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     FollowedGrid followed(style);
-    followed.one.grid().fill_box({10, 10, 10}, {20, 20, 20}, 1);
-    followed.one.grid().fill_box({330, 10, 10}, {340, 20, 20}, 2);
+    followed.one.grid().fill_box({{10, 10, 10}, {21, 21, 21}}, 1);
+    followed.one.grid().fill_box({{330, 10, 10}, {341, 21, 21}}, 2);
     ChunkSet given;
     EXPECT_EQ(followed.meshed(given), 2);
     VoxelRegistry& types = followed.one.scene.types;

@@ -319,7 +319,7 @@ class SceneEditor {
       grid.set(at, type);
       grid.set(at, before);
     } else if (which < 32) {
-      grid.fill_box(at, at + IVec3{below(40), below(9), below(40)}, type);
+      grid.fill_box({at, at + IVec3{below(40) + 1, below(9) + 1, below(40) + 1}}, type);
     } else if (which < 36) {
       grid.fill_sphere(at, below(12), type);
     } else {

@@ -13,7 +13,7 @@ namespace quoin {
 namespace {
 
 unsigned worker_count(Threads threads) {
-  return threads.count != 0 ? threads.count : std::max(2U, resolve(threads)) - 1;
+  return threads.count != 0 ? threads.count : std::max(2U, thread_count(threads)) - 1;
 }
 
 // A smooth chunk takes a worker milliseconds, and its job the copies of up to 125 chunks.

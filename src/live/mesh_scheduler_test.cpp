@@ -183,7 +183,7 @@ TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
     book.update(one.scene, {});
     gated.wait_for_started(1);
     one.grid() = Grid();
-    if (replaced) one.grid().fill_box({30, 30, 30}, {31, 30, 30}, 1);
+    if (replaced) one.grid().fill_box({{30, 30, 30}, {32, 31, 31}}, 1);
     book.update(one.scene, {});
     EXPECT_EQ(book.pending(), replaced ? 1U : 0U);
     gated.open();
@@ -232,7 +232,7 @@ TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
   constexpr int kEdited = 40;
   for (int row = 0; row < 2; ++row) {
     for (int i = 0; i < kEdited; ++i)
-      one.grid().fill_box({64 * i + 28, 64 * row + 28, 28}, {64 * i + 36, 64 * row + 36, 36}, 1);
+      one.grid().fill_box({{64 * i + 28, 64 * row + 28, 28}, {64 * i + 37, 64 * row + 37, 37}}, 1);
   }
   std::mutex mutex;
   std::condition_variable called;
@@ -272,7 +272,7 @@ TEST(MeshScheduler, MemoryThatRunsOutIsTriedAgain) {
     LiveMeshOptions options = blocky(2);
     options.style = style;
     OneGrid one;
-    one.grid().fill_box({25, 25, 25}, {35, 35, 35}, 1);
+    one.grid().fill_box({{25, 25, 25}, {36, 36, 36}}, 1);
     std::atomic<int> calls{0};
     MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
       if (++calls % 2 == 1) throw std::bad_alloc();

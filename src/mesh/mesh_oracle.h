@@ -19,7 +19,7 @@ namespace quoin::oracle {
 /// A visible unit face: what it shows.
 struct UnitFace {
   VoxelType type = kAir;
-  FaceOcclusion levels{};
+  FaceOcclusion corners{};
   bool operator==(const UnitFace&) const = default;
 };
 
@@ -32,9 +32,9 @@ inline bool shows(const VoxelRegistry& types, VoxelType a, VoxelType b) {
 }
 
 /// Levels by asking for each of the three voxels of each corner.
-inline FaceOcclusion levels_of(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
+inline FaceOcclusion corners_of_face(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
   const FaceFrame& frame = frame_of(d);
-  FaceOcclusion levels{};
+  FaceOcclusion corners{};
   const int du[4] = {-1, 1, 1, -1};
   const int dv[4] = {-1, -1, 1, 1};
   for (std::size_t corner = 0; corner < 4; ++corner) {
@@ -46,9 +46,9 @@ inline FaceOcclusion levels_of(const Grid& grid, const VoxelRegistry& types, IVe
     across[frame.v] += dv[corner];
     const auto blocks = [&](IVec3 at) { return types[grid.get(at)].visibility == Visibility::Opaque ? 1 : 0; };
     const int sum = blocks(side1) + blocks(side2);
-    levels[corner] = static_cast<std::uint8_t>(sum == 2 ? 3 : sum + blocks(across));
+    corners[corner] = static_cast<std::uint8_t>(sum == 2 ? 3 : sum + blocks(across));
   }
-  return levels;
+  return corners;
 }
 
 inline FaceSet visible_faces(const Grid& grid, const VoxelRegistry& types, bool occlusion) {
@@ -56,24 +56,25 @@ inline FaceSet visible_faces(const Grid& grid, const VoxelRegistry& types, bool 
   grid.for_each([&](IVec3 v, VoxelType type) {
     for (const Direction d : kDirections) {
       if (!shows(types, type, grid.get(v + normal_of(d)))) continue;
-      faces[{v.x, v.y, v.z, static_cast<int>(d)}] = {type, occlusion ? levels_of(grid, types, v, d) : FaceOcclusion{}};
+      faces[{v.x, v.y, v.z, static_cast<int>(d)}] = {type,
+                                                     occlusion ? corners_of_face(grid, types, v, d) : FaceOcclusion{}};
     }
   });
   return faces;
 }
 
-/// Takes a quad apart into unit faces; fails where its levels do not interpolate to one tuple, or a face is there
+/// Takes a quad apart into unit faces; fails where its corners do not interpolate to one tuple, or a face is there
 /// twice.
 inline void add_quad(const Quad& quad, IVec3 origin, FaceSet& faces) {
-  const FaceOcclusion levels = quad.occlusion();
+  const FaceOcclusion corners = quad.occlusion();
   const FaceFrame& frame = frame_of(quad.direction());
   if (quad.size_u() > 1) {
-    EXPECT_TRUE(levels[0] == levels[1] && levels[3] == levels[2]);
+    EXPECT_TRUE(corners[0] == corners[1] && corners[3] == corners[2]);
   }
   if (quad.size_v() > 1) {
-    EXPECT_TRUE(levels[0] == levels[3] && levels[1] == levels[2]);
+    EXPECT_TRUE(corners[0] == corners[3] && corners[1] == corners[2]);
   }
-  EXPECT_EQ(quad.flipped(), levels[0] + levels[2] > levels[1] + levels[3]);
+  EXPECT_EQ(quad.flipped(), corners[0] + corners[2] > corners[1] + corners[3]);
   for (int v = 0; v < quad.size_v(); ++v) {
     for (int u = 0; u < quad.size_u(); ++u) {
       IVec3 at = quad.voxel();
@@ -81,7 +82,7 @@ inline void add_quad(const Quad& quad, IVec3 origin, FaceSet& faces) {
       at[frame.v] += v;
       at += origin;
       const FaceKey key{at.x, at.y, at.z, static_cast<int>(quad.direction())};
-      EXPECT_TRUE(faces.emplace(key, UnitFace{quad.type(), levels}).second) << "a face is covered twice";
+      EXPECT_TRUE(faces.emplace(key, UnitFace{quad.type(), corners}).second) << "a face is covered twice";
     }
   }
 }
@@ -111,7 +112,7 @@ inline Grid random_world(unsigned seed, const IBox& box, int type_count, double 
   for (int i = 0; i < blocks; ++i) {
     const IVec3 a{within(0), within(1), within(2)};
     const IVec3 b{within(0), within(1), within(2)};
-    grid.fill_box(a, glm::min(a + glm::abs(b - a) / 2, box.max - 1), type());
+    grid.fill_box({a, glm::min(a + glm::abs(b - a) / 2, box.max - 1) + 1}, type());
   }
   const double voxels = density * size.x * size.y * size.z;
   for (int i = 0; i < static_cast<int>(voxels); ++i) grid.set({within(0), within(1), within(2)}, type());

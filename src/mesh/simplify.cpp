@@ -81,7 +81,8 @@ bool can_simplify() {
 }
 
 Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples) {
-  if (!(error_in_samples >= 0.0F)) return fail(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+  if (!(error_in_samples >= 0.0F))
+    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
 #if QUOIN_ASSERT_ENABLED
   QUOIN_ASSERT(has_arrays_of_one_length(mesh));
   QUOIN_ASSERT(names_vertices(mesh));
@@ -102,9 +103,11 @@ bool can_simplify() {
 }
 
 Result<float> simplify_smooth_mesh(SmoothMesh&, float error_in_samples) {
-  if (!(error_in_samples >= 0.0F)) return fail(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
-  return fail(ErrorCode::Unsupported,
-              "this build cannot simplify meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
+  if (!(error_in_samples >= 0.0F))
+    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+  return make_error(
+      ErrorCode::Unsupported,
+      "this build cannot simplify meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
 }
 
 #endif

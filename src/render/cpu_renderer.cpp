@@ -131,7 +131,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
     tile.write_to(picture);
     done.add_counts(tile);
   });
-  if (done.is_cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+  if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   done.put_counts(picture);
   return picture;
 }

@@ -28,7 +28,7 @@ void full(benchmark::State& state) {
 }
 void all_threads(benchmark::State& state) {
   picture(state, {}, {});
-  state.counters["threads"] = resolve(Threads{});
+  state.counters["threads"] = thread_count(Threads{});
 }
 void unlit(benchmark::State& state) {
   LightOptions light;

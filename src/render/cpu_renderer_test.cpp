@@ -201,7 +201,7 @@ TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
 TEST(CpuRenderer, SamplesSoftenEdgesOnly) {
   Scene scene;
   Grid grid;
-  grid.fill_box({0, 0, 0}, {3, 3, 3}, add_type(scene, {255, 255, 255, 255}));
+  grid.fill_box({{0, 0, 0}, {4, 4, 4}}, add_type(scene, {255, 255, 255, 255}));
   place(scene, std::move(grid));
   RenderOptions options = sized(64, 64);
   options.light.lit = false;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 
 Status check_camera(const Camera& camera) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (!is_finite(camera.position)) return refuse("camera: position must be finite");
   for (const DVec3 axis : {camera.right, camera.up, camera.forward}) {
     if (!(std::abs(glm::dot(axis, axis) - 1.0) < 1e-3)) return refuse("camera: directions must be unit vectors");
@@ -29,7 +29,7 @@ Status check_camera(const Camera& camera) {
 }  // namespace
 
 Status check(const Camera& camera, const RenderOptions& options) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
   if (std::int64_t{options.width} * options.height > kMaxPixels) {
     return refuse("size: more than 268,435,456 pixels");

@@ -50,15 +50,15 @@ Model ship() {
     const double taper = z < 60 ? std::sqrt(z / 60.0) : 1.0;
     for (int y = 0; y < 32; ++y) {
       const int half = std::max(0, static_cast<int>(std::lround(27.0 * taper)) - std::max(0, 15 - y));
-      grid.fill_box({-half, y, z}, {half, y, z}, y % 7 == 5 ? plank : wood);
-      if (y > 24) grid.fill_box({-half + 3, y, z}, {half - 3, y, z}, kAir);
+      grid.fill_box({{-half, y, z}, {half + 1, y + 1, z + 1}}, y % 7 == 5 ? plank : wood);
+      if (y > 24) grid.fill_box({{-half + 3, y, z}, {half - 2, y + 1, z + 1}}, kAir);
     }
   }
   for (const int z : {60, 123}) {
-    grid.fill_box({-1, 20, z}, {1, 150, z + 2}, wood);
+    grid.fill_box({{-1, 20, z}, {2, 151, z + 3}}, wood);
     for (int y = 50; y <= 140; ++y) {
       const int bulge = static_cast<int>(std::lround(13.0 * std::sin((y - 50) / 90.0 * std::numbers::pi)));
-      grid.fill_box({-37, y, z - 4 - bulge}, {37, y, z - 3 - bulge}, sail);
+      grid.fill_box({{-37, y, z - 4 - bulge}, {38, y + 1, z - 2 - bulge}}, sail);
     }
   }
   model.place_turned(std::move(grid));
@@ -79,14 +79,14 @@ Model bridge() {
   const VoxelType stone = add_type(model.scene, {150, 145, 135, 255});
   const VoxelType steel = add_type(model.scene, {190, 60, 45, 255});
   Grid grid;
-  grid.fill_box({-110, 41, -12}, {110, 41, 13}, stone);
+  grid.fill_box({{-110, 41, -12}, {111, 42, 14}}, stone);
   for (const int x : {-81, 0, 83}) {
-    grid.fill_box({x, 0, -11}, {x + 7, 78, -5}, stone);
-    grid.fill_box({x, 0, 5}, {x + 7, 78, 11}, stone);
+    grid.fill_box({{x, 0, -11}, {x + 8, 79, -4}}, stone);
+    grid.fill_box({{x, 0, 5}, {x + 8, 79, 12}}, stone);
   }
   for (const int z : {-9, 9}) {
-    grid.fill_box({-110, 47, z}, {110, 47, z}, steel);
-    for (int x = -105; x <= 105; x += 15) grid.fill_box({x, 41, z}, {x, 47, z}, steel);
+    grid.fill_box({{-110, 47, z}, {111, 48, z + 1}}, steel);
+    for (int x = -105; x <= 105; x += 15) grid.fill_box({{x, 41, z}, {x + 1, 48, z + 1}}, steel);
   }
   model.place_turned(std::move(grid));
   return model;
@@ -191,7 +191,7 @@ Model blobs(VoxelType* glass = nullptr) {
   for (int i = 0; i < 30; ++i) {
     const auto coordinate = [&] { return 2 * (static_cast<int>(random() % 12) - 6); };
     const IVec3 at{coordinate(), coordinate(), coordinate()};
-    grid.fill_box(at, at + IVec3(1 + 2 * static_cast<int>(random() % 4)), types.at(random() % 3));
+    grid.fill_box({at, at + IVec3(1 + 2 * static_cast<int>(random() % 4)) + 1}, types.at(random() % 3));
     const IVec3 speck{coordinate(), coordinate(), coordinate()};
     if (grid.get(speck) == kAir) grid.set(speck, types[0]);
   }
@@ -286,10 +286,10 @@ TEST(RenderDetail, WhatIsOutOfThePictureStillCastsItsShadow) {
   Scene scene;
   const VoxelType type = add_type(scene, {200, 200, 200, 255});
   Grid floor;
-  floor.fill_box({-40, -1, -40}, {40, -1, 40}, type);
+  floor.fill_box({{-40, -1, -40}, {41, 0, 41}}, type);
   place(scene, std::move(floor));
   Grid roof;
-  roof.fill_box({-20, 0, -20}, {20, 0, 20}, type);
+  roof.fill_box({{-20, 0, -20}, {21, 1, 21}}, type);
   const InstanceHandle handle = place(scene, std::move(roof), {0, 90, 0});
   RenderOptions options = sized(4, 4);
   options.light.sun = {0, 1, 0};
@@ -304,7 +304,7 @@ TEST(RenderDetail, ColoursTellTheDetail) {
   Scene scene;
   const VoxelType type = add_type(scene, {200, 200, 200, 255});
   Grid slab;
-  slab.fill_box({-208, -16, -208}, {207, -1, 207}, type);
+  slab.fill_box({{-208, -16, -208}, {208, 0, 208}}, type);
   place(scene, std::move(slab));
   RenderOptions options = sized(4, 4);
   options.detail_colours = true;

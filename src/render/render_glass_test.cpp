@@ -39,8 +39,8 @@ TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
   for (const int thickness : {1, 2, 3, 7}) {
     GlassScene s;
     Grid grid;
-    grid.fill_box({-5, -1, -5}, {5, -1, 5}, s.stone);
-    grid.fill_box({-5, 3, -5}, {5, 2 + thickness, 5}, s.glass);
+    grid.fill_box({{-5, -1, -5}, {6, 0, 6}}, s.stone);
+    grid.fill_box({{-5, 3, -5}, {6, 3 + thickness, 6}}, s.glass);
     place(s.scene, std::move(grid));
     RenderOptions options = sized(4, 4);
     options.light.lit = false;
@@ -56,7 +56,7 @@ TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
 TEST(RenderGlass, IsVisibleOnADarkGroundAndAgainstTheSky) {
   GlassScene s;
   Grid grid;
-  grid.fill_box({-5, 0, -5}, {5, 0, 5}, s.glass);
+  grid.fill_box({{-5, 0, -5}, {6, 1, 6}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(2, 2);
   const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
@@ -70,10 +70,10 @@ TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
   const auto picture_of = [](int shift, bool is_split) {
     GlassScene s;
     Grid grid;
-    grid.fill_box({shift - 9, -1, -9}, {shift + 9, -1, 9}, s.stone);
-    grid.fill_box({shift - 4, 1, -4}, {shift - 1, 4, 4}, s.glass);
+    grid.fill_box({{shift - 9, -1, -9}, {shift + 10, 0, 10}}, s.stone);
+    grid.fill_box({{shift - 4, 1, -4}, {shift, 5, 5}}, s.glass);
     Grid other;
-    (is_split ? other : grid).fill_box({shift, 1, -4}, {shift + 4, 4, 4}, s.glass);
+    (is_split ? other : grid).fill_box({{shift, 1, -4}, {shift + 5, 5, 5}}, s.glass);
     place(s.scene, std::move(grid), {-shift, 0, 0});
     if (is_split) place(s.scene, std::move(other), {-shift, 0, 0});
     return taken(s.scene, towards({9, 8, 11}, {0, 1, 0}), sized(90, 70));
@@ -86,8 +86,8 @@ TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
 TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
   GlassScene s;
   Grid grid;
-  grid.fill_box({0, 0, 0}, {0, 0, 1}, s.glass);
-  grid.fill_box({0, 0, 2}, {0, 0, 3}, s.green);
+  grid.fill_box({{0, 0, 0}, {1, 1, 2}}, s.glass);
+  grid.fill_box({{0, 0, 2}, {1, 1, 4}}, s.green);
   place(s.scene, std::move(grid));
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, DVec3(0.0));
@@ -103,7 +103,7 @@ TEST(RenderGlass, DifferentGlassesAreTwoBodies) {
 TEST(RenderGlass, LengthsAreInVoxelsWhateverTheirSize) {
   GlassScene s;
   Grid grid;
-  grid.fill_box({0, 0, 0}, {0, 0, 3}, s.glass);
+  grid.fill_box({{0, 0, 0}, {1, 1, 4}}, s.glass);
   const InstanceHandle instance = place(s.scene, std::move(grid), {0, 0, 10});
   s.scene.edit(instance).voxel_size = 0.5;
   const SceneTracer tracer(s.scene);
@@ -118,8 +118,8 @@ TEST(RenderGlass, LengthsAreInVoxelsWhateverTheirSize) {
 TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
   GlassScene s;
   Grid grid;
-  grid.fill_box({-9, -1, -9}, {9, -1, 9}, s.stone);
-  grid.fill_box({-9, 3, -9}, {9, 4, 9}, s.glass);
+  grid.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.stone);
+  grid.fill_box({{-9, 3, -9}, {10, 5, 10}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
   options.light.sun = {0, 1, 0};
@@ -138,8 +138,8 @@ TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
 TEST(RenderGlass, SeenFromInsideTintsOnly) {
   GlassScene s;
   Grid grid;
-  grid.fill_box({-9, -1, -9}, {9, -1, 9}, s.stone);
-  grid.fill_box({-9, 0, -9}, {9, 9, 9}, s.glass);
+  grid.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.stone);
+  grid.fill_box({{-9, 0, -9}, {10, 10, 10}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
   options.light.lit = false;
@@ -155,8 +155,8 @@ TEST(RenderGlass, ThatGlowsShinesInTheDarkFromOutsideAndInside) {
       Scene scene;
       const VoxelType glass = add_type(scene, kGlass, Visibility::Transparent, emission);
       Grid grid;
-      grid.fill_box({-5, 0, -5}, {5, 3, 5}, glass);
-      grid.fill_box({-5, -1, -5}, {5, -1, 5}, add_type(scene, {0, 0, 0, 255}));
+      grid.fill_box({{-5, 0, -5}, {6, 4, 6}}, glass);
+      grid.fill_box({{-5, -1, -5}, {6, 0, 6}}, add_type(scene, {0, 0, 0, 255}));
       place(scene, std::move(grid));
       RenderOptions options = sized(2, 2);
       options.light.sun = {0, -1, 0};
@@ -172,8 +172,8 @@ TEST(RenderGlass, DarkAndDeepGlassIsNeverNotANumber) {
   const VoxelType ink = add_type(scene, {0, 0, 0, 255}, Visibility::Transparent);
   const VoxelType clear = add_type(scene, {255, 255, 255, 0}, Visibility::Transparent);
   Grid grid;
-  grid.fill_box({-50, -50, -50}, {50, 0, 0}, ink);
-  grid.fill_box({-50, -50, 1}, {50, 0, 50}, clear);
+  grid.fill_box({{-50, -50, -50}, {51, 1, 1}}, ink);
+  grid.fill_box({{-50, -50, 1}, {51, 1, 51}}, clear);
   place(scene, std::move(grid));
   RenderOptions options = sized(64, 48);
   const Picture picture = taken(scene, towards({0, 1.0, 60}, {0, 0, 0}, 1.5), options);

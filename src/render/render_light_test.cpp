@@ -15,7 +15,7 @@ constexpr Rgba8 kGrey{188, 188, 188, 255};
 // The y = 0 plane is the top of a floor from -40 to 40.
 Grid floor_of(VoxelType type) {
   Grid grid;
-  grid.fill_box({-40, -1, -40}, {39, -1, 39}, type);
+  grid.fill_box({{-40, -1, -40}, {40, 0, 40}}, type);
   return grid;
 }
 
@@ -53,8 +53,8 @@ TEST(RenderLight, ASmallClosedBoxIsBlackInside) {
   Scene scene;
   Grid grid;
   const VoxelType type = add_type(scene, kGrey);
-  grid.fill_box({-2, -2, -2}, {2, 2, 2}, type);
-  grid.fill_box({-1, -1, -1}, {1, 1, 1}, kAir);
+  grid.fill_box({{-2, -2, -2}, {3, 3, 3}}, type);
+  grid.fill_box({{-1, -1, -1}, {2, 2, 2}}, kAir);
   place(scene, std::move(grid));
   for (const int rays : {6, 9, 17}) {
     RenderOptions options = sized(24, 24);
@@ -75,7 +75,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
   Grid grid = floor_of(type);
   const DVec3 low{1, 6, -2};
   const DVec3 high{4, 8, 1};
-  grid.fill_box({1, 6, -2}, {3, 7, 0}, type);
+  grid.fill_box({{1, 6, -2}, {4, 8, 1}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(160, 160);
   options.light.occlusion = OcclusionMode::Off;
@@ -105,7 +105,7 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
-  grid.fill_box({-9, 10, -9}, {8, 10, 8}, type);
+  grid.fill_box({{-9, 10, -9}, {9, 11, 9}}, type);
   const InstanceHandle instance = place(scene, std::move(grid));
   scene.edit(instance).voxel_size = 0.25;
   RenderOptions options = sized(1, 1);
@@ -125,7 +125,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
-  grid.fill_box({-40, 6, -40}, {39, 6, 39}, type);
+  grid.fill_box({{-40, 6, -40}, {40, 7, 40}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(1, 1);
   options.light.shadows = false;
@@ -142,7 +142,7 @@ TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
-  grid.fill_box({1, 0, -40}, {1, 9, 39}, type);
+  grid.fill_box({{1, 0, -40}, {2, 10, 40}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(1, 1);
   options.light.sun = {0, -1, 0};
@@ -180,12 +180,12 @@ TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
             encoded((linear(amber) * 0.5F + linear(amber) * 0.15F) * 0.25F));
 }
 
-// Beside a wall, where the corner levels fall from 2 to 0 across one voxel.
+// Beside a wall, where the occlusion of corners falls from 2 to 0 across one voxel.
 TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
   Grid grid = floor_of(type);
-  grid.fill_box({4, 0, -40}, {4, 5, 39}, type);
+  grid.fill_box({{4, 0, -40}, {5, 6, 40}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(40, 1);
   options.light.occlusion = OcclusionMode::Vertex;

@@ -35,7 +35,7 @@ Grid blobs(const World& world, unsigned seed, IVec3 shift = IVec3(0)) {
   for (int i = 0; i < 24; ++i) {
     const auto coordinate = [&] { return static_cast<int>(random() % 11) - 6; };
     const IVec3 at = IVec3(coordinate(), coordinate(), coordinate()) + shift;
-    grid.fill_box(at, at + IVec3(static_cast<int>(random() % 3)), world.types[random() % 3]);
+    grid.fill_box({at, at + IVec3(static_cast<int>(random() % 3)) + 1}, world.types[random() % 3]);
   }
   return grid;
 }
@@ -169,7 +169,7 @@ TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
     World world;
     for (const int i : {0, 1}) {
       Grid slab;
-      slab.fill_box({-3, 0, -3}, {3, 0, 3}, world.types.at(static_cast<std::size_t>(i) ^ (is_reversed ? 1U : 0U)));
+      slab.fill_box({{-3, 0, -3}, {4, 1, 4}}, world.types.at(static_cast<std::size_t>(i) ^ (is_reversed ? 1U : 0U)));
       place(world.scene, std::move(slab));
     }
     RenderOptions options = sized(8, 8);
@@ -198,10 +198,10 @@ TEST(RenderScene, SmallVoxelsSeenFromNearLookLikeLargeOnesFromFar) {
 TEST(RenderScene, ShadowsFallFromOneInstanceOntoAnother) {
   World world;
   Grid floor;
-  floor.fill_box({-9, -1, -9}, {9, -1, 9}, world.types[0]);
+  floor.fill_box({{-9, -1, -9}, {10, 0, 10}}, world.types[0]);
   place(world.scene, std::move(floor));
   Grid roof;
-  roof.fill_box({-9, 0, -9}, {9, 0, 9}, world.types[0]);
+  roof.fill_box({{-9, 0, -9}, {10, 1, 10}}, world.types[0]);
   RenderOptions options = sized(4, 4);
   options.light.sun = {0, 1, 0};
   const Camera camera = from_above(0, 2, 0, 4);
@@ -223,7 +223,7 @@ TEST(RenderScene, OrthographicPicturesHaveASkyToo) {
 TEST(RenderScene, LooksStraightUpAndDownAndFromFarAway) {
   World world;
   Grid slab;
-  slab.fill_box({-9, 5, -9}, {9, 5, 9}, world.types[0]);
+  slab.fill_box({{-9, 5, -9}, {10, 6, 10}}, world.types[0]);
   place(world.scene, std::move(slab));
   Camera up = from_above(0, 0, 0, 4);
   up.forward = {0, 1, 0};

@@ -9,13 +9,13 @@ namespace quoin {
 namespace {
 
 Error refusal() {
-  return fail(ErrorCode::Unsupported, "vulkan: this build is without it: " QUOIN_VULKAN_MISSING);
+  return make_error(ErrorCode::Unsupported, "vulkan: this build is without it: " QUOIN_VULKAN_MISSING);
 }
 
 }  // namespace
 
 struct VulkanRenderer::Impl {
-  VulkanDevice device;
+  VulkanDeviceInfo device;
 };
 
 VulkanRenderer::VulkanRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -23,10 +23,10 @@ VulkanRenderer::VulkanRenderer(VulkanRenderer&&) noexcept = default;
 VulkanRenderer& VulkanRenderer::operator=(VulkanRenderer&&) noexcept = default;
 VulkanRenderer::~VulkanRenderer() = default;
 
-Result<std::vector<VulkanDevice>> vulkan_devices() {
+Result<std::vector<VulkanDeviceInfo>> vulkan_devices() {
   return refusal();
 }
-Result<VulkanDevice> describe_vulkan_device(VkInstance_T*, VkPhysicalDevice_T*, VulkanFunctionFinder) {
+Result<VulkanDeviceInfo> describe_vulkan_device(VkInstance_T*, VkPhysicalDevice_T*, VulkanGetInstanceProcAddr) {
   return refusal();
 }
 Status enable_vulkan_features(VkDeviceCreateInfo&, VulkanFeatureStorage&) {
@@ -38,7 +38,7 @@ Result<VulkanRenderer> VulkanRenderer::create(const VulkanOptions&) {
 Result<VulkanRenderer> VulkanRenderer::create(const BorrowedVulkanDevice&, std::uint64_t) {
   return refusal();
 }
-const VulkanDevice& VulkanRenderer::device() const {
+const VulkanDeviceInfo& VulkanRenderer::device() const {
   return impl_->device;
 }
 Status VulkanRenderer::update(const Scene&, InstanceFilter, Threads) {

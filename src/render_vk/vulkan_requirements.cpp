@@ -16,11 +16,11 @@ constexpr std::array kFeatures = {"bufferDeviceAddress"};
 constexpr std::array kOptionalFeatures = {"fillModeNonSolid"};
 
 Error refuse(std::string message) {
-  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+  return make_error(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
 // The better a device, the less.
-int rank_of(const VulkanDevice& device) {
+int rank_of(const VulkanDeviceInfo& device) {
   constexpr std::array<std::string_view, 4> kOrder = {"discrete", "integrated", "virtual", "cpu"};
   return static_cast<int>(std::find(kOrder.begin(), kOrder.end(), device.kind) - kOrder.begin());
 }
@@ -41,15 +41,15 @@ VulkanRequirements vulkan_requirements() {
   return {kVersion12, {}, {}, kFeatures, kOptionalFeatures};
 }
 
-Result<std::size_t> choose_vulkan_device(std::span<const VulkanDevice> devices, const std::string& wanted) {
-  const VulkanDevice* chosen = nullptr;
+Result<std::size_t> choose_vulkan_device(std::span<const VulkanDeviceInfo> devices, const std::string& wanted) {
+  const VulkanDeviceInfo* chosen = nullptr;
   if (is_number(wanted)) {
     const auto index = static_cast<std::size_t>(std::stoul(wanted));
     if (index < devices.size()) chosen = &devices[index];
   } else {
-    for (const VulkanDevice& device : devices) {
+    for (const VulkanDeviceInfo& device : devices) {
       if (!wanted.empty() && lower(device.name).find(lower(wanted)) == std::string::npos) continue;
-      const auto score = [](const VulkanDevice& d) { return std::pair(!d.missing.empty(), rank_of(d)); };
+      const auto score = [](const VulkanDeviceInfo& d) { return std::pair(!d.missing.empty(), rank_of(d)); };
       if (chosen == nullptr || score(device) < score(*chosen)) chosen = &device;
     }
   }

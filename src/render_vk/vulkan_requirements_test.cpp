@@ -9,9 +9,9 @@
 namespace quoin {
 namespace {
 
-const std::array<VulkanDevice, 4> kDevices = {
-    VulkanDevice{"llvmpipe (LLVM 15)", "cpu", ""}, VulkanDevice{"Old Card", "discrete", "bufferDeviceAddress"},
-    VulkanDevice{"Card 1", "integrated", ""}, VulkanDevice{"Card 2", "integrated", ""}};
+const std::array<VulkanDeviceInfo, 4> kDevices = {
+    VulkanDeviceInfo{"llvmpipe (LLVM 15)", "cpu", ""}, VulkanDeviceInfo{"Old Card", "discrete", "bufferDeviceAddress"},
+    VulkanDeviceInfo{"Card 1", "integrated", ""}, VulkanDeviceInfo{"Card 2", "integrated", ""}};
 
 TEST(ChooseVulkanDevice, TakesTheFirstOfTheBestKindThatLacksNothing) {
   EXPECT_EQ(choose_vulkan_device(kDevices, "").value(), 2U);
@@ -26,7 +26,7 @@ TEST(ChooseVulkanDevice, TakesNumbersAndPartsOfNames) {
 }
 
 TEST(ChooseVulkanDevice, SaysWhatThereIsAndWhatIsMissing) {
-  const auto expect_refusal = [](std::span<const VulkanDevice> devices, const char* wanted, const char* message) {
+  const auto expect_refusal = [](std::span<const VulkanDeviceInfo> devices, const char* wanted, const char* message) {
     const auto chosen = choose_vulkan_device(devices, wanted);
     ASSERT_FALSE(chosen);
     EXPECT_EQ(chosen.error().code, ErrorCode::Unsupported);

@@ -8,6 +8,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
 
@@ -65,21 +66,28 @@ Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
 }  // namespace
 
 Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
-  if (!is_finite(position)) return fail(ErrorCode::InvalidArgument, "the camera's position is not finite");
-  if (!is_finite(target)) return fail(ErrorCode::InvalidArgument, "the point to look at is not finite");
+  if (!is_finite(position)) return make_error(ErrorCode::InvalidArgument, "the camera's position is not finite");
+  if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "the point to look at is not finite");
   if (!(vertical_fov > 0.0 && vertical_fov < std::numbers::pi)) {
-    return fail(ErrorCode::InvalidArgument,
-                "the field of view is not more than 0 and less than pi radians (180 degrees)");
+    return make_error(ErrorCode::InvalidArgument,
+                      "the field of view is not more than 0 and less than pi radians (180 degrees)");
   }
   // Halved so that the difference of the greatest numbers is one; then scaled so that no square is lost.
   const DVec3 half = 0.5 * target - 0.5 * position;
   const double largest = std::max({std::abs(half.x), std::abs(half.y), std::abs(half.z)});
-  if (!(largest > 0.0)) return fail(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
+  if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
   Camera camera;
   camera.position = position;
   camera.vertical_fov = vertical_fov;
   turn(camera, glm::normalize(half / largest));
   return camera;
+}
+
+glm::dmat4 camera_from_world(const Camera& camera) {
+  const glm::dmat3 camera_axes = glm::transpose(glm::dmat3(camera.right, camera.up, -camera.forward));
+  glm::dmat4 matrix(camera_axes);
+  matrix[3] = glm::dvec4(-(camera_axes * camera.position), 1.0);
+  return matrix;
 }
 
 Ray ray_through(const Camera& camera, double x, double y, int width, int height) {

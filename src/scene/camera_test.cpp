@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <gtest/gtest.h>
 #include <quoin/scene/scene.h>
 
@@ -73,6 +74,21 @@ TEST(Camera, LooksAtItsTargetUpright) {
   EXPECT_NEAR(target.depth, std::sqrt(16 + 9 + 56.25), 1e-12);
   EXPECT_GT(project(*camera, 1.5, {-1, 3, 0.5}).y, 0.0) << "what is higher is higher in the picture";
   EXPECT_GT(project(*look_at({0, 0, 5}, {0, 0, 0}, 1.0), 1.0, {1, 0, 0}).x, 0.0) << "not mirrored";
+}
+
+TEST(Camera, TheViewMatrixAgreesWithItsRays) {
+  const Camera camera = *look_at({3, 4, 5}, {-7, 1, 20}, 0.8);
+  const glm::dmat4 view = camera_from_world(camera);
+  expect_near(DVec3(view * glm::dvec4(camera.position, 1.0)), DVec3(0.0));
+  const int width = 640;
+  const int height = 360;
+  const glm::dmat4 clip = glm::perspective(camera.vertical_fov, double{width} / height, 0.1, 1e3) * view;
+  for (const DVec3 at : {DVec3(0, 0, 1), DVec3(640, 0, 9), DVec3(100, 333, 50)}) {
+    const Ray ray = ray_through(camera, at.x, at.y, width, height);
+    const glm::dvec4 point = clip * glm::dvec4(ray.origin + ray.direction * at.z, 1.0);
+    EXPECT_NEAR(point.x / point.w, at.x / width * 2.0 - 1.0, 1e-12);
+    EXPECT_NEAR(point.y / point.w, 1.0 - at.y / height * 2.0, 1e-12);
+  }
 }
 
 TEST(Camera, StraightDownAndUpHaveADefinedTop) {

@@ -26,7 +26,7 @@ Scene cubes(int count, int edge = 20) {
   VoxelProperties properties;
   EXPECT_TRUE(scene.types.add(properties));
   SceneGrid grid;
-  grid.grid.fill_box({0, 0, 0}, IVec3(edge - 1), 1);
+  grid.grid.fill_box({{0, 0, 0}, IVec3(edge)}, 1);
   grid.pivot = DVec3(0.5 * edge);
   const GridHandle handle = scene.add_grid(std::move(grid));
   for (int i = 0; i < count; ++i) scene.add_instance({"", handle});
@@ -93,7 +93,7 @@ TEST(LevelOfDetail, ByPixelsGoesByVoxelsAndTheWhole) {
 TEST(LevelOfDetail, ContentIsWhatIsThereNotTheOriginNorTheChunk) {
   Grid grid;
   EXPECT_EQ(content_sphere(grid).radius, 0.0);
-  grid.fill_box({100, -7, 3}, {140, 33, 43}, 1);  // 41 wide
+  grid.fill_box({{100, -7, 3}, {141, 34, 44}}, 1);  // 41 wide
   const ContentSphere sphere = content_sphere(grid);
   EXPECT_EQ(sphere.centre, DVec3(120.5, 13.5, 23.5));
   EXPECT_NEAR(sphere.radius, 20.5 * std::sqrt(3.0), 1e-12);
@@ -243,7 +243,7 @@ TEST(LevelOfDetail, EditsAreSeen) {
   std::vector<SelectedInstance> selected;
   selector.select(scene, looking_at_origin(1000.0), 800, 600, {}, selected);
   ASSERT_EQ(selected.at(0).detail, Detail::Far);
-  scene.edit(scene.grids().handles()[0]).grid.fill_box({0, 0, 0}, {399, 399, 399}, 1);
+  scene.edit(scene.grids().handles()[0]).grid.fill_box({{0, 0, 0}, {400, 400, 400}}, 1);
   selector.select(scene, looking_at_origin(1000.0), 800, 600, {}, selected);
   EXPECT_NE(selected.at(0).detail, Detail::Far);
 }

@@ -1,9 +1,10 @@
-// From the world into an instance's grid.
+// Between an instance's grid and the world.
 
 #include <cmath>
 #include <limits>
 
 #include <glm/common.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 #include <quoin/scene/scene.h>
 
@@ -15,6 +16,12 @@ namespace {
 constexpr DVec3 kNowhere{std::numeric_limits<double>::quiet_NaN()};
 
 }  // namespace
+
+glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid) {
+  glm::dmat4 matrix(world_axes(instance) * instance.voxel_size);
+  matrix[3] = glm::dvec4(world_from_grid(instance, grid, DVec3(0.0)), 1.0);
+  return matrix;
+}
 
 // The inverse rather than the transpose: a quaternion may be a little longer than 1, and far from the pivot that shows.
 DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {

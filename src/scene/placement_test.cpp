@@ -8,6 +8,7 @@
 #include <string>
 
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <gtest/gtest.h>
 
 #include <quoin/scene/scene.h>
@@ -65,6 +66,20 @@ TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
     EXPECT_LE(largest(grid_from_world_direction(instance, direction) - point), rounding * largest(point));
     const DVec3 moved = world_from_grid(instance, grid, grid.pivot + point) - instance.position;
     EXPECT_LE(largest(direction - moved), 4.0 * room * instance.voxel_size);
+  }
+}
+
+TEST(WorldFromGrid, IsTheSameAsAMatrix) {
+  for (unsigned seed = 1; seed <= 500; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const Instance instance = random.instance(1e3);
+    SceneGrid grid;
+    grid.pivot = random.vector() * 100.0;
+    const glm::dmat4 matrix = world_from_grid(instance, grid);
+    EXPECT_EQ(glm::determinant(matrix) < 0.0, instance.mirrored);
+    const DVec3 point = random.vector() * 100.0;
+    EXPECT_LE(largest(DVec3(matrix * glm::dvec4(point, 1.0)) - world_from_grid(instance, grid, point)), 1e-9);
   }
 }
 

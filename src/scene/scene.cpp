@@ -189,6 +189,12 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   return changes;
 }
 
+bool Scene::has_changed_since(const ChangeCursor& cursor) const {
+  const std::lock_guard lock(book_->mutex);
+  book_->collect(grids_, grids_.size() + instances_.size());
+  return book_->journal.has_changed_since(cursor);
+}
+
 ChangeCursor Scene::cursor() const {
   ChangeCursor cursor;
   (void)changes_since(cursor);

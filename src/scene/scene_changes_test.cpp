@@ -134,7 +134,9 @@ TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
   for (int round = 0; round < 3; ++round) {
     kept.set({round, 2, 3}, 4);
     kept.set({round, 2, 4}, 4);
+    EXPECT_TRUE(scene.has_changed_since(cursor));
     EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{first}) << round;
+    EXPECT_FALSE(scene.has_changed_since(cursor));
     EXPECT_TRUE(scene.changes_since(cursor).empty());
   }
   Scene moved = std::move(scene);
@@ -172,7 +174,7 @@ TEST(SceneChanges, ASnapshotStaysAsItWas) {
   SceneGrid hill;
   hill.name = "hill";
   hill.pivot = {1.0, 2.0, 3.0};
-  hill.grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
+  hill.grid.fill_box({{0, 0, 0}, {10, 10, 10}}, stone);
   const GridHandle grid = scene.add_grid(std::move(hill));
   Instance instance;
   instance.grid = grid;

@@ -47,8 +47,9 @@ Status check_instances(const Scene& scene, InstanceFilter filter) {
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, filter)) continue;
     if (has_place(instance)) continue;
-    return fail(ErrorCode::InvalidArgument,
-                "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
+    return make_error(
+        ErrorCode::InvalidArgument,
+        "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
   }
   return {};
 }
@@ -90,7 +91,7 @@ Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const Blocky
     told = fraction;
     return progress.advance(more);
   });
-  if (mesh && !progress.advance((1.0 - told) * chunks)) return fail(ErrorCode::Cancelled, "cancelled");
+  if (mesh && !progress.advance((1.0 - told) * chunks)) return make_error(ErrorCode::Cancelled, "cancelled");
   return mesh;
 }
 

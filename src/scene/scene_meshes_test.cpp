@@ -23,7 +23,7 @@ GridHandle add_grid(Scene& scene, int length) {
   grid.name = std::to_string(length) + " long";
   VoxelProperties stone;
   stone.name = "stone";
-  grid.grid.fill_box({0, 0, 0}, {length - 1, 0, 0}, *scene.types.find_or_add(stone));
+  grid.grid.fill_box({{0, 0, 0}, {length, 1, 1}}, *scene.types.find_or_add(stone));
   return scene.add_grid(std::move(grid));
 }
 

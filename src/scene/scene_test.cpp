@@ -9,7 +9,7 @@ const DQuat kQuarterTurnAboutY = glm::angleAxis(1.5707963267948966, DVec3(0, 1, 
 
 SceneGrid box_grid(IVec3 first, IVec3 last) {
   SceneGrid grid;
-  grid.grid.fill_box(first, last, 1);
+  grid.grid.fill_box({first, last + 1}, 1);
   return grid;
 }
 

@@ -104,7 +104,7 @@ class GroundWriter {
 
  private:
   void set(int y, int z, std::uint64_t mask, VoxelType type) {
-    if ((mask & inside_) != 0) chunk_.set_row(y, z, mask & inside_, type);
+    if ((mask & inside_) != 0) chunk_.fill_row(y, z, mask & inside_, type);
   }
 
   std::array<VoxelType, kSurfaces> cover_;

@@ -29,12 +29,12 @@ bool are_filled(const TerrainTypes& t) {
 Status check(const SmoothTerrainOptions& options) {
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
-    return fail(ErrorCode::InvalidArgument,
-                "a smooth terrain is 1 to 512 chunks of 64 samples wide and deep, 1 to 16 high");
+    return make_error(ErrorCode::InvalidArgument,
+                      "a smooth terrain is 1 to 512 chunks of 64 samples wide and deep, 1 to 16 high");
   }
   if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
       std::max(options.first_x, options.first_z) > kMaxPlace) {
-    return fail(ErrorCode::InvalidArgument, "a smooth terrain begins at most 524288 chunks from the origin");
+    return make_error(ErrorCode::InvalidArgument, "a smooth terrain begins at most 524288 chunks from the origin");
   }
   return {};
 }
@@ -83,7 +83,7 @@ Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options,
   std::vector<std::optional<DensityChunk>> made(std::min(kBatch, count) * up);
   for (std::size_t first = 0; first < count; first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(count))) {
-      return fail(ErrorCode::Cancelled, "cancelled");
+      return make_error(ErrorCode::Cancelled, "cancelled");
     }
     const std::size_t batch = std::min(kBatch, count - first);
     const auto place = [&](std::size_t i) {

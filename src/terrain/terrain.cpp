@@ -21,11 +21,12 @@ constexpr int kMaxPlace = 1 << 20;
 Status check(const TerrainOptions& options) {
   const IVec3 size = options.size;
   if (std::min({size.x, size.y, size.z}) < 1 || size.y > kMaxUp || std::max(size.x, size.z) > kMaxAcross) {
-    return fail(ErrorCode::InvalidArgument, "a terrain is 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
+    return make_error(ErrorCode::InvalidArgument,
+                      "a terrain is 1 to 1024 units of 32 voxels wide and deep, 1 to 32 high");
   }
   if (std::min(options.first_x, options.first_z) < -kMaxPlace ||
       std::max(options.first_x, options.first_z) > kMaxPlace) {
-    return fail(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
+    return make_error(ErrorCode::InvalidArgument, "a terrain begins at most 1048576 units from the origin");
   }
   return {};
 }
@@ -145,7 +146,7 @@ Result<Grid> generate_terrain(const TerrainOptions& options, const TerrainTypes&
   std::vector<Chunk> made;
   for (std::size_t first = 0; first < count; first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(count))) {
-      return fail(ErrorCode::Cancelled, "cancelled");
+      return make_error(ErrorCode::Cancelled, "cancelled");
     }
     const std::size_t batch = std::min(kBatch, count - first);
     made.clear();

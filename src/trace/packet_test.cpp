@@ -240,7 +240,7 @@ TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAnswerTheSame) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {
     const IVec3 corner{whole(-1'500, 2'500), whole(-40, 90), whole(-70, 75)};
-    grid.fill_box(corner, corner + IVec3{whole(1, 4), whole(1, 4), whole(1, 4)}, VoxelType{1});
+    grid.fill_box({corner, corner + IVec3{whole(1, 4) + 1, whole(1, 4) + 1, whole(1, 4) + 1}}, VoxelType{1});
   }
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
   ASSERT_NE(tree.view(), nullptr);
@@ -268,7 +268,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, Packets,
 TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
   const VoxelRegistry types = oracle::mixed_types();
   Grid grid;
-  grid.fill_box({-70, -70, -70}, {70, -20, 70}, 1);
+  grid.fill_box({{-70, -70, -70}, {71, -19, 71}}, 1);
   OccupancyTree tree = OccupancyTree::build(grid, types);
   ChangeFollower follower(grid);
   std::mt19937 random(3);
@@ -305,7 +305,7 @@ TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
   const VoxelRegistry types = oracle::mixed_types();
   for (const int gap : {5'000, 1'000'000}) {
     Grid grid;
-    grid.fill_box({0, 0, 0}, {8, 40, 40}, 1);
+    grid.fill_box({{0, 0, 0}, {9, 41, 41}}, 1);
     grid.fill_sphere({gap, 20, 20}, 15.0, 2);
     const OccupancyTree tree = OccupancyTree::build(grid, types);
     EXPECT_EQ(tree.view() == nullptr, gap == 1'000'000);
@@ -337,7 +337,7 @@ TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
 
 TEST(PacketsOf, OfNoRaysHitNothing) {
   Grid grid;
-  grid.fill_box({-5, -5, -5}, {5, 5, 5}, 1);
+  grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   RayPacket rays;

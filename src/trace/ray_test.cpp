@@ -159,7 +159,7 @@ TEST(Ray, ABillionVoxelsFromTheOriginHitsAsAtTheOrigin) {
 
 TEST(Ray, ThatCannotBeOneHitsNothing) {
   Grid grid;
-  grid.fill_box({-5, -5, -5}, {5, 5, 5}, 1);
+  grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(first_hit(tree, {{0, 0, 0}, {0, 0, 0}}).has_value());
@@ -174,7 +174,7 @@ TEST(Ray, ThatCannotBeOneHitsNothing) {
 
 TEST(Ray, ThatStartsInsideHitsAtOnce) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, 1);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
   const auto hit = first_hit(tree, {{5.5, 5.5, 5.5}, {0.2, -0.9, 0.1}});
   ASSERT_TRUE(hit.has_value());
@@ -195,7 +195,7 @@ TEST(Ray, BlockerThatStraddlesTheEndIsHit) {
 // Rays that start far away are moved to the bounds first, of which a flat floor is a face.
 TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
   Grid grid;
-  grid.fill_box({-200, -5, -200}, {200, 0, 200}, 1);
+  grid.fill_box({{-200, -5, -200}, {201, 1, 201}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(-190.0, 190.0);

@@ -145,7 +145,7 @@ void update(benchmark::State& state) {
   bool is_solid = false;
   for (auto _ : state) {
     state.PauseTiming();
-    grid.fill_box(corner, corner + size, is_solid ? VoxelType{1} : kAir);
+    grid.fill_box({corner, corner + size + 1}, is_solid ? VoxelType{1} : kAir);
     is_solid = !is_solid;
     const GridChanges dirty = grid.changes_since(cursor);
     state.ResumeTiming();

@@ -223,8 +223,9 @@ void draw_welcome(const ViewState& state, MenuChoice& choice) {
   ImGui::Spacing();
   if (ImGui::Button("Open a file (Ctrl+O)")) choice.commands.push_back(Command::Open);
   for (const std::string& file : state.settings.recent) {
-    const std::string name = std::filesystem::path(file).filename().string();
-    if (ImGui::Selectable((name + "##" + file).c_str())) choice.recent = file;
+    std::string label = std::filesystem::path(file).filename().string();
+    label.append("##").append(file);
+    if (ImGui::Selectable(label.c_str())) choice.recent = file;
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", file.c_str());
   }
   ImGui::End();

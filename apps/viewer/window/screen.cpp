@@ -17,8 +17,8 @@ Result<std::unique_ptr<SdlVideo>> SdlVideo::start() {
   SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
   SDL_SetHint(SDL_HINT_MOUSE_FOCUS_CLICKTHROUGH, "1");
   const auto no_display = [](const std::string& why) {
-    return fail(ErrorCode::Unsupported,
-                "no display to open a window on (" + why + "); `quoin render` draws pictures without one");
+    return make_error(ErrorCode::Unsupported,
+                      "no display to open a window on (" + why + "); `quoin render` draws pictures without one");
   };
   const auto is_set = [](const char* name) {
     const char* value = SDL_getenv(name);
@@ -63,7 +63,7 @@ Status Screen::open_window(int width, int height, Uint32 flags) {
   constexpr int kCentred = static_cast<int>(SDL_WINDOWPOS_CENTERED);
   const Uint32 all = flags | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI;
   window_.reset(SDL_CreateWindow("Quoin", kCentred, kCentred, width, height, all));
-  if (!window_) return fail(ErrorCode::Unsupported, "cannot open a window: " + sdl_says());
+  if (!window_) return make_error(ErrorCode::Unsupported, "cannot open a window: " + sdl_says());
   SDL_SetWindowMinimumSize(window(), 320, 240);
   return {};
 }

@@ -35,7 +35,7 @@ class SdlScreen final : public Screen {
 };
 
 Error cannot(const std::string& what) {
-  return fail(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
+  return make_error(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
 }
 
 Status SdlScreen::open(int width, int height) {

@@ -11,7 +11,7 @@ namespace {
 /// Whether there is a device that is no processor in truth.
 bool has_graphics_card() {
   const auto devices = vulkan_devices();
-  return devices && std::any_of(devices->begin(), devices->end(), [](const VulkanDevice& device) {
+  return devices && std::any_of(devices->begin(), devices->end(), [](const VulkanDeviceInfo& device) {
            return device.missing.empty() && device.kind != "cpu";
          });
 }

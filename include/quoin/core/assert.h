@@ -19,7 +19,7 @@ using AssertHandler = void (*)(const AssertFailure& failure);
 AssertHandler set_assert_handler(AssertHandler handler);
 
 /// Calls the handler, then aborts.
-[[noreturn]] void fail_assert(const AssertFailure& failure);
+[[noreturn]] void handle_assert_failure(const AssertFailure& failure);
 
 }  // namespace quoin
 
@@ -36,7 +36,7 @@ AssertHandler set_assert_handler(AssertHandler handler);
 #define QUOIN_ASSERT(condition, ...) \
   (static_cast<bool>(condition)      \
        ? static_cast<void>(0)        \
-       : ::quoin::fail_assert({#condition, "" __VA_ARGS__, ::std::source_location::current()}))
+       : ::quoin::handle_assert_failure({#condition, "" __VA_ARGS__, ::std::source_location::current()}))
 #else
 #define QUOIN_ASSERT(condition, ...) static_cast<void>(sizeof(static_cast<bool>(condition)))
 #endif

@@ -10,8 +10,8 @@ struct Threads {
   unsigned count = 0;
 };
 
-/// The number of threads that `threads` stands for on this machine; at least 1.
-[[nodiscard]] unsigned resolve(Threads threads);
+/// The number of threads that a `Threads` stands for on this machine; at least 1.
+[[nodiscard]] unsigned thread_count(Threads threads);
 
 /// Calls `body(i)` once for every i in [0, count), on several threads, and returns when all are done.
 ///

@@ -17,6 +17,7 @@ enum class ErrorCode : std::uint8_t {
   Unsupported,      ///< A valid file or request that Quoin cannot serve.
   LimitExceeded,    ///< More types, models, bytes or depth than can be represented.
   Cancelled,        ///< A progress callback asked to stop.
+  DeviceLost,       ///< The graphics device stopped working; what was made on it has to be made anew.
 };
 
 /// What went wrong with data from outside: one line for a person, with the place where there is one.
@@ -42,8 +43,9 @@ class [[nodiscard]] Result : public tl::expected<T, Error> {
 
 using Status = Result<void>;
 
-[[nodiscard]] inline Error fail(ErrorCode code, std::string message, std::string path = {},
-                                std::optional<std::uint64_t> byte_offset = std::nullopt) {
+/// An Error in one call: `return make_error(ErrorCode::BadFormat, "no voxels", path);`.
+[[nodiscard]] inline Error make_error(ErrorCode code, std::string message, std::string path = {},
+                                      std::optional<std::uint64_t> byte_offset = std::nullopt) {
   return Error{code, std::move(message), std::move(path), byte_offset};
 }
 

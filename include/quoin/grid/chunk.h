@@ -60,7 +60,7 @@ class Chunk {
   [[nodiscard]] VoxelType get(IVec3 local) const { return get(local.x, local.y, local.z); }
 
   /// Sets the voxels of one row whose bits are set in `mask`; returns which of them had another type before.
-  std::uint64_t set_row(int y, int z, std::uint64_t mask, VoxelType type);
+  std::uint64_t fill_row(int y, int z, std::uint64_t mask, VoxelType type);
   /// Sets the 64 voxels of one row; returns which of them had another type before.
   std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
     return write_row(y, z, ~std::uint64_t{0}, types);

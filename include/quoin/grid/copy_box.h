@@ -24,9 +24,9 @@ struct CopyOptions {
 /// Overlap: `from` and `to` may be one grid, and the boxes may overlap: as if all were copied at once.
 /// Ends:    what would come to lie outside the world (see Grid) is left out; an empty box copies nothing.
 /// Cost:    O(chunks of the box) where it is moved by whole chunks and not turned: these are shared with `from`, no
-///          voxel is copied until one is edited. Where chunks of one type lie, likewise. Otherwise O(rows of 64 voxels
-///          of the box), turned or not, and 0.5 MiB of memory for the call. Of a box larger than what the grids hold
-///          only their chunks are looked at.
+///          voxel is copied until one is edited. So are chunks of one type, wherever they go. Otherwise O(rows of 64
+///          voxels of the box), turned or not, and 0.5 MiB of memory for the call. Of a box larger than what the grids
+///          hold only their chunks are looked at.
 std::int64_t copy_box(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation = {},
                       const CopyOptions& options = {});
 

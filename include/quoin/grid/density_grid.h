@@ -81,7 +81,8 @@ class DensityGrid {
   /// Cost: as adding a sphere.
   std::int64_t flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength, VoxelType material);
   /// Asks `pick(IVec3 sample, DensitySample current)` for the new value of every sample of the box (half open: `max`
-  /// excluded), x fastest, then y, then z within a chunk, chunks likewise. Returns how many samples changed.
+  /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many samples
+  /// changed.
   /// Requires: `pick` leaves the grid alone. Cost: O(samples of the box), far air too.
   template <class Pick>
   std::int64_t edit(const IBox& box, Pick&& pick) {
@@ -93,8 +94,8 @@ class DensityGrid {
       }
     });
   }
-  /// Likewise a row at a time: `change(first, densities, materials)` gets the samples of the box along x in one chunk,
-  /// from `first` on, and changes them in place.
+  /// `edit`, a row at a time: `change(first, densities, materials)` gets the samples of the box along x in one chunk,
+  /// from `first` on, and changes them in place. Returns how many changed.
   std::int64_t edit_rows(
       const IBox& box,
       FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change);

@@ -49,19 +49,19 @@ class Grid {
   bool set(int x, int y, int z, VoxelType type);
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
   /// one edit. Returns how many changed.
-  std::int64_t set_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
-  /// Sets all voxels from `first` to `last`, both included, in any order of corners. Returns how many changed.
+  std::int64_t write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
+  /// Sets all voxels of a box. Returns how many changed.
   /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel. It cannot be
   /// cancelled: a box of millions of chunks is better filled piece by piece.
-  std::int64_t fill_box(IVec3 first, IVec3 last, VoxelType type);
+  std::int64_t fill_box(const IBox& box, VoxelType type);
   /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
   /// A radius that is negative or not finite, or a centre that is not finite, changes nothing.
   /// Cost: O(voxels of the box around the sphere); of air, of those in chunks that there are.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
   /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max`
-  /// excluded), x fastest, then y, then z within a chunk, chunks likewise. Returns how many changed. Requires: `pick`
-  /// changes nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was picked for earlier
-  /// rows, of 64 voxels along x, but not its own.
+  /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many changed.
+  /// Requires: `pick` changes nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was
+  /// picked for earlier rows, of 64 voxels along x, but not its own.
   template <class Pick>
   std::int64_t edit(const IBox& box, Pick&& pick) {
     return edit_rows(box, [&pick](IVec3 first, std::span<VoxelType> row) {
@@ -71,8 +71,8 @@ class Grid {
       }
     });
   }
-  /// Likewise a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
-  /// box along x in one chunk, from `first` on, and changes them in place.
+  /// `edit`, a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
+  /// box along x in one chunk, from `first` on, and changes them in place. Returns how many changed.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change);
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many voxels changed. The outermost
   /// chunks are ignored.

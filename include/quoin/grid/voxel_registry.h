@@ -107,6 +107,8 @@ class VoxelRegistry {
   /// The types that were added or replaced since the cursor's last time, in the order of their ids; moves the cursor to
   /// the present. Cost: O(types that changed). See ChangeCursor.
   [[nodiscard]] TypeChanges changes_since(ChangeCursor& cursor) const;
+  /// Whether that would tell of anything. Cost: O(1).
+  [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   /// A cursor at the present: it will be told what changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
 

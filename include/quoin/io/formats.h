@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/io/vox.h>
 
@@ -53,9 +54,11 @@ struct FormatInfo {
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; those of
 ///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
 ///         set in all.
-[[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
+[[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
+                                             const Progress& progress = {});
 
 /// The same of bytes. Errors: Unsupported also for scene files, whose other files only a path finds.
-[[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {});
+[[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
+                                             const Progress& progress = {});
 
 }  // namespace quoin

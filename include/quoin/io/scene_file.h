@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/io/vox.h>
@@ -59,7 +60,8 @@ struct SceneFile {
 ///
 /// Errors: those of `parse_scene_file` and of reading the files (with their paths); Unsupported when one of them is a
 ///         scene file itself or a volume; LimitExceeded when all files together have more types than a registry holds.
-[[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {});
+[[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {},
+                                                  const Progress& progress = {});
 
 /// Whether bytes look like a scene file: an object that names its version near the beginning.
 [[nodiscard]] bool is_scene_file(std::span<const std::byte> beginning);

@@ -21,13 +21,12 @@ struct LoadedScene {
   std::string format;                 ///< "vox", ...
   std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
   std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
-  std::optional<Camera> camera;       ///< likewise
+  std::optional<Camera> camera;       ///< where the file has one
 };
 
 struct LoadOptions {
   bool show_hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
   int frame = 0;             ///< which animation frame to take
-  Progress progress{};       ///< told after every model; once it returns false, the work is Cancelled
 };
 
 /// MagicaVoxel's format, versions 150 and 200.
@@ -42,13 +41,16 @@ struct LoadOptions {
 ///          last key or the end of the animation's range.
 /// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
+/// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered
 ///          voxels would take far more memory than the file has bytes. Memory stays within a multiple of the input's
 ///          size.
-[[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {});
+[[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {},
+                                           const Progress& progress = {});
 /// The same of a file. Errors: also CannotRead; they name the file.
-[[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {});
+[[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {},
+                                           const Progress& progress = {});
 
 /// The scene as a .vox file of version 150; the same scene gives the same bytes.
 ///

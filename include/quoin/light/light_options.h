@@ -12,8 +12,8 @@ namespace quoin {
 enum class OcclusionMode : std::uint8_t {
   Off,
   Rays,    ///< short rays over the face's hemisphere
-  Vertex,  ///< the four corner levels of the face, interpolated over its two triangles, as blocky meshes carry them:
-           ///< they know of the face's own grid only
+  Vertex,  ///< the occlusion of the face's four corners, interpolated over its triangles, as blocky meshes carry it:
+           ///< it knows of the face's own grid only
 };
 
 /// What ambient occlusion darkens.

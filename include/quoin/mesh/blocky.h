@@ -17,7 +17,7 @@ namespace quoin {
 
 struct QuadOptions {
   bool merge = true;      ///< false: one quad a visible unit face
-  bool occlusion = true;  ///< false: all levels 0, and faces merge whatever stands before them
+  bool occlusion = true;  ///< false: 0 everywhere, and faces merge whatever stands before them
   IBox region = kWholeChunk;
 };
 
@@ -34,9 +34,9 @@ class BlockyMesher {
   /// Space:    voxels, origin at the chunk's minimum corner.
   /// Border:   reads one voxel past each side; the chunk that owns the voxel emits the face. A null centre is air and
   ///           gives no quads.
-  /// Lossless: every visible unit face of the region is covered by exactly one quad, of its type, whose levels
-  ///           interpolate to that face's own; faces merge only where type and all four levels agree and along
-  ///           directions in which the levels do not change.
+  /// Lossless: every visible unit face of the region is covered by exactly one quad, of its type, whose occlusion
+  ///           interpolates to that face's own; faces merge only where type and occlusion of all four corners agree,
+  ///           and along directions in which the occlusion does not change.
   /// Order:    direction, layer, row, column; the same bytes on every machine.
   /// Cost:     O(rows of 64 voxels + visible faces); no allocation once `out` has grown.
   void mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options, QuadBuffer& out);

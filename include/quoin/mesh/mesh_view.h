@@ -44,7 +44,7 @@ struct MeshView {
   return view;
 }
 
-/// Lifetime: likewise.
+/// Lifetime: the mesh must outlive the view, unchanged.
 [[nodiscard]] inline MeshView view_of(const SmoothMesh& mesh) {
   MeshView view;
   view.positions = mesh.positions;

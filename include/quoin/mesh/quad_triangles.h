@@ -50,7 +50,7 @@ inline constexpr std::array<std::array<std::uint8_t, 6>, 4> kTriangleCorners = {
 [[nodiscard]] inline IVec3 unpacked_corner(std::uint32_t packed) {
   return {static_cast<int>(packed & 255U), static_cast<int>(packed >> 8 & 255U), static_cast<int>(packed >> 16)};
 }
-/// Likewise, unpacked.
+/// The positions of all four corners, as Quad::corner gives them one by one.
 [[nodiscard]] inline std::array<IVec3, 4> corners_of(const Quad& quad) {
   const std::array<std::uint32_t, 4> packed = packed_corners_of(quad);
   return {unpacked_corner(packed[0]), unpacked_corner(packed[1]), unpacked_corner(packed[2]),
@@ -112,7 +112,7 @@ void write_indices(std::span<const Quad> quads, std::size_t first_vertex, std::s
   }
 }
 
-/// Likewise the indices of a mesh that has some (BlockyTriangles, SmoothChunkMesh, SmoothMesh), each more by
+/// Writes the indices of a mesh that has some (BlockyTriangles, SmoothChunkMesh, SmoothMesh), each more by
 /// `first_vertex`.
 ///
 /// Requires: `out` is as long as `indices`, which is three a triangle; every sum is less than the greatest Index.

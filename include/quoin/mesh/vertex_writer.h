@@ -105,9 +105,10 @@ class VertexWriter {
   /// Requires: can_write(layout, VertexSource::Quads); room for the bytes needed; where positions are whole numbers,
   ///           `origin` is, and their sums are within the format's range.
   void write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const;
-  /// The mesh's vertices. Requires: likewise, of SmoothChunk.
+  /// The mesh's vertices. Requires: can_write(layout, VertexSource::SmoothChunk); room for the bytes needed.
   void write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const;
-  /// The view's vertices. Requires: likewise, of Blocks or Smooth, which `has_albedo` tells.
+  /// The view's vertices. Requires: can_write(layout, source), where `has_albedo` tells Smooth from Blocks; room for
+  /// the bytes needed.
   void write(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const;
 
  private:

@@ -14,7 +14,7 @@
 namespace quoin {
 
 /// A device that Vulkan offers.
-struct VulkanDevice {
+struct VulkanDeviceInfo {
   std::string name;
   std::string kind;     ///< discrete, integrated, virtual, cpu or other
   std::string missing;  ///< what it lacks of what Quoin needs; empty: nothing
@@ -23,13 +23,13 @@ struct VulkanDevice {
 /// The devices of this machine, in Vulkan's order.
 ///
 /// Errors: Unsupported when the library was built without Vulkan, when there is no loader, or no driver.
-[[nodiscard]] Result<std::vector<VulkanDevice>> vulkan_devices();
+[[nodiscard]] Result<std::vector<VulkanDeviceInfo>> vulkan_devices();
 
 /// Returns the index of the device that `wanted` names: a number is an index, anything else a part of a name, in
 /// capitals or not; empty: the first of the best kind (discrete, integrated, virtual, cpu, other) that lacks nothing.
 ///
 /// Errors: Unsupported when there is no such device, naming those there are, and when it lacks something, saying what.
-[[nodiscard]] Result<std::size_t> choose_vulkan_device(std::span<const VulkanDevice> devices,
+[[nodiscard]] Result<std::size_t> choose_vulkan_device(std::span<const VulkanDeviceInfo> devices,
                                                        const std::string& wanted);
 
 /// What an instance and a device that a program makes by itself need for Quoin's renderers.
@@ -48,13 +48,14 @@ struct VulkanRequirements {
 [[nodiscard]] VulkanRequirements vulkan_requirements();
 
 /// Returns how a physical device of a program's own instance is called, and what it lacks. `instance` must have been
-/// made with at least `vulkan_requirements().api_version`. `find_function` is vkGetInstanceProcAddr; null: that of the
-/// loader that the library finds (libvulkan.so.1).
+/// made with at least `vulkan_requirements().api_version`. `get_instance_proc_addr` is vkGetInstanceProcAddr; null:
+/// that of the loader that the library finds (libvulkan.so.1).
 ///
 /// Errors: InvalidArgument when a handle is null; Unsupported when the library was built without Vulkan, or when there
 ///         is no loader.
-[[nodiscard]] Result<VulkanDevice> describe_vulkan_device(VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
-                                                          VulkanFunctionFinder find_function = nullptr);
+[[nodiscard]] Result<VulkanDeviceInfo> describe_vulkan_device(
+    VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
+    VulkanGetInstanceProcAddr get_instance_proc_addr = nullptr);
 
 /// Memory for a structure that `enable_vulkan_features` chains.
 struct VulkanFeatureStorage {
@@ -78,7 +79,8 @@ struct BorrowedVulkanDevice {
   VkQueue_T* queue = nullptr;                     ///< VkQueue that computes; for meshes it must draw too
   std::uint32_t queue_family = 0;                 ///< of that queue
   bool fill_mode_non_solid = false;               ///< that feature is enabled: wireframes need it
-  VulkanFunctionFinder find_function = nullptr;   ///< vkGetInstanceProcAddr; null: the loader's (libvulkan.so.1)
+  /// vkGetInstanceProcAddr; null: the loader's (libvulkan.so.1).
+  VulkanGetInstanceProcAddr get_instance_proc_addr = nullptr;
   /// Vulkan wants one thread at a time to use a queue. Quoin submits from the thread that calls it, and only while it
   /// runs `use`, which this must do once, before it returns: with the lock held that guards the queue. Empty: nobody
   /// else uses the queue during calls of Quoin's that may draw, upload or read.

@@ -23,10 +23,10 @@ using VulkanImageHandle = std::conditional_t<sizeof(void*) == 8, VkImage_T*, std
 /// PFN_vkVoidFunction and PFN_vkGetInstanceProcAddr. Windows of 32 bits calls these in another way.
 #if defined(_WIN32) && !defined(_WIN64)
 using VulkanFunction = void(__stdcall*)();
-using VulkanFunctionFinder = VulkanFunction(__stdcall*)(VkInstance_T* instance, const char* name);
+using VulkanGetInstanceProcAddr = VulkanFunction(__stdcall*)(VkInstance_T* instance, const char* name);
 #else
 using VulkanFunction = void (*)();
-using VulkanFunctionFinder = VulkanFunction (*)(VkInstance_T* instance, const char* name);
+using VulkanGetInstanceProcAddr = VulkanFunction (*)(VkInstance_T* instance, const char* name);
 #endif
 
 }  // namespace quoin

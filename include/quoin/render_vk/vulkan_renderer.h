@@ -44,8 +44,8 @@ enum class Accumulation : std::uint8_t {
 ///          of the last update: pictures with `RenderOptions::detail` require that it is still there, unedited.
 /// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
-/// Errors:  LimitExceeded when a memory is full; Unsupported when the device was lost, after which a new renderer is
-///          needed.
+/// Errors:  LimitExceeded when a memory is full; DeviceLost, after which a new renderer is needed; Unsupported for what
+///          the driver refuses otherwise.
 /// Threads: one at a time.
 class VulkanRenderer {
  public:
@@ -64,7 +64,7 @@ class VulkanRenderer {
   VulkanRenderer& operator=(VulkanRenderer&&) noexcept;
   ~VulkanRenderer();
 
-  [[nodiscard]] const VulkanDevice& device() const;
+  [[nodiscard]] const VulkanDeviceInfo& device() const;
 
   /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards but for levels of detail
   /// (see above). Draws the instances that `filter` lets pass.

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string_view>
 
+#include <glm/mat4x4.hpp>
+
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene.h>
@@ -21,8 +23,8 @@ struct Camera {
   DVec3 up{0.0, 1.0, 0.0};
   DVec3 forward{0.0, 0.0, -1.0};
   Projection projection = Projection::Perspective;
-  double vertical_fov = 0.0;  ///< perspective: radians, more than 0 and less than pi
-  double view_height = 0.0;   ///< orthographic: world units from the picture's lower to its upper edge
+  double vertical_fov = 1.0;  ///< perspective: radians, more than 0 and less than pi
+  double view_height = 1.0;   ///< orthographic: world units from the picture's lower to its upper edge
 };
 
 /// A perspective camera at `position` that looks at `target`, upright (+Y up; where it looks straight up or down, the
@@ -31,6 +33,10 @@ struct Camera {
 /// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view (vertical,
 ///         radians) is not more than 0 and less than pi.
 [[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov);
+
+/// The view matrix: x to the right, y up, and -z forward, as glm::perspective(camera.vertical_fov, aspect, near, far)
+/// and glTF's cameras expect.
+[[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);
 
 /// The ray of a point of the picture, in world space: from the camera for a perspective one, from the picture's plane
 /// for an orthographic one. `direction` is unit, so distances along it are world units.

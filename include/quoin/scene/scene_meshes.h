@@ -53,8 +53,8 @@ struct MeshPart {
 /// What was counted while meshing; a part that is placed several times counts once.
 struct MeshStats {
   std::int64_t faces_visible = 0;  ///< of blocks
-  std::int64_t faces_total = 0;    ///< likewise
-  std::int64_t quads = 0;          ///< likewise
+  std::int64_t faces_total = 0;    ///< of blocks
+  std::int64_t quads = 0;          ///< of blocks
   std::int64_t triangles = 0;
   std::int64_t vertices = 0;
   std::int64_t solid_samples = 0;  ///< of a volume
@@ -89,8 +89,8 @@ struct SmoothSceneOptions {
   InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
 };
 
-/// Likewise, with smooth surfaces around the voxels, as field_from_grid and build_smooth_mesh make them. Placements are
-/// in the order of their parts; grids without a surface are left out.
+/// Meshes every grid that a drawn instance places, once, with smooth surfaces around the voxels, as field_from_grid and
+/// build_smooth_mesh make them. Placements are in the order of their parts; grids without a surface are left out.
 ///
 /// Types:  every voxel that is not air is solid and opaque.
 /// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.

@@ -171,7 +171,7 @@ std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type
   return index;
 }
 
-std::uint64_t Chunk::set_row(int y, int z, std::uint64_t mask, VoxelType type) {
+std::uint64_t Chunk::fill_row(int y, int z, std::uint64_t mask, VoxelType type) {
   const std::optional<VoxelType> old = one_type_of_row(*this, y, z);
   const auto where = [&](VoxelType wanted) {
     if (old.has_value()) return *old == wanted ? kAllVoxels : 0;
@@ -283,7 +283,7 @@ void Chunk::fill_box(const IBox& box, VoxelType type,
     if (part.empty()) continue;
     for (int row_z = part.min.z; row_z < part.max.z; ++row_z) {
       for (int row_y = part.min.y; row_y < part.max.y; ++row_y) {
-        const std::uint64_t changed = set_row(row_y, row_z, mask, type);
+        const std::uint64_t changed = fill_row(row_y, row_z, mask, type);
         if (changed != 0) on_change(row_y, row_z, changed);
       }
     }

@@ -94,7 +94,7 @@ TEST_P(ChunkOfTypes, HoldsWhatAPlainArrayHolds) {
       voxel = type;
       changed |= std::uint64_t{1} << x;
     }
-    ASSERT_EQ(chunk.set_row(y, z, mask, type), changed);
+    ASSERT_EQ(chunk.fill_row(y, z, mask, type), changed);
   }
   expect_holds(chunk, dense);
   Chunk packed = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));

@@ -177,7 +177,7 @@ struct ConnectedPieces::Impl {
 // Makes the parts of these chunks anew.
 void ConnectedPieces::Impl::find_parts(const Grid& grid, const std::vector<IVec3>& chunks, Threads threads) {
   std::vector<ChunkParts> made(chunks.size());
-  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
+  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
   parallel_for(tasks, threads, [&](std::size_t task) {
     const auto scratch = std::make_unique<ChunkParts::Scratch>();
     for (std::size_t i = task; i < chunks.size(); i += tasks) {
@@ -218,7 +218,7 @@ void ConnectedPieces::Impl::find_links(const std::vector<IVec3>& chunks, Threads
       if (!std::binary_search(chunks.begin(), chunks.end(), before, by_zyx)) add(before, next);
     }
   }
-  const std::size_t tasks = std::min<std::size_t>(pairs.size(), std::size_t{8} * resolve(threads));
+  const std::size_t tasks = std::min<std::size_t>(pairs.size(), std::size_t{8} * thread_count(threads));
   parallel_for(tasks, threads, [&](std::size_t task) {
     for (std::size_t i = task; i < pairs.size(); i += tasks) {
       const auto other = entries.find(pairs[i].at + next_chunk(pairs[i].next));
@@ -427,7 +427,7 @@ Grid ConnectedPieces::extract(std::size_t piece) const {
     }
     Impl::for_each_row(entry, of_piece, [&](IVec3 row, std::uint64_t voxels) {
       entry.parts.chunk().read_row(row.y, row.z, types);
-      grid.set_row(entry.at * kChunkEdge + row, voxels, types);
+      grid.write_row(entry.at * kChunkEdge + row, voxels, types);
     });
   });
   return grid;
@@ -444,7 +444,7 @@ std::int64_t ConnectedPieces::remove_from(Grid& grid, std::size_t piece) const {
       return;
     }
     Impl::for_each_row(entry, of_piece, [&](IVec3 row, std::uint64_t voxels) {
-      changed += grid.set_row(entry.at * kChunkEdge + row, voxels, kAirRow);
+      changed += grid.write_row(entry.at * kChunkEdge + row, voxels, kAirRow);
     });
   });
   return changed;

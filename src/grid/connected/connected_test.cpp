@@ -85,7 +85,7 @@ struct Random {
     const IVec3 first = place();
     const IVec3 size{below(60), below(40), below(50)};
     const IVec3 last = glm::min(first + size, IVec3(79));
-    grid.fill_box(first, last, static_cast<VoxelType>(below(types)));
+    grid.fill_box({first, last + 1}, static_cast<VoxelType>(below(types)));
   }
 };
 
@@ -93,7 +93,7 @@ struct Random {
 Grid random_grid(Random& random) {
   Grid grid;
   const int types = 2 + random.below(12);
-  if (random.below(2) == 0) grid.fill_box({0, -64, 0}, {63, -1, 63}, 1);
+  if (random.below(2) == 0) grid.fill_box({{0, -64, 0}, {64, 0, 64}}, 1);
   for (int i = 0; i < 10; ++i) random.add_box(grid, types);
   const IVec3 dust = random.place();
   grid.edit({dust, glm::min(dust + 40, IVec3(79))},
@@ -154,7 +154,7 @@ TEST(ConnectedPieces, FollowEdits) {
     for (int edit = 0; edit < 6; ++edit) {
       pieces.update(grid, {1});
       expect_pieces(pieces, grid, options);
-      if (edit == 3) grid.fill_box({-64, -64, -64}, {-1, -1, 79}, kAir);
+      if (edit == 3) grid.fill_box({{-64, -64, -64}, {0, 0, 80}}, kAir);
       grid.fill_sphere(DVec3(random.place()), random.below(20), kAir);
       if (random.below(2) == 0) random.add_box(grid, 4);
       grid.set(random.place(), 1);
@@ -220,7 +220,7 @@ TEST(ConnectedPieces, ExtractedMakeUpTheGrid) {
 
 TEST(ConnectedPieces, WholeChunksOfAPieceAreShared) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {200, 90, 70}, 1);
+  grid.fill_box({{0, 0, 0}, {201, 91, 71}}, 1);
   grid.set({5, 5, 5}, 2);
   grid.set({300, 0, 0}, 3);
   ConnectedPieces pieces;
@@ -266,12 +266,12 @@ TEST(ConnectedPieces, WhatIsCutFromTheGroundIsApartFromIt) {
   constexpr int kMax = std::numeric_limits<int>::max();
   const IBox ground{{kMin, 0, kMin}, {kMax, 1, kMax}};
   Grid world;
-  world.fill_box({-100, 0, -100}, {100, 3, 100}, 1);
-  world.fill_box({10, 4, 10}, {12, 150, 12}, 2);  // a tower of three chunks
+  world.fill_box({{-100, 0, -100}, {101, 4, 101}}, 1);
+  world.fill_box({{10, 4, 10}, {13, 151, 13}}, 2);  // a tower of three chunks
   ConnectedPieces pieces;
   pieces.update(world);
   EXPECT_TRUE(pieces.apart_from(ground).empty());
-  world.fill_box({0, 40, 0}, {20, 40, 20}, kAir);
+  world.fill_box({{0, 40, 0}, {21, 41, 21}}, kAir);
   pieces.update(world);
   const std::vector<std::size_t> loose = pieces.apart_from(ground);
   ASSERT_EQ(loose.size(), 1U);

@@ -161,7 +161,7 @@ class BoxCopy {
     const bool is_whole = place.size() == IVec3(kChunkEdge);
     if (const auto type = one_type(chunks)) {
       if (*type == kAir && !options_.copy_air) return;
-      changed_ += is_whole ? to_.put_chunk(at, Chunk(*type)) : to_.fill_box(place.min, place.max - 1, *type);
+      changed_ += is_whole ? to_.put_chunk(at, Chunk(*type)) : to_.fill_box(place, *type);
       return;
     }
     if (is_whole && orientation_ == AxisOrientation() && chunks.size() == IVec3(1)) {

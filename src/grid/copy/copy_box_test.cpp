@@ -55,10 +55,10 @@ struct Random {
     const int types = 1 + below(300);
     for (int i = 0; i < 6; ++i) {
       const IVec3 first = place(100);
-      made.fill_box(first, first + IVec3(below(90), below(90), below(90)), static_cast<VoxelType>(below(types)));
+      made.fill_box({first, first + IVec3(below(90), below(90), below(90)) + 1}, static_cast<VoxelType>(below(types)));
     }
     const IVec3 chunk = place(2);
-    made.fill_box(chunk * kChunkEdge, (chunk + IVec3(2, 1, 1)) * kChunkEdge - 1, 9);
+    made.fill_box({chunk * kChunkEdge, (chunk + IVec3(2, 1, 1)) * kChunkEdge}, 9);
     for (int i = 0; i < 400; ++i) made.set(place(90), static_cast<VoxelType>(below(types)));
     return made;
   }
@@ -189,7 +189,7 @@ TEST(CopyBox, OfAlmostEmptyWorldsLooksOnlyAtWhatIsThere) {
 
 TEST(CopyBox, LeavesOutWhatWouldLieOutsideTheWorld) {
   Grid from;
-  from.fill_box({0, 0, 0}, {9, 9, 9}, 1);
+  from.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   Grid to;
   EXPECT_EQ(copy_box(from, {IVec3(0), IVec3(10)}, to, {kWorldEdge - 5, 0, 0}), 500);
   EXPECT_EQ(to.get(kWorldEdge - 1, 9, 9), 1);

@@ -74,7 +74,7 @@ std::uint64_t DensityStore::write_row(DensityChunk& samples, int y, int z, int f
   for (std::uint64_t left = has_material; left != 0;) {
     const VoxelType type = row.materials[static_cast<std::size_t>(std::countr_zero(left))];
     const std::uint64_t same = left & mask_where(first, end, [&](std::size_t x) { return row.materials[x] == type; });
-    repainted |= samples.materials().set_row(y, z, same, type);
+    repainted |= samples.materials().fill_row(y, z, same, type);
     left &= ~same;
   }
   return changed | (repainted & had_material);

@@ -55,7 +55,7 @@ Grid random_model(unsigned seed) {
   for (int i = 0; i < 6; ++i) {
     grid.fill_sphere({place(), place(), place()}, static_cast<double>(random() % 20), static_cast<VoxelType>(i + 1));
     const IVec3 first{place(), place(), place()};
-    grid.fill_box(first, first + IVec3(random() % 40, random() % 3, random() % 40), 9);
+    grid.fill_box({first, first + IVec3(random() % 40, random() % 3, random() % 40) + 1}, 9);
     grid.set({place(), place(), place()}, 7);
   }
   return grid;
@@ -104,7 +104,7 @@ TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
 
 TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   Grid grid;
-  grid.fill_box({-100, -100, -40}, {100, 9, 40}, 3);
+  grid.fill_box({{-100, -100, -40}, {101, 10, 41}}, 3);
   const DensityGrid field = field_from_grid(grid);
   for (int y = 0; y < 30; ++y) {
     // The smoothing sees no more than 8.5, so it bends the last values a little.
@@ -132,7 +132,7 @@ TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
 
 TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {64 * 5 - 1, 64 * 5 - 1, 64 * 5 - 1}, 3);
+  grid.fill_box({{0, 0, 0}, {64 * 5, 64 * 5, 64 * 5}}, 3);
   const DensityGrid field = field_from_grid(grid);
   EXPECT_TRUE(field.find_chunk({2, 2, 2})->uniform().has_value());
   EXPECT_TRUE(field.find_chunk({1, 1, 1})->uniform().has_value());

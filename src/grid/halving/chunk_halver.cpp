@@ -41,7 +41,7 @@ Chunk ChunkHalver::make() {
         const std::uint64_t of_half = solid >> (half * kHalfEdge) & kHalfRow;
         if (of_half != 0) fill_half(half, y, z, of_half);
       }
-      for (const Run& run : runs_) made.set_row(y, z, run.cells, run.type);
+      for (const Run& run : runs_) made.fill_row(y, z, run.cells, run.type);
     }
   }
   made.compact();

@@ -92,7 +92,7 @@ Grid random_grid(std::mt19937& random) {
     const IVec3 at = centres.at(i % 3U) + IVec3(below(40) - 20, below(40) - 20, below(40) - 20);
     IVec3 size{below(3), below(3), below(3)};
     if (i % 2 == 0) size = unit(below(3)) * below(12);
-    grid.fill_box(at, at + size, static_cast<VoxelType>(below(6) % 5));
+    grid.fill_box({at, at + size + 1}, static_cast<VoxelType>(below(6) % 5));
   }
   return grid;
 }
@@ -139,9 +139,9 @@ TEST(Downsample, EmptyFullAndUniform) {
   const VoxelRegistry types = some_types();
   EXPECT_EQ(halved(Grid(), types).chunk_count(), 0U);
   Grid block;
-  block.fill_box({-128, -128, 0}, {127, 127, 255}, 3);
+  block.fill_box({{-128, -128, 0}, {128, 128, 256}}, 3);
   Grid expected;
-  expected.fill_box({-64, -64, 0}, {63, 63, 127}, 3);
+  expected.fill_box({{-64, -64, 0}, {64, 64, 128}}, 3);
   EXPECT_TRUE(are_equal(halved(block, types), expected));
 }
 
@@ -155,7 +155,7 @@ TEST(Downsample, RodsStayWholeWhereverTheyLie) {
         first[axis] = -70;
         IVec3 last = first + (IVec3(1) - unit(axis)) * (width - 1);
         last[axis] = 69;
-        grid.fill_box(first, last, 3);
+        grid.fill_box({first, last + 1}, 3);
         const Grid coarse = halved(grid, types);
         for (int along = -35; along < 35; ++along) {
           int cells = 0;
@@ -171,23 +171,23 @@ TEST(Downsample, RodsStayWholeWhereverTheyLie) {
 TEST(Downsample, SpecksGoAndStepsOfASurfaceDoNotGrow) {
   const VoxelRegistry types = some_types();
   Grid grid;
-  grid.fill_box({-20, -20, -20}, {19, -1, 19}, 3);
+  grid.fill_box({{-20, -20, -20}, {20, 0, 20}}, 3);
   const std::int64_t ground = halved(grid, types).voxel_count();
-  grid.fill_box({-20, 0, 3}, {19, 0, 3}, 3);  // a kerb on the ground
+  grid.fill_box({{-20, 0, 3}, {20, 1, 4}}, 3);  // a kerb on the ground
   grid.set({5, 30, 5}, 3);
-  grid.fill_box({5, 40, 5}, {6, 40, 5}, 3);
+  grid.fill_box({{5, 40, 5}, {7, 41, 6}}, 3);
   EXPECT_EQ(halved(grid, types).voxel_count(), ground);
 }
 
 TEST(Downsample, WhatLiesOpenGivesTheColourAndOpaqueBeatsTransparent) {
   const VoxelRegistry types = some_types();
   Grid lawn;
-  lawn.fill_box({0, 0, 0}, {7, 6, 7}, 4);
-  lawn.fill_box({0, 7, 0}, {7, 7, 7}, 3);  // half of each topmost cell, on top
+  lawn.fill_box({{0, 0, 0}, {8, 7, 8}}, 4);
+  lawn.fill_box({{0, 7, 0}, {8, 8, 8}}, 3);  // half of each topmost cell, on top
   EXPECT_EQ(halved(lawn, types).get({1, 3, 1}), 3);
   EXPECT_EQ(halved(lawn, types).get({1, 2, 1}), 4);
   Grid framed;
-  framed.fill_box({0, 0, 0}, {1, 1, 1}, 1);
+  framed.fill_box({{0, 0, 0}, {2, 2, 2}}, 1);
   framed.set({0, 0, 0}, 4);
   EXPECT_EQ(halved(framed, types).get({0, 0, 0}), 4);
 }
@@ -208,8 +208,8 @@ TEST(Downsample, APyramidFollowsEdits) {
     ASSERT_EQ(pyramid.levels(), 3);
     const auto near_border = [&] { return 64 * (static_cast<int>(random() % 5) - 2) - static_cast<int>(random() % 4); };
     const IVec3 at{near_border(), near_border(), near_border()};
-    if (step == 5) grid.fill_box({-30, -30, -30}, {30, 30, 30}, kAir);
-    grid.fill_box(at, at + IVec3(static_cast<int>(random() % 5)), static_cast<VoxelType>(random() % 5));
+    if (step == 5) grid.fill_box({{-30, -30, -30}, {31, 31, 31}}, kAir);
+    grid.fill_box({at, at + IVec3(static_cast<int>(random() % 5)) + 1}, static_cast<VoxelType>(random() % 5));
   }
   grid.clear();
   pyramid.update(grid, types, 3);
@@ -219,13 +219,13 @@ TEST(Downsample, APyramidFollowsEdits) {
 TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
   const VoxelRegistry types = some_types();
   Grid grid;
-  grid.fill_box({0, 0, 0}, {600, 20, 20}, 3);
+  grid.fill_box({{0, 0, 0}, {601, 21, 21}}, 3);
   GridPyramid pyramid;
   pyramid.update(grid, types, 1);
   const Grid* level = &pyramid.level(1);
   ChangeCursor cursor = level->cursor();
   grid.set({5, 5, 5}, 4);
-  grid.fill_box({4, 4, 4}, {5, 5, 5}, 4);
+  grid.fill_box({{4, 4, 4}, {6, 6, 6}}, 4);
   pyramid.update(grid, types, 1);
   EXPECT_EQ(&pyramid.level(1), level);
   EXPECT_EQ(level->get({2, 2, 2}), 4);
@@ -237,14 +237,14 @@ TEST(Downsample, AnUpdateLeavesUntouchedChunksAlone) {
 TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
   const VoxelRegistry types = some_types();
   Grid grid;
-  grid.fill_box({-150, -150, -150}, {150, 150, 150}, 3);
+  grid.fill_box({{-150, -150, -150}, {151, 151, 151}}, 3);
   GridPyramid pyramid;
   pyramid.update(grid, types, 1);
   const auto made_anew = [&](IVec3 voxel) {
     std::vector<Chunk> before;
     const std::vector<IVec3> chunks = pyramid.level(1).chunks();
     for (const IVec3 chunk : chunks) before.push_back(*pyramid.level(1).find_chunk(chunk));
-    grid.fill_box(voxel, voxel, 4);
+    grid.fill_box({voxel, voxel + 1}, 4);
     pyramid.update(grid, types, 1);
     int anew = 0;
     for (std::size_t i = 0; i < chunks.size(); ++i) {
@@ -253,10 +253,10 @@ TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
     return anew;
   };
   grid.set({0, 0, 0}, 4);  // chunks of one type share nothing that could tell
-  grid.fill_box({-1, -1, -1}, {-1, -1, -1}, 4);
+  grid.fill_box({{-1, -1, -1}, {0, 0, 0}}, 4);
   for (const int x : {-40, 40}) {
     for (const int y : {-40, 40}) {
-      for (const int z : {-40, 40}) grid.fill_box({x, y, z}, {x + 2, y + 2, z + 2}, 4);
+      for (const int z : {-40, 40}) grid.fill_box({{x, y, z}, {x + 3, y + 3, z + 3}}, 4);
     }
   }
   pyramid.update(grid, types, 1);
@@ -271,7 +271,7 @@ TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
 TEST(Downsample, AGridOfWhichNothingWouldBeLeftHasFewerLevels) {
   const VoxelRegistry types = some_types();
   Grid grid;
-  grid.fill_box({0, 0, 0}, {3, 3, 3}, 3);
+  grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 3);
   GridPyramid pyramid;
   pyramid.update(grid, types, 4);
   EXPECT_EQ(pyramid.levels(), 2);

@@ -44,8 +44,8 @@ void write_colours(const MeshView& view, BlockWriter& out) {
     for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(linear_colour(view, i));
   }
   std::array<std::array<std::uint8_t, 4>, 4> greys;
-  for (std::uint8_t i = 0; i < greys.size(); ++i) {
-    const std::uint8_t grey = occlusion_grey(i);
+  for (std::size_t i = 0; i < greys.size(); ++i) {
+    const std::uint8_t grey = occlusion_grey(static_cast<std::uint8_t>(i));
     greys[i] = {grey, grey, grey, 255};
   }
   for (const std::uint8_t occlusion : view.block_occlusion) out.put(greys[occlusion]);
@@ -132,8 +132,8 @@ Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buf
   std::uint64_t total = kHeaderBytes + kChunkHeaderBytes + json_bytes;
   if (buffer_bytes > 0) total += kChunkHeaderBytes + buffer_bytes;
   if (total > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::LimitExceeded,
-                "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
+    return make_error(ErrorCode::LimitExceeded,
+                      "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
   }
   return total;
 }

@@ -21,8 +21,8 @@ inline GridHandle add_asymmetric_grid(Scene& scene, const std::string& name) {
   const VoxelType red = add_type(scene, "red", {200, 10, 20, 255});
   SceneGrid grid;
   grid.name = name;
-  grid.grid.fill_box({0, 0, 0}, {0, 4, 0}, grey);
-  grid.grid.fill_box({1, 0, 0}, {3, 0, 0}, grey);
+  grid.grid.fill_box({{0, 0, 0}, {1, 5, 1}}, grey);
+  grid.grid.fill_box({{1, 0, 0}, {4, 1, 1}}, grey);
   grid.grid.set({3, 1, 0}, red);
   grid.grid.set({0, 1, 1}, grey);
   grid.pivot = {2.0, 2.5, 0.5};

@@ -53,7 +53,7 @@ struct Header {
 };
 
 Error bad(std::string message, std::size_t at) {
-  return fail(ErrorCode::BadFormat, std::move(message), {}, at);
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
 Result<int> read_size(HeaderReader& reader, const char* what) {
@@ -67,7 +67,7 @@ Result<int> read_size(HeaderReader& reader, const char* what) {
 Result<Header> read_header(std::span<const std::byte> bytes) {
   HeaderReader reader(bytes);
   const std::string_view magic = reader.word();
-  if (magic == "PF") return fail(ErrorCode::Unsupported, "a PFM in colour; only greyscale ones are read", {}, 0);
+  if (magic == "PF") return make_error(ErrorCode::Unsupported, "a PFM in colour; only greyscale ones are read", {}, 0);
   if (magic != "Pf" || reader.word_at() != 0) return bad("not a PFM: it does not begin with \"Pf\"", 0);
   Header header;
   const auto width = read_size(reader, "width");
@@ -121,7 +121,7 @@ Result<std::vector<std::byte>> write_pfm(const FloatImage& picture) {
   const auto width = static_cast<std::size_t>(picture.width);
   const auto height = static_cast<std::size_t>(picture.height);
   if (picture.width <= 0 || picture.height <= 0 || picture.values.size() != width * height) {
-    return fail(ErrorCode::InvalidArgument, "the picture's size is not that of its values");
+    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its values");
   }
   const std::string header = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n";
   const auto head = std::as_bytes(std::span(header));

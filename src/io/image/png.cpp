@@ -71,7 +71,7 @@ Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effor
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
   const bool written = info != nullptr && write_image(png, info, image, effort, out);
   png_destroy_write_struct(&png, &info);
-  if (!written) return fail(ErrorCode::LimitExceeded, "the picture cannot be encoded as PNG");
+  if (!written) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as PNG");
   return out;
 }
 
@@ -79,22 +79,22 @@ Result<PngImage> decode_png(std::span<const std::byte> file) {
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_memory(&header, file.data(), file.size()) == 0) {
-    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+    return make_error(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
   }
   if (std::uint64_t{header.width} * header.height > (std::uint64_t{1} << 28)) {
     png_image_free(&header);
-    return fail(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
+    return make_error(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
   }
   // Deflate makes at most 1,032 bytes of one, and a pixel takes a bit or more.
   if (std::uint64_t{header.width} * header.height > std::uint64_t{8} * 1032 * file.size()) {
     png_image_free(&header);
-    return fail(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
+    return make_error(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
   }
   header.format = PNG_FORMAT_RGBA;
   PngImage image{header.width, header.height, 4, {}};
   image.pixels.resize(PNG_IMAGE_SIZE(header));
   if (png_image_finish_read(&header, nullptr, image.pixels.data(), 0, nullptr) == 0) {
-    return fail(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
+    return make_error(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
   }
   return image;
 }
@@ -103,7 +103,7 @@ Result<std::vector<std::byte>> write_png(const Image& picture) {
   const auto width = static_cast<std::uint32_t>(picture.width);
   const auto height = static_cast<std::uint32_t>(picture.height);
   if (picture.width <= 0 || picture.height <= 0 || picture.rgb.size() != std::size_t{3} * width * height) {
-    return fail(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
+    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
   }
   return encode_png({width, height, 3, picture.rgb}, PngEffort::Quick);
 }

@@ -147,10 +147,9 @@ class ObjText {
  public:
   ObjText(const SceneMeshes& meshes, const MaterialPalette& palette, BlockWriter& out)
       : meshes_(meshes), palette_(palette), lines_(out), out_(out) {
-    for (std::uint8_t level = 0; level < greys_.size(); ++level) {
-      std::string grey = " ";
-      grey += ObjLines::text_of(occlusion_brightness(level));
-      greys_[level] = grey + grey + grey;
+    for (std::size_t occlusion = 0; occlusion < greys_.size(); ++occlusion) {
+      const std::string grey = ObjLines::text_of(occlusion_brightness(static_cast<std::uint8_t>(occlusion)));
+      for (int channel = 0; channel < 3; ++channel) greys_[occlusion].append(" ").append(grey);
     }
   }
 

@@ -76,7 +76,7 @@ class Obj : public ::testing::Test {
     lamp.emission = 3.0F;
     SceneGrid grid;
     grid.name = "a crane";
-    grid.grid.fill_box({0, 0, 0}, {3, 0, 0}, *scene_.types.add(stone));
+    grid.grid.fill_box({{0, 0, 0}, {4, 1, 1}}, *scene_.types.add(stone));
     grid.grid.set({0, 1, 0}, *scene_.types.add(glass));
     grid.grid.set({3, 1, 0}, *scene_.types.add(lamp));
     grid.pivot = {2, 1, 0.5};

@@ -127,9 +127,9 @@ Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::fil
   });
   constexpr std::uint64_t kMost = 0x7FFF'FFFF;
   if (counts.vertices > kMost || counts.faces > kMost) {
-    return fail(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(counts.vertices) + " vertices and " +
-                                              std::to_string(counts.faces) +
-                                              " triangles, and a PLY file holds 2147483647 of each");
+    return make_error(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(counts.vertices) +
+                                                    " vertices and " + std::to_string(counts.faces) +
+                                                    " triangles, and a PLY file holds 2147483647 of each");
   }
   std::string header = header_of(counts);
   const std::uint64_t bytes = header.size() + counts.vertices * kVertexBytes + counts.faces * kFaceBytes;

@@ -82,18 +82,20 @@ Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool i
   return instance;
 }
 
-Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options) {
+Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options,
+                                const Progress& progress) {
   const auto format = detect_format(path);
   if (!format) return format.error();
   if (*format == FileFormat::Scene) {
-    return fail(ErrorCode::Unsupported, "a scene file within a scene file", path.string());
+    return make_error(ErrorCode::Unsupported, "a scene file within a scene file", path.string());
   }
-  return load_scene(path, options);
+  return load_scene(path, options, progress);
 }
 
 }  // namespace
 
-Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options) {
+Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options,
+                                    const Progress& progress) {
   const auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
   if (!file) return file.error();
   LoadedScene loaded;
@@ -101,15 +103,13 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   loaded.sun = file->sun;
   loaded.camera = file->camera;
   std::map<std::string, Body, std::less<>> bodies;
-  LoadOptions of_source = options;
   for (const SceneFile::Source& source : file->sources) {
     const double before = static_cast<double>(bodies.size());
-    if (options.progress) {
-      of_source.progress = [&](double share) {
-        return options.progress((before + share) / static_cast<double>(file->sources.size()));
-      };
+    Progress of_source;
+    if (progress) {
+      of_source = [&](double share) { return progress((before + share) / static_cast<double>(file->sources.size())); };
     }
-    auto part = load_source(path.parent_path() / source.file, of_source);
+    auto part = load_source(path.parent_path() / source.file, options, of_source);
     if (!part) return with_path(std::move(part), path);
     for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
     auto body = with_path(take_over(part->scene, loaded.scene), path);

@@ -304,19 +304,19 @@ int depth_of(std::string_view text) {
 }  // namespace
 
 Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
-  if (text.size() > kMaxBytes) return fail(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB");
+  if (text.size() > kMaxBytes) return make_error(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB");
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
   if (depth_of(chars) > kMaxDepth) {
-    return fail(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
+    return make_error(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
   }
   SceneFile scene;
   Faults faults;
   try {
     read_file_object(Json::parse(chars), scene, faults);
   } catch (const Json::parse_error& error) {
-    return fail(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
+    return make_error(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
   } catch (const Json::exception&) {
-    return fail(ErrorCode::BadFormat, "a number too large for any computer");
+    return make_error(ErrorCode::BadFormat, "a number too large for any computer");
   }
   if (faults.error()) return *faults.error();
   return scene;

@@ -35,12 +35,12 @@ Result<Json> json_of(const Camera& camera) {
   const DVec3 reach = glm::abs(camera.position);
   const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
   if (camera.projection != Camera::Projection::Perspective) {
-    return fail(ErrorCode::Unsupported, "a scene file holds perspective cameras only");
+    return make_error(ErrorCode::Unsupported, "a scene file holds perspective cameras only");
   }
   const auto again = look_at(camera.position, target, camera.vertical_fov);
   if (!again) return again.error();
   if (glm::distance(again->up, camera.up) > 1e-6) {
-    return fail(ErrorCode::Unsupported, "a scene file holds upright cameras only");
+    return make_error(ErrorCode::Unsupported, "a scene file holds upright cameras only");
   }
   return Json{{"position", triple(camera.position)},
               {"look_at", triple(target)},
@@ -67,13 +67,14 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene) {
   try {
     text = json.dump(2) + "\n";
   } catch (const Json::type_error&) {  // of text: numbers that are not finite become null
-    return fail(ErrorCode::InvalidArgument, "a name, id or path is not UTF-8");
+    return make_error(ErrorCode::InvalidArgument, "a name, id or path is not UTF-8");
   }
   const auto bytes = std::as_bytes(std::span(text));
   // Whatever the reader refuses is not written.
   if (const auto read = parse_scene_file(bytes); !read) {
-    return fail(read.error().code == ErrorCode::LimitExceeded ? ErrorCode::LimitExceeded : ErrorCode::InvalidArgument,
-                read.error().message);
+    return make_error(
+        read.error().code == ErrorCode::LimitExceeded ? ErrorCode::LimitExceeded : ErrorCode::InvalidArgument,
+        read.error().message);
   }
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }

@@ -62,7 +62,7 @@ Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
   }
   std::size_t filled = 0;
   while (filled < out.size() && !inflater_->is_done) {
-    const auto count = inflate_some(out.subspan(filled, std::min(out.size() - filled, kMaxAtOnce)));
+    auto count = inflate_some(out.subspan(filled, std::min(out.size() - filled, kMaxAtOnce)));
     if (!count) return count;
     filled += *count;
   }
@@ -87,11 +87,11 @@ Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
     return written;
   }
   if (outcome == Z_BUF_ERROR || (outcome == Z_OK && written == 0 && position_ == file_.size())) {
-    return fail(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
+    return make_error(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
   }
   if (outcome == Z_OK) return written;
   const std::string why = state.msg != nullptr ? std::string(" (") + state.msg + ")" : "";
-  return fail(ErrorCode::BadFormat, "the compressed data are damaged" + why, {}, position_);
+  return make_error(ErrorCode::BadFormat, "the compressed data are damaged" + why, {}, position_);
 }
 
 Status ByteStream::begin_next_member() {
@@ -100,7 +100,7 @@ Status ByteStream::begin_next_member() {
     return {};
   }
   if (inflateReset(&inflater_->state) == Z_OK) return {};
-  return fail(ErrorCode::BadFormat, "the compressed data are damaged", {}, position_);
+  return make_error(ErrorCode::BadFormat, "the compressed data are damaged", {}, position_);
 }
 
 Result<std::uint64_t> ByteStream::skip(std::uint64_t count) {

@@ -48,9 +48,9 @@ Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions&
     room = extent > std::numeric_limits<std::int32_t>::max() ? 0 : room / extent;
   }
   if (room < 1) {
-    return fail(ErrorCode::LimitExceeded,
-                "it claims " + text + " values; at most " + std::to_string(options.max_values) + " are read", {},
-                byte_offset);
+    return make_error(ErrorCode::LimitExceeded,
+                      "it claims " + text + " values; at most " + std::to_string(options.max_values) + " are read", {},
+                      byte_offset);
   }
   for (int axis = 0; axis < 3; ++axis) {
     volume.size[axis] = static_cast<std::int32_t>(extents[static_cast<std::size_t>(axis)]);
@@ -193,8 +193,8 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
                      static_cast<std::size_t>(volume.size.z);
   const std::size_t width = bytes_of(volume.type);
   const auto cut_off = [&](std::uint64_t held, const char* how) {
-    return fail(ErrorCode::BadFormat, claim(volume, count * width) + ", but there are " + how + std::to_string(held),
-                {}, offset);
+    return make_error(ErrorCode::BadFormat,
+                      claim(volume, count * width) + ", but there are " + how + std::to_string(held), {}, offset);
   };
   const std::uint64_t most = stream.is_compressed() ? stream.max_bytes() : stream.remaining();
   if (count * width > most) return cut_off(most, stream.is_compressed() ? "at most " : "");

@@ -178,7 +178,7 @@ constexpr std::size_t kSecondMagicAt = 4;
 constexpr std::size_t kExtenderBytes = 4;
 
 Error bad(std::string message, std::size_t at) {
-  return fail(ErrorCode::BadFormat, std::move(message), {}, at);
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
 bool has_text(std::span<const std::byte> bytes, std::size_t at, std::string_view text) {
@@ -250,8 +250,8 @@ Error refuse_type(int datatype, std::size_t at) {
   if (datatype == 128 || datatype == 2304) what = "colours";
   if (datatype == 1536) what = "128-bit numbers";
   if (what == nullptr) return bad("datatype " + std::to_string(datatype) + " is none of NIfTI's", at);
-  return fail(ErrorCode::Unsupported, std::string("the values are ") + what + ", not plain numbers of up to 64 bits",
-              {}, at);
+  return make_error(ErrorCode::Unsupported,
+                    std::string("the values are ") + what + ", not plain numbers of up to 64 bits", {}, at);
 }
 
 Status read_type(const Fields& fields, Volume& volume) {

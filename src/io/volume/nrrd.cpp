@@ -54,7 +54,7 @@ std::string key_of(std::string_view text) {
 }
 
 Error bad(std::string message, std::size_t at) {
-  return fail(ErrorCode::BadFormat, std::move(message), {}, at);
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
 /// `text`, or as much of it as a message can hold, on one line between quotation marks.
@@ -171,11 +171,11 @@ std::optional<std::vector<std::vector<double>>> parse_vectors(std::string_view t
 }
 
 Error bad(std::string message, const Field& field) {
-  return fail(ErrorCode::BadFormat, std::move(message), {}, field.at);
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, field.at);
 }
 
 Error unsupported(std::string message, const Field& field) {
-  return fail(ErrorCode::Unsupported, std::move(message), {}, field.at);
+  return make_error(ErrorCode::Unsupported, std::move(message), {}, field.at);
 }
 
 Result<VolumeSpace> space_of(const Fields& fields) {
@@ -309,7 +309,7 @@ std::string_view text_of(std::span<const std::byte> bytes) {
 }
 
 Error unsupported(std::string message, std::size_t at) {
-  return fail(ErrorCode::Unsupported, std::move(message), {}, at);
+  return make_error(ErrorCode::Unsupported, std::move(message), {}, at);
 }
 
 /// The names that the format gives each type.

@@ -28,7 +28,7 @@ Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
 Result<VolumeHeader> header_of(const Beginning& beginning, const VolumeOptions& options) {
   auto header = nifti::is_header(beginning.bytes)  ? nifti::read_header(beginning.bytes, options)
                 : nrrd::is_header(beginning.bytes) ? nrrd::read_header(beginning.bytes, options)
-                                                   : fail(ErrorCode::BadFormat, "neither NIfTI nor NRRD");
+                                                   : make_error(ErrorCode::BadFormat, "neither NIfTI nor NRRD");
   if (!header && header.error().byte_offset && beginning.compression != Compression::None) {
     header.error().message += " (counted after decompression)";
   }
@@ -39,9 +39,9 @@ Status skip(ByteStream& stream, std::uint64_t count, std::uint64_t byte_offset) 
   const auto skipped = stream.skip(count);
   if (!skipped) return skipped.error();
   if (*skipped == count) return {};
-  return fail(ErrorCode::BadFormat,
-              "the values begin at byte " + std::to_string(count) + ", but there are " + std::to_string(*skipped), {},
-              byte_offset);
+  return make_error(ErrorCode::BadFormat,
+                    "the values begin at byte " + std::to_string(count) + ", but there are " + std::to_string(*skipped),
+                    {}, byte_offset);
 }
 
 /// Reads a byte more, so that a checksum at the end is looked at.
@@ -78,7 +78,7 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
   }
   const auto begin = static_cast<std::size_t>(header.data_at);
   if (!begins_gzip(bytes.subspan(begin))) {
-    return fail(ErrorCode::BadFormat, "the encoding is gzip, but the data are not", {}, begin);
+    return make_error(ErrorCode::BadFormat, "the encoding is gzip, but the data are not", {}, begin);
   }
   ByteStream stream(bytes, begin, Compression::Gzip);
   return read_stream(stream, header.skip, header);
@@ -87,7 +87,8 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
 Status check_combination(const VolumeHeader& header, Compression compression) {
   if (compression == Compression::None) return {};
   if (header.data_compression == Compression::None && !header.is_data_at_end) return {};
-  return fail(ErrorCode::Unsupported, "a NRRD within gzip whose data are compressed once more or counted from the end");
+  return make_error(ErrorCode::Unsupported,
+                    "a NRRD within gzip whose data are compressed once more or counted from the end");
 }
 
 std::filesystem::path image_beside(const std::filesystem::path& header_path) {
@@ -122,7 +123,7 @@ Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::p
   }
   if (!header->is_data_elsewhere) return read_data(bytes, beginning->compression, *header);
   if (!path.empty()) return read_pair(path, *header);
-  return fail(ErrorCode::Unsupported, "the header of a pair, whose values are in a file of their own (.img)");
+  return make_error(ErrorCode::Unsupported, "the header of a pair, whose values are in a file of their own (.img)");
 }
 
 std::string name_from(std::filesystem::path path) {
@@ -146,7 +147,7 @@ Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOption
 
 Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options) {
   if (raw.size.x < 1 || raw.size.y < 1 || raw.size.z < 1) {
-    return fail(ErrorCode::InvalidArgument, "a volume of " + text_of_size(raw.size) + " values");
+    return make_error(ErrorCode::InvalidArgument, "a volume of " + text_of_size(raw.size) + " values");
   }
   VolumeHeader header;
   header.order = raw.order;
@@ -159,9 +160,10 @@ Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume
   ByteStream stream(bytes, 0, Compression::None);
   auto volume = read_stream(stream, 0, header);
   if (volume && stream.remaining() > 0) {
-    return fail(ErrorCode::BadFormat,
-                "the values end here, but " + std::to_string(stream.remaining()) + " bytes follow; is the size right?",
-                {}, stream.position());
+    return make_error(
+        ErrorCode::BadFormat,
+        "the values end here, but " + std::to_string(stream.remaining()) + " bytes follow; is the size right?", {},
+        stream.position());
   }
   return volume;
 }

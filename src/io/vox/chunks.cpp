@@ -39,13 +39,13 @@ bool is_slab6(std::span<const std::byte> bytes) {
 }
 
 Status check_signature(std::span<const std::byte> bytes) {
-  if (bytes.empty()) return fail(ErrorCode::BadFormat, "the file is empty");
+  if (bytes.empty()) return make_error(ErrorCode::BadFormat, "the file is empty");
   if (text_of(bytes, 4) == kMagic) return {};
   if (text_of(bytes, kLfsPointer.size()) == kLfsPointer) {
-    return fail(ErrorCode::Unsupported, "this is a git-LFS pointer, not the file that it stands for");
+    return make_error(ErrorCode::Unsupported, "this is a git-LFS pointer, not the file that it stands for");
   }
   if (is_slab6(bytes)) {
-    return fail(ErrorCode::Unsupported, "this is SLAB6's .vox format, not MagicaVoxel's of the same name");
+    return make_error(ErrorCode::Unsupported, "this is SLAB6's .vox format, not MagicaVoxel's of the same name");
   }
   return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this one with \"" + printable(text_of(bytes, 4)) + "\"");
 }
@@ -158,7 +158,7 @@ Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::si
 }  // namespace
 
 Error bad_at(std::uint64_t offset, std::string message) {
-  return fail(ErrorCode::BadFormat, std::move(message), {}, offset);
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, offset);
 }
 
 std::string_view Dict::get(std::string_view key) const {

@@ -166,7 +166,7 @@ Status GraphWalk::place(const Node& node, const Step& parent) {
   placement.shape_name = node.name;
   const std::size_t name_bytes = placement.name.size() + placement.shape_name.size();
   if (name_bytes > names_left_) {
-    return fail(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {}, node.offset);
+    return make_error(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {}, node.offset);
   }
   names_left_ -= name_bytes;
   out_.all.push_back(placement);
@@ -177,8 +177,8 @@ Status GraphWalk::enter(std::size_t at, const Step& parent) {
   const Node& node = document_.nodes[at];
   if (is_open_[at]) return bad_at(node.offset, "node " + std::to_string(node.id) + " is below itself");
   if (visits_left_ == 0) {
-    return fail(ErrorCode::LimitExceeded, "nodes with several parents multiply beyond the file's size", {},
-                node.offset);
+    return make_error(ErrorCode::LimitExceeded, "nodes with several parents multiply beyond the file's size", {},
+                      node.offset);
   }
   --visits_left_;
   is_seen_[at] = true;
@@ -265,8 +265,8 @@ Result<Placements> place_models(const Document& document, int frame, std::size_t
   const std::int64_t from_models = std::max<std::int64_t>(static_cast<std::int64_t>(document.models.size()) - 1, 0);
   const std::int64_t last_frame = document.nodes.empty() ? from_models : document.last_frame;
   if (frame < 0 || frame > last_frame) {
-    return fail(ErrorCode::InvalidArgument,
-                "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last_frame));
+    return make_error(ErrorCode::InvalidArgument,
+                      "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last_frame));
   }
   Result<Placements> placements =
       document.nodes.empty() ? place_lone_model(document, frame) : GraphWalk(document, frame, file_bytes).run();

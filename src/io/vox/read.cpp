@@ -27,12 +27,12 @@ Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::Mo
     SceneGrid grid = builder.build(model);
     grid_bytes += grid.grid.bytes();
     if (grid_bytes > max_bytes) {
-      return fail(ErrorCode::LimitExceeded, "scattered voxels take far more memory than the file has bytes", {},
-                  model.offset);
+      return make_error(ErrorCode::LimitExceeded, "scattered voxels take far more memory than the file has bytes", {},
+                        model.offset);
     }
     handles.push_back(scene.add_grid(std::move(grid)));
     const double share = static_cast<double>(handles.size()) / static_cast<double>(document.models.size());
-    if (progress && !progress(share)) return fail(ErrorCode::Cancelled, "cancelled");
+    if (progress && !progress(share)) return make_error(ErrorCode::Cancelled, "cancelled");
   }
   return handles;
 }
@@ -81,7 +81,7 @@ void add_warnings(const vox::Placements& placements, const vox::ModelLosses& los
 
 }  // namespace
 
-Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options) {
+Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {
   Result<vox::Document> document = vox::parse_document(bytes);
   if (!document) return document.error();
   const Result<vox::Placements> placements = vox::place_models(*document, options.frame, bytes.size());
@@ -95,8 +95,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
     return status.error();
   }
   vox::ModelBuilder builder(type_of);
-  const Result<std::vector<GridHandle>> grids =
-      add_grids(*document, builder, bytes.size(), options.progress, loaded.scene);
+  const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes.size(), progress, loaded.scene);
   if (!grids) return grids.error();
   add_instances(*placements, *grids, options, loaded.scene);
   warn("materials of no colour skipped", document->stray_materials, loaded.warnings);
@@ -104,8 +103,8 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   return loaded;
 }
 
-Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options) {
-  return read_whole(path, [&](std::span<const std::byte> bytes) { return read_vox(bytes, options); });
+Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options, const Progress& progress) {
+  return read_whole(path, [&](std::span<const std::byte> bytes) { return read_vox(bytes, options, progress); });
 }
 
 }  // namespace quoin

@@ -146,11 +146,12 @@ void Writer::write_models(const vox::TypeTable& table) {
 /// Where the first piece of an instance goes.
 Status Writer::place(const Instance& instance, const GridParts& parts, TransformChunk& out) {
   if (instance.voxel_size != 1.0) {
-    return fail(ErrorCode::Unsupported, instance_text(instance) + " is scaled, which a .vox file cannot say");
+    return make_error(ErrorCode::Unsupported, instance_text(instance) + " is scaled, which a .vox file cannot say");
   }
   const auto orientation = vox::orientation_from_turn({instance.rotation, instance.mirrored});
   if (!orientation.has_value()) {
-    return fail(ErrorCode::Unsupported, instance_text(instance) + " is not turned by quarter turns, as .vox requires");
+    return make_error(ErrorCode::Unsupported,
+                      instance_text(instance) + " is not turned by quarter turns, as .vox requires");
   }
   const DVec3 world = world_from_grid(instance, scene_.grids()[parts.grid], vox::pivot_of(parts.pieces.front()));
   vox::Offset rounded{};
@@ -158,7 +159,7 @@ Status Writer::place(const Instance& instance, const GridParts& parts, Transform
   for (int axis = 0; axis < 3; ++axis) {
     // Less than the largest, so that it can be negated.
     if (!(std::abs(world[axis]) < std::numeric_limits<std::int32_t>::max())) {
-      return fail(ErrorCode::LimitExceeded, instance_text(instance) + " lies too far out for a .vox file");
+      return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " lies too far out for a .vox file");
     }
     constexpr double kRounding = 1e-6;
     exact = exact && std::abs(world[axis] - std::round(world[axis])) < kRounding;
@@ -311,7 +312,7 @@ Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
   write_materials(*table);
   out_.end_parent(main);
   if (out_.size() > std::numeric_limits<std::uint32_t>::max()) {
-    return fail(ErrorCode::LimitExceeded, "the scene takes more than the 4 GiB that a .vox file can hold");
+    return make_error(ErrorCode::LimitExceeded, "the scene takes more than the 4 GiB that a .vox file can hold");
   }
   if (rounded_ > 0) {
     warnings.push_back("instances between voxels moved to the nearest: " + std::to_string(rounded_));

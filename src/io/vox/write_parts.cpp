@@ -57,8 +57,8 @@ Result<TypeTable> make_type_table(const Scene& scene) {
     for (std::size_t type = 1; type < kColours; ++type) types.push_back(static_cast<VoxelType>(type));
   }
   if (types.size() >= kColours) {
-    return fail(ErrorCode::LimitExceeded,
-                "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
+    return make_error(ErrorCode::LimitExceeded,
+                      "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
   }
   TypeTable table;
   table.index_of_type.resize(std::size_t{types.back()} + 1);

@@ -154,7 +154,7 @@ Scene scene_with_types(int count) {
 TEST(VoxWrite, GridsOfAnyBoundsAndPivotStandWhereTheyStood) {
   Scene scene = scene_with_types(5);
   SceneGrid grid;
-  grid.grid.fill_box({-3, -70, 5}, {4, -60, 9}, 2);
+  grid.grid.fill_box({{-3, -70, 5}, {5, -59, 10}}, 2);
   grid.grid.set({100, 40, -90}, 5);
   grid.pivot = {-1, 2, 11};
   const GridHandle handle = scene.add_grid(std::move(grid));
@@ -174,8 +174,8 @@ TEST(VoxWrite, GridsOfAnyBoundsAndPivotStandWhereTheyStood) {
 TEST(VoxWrite, GridsBeyond256AreCutAndStillStandWhereTheyStood) {
   Scene scene = scene_with_types(5);
   SceneGrid grid;
-  grid.grid.fill_box({-300, 0, 0}, {310, 1, 1}, 3);
-  grid.grid.fill_box({0, -200, 0}, {0, 400, 0}, 4);
+  grid.grid.fill_box({{-300, 0, 0}, {311, 2, 2}}, 3);
+  grid.grid.fill_box({{0, -200, 0}, {1, 401, 1}}, 4);
   grid.grid.set({5, 5, 700}, 5);
   const GridHandle handle = scene.add_grid(std::move(grid));
   for (const int byte : {4, 17, 33, 52, 105, 84}) {

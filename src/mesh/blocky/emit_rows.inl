@@ -4,7 +4,7 @@
 //   Parts       | first | first | ...     a byte each: the run's first cell
 //               | last  | last  | ...     its last cell
 //               | rows  | rows  | ...     its rows before this one
-//               | levels| levels| ...     its eight level bits
+//               | corners ...           the eight bits of their occlusion
 //   places      | 64 plane + row | ...    two bytes each
 
 #pragma once
@@ -36,8 +36,8 @@ QUOIN_STAGE std::size_t list_rows(int groups, const Batch& b, std::uint16_t* row
   return static_cast<std::size_t>(_mm512_reduce_add_epi64(quads));
 }
 
-// What does not change from row to row when levels are found: for each bit of a cell's levels (two a corner), which
-// neighbours it comes from.
+// What does not change from row to row when occlusion is found: for each bit of a cell's occlusion (two a corner),
+// which neighbours it comes from.
 template <bool kUAlongBits>
 struct CornerLanes {
   // Corners (bit, row) in a quad's order: (0,0) (1,0) (1,1) (0,1), or with the axes exchanged.
@@ -66,9 +66,9 @@ QUOIN_INLINE __m512i cells_beside(__m512i row, __m512i ends) {
   return _mm512_rolv_epi64(_mm512_ternarylogic_epi64(brought, ends, row, 0xCA), rotation);
 }
 
-// The eight level bits of all 64 cells of a row, as a quad has them.
+// The eight bits of occlusion of all 64 cells of a row, as a quad has them.
 template <bool kUAlongBits, bool kRowEnds>
-QUOIN_INLINE __m512i levels_of_row(const std::uint64_t* front, const std::uint64_t* ends) {
+QUOIN_INLINE __m512i occlusion_of_row(const std::uint64_t* front, const std::uint64_t* ends) {
   const __m512i none = _mm512_setzero_si512();
   const __m512i side2 = rows_beside<kUAlongBits>(front);
   const __m512i side1 = cells_beside<kUAlongBits>(broadcast(front), kRowEnds ? broadcast(ends) : none);
@@ -131,10 +131,10 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
     append(out + Parts::kRowsBefore * kBatchQuads, _mm512_permutexvar_epi8(last, heights), count);
     heights = _mm512_maskz_add_epi8(ends ^ closes, heights, one);
     if constexpr (kOcclusion) {
-      const __m512i levels = levels_of_row<kUAlongBits, kRowEnds>(opaque + at, row_ends + at);
-      append(out + Parts::kLevels * kBatchQuads, _mm512_permutexvar_epi8(last, levels), count);
+      const __m512i occlusion = occlusion_of_row<kUAlongBits, kRowEnds>(opaque + at, row_ends + at);
+      append(out + Parts::kOcclusion * kBatchQuads, _mm512_permutexvar_epi8(last, occlusion), count);
     }
-    append(places, _mm512_set1_epi32(static_cast<int>(s.levels.numbers[at])), count);
+    append(places, _mm512_set1_epi32(static_cast<int>(s.occlusion.numbers[at])), count);
     out += count;
     places += count;
   }
@@ -173,7 +173,7 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
   const __m512i plane = _mm512_set1_epi32(first_plane << (6 * L::kAxis));
   const __m512i upper =
       _mm512_set1_epi32(static_cast<int>(((std::uint64_t{kDirection} << Quad::kDirectionShift) | one_type) >> 32));
-  const __m512i flips = _mm512_broadcast_i32x8(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(s.levels.flips)));
+  const __m512i flips = _mm512_broadcast_i32x8(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(s.occlusion.flips)));
   const __m512i low_half = _mm512_set_epi32(23, 7, 22, 6, 21, 5, 20, 4, 19, 3, 18, 2, 17, 1, 16, 0);
   const __m512i high_half = _mm512_add_epi32(low_half, _mm512_set1_epi32(8));
   for (std::size_t i = 0; i < quads; i += 16) {
@@ -190,11 +190,12 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
     if constexpr (kPlanes > 0) high = _mm512_or_si512(high, types_of<kPlanes>(s, low));
     low = or3(low, _mm512_slli_epi32(width, L::kWidthShift), _mm512_slli_epi32(rows_before, L::kHeightShift));
     if constexpr (kOcclusion) {
-      const __m512i levels = sixteen_bytes(parts.bytes[Parts::kLevels] + i);
-      low = _mm512_or_si512(low, _mm512_slli_epi32(levels, Quad::kOcclusionShift));
-      const __m512i flip = _mm512_rorv_epi32(_mm512_permutexvar_epi32(_mm512_srli_epi32(levels, 5), flips), levels);
+      const __m512i occlusion = sixteen_bytes(parts.bytes[Parts::kOcclusion] + i);
+      low = _mm512_or_si512(low, _mm512_slli_epi32(occlusion, Quad::kOcclusionShift));
+      const __m512i flip =
+          _mm512_rorv_epi32(_mm512_permutexvar_epi32(_mm512_srli_epi32(occlusion, 5), flips), occlusion);
       high = _mm512_ternarylogic_epi32(high, flip, _mm512_set1_epi32(1 << (Quad::kFlipShift - 32)), 0xF8);
-      high = _mm512_or_si512(high, _mm512_srli_epi32(levels, 32 - Quad::kOcclusionShift));
+      high = _mm512_or_si512(high, _mm512_srli_epi32(occlusion, 32 - Quad::kOcclusionShift));
     }
     _mm512_storeu_si512(out + i, _mm512_permutex2var_epi32(low, low_half, high));
     _mm512_storeu_si512(out + i + 8, _mm512_permutex2var_epi32(low, high_half, high));

@@ -1,7 +1,7 @@
 // From runs to quads, one run after the other.
 //
 //   Row      | ends | starts | closes | place | front |      a row that has runs, its five words side by side
-//   quad     | type | levels, flip | size v | size u | place, direction |      64 bits; see quoin/mesh/quad.h
+//   quad     | type | occlusion, flip | size v | size u | place, direction |      64 bits; see quoin/mesh/quad.h
 
 #pragma once
 
@@ -18,7 +18,7 @@ template <int kDirection>
 QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Scratch& s) {
   using L = Layout<kDirection>;
   Batch& b = s.batch;
-  const std::uint64_t* places = s.levels.places[L::kAxis];
+  const std::uint64_t* places = s.occlusion.places[L::kAxis];
   const std::uint64_t base = (std::uint64_t{kDirection} << Quad::kDirectionShift) + types.one +
                              (static_cast<std::uint64_t>(first_plane) << (6 * L::kAxis));
   const std::uint64_t* front = pass.view->opaque.words + word_index(first_plane + L::kFrame.sign, 0);
@@ -42,7 +42,7 @@ QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups,
   return static_cast<std::size_t>(runs);
 }
 
-// The bits of the 9 voxels in front of the first or last cell of a row, as the level tables index them.
+// The bits of the 9 voxels in front of the first or last cell of a row, as the occlusion tables index them.
 __attribute__((noinline)) std::uint64_t bits_in_front_at_end(const Pass& pass, const std::uint64_t* front,
                                                              bool is_first) {
   const std::int64_t word = front - pass.view->opaque.words;
@@ -120,7 +120,7 @@ QUOIN_STAGE std::uint64_t* emit(const Pass& pass, std::size_t runs, Scratch& s, 
     std::uint64_t quad = row->place + rows_before + (first << (6 * L::kBitAxis)) + ((last - first) << L::kWidthShift);
     if constexpr (kOcclusion) {
       const std::uint64_t around = bits_in_front(pass, row->front, last);
-      quad |= L::kUAlongBits ? s.levels.u_along_bits[around] : s.levels.u_along_rows[around];
+      quad |= L::kUAlongBits ? s.occlusion.u_along_bits[around] : s.occlusion.u_along_rows[around];
     }
     *out = quad | type_of<kDirection, kLogBits>(s, row->place, last);
     out += closes;

@@ -29,7 +29,7 @@ void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoi
   for (const OutlinePoint& point : outline) {
     out.positions.emplace_back(origin + point.position);
     out.directions.push_back(quad.direction());
-    out.occlusion.push_back(point.level);
+    out.occlusion.push_back(point.occlusion);
     out.types.push_back(quad.type());
   }
   triangulate_outline(outline, quad.flipped(), base, out.indices);
@@ -60,7 +60,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
   const std::vector<IVec3> chunks = grid.chunks();
   std::vector<QuadBuffer> parts(chunks.size());
   // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
-  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * resolve(threads));
+  const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
   ProgressSteps reporter(progress, 2 * chunks.size());
   parallel_for(tasks, threads, [&](std::size_t task) {
     BlockyMesher mesher;
@@ -72,7 +72,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
       reporter.step();
     }
   });
-  if (reporter.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+  if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
 
   std::vector<SurfaceClass> classes(types.size());
   for (std::size_t i = 0; i < classes.size(); ++i) classes[i] = surface_class(types[static_cast<VoxelType>(i)]);
@@ -89,7 +89,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
       const SurfaceClass which = quad.type() < classes.size() ? classes[quad.type()] : SurfaceClass::Opaque;
       BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(which)];
       if (out.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
-        return fail(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");
+        return make_error(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");
       }
       if (options.watertight) {
         finder.outline(quad, outline);
@@ -100,7 +100,7 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
     }
     quads = {};
     reporter.step();
-    if (reporter.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+    if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   }
   return mesh;
 }

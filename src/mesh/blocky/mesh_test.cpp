@@ -32,7 +32,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, WatertightWorld, testing::Range(1U, 13U));
 
 TEST(BlockyMesh, PlainGreedyQuadsAreNotWatertight) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 0, 9}, 1);
+  grid.fill_box({{0, 0, 0}, {10, 1, 10}}, 1);
   grid.set({4, 1, 4}, 1);
   BlockyMeshOptions options;
   EXPECT_NE(oracle::watertight_fault(*build_blocky_mesh(grid, oracle::mixed_types(), options)), "");

@@ -15,8 +15,8 @@ namespace quoin {
 namespace blocky {
 namespace {
 
-LevelTables make_level_tables() {
-  LevelTables tables{};
+OcclusionTables make_occlusion_tables() {
+  OcclusionTables tables{};
   for (unsigned around = 0; around < 512; ++around) {
     const auto bit = [&](unsigned i) { return (around >> i & 1U) != 0; };
     // By (bit, row): the sides are the neighbours along each, the corner the one across.
@@ -24,17 +24,17 @@ LevelTables make_level_tables() {
     const std::uint8_t l10 = vertex_occlusion(bit(5), bit(1), bit(2));
     const std::uint8_t l01 = vertex_occlusion(bit(3), bit(7), bit(6));
     const std::uint8_t l11 = vertex_occlusion(bit(5), bit(7), bit(8));
-    const auto pack = [](const FaceOcclusion& levels) {
-      const int packed = levels[0] | levels[1] << 2 | levels[2] << 4 | levels[3] << 6;
-      return static_cast<std::uint64_t>(packed) << Quad::kOcclusionShift | std::uint64_t{flips_diagonal(levels)}
+    const auto pack = [](const FaceOcclusion& occlusion) {
+      const int packed = occlusion[0] | occlusion[1] << 2 | occlusion[2] << 4 | occlusion[3] << 6;
+      return static_cast<std::uint64_t>(packed) << Quad::kOcclusionShift | std::uint64_t{flips_diagonal(occlusion)}
                                                                                << Quad::kFlipShift;
     };
     tables.u_along_bits[around] = pack({l00, l10, l11, l01});
     tables.u_along_rows[around] = pack({l00, l01, l11, l10});
   }
   for (unsigned bits = 0; bits < 256; ++bits) {
-    const auto level = [&](unsigned corner) { return static_cast<std::uint8_t>(bits >> (2 * corner) & 3U); };
-    const bool flips = flips_diagonal({level(0), level(1), level(2), level(3)});
+    const auto occlusion = [&](unsigned corner) { return static_cast<std::uint8_t>(bits >> (2 * corner) & 3U); };
+    const bool flips = flips_diagonal({occlusion(0), occlusion(1), occlusion(2), occlusion(3)});
     tables.flips[bits / 32] |= std::uint32_t{flips} << (bits + 6) % 32;
   }
   for (std::uint32_t at = 0; at < kBatchWords; ++at) {
@@ -176,7 +176,7 @@ struct BlockyMesher::Scratch : blocky::Scratch {
 };
 
 BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
-  scratch_->levels = blocky::make_level_tables();
+  scratch_->occlusion = blocky::make_occlusion_tables();
   scratch_->kernel = pick_kernel();
 }
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
@@ -264,10 +264,10 @@ FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& t
     at[frame.v] += dv;
     return types.is_opaque(chunks.get(at));
   };
-  const auto level = [&](int du, int dv) {
+  const auto occlusion = [&](int du, int dv) {
     return vertex_occlusion(is_occluder(du, 0), is_occluder(0, dv), is_occluder(du, dv));
   };
-  return {level(-1, -1), level(1, -1), level(1, 1), level(-1, 1)};
+  return {occlusion(-1, -1), occlusion(1, -1), occlusion(1, 1), occlusion(-1, 1)};
 }
 
 }  // namespace quoin

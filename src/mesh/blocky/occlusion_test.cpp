@@ -76,7 +76,7 @@ TEST(VisibleFaces, ANeighbourChunkHidesFacesToo) {
 
 TEST(VisibleFaces, FullRegionAloneShowsItsShell) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {31, 31, 31}, kStone);
+  grid.fill_box({{0, 0, 0}, {32, 32, 32}}, kStone);
   std::vector<std::uint8_t> faces;
   visible_faces(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), kCube32, faces);
   int visible = 0;
@@ -87,7 +87,7 @@ TEST(VisibleFaces, FullRegionAloneShowsItsShell) {
 
 TEST(VisibleFaces, FullRegionInsideFullNeighboursShowsNothing) {
   Grid grid;
-  grid.fill_box({-64, -64, -64}, {127, 127, 127}, kStone);
+  grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, kStone);
   std::vector<std::uint8_t> faces;
   visible_faces(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), kCube32, faces);
   EXPECT_EQ(faces, std::vector<std::uint8_t>(32 * 32 * 32, 0));
@@ -121,19 +121,19 @@ TEST(FaceOcclusion, AWallDarkensTheFloorAtItsFoot) {
   Grid grid;
   grid.set({5, 0, 5}, kStone);
   grid.set({5, 1, 6}, kStone);
-  const FaceOcclusion levels =
+  const FaceOcclusion corners =
       face_occlusion(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), {5, 0, 5}, Direction::PosY);
   // +Y has u = z, v = x: corners 1 and 2 lie towards z = 6.
-  EXPECT_EQ(levels, (FaceOcclusion{0, 1, 1, 0}));
+  EXPECT_EQ(corners, (FaceOcclusion{0, 1, 1, 0}));
 }
 
 TEST(FaceOcclusion, GlassDoesNotDarken) {
   Grid grid;
   grid.set({5, 0, 5}, kStone);
   grid.set({5, 1, 6}, kGlass);
-  const FaceOcclusion levels =
+  const FaceOcclusion corners =
       face_occlusion(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), {5, 0, 5}, Direction::PosY);
-  EXPECT_EQ(levels, FaceOcclusion{});
+  EXPECT_EQ(corners, FaceOcclusion{});
 }
 
 TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {

@@ -46,7 +46,7 @@ VoxelRegistry many_types(int count, bool transparent) {
 
 TEST(MesherReuse, CulledAfterGreedyMergesNothing) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, 1);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const VoxelRegistry types = oracle::mixed_types();
   BlockyMesher mesher;
   QuadBuffer quads;

@@ -1,7 +1,7 @@
 // Faces and runs of a batch of planes.
 //
 //   faces        . X X X X . X X      a row: visible faces
-//   merged       . X X . . . X .      the next cell has the same type and levels
+//   merged       . X X . . . X .      the next cell has the same type and occlusion
 //   starts       . X . . X . X .      first cells of runs
 //   ends         . . . X X . . X      last cells of runs
 //   closes       . . . . X . . X      ends of runs that do not go on in the next row, by the carry of one addition
@@ -49,17 +49,18 @@ QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, B
   return groups;
 }
 
-struct Levels {
+struct CornerOcclusion {
   Words low;
   Words high;
 };
 
-QUOIN_INLINE Levels corner_levels(Words side1, Words side2, Words corner) {
-  return {level_low(side1, side2, corner), level_high(side1, side2, corner)};
+QUOIN_INLINE CornerOcclusion corner_occlusion(Words side1, Words side2, Words corner) {
+  return {occlusion_low(side1, side2, corner), occlusion_high(side1, side2, corner)};
 }
 
-// Where two pairs of levels agree.
-QUOIN_INLINE Words agree(const Levels& a, const Levels& b, const Levels& c, const Levels& d) {
+// Where `a` has the occlusion of `b`, and `c` that of `d`.
+QUOIN_INLINE Words agree(const CornerOcclusion& a, const CornerOcclusion& b, const CornerOcclusion& c,
+                         const CornerOcclusion& d) {
   return ~or_difference(or_difference(or_difference(a.low ^ b.low, a.high, b.high), c.low, d.low), c.high, d.high);
 }
 
@@ -74,9 +75,9 @@ QUOIN_STAGE void keep_apart(int groups, Batch& b) {
   }
 }
 
-// Faces of a group whose levels are constant along the bits, and along the rows.
+// Faces of a group whose occlusion is constant along the bits, and along the rows.
 template <bool kRowEnds>
-QUOIN_INLINE void constant_levels(const Pass& pass, int front, Words& along_bits, Words& along_rows) {
+QUOIN_INLINE void constant_occlusion(const Pass& pass, int front, Words& along_bits, Words& along_rows) {
   const auto row_at = [&](int offset, Words& before, Words& middle, Words& after) {
     middle = load(pass.view->opaque.words + front + offset);
     before = middle << 1;
@@ -91,15 +92,15 @@ QUOIN_INLINE void constant_levels(const Pass& pass, int front, Words& along_bits
   row_at(-1, a_before, a, a_after);
   row_at(0, b_before, unused, b_after);
   row_at(1, c_before, c, c_after);
-  const Levels l00 = corner_levels(b_before, a, a_before);
-  const Levels l10 = corner_levels(b_after, a, a_after);
-  const Levels l01 = corner_levels(b_before, c, c_before);
-  const Levels l11 = corner_levels(b_after, c, c_after);
+  const CornerOcclusion l00 = corner_occlusion(b_before, a, a_before);
+  const CornerOcclusion l10 = corner_occlusion(b_after, a, a_after);
+  const CornerOcclusion l01 = corner_occlusion(b_before, c, c_before);
+  const CornerOcclusion l11 = corner_occlusion(b_after, c, c_after);
   along_bits = agree(l00, l10, l01, l11);
   along_rows = agree(l00, l01, l10, l11);
 }
 
-// Splits the faces of each listed group into runs of equal type and constant levels.
+// Splits the faces of each listed group into runs of equal type and constant occlusion.
 template <bool kOcclusion, bool kRowEnds, bool kTypes>
 QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
@@ -111,7 +112,7 @@ QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch&
     if constexpr (kOcclusion) {
       Words along_bits;
       Words along_rows;
-      constant_levels<kRowEnds>(pass, here + pass.side * kRowStride, along_bits, along_rows);
+      constant_occlusion<kRowEnds>(pass, here + pass.side * kRowStride, along_bits, along_rows);
       joined &= along_bits;
       mergeable &= along_rows;
     }
@@ -123,7 +124,7 @@ QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch&
   }
 }
 
-// Which runs go on in the next row: those with the same extent, type and levels constant along the rows.
+// Which runs go on in the next row: those with the same extent, type and occlusion constant along the rows.
 template <bool kTypes>
 QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {

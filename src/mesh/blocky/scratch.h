@@ -50,7 +50,7 @@ struct alignas(64) Row {
 
 struct alignas(64) Batch {
   std::uint64_t faces[kBatchWords + 8];
-  std::uint64_t mergeable[kBatchWords + 8];  // faces whose levels are constant along the rows
+  std::uint64_t mergeable[kBatchWords + 8];  // faces whose occlusion is constant along the rows
   std::uint64_t starts[kBatchWords + 8];     // first cell of each run
   std::uint64_t ends[kBatchWords + 8];       // last cell of each run
   std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
@@ -65,25 +65,26 @@ struct alignas(64) Batch {
 inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
 
 struct alignas(64) Parts {
-  // Of the row in which a quad ends, its first and last cell; its rows before; its eight level bits.
+  // Of the row in which a quad ends, its first and last cell; its rows before; its eight bits of occlusion.
   static constexpr std::size_t kFirst = 0;
   static constexpr std::size_t kLast = 1;
   static constexpr std::size_t kRowsBefore = 2;
-  static constexpr std::size_t kLevels = 3;
+  static constexpr std::size_t kOcclusion = 3;
 
   std::uint16_t rows[kBatchPlanes * 64 + 8];  // words of a batch
   std::uint8_t bytes[4][kBatchQuads];
   std::uint16_t places[kBatchQuads];  // 64 * plane of the batch + row
 };
 
-// 9 front neighbours' bits -> a quad's bits for levels and diagonal, for faces whose u lies along the bits, and along
-// the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
-struct LevelTables {
+// 9 front neighbours' bits -> a quad's bits for occlusion and diagonal, for faces whose u lies along the bits, and
+// along the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
+struct OcclusionTables {
   std::uint64_t u_along_bits[512];
   std::uint64_t u_along_rows[512];
   std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
   std::uint32_t numbers[kBatchWords];    // by word of a batch: 64 * plane + row, twice
-  std::uint32_t flips[8];  // by a quad's eight level bits: whether it is flipped; bit (levels + 6) % 32 of a word
+  std::uint32_t
+      flips[8];  // by a quad's eight bits of occlusion: whether it is flipped; bit (occlusion + 6) % 32 of a word
 };
 
 struct Scratch {
@@ -96,7 +97,7 @@ struct Scratch {
   Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; not used by meshing opaque types
   Batch batch;
   Parts parts;
-  LevelTables levels;
+  OcclusionTables occlusion;
   std::uint64_t palette[256];          // types in a quad's place, by palette index
   std::uint32_t narrow_palette[16];    // the first, as in the upper half of a quad
   std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region

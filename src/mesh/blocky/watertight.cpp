@@ -63,7 +63,7 @@ void OutlineFinder::outline(const Quad& quad, std::vector<OutlinePoint>& out) co
     const bool all = edge_is_on_border(from, axis);
     out.push_back({from, quad.occlusion(corner)});
     for (IVec3 p = from + step; p != to; p += step) {
-      // Quads merge only where levels are constant, so along an edge longer than a voxel they do not change.
+      // Quads merge only where occlusion is constant, so along an edge longer than a voxel it does not change.
       if (all || is_vertex(p)) out.push_back({p, quad.occlusion(corner)});
     }
   }

@@ -11,7 +11,7 @@ namespace quoin {
 
 struct OutlinePoint {
   IVec3 position;  ///< chunk coordinates, 0..64
-  std::uint8_t level;
+  std::uint8_t occlusion;
 };
 
 /// Finds, for the quads of one chunk, the vertices that must lie on their outlines so that no vertex lies inside

@@ -75,10 +75,10 @@ QUOIN_INLINE Words choose(Words mask, Words where_set, Words where_not) {
 QUOIN_INLINE Words and_same(Words so_far, Words a, Words b) {
   return ternary<0x90>(so_far, a, b);
 }
-QUOIN_INLINE Words level_low(Words side1, Words side2, Words corner) {
+QUOIN_INLINE Words occlusion_low(Words side1, Words side2, Words corner) {
   return ternary<0xD6>(side1, side2, corner);
 }
-QUOIN_INLINE Words level_high(Words side1, Words side2, Words corner) {
+QUOIN_INLINE Words occlusion_high(Words side1, Words side2, Words corner) {
   return ternary<0xE8>(side1, side2, corner);
 }
 
@@ -101,11 +101,11 @@ QUOIN_INLINE Words and_not(Words a, Words but_not, Words b) {
 QUOIN_INLINE Words and_same(Words so_far, Words a, Words b) {
   return so_far & ~(a ^ b);
 }
-// The two bits of a corner's level: how many of the three are set, but 3 where both sides are.
-QUOIN_INLINE Words level_low(Words side1, Words side2, Words corner) {
+// The two bits of a corner's occlusion: how many of the three are set, but 3 where both sides are.
+QUOIN_INLINE Words occlusion_low(Words side1, Words side2, Words corner) {
   return (side1 ^ side2 ^ corner) | (side1 & side2);
 }
-QUOIN_INLINE Words level_high(Words side1, Words side2, Words corner) {
+QUOIN_INLINE Words occlusion_high(Words side1, Words side2, Words corner) {
   return (side1 & side2) | ((side1 ^ side2) & corner);
 }
 

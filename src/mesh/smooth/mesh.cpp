@@ -45,10 +45,10 @@ class LevelMap {
     for (const IVec3 chunk : chunks_) {
       const int level = level_of(chunk);
       if (level < 0 || level > kMaxSmoothLevel) {
-        return fail(ErrorCode::InvalidArgument, "level of detail " + std::to_string(level) + " of chunk " +
-                                                    std::to_string(chunk.x) + ", " + std::to_string(chunk.y) + ", " +
-                                                    std::to_string(chunk.z) + " is not 0 to " +
-                                                    std::to_string(kMaxSmoothLevel));
+        return make_error(ErrorCode::InvalidArgument, "level of detail " + std::to_string(level) + " of chunk " +
+                                                          std::to_string(chunk.x) + ", " + std::to_string(chunk.y) +
+                                                          ", " + std::to_string(chunk.z) + " is not 0 to " +
+                                                          std::to_string(kMaxSmoothLevel));
       }
       levels_.push_back(static_cast<std::uint8_t>(level));
     }
@@ -174,7 +174,7 @@ class Builder {
       workspaces.give_back(std::move(workspace));
       steps_.step();
     });
-    if (steps_.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+    if (steps_.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
     return weld();
   }
 
@@ -199,7 +199,7 @@ class Builder {
       vertices += part.positions.size();
       indices += part.indices.size();
       if (vertices >= std::numeric_limits<std::uint32_t>::max()) {
-        return fail(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 - 2 vertices");
+        return make_error(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 - 2 vertices");
       }
     }
     mesh.positions.resize(vertices);
@@ -214,7 +214,7 @@ class Builder {
       copy_indices(i, mesh);
       steps_.step();
     });
-    if (steps_.cancelled()) return fail(ErrorCode::Cancelled, "cancelled");
+    if (steps_.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
     return mesh;
   }
 

@@ -78,9 +78,7 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
   return along;
 }
 
-// What each kernel has of its own: finding the places of bits, halves as floats, vertices and quads.
-std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t* end);
-std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_place, std::uint16_t* end);
+// What each kernel has of its own, beside finding the places of bits: halves as floats, vertices and quads.
 void decode_row(const Half* from, float* to, int count);
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion);

@@ -21,9 +21,9 @@ int edge_for(const ContentSphere& content) {
   return voxels <= Impostor::kEdge ? Impostor::kEdge : 2 * Impostor::kEdge;
 }
 
-std::uint8_t packed(const FaceOcclusion& levels) {
+std::uint8_t packed(const FaceOcclusion& corners) {
   unsigned all = 0;
-  for (std::size_t i = 0; i < 4; ++i) all |= static_cast<unsigned>(levels[i]) << 2 * i;
+  for (std::size_t i = 0; i < 4; ++i) all |= static_cast<unsigned>(corners[i]) << 2 * i;
   return static_cast<std::uint8_t>(all);
 }
 
@@ -65,7 +65,7 @@ void put_faces(const std::vector<SeenFace>& seen, GridReader& reader, IsOpaque i
     face.voxel = voxel;
     face.direction = direction;
     face.type = reader.get(voxel);
-    face.occlusion = packed(corner_levels(is_opaque, voxel, direction));
+    face.occlusion = packed(corner_occlusion(is_opaque, voxel, direction));
   }
 }
 

@@ -172,7 +172,7 @@ std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds,
   const auto begin = Clock::now();
   impl_->look_at(scene.types);
   const auto is_over = [&] { return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds); };
-  const std::size_t count = resolve(threads);
+  const std::size_t count = thread_count(threads);
   parallel_for(count, threads, [&](std::size_t i) {
     bool is_first = i == 0;
     while (is_first || !is_over()) {

@@ -19,7 +19,7 @@ struct World {
     scene.types = workloads::three_types();
     for (int i = 0; i < count; ++i) {
       SceneGrid grid;
-      grid.grid.fill_box({0, 0, 0}, {i, 2, 3}, 1);
+      grid.grid.fill_box({{0, 0, 0}, {i + 1, 3, 4}}, 1);
       grids.push_back(scene.add_grid(std::move(grid)));
     }
   }
@@ -53,7 +53,7 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   const auto old = cache.find(world.scene, world.grids[0]);
   ASSERT_NE(old, nullptr);
-  world.scene.edit(world.grids[0]).grid.fill_box({0, 0, 0}, {5, 5, 5}, 2);
+  world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {6, 6, 6}}, 2);
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), old);
   EXPECT_EQ(cache.build_some(world.scene, 1.0), 0U);
   const auto renewed = cache.find(world.scene, world.grids[0]);
@@ -76,7 +76,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   const auto first = ready();
   EXPECT_EQ(ready(), first) << "nothing has changed";
   Grid other;
-  other.fill_box({0, 0, 0}, {0, 2, 3}, 3);
+  other.fill_box({{0, 0, 0}, {1, 3, 4}}, 3);
   world.scene.edit(world.grids[0]).grid = std::move(other);
   const auto second = ready();
   EXPECT_TRUE(shows(*second, 3)) << "of the same version as the one before";
@@ -90,7 +90,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
 TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
   World world(1);
   const auto type = static_cast<VoxelType>(world.scene.types.size());
-  world.scene.edit(world.grids[0]).grid.fill_box({0, 0, 0}, {0, 2, 3}, type);
+  world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {1, 3, 4}}, type);
   ImpostorCache cache;
   const auto is_empty = [&] {
     cache.update_types(world.scene.types);

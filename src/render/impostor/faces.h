@@ -62,10 +62,10 @@ struct ImpostorFaces {
 /// 0 to 1 at a point of a face (in the grid): in OcclusionMode::Vertex by its corners, else by rays from its middle.
 [[nodiscard]] float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position);
 
-[[nodiscard]] inline FaceOcclusion unpacked_levels(std::uint8_t packed) {
-  FaceOcclusion levels{};
-  for (std::size_t i = 0; i < 4; ++i) levels[i] = static_cast<std::uint8_t>(packed >> 2 * i & 3U);
-  return levels;
+[[nodiscard]] inline FaceOcclusion unpacked_corners(std::uint8_t packed) {
+  FaceOcclusion corners{};
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = static_cast<std::uint8_t>(packed >> 2 * i & 3U);
+  return corners;
 }
 
 }  // namespace quoin

@@ -36,7 +36,7 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   ImpostorWorld world(Model::Castle);
   Instance ground = world.placed();
   SceneGrid slab;
-  slab.grid.fill_box({-300, 0, -300}, {300, 0, 300}, 2);
+  slab.grid.fill_box({{-300, 0, -300}, {301, 1, 301}}, 2);
   ground.grid = world.scene.add_grid(std::move(slab));
   ground.position = {0, -15, 0};
   world.scene.add_instance(ground);

@@ -91,7 +91,7 @@ std::size_t ImpostorFaces::bytes() const {
 float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position) {
   if (mode != OcclusionMode::Vertex) return static_cast<float>(face.open_rays) / ImpostorFaces::Face::kRays;
   if (face.occlusion == 0) return 1.0F;
-  return 1.0F - level_at(unpacked_levels(face.occlusion), face.voxel, face.direction, position) / 3.0F;
+  return 1.0F - occlusion_at(unpacked_corners(face.occlusion), face.voxel, face.direction, position) / 3.0F;
 }
 
 Impostor::Impostor() : faces_(std::make_shared<const ImpostorFaces>()) {}

@@ -45,7 +45,7 @@ Grid model(int which) {
     for (int i = 0; i < 40; ++i) {
       const auto coordinate = [&] { return static_cast<int>(random() % 41); };
       const IVec3 at{coordinate(), coordinate(), coordinate()};
-      grid.fill_box(at, at + IVec3(static_cast<int>(random() % 9)), static_cast<VoxelType>(1 + random() % 3));
+      grid.fill_box({at, at + IVec3(static_cast<int>(random() % 9)) + 1}, static_cast<VoxelType>(1 + random() % 3));
     }
   }
   return grid;

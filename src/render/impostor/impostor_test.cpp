@@ -43,7 +43,7 @@ Grid blobs(unsigned seed) {
   for (int i = 0; i < 20; ++i) {
     const auto coordinate = [&] { return static_cast<int>(random() % 30); };
     const IVec3 at{coordinate(), coordinate(), coordinate()};
-    grid.fill_box(at, at + IVec3(static_cast<int>(random() % 6)), static_cast<VoxelType>(1 + random() % 2));
+    grid.fill_box({at, at + IVec3(static_cast<int>(random() % 6)) + 1}, static_cast<VoxelType>(1 + random() % 2));
   }
   return grid;
 }
@@ -133,9 +133,9 @@ TEST(Impostor, HoldsWhatSingleRaysSee) {
       }
       ASSERT_NEAR(snapshot.depth[i], hit->t, 1e-4);
       ASSERT_EQ(snapshot.faces[i], hit->face);
-      const float level = level_at(corner_levels(reader, types, hit->voxel, hit->face), hit->voxel, hit->face,
-                                   ray.origin + ray.direction * hit->t);
-      ASSERT_NEAR(snapshot.occlusion[i], level * 85.0F, 0.51F);
+      const float occlusion = occlusion_at(corner_occlusion(reader, types, hit->voxel, hit->face), hit->voxel,
+                                           hit->face, ray.origin + ray.direction * hit->t);
+      ASSERT_NEAR(snapshot.occlusion[i], occlusion * 85.0F, 0.51F);
     }
   }
 }
@@ -143,7 +143,7 @@ TEST(Impostor, HoldsWhatSingleRaysSee) {
 TEST(Impostor, BlackVoxelsAreNoHoles) {
   const VoxelRegistry types = two_types();
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, 1);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   for (int view = 0; view < kImpostorViews; ++view) {
     const Snapshot snapshot = take_snapshot(grid, types, tree, view);
@@ -191,7 +191,7 @@ TEST(Impostor, LeavesTransparentVoxelsOut) {
   Scene scene;
   const VoxelType glass = add_type(scene, {90, 120, 220, 120}, Visibility::Transparent);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {4, 4, 4}, glass);
+  grid.fill_box({{0, 0, 0}, {5, 5, 5}}, glass);
   EXPECT_TRUE(Impostor::build(grid, scene.types).is_empty());
 }
 

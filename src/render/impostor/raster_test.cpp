@@ -32,7 +32,7 @@ struct Shape {
     for (int i = 0; i < 12; ++i) {
       const auto coordinate = [&](unsigned most) { return static_cast<int>(random() % most); };
       const IVec3 at{coordinate(20), coordinate(20), coordinate(20)};
-      grid.fill_box(at, at + IVec3{coordinate(7), coordinate(7), coordinate(7)}, 1);
+      grid.fill_box({at, at + IVec3{coordinate(7) + 1, coordinate(7) + 1, coordinate(7) + 1}}, 1);
     }
     content = content_sphere(grid);
     const OccupancyTree tree = OccupancyTree::build(grid, workloads::three_types(), Occupancy::Opaque);

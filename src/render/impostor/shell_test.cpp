@@ -34,7 +34,7 @@ struct World {
     const IVec3 corner{around(3000), around(3000), around(3000)};
     for (int i = 0; i < 30; ++i) {
       const IVec3 at = corner + IVec3{around(45), around(45), around(45)};
-      grid.fill_box(at, at + IVec3{static_cast<int>(random() % 12), static_cast<int>(random() % 12), 3},
+      grid.fill_box({at, at + IVec3{static_cast<int>(random() % 12) + 1, static_cast<int>(random() % 12) + 1, 4}},
                     random() % 4 == 0 ? kAir : static_cast<VoxelType>(1 + random() % 3));
     }
     grid.set(corner, 1);

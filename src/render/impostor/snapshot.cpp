@@ -87,11 +87,11 @@ Snapshot take_snapshot(const Grid& grid, const VoxelRegistry& types, const Occup
         const Ray ray = rays.ray(lane);
         const RayHit hit = hits[lane];
         const auto texel = static_cast<std::size_t>((row + lane / kTexelBlock) * edge + column + lane % kTexelBlock);
-        const FaceOcclusion levels = corner_levels(reader, types, hit.voxel, hit.face);
-        const float level = level_at(levels, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
+        const FaceOcclusion corners = corner_occlusion(reader, types, hit.voxel, hit.face);
+        const float occlusion = occlusion_at(corners, hit.voxel, hit.face, ray.origin + ray.direction * hit.t);
         snapshot.types[texel] = reader.get(hit.voxel);
         snapshot.faces[texel] = hit.face;
-        snapshot.occlusion[texel] = static_cast<std::uint8_t>(std::lround(level * (255.0F / 3.0F)));
+        snapshot.occlusion[texel] = static_cast<std::uint8_t>(std::lround(occlusion * (255.0F / 3.0F)));
         snapshot.depth[texel] = static_cast<float>(hit.t);
       }
     }

@@ -50,14 +50,14 @@ enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb };
 
 inline Grid castle() {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {44, 0, 44}, 2);
+  grid.fill_box({{0, 0, 0}, {45, 1, 45}}, 2);
   for (const IVec3 corner : {IVec3{0, 1, 0}, {36, 1, 0}, {0, 1, 36}, {36, 1, 36}}) {
-    grid.fill_box(corner, corner + IVec3{8, 27, 8}, 1);
-    grid.fill_box(corner + IVec3{2, 20, 2}, corner + IVec3{6, 27, 6}, kAir);
+    grid.fill_box({corner, corner + IVec3{9, 28, 9}}, 1);
+    grid.fill_box({corner + IVec3{2, 20, 2}, corner + IVec3{7, 28, 7}}, kAir);
   }
-  grid.fill_box({8, 1, 3}, {36, 14, 5}, 3);
-  grid.fill_box({8, 1, 39}, {36, 14, 41}, 3);
-  grid.fill_box({16, 1, 16}, {28, 22, 28}, 3);
+  grid.fill_box({{8, 1, 3}, {37, 15, 6}}, 3);
+  grid.fill_box({{8, 1, 39}, {37, 15, 42}}, 3);
+  grid.fill_box({{16, 1, 16}, {29, 23, 29}}, 3);
   return grid;
 }
 
@@ -65,13 +65,13 @@ inline Grid ship() {
   Grid grid;
   for (int z = 0; z < 48; ++z) {
     const int half = std::min({6, z / 2 + 1, (47 - z) / 3 + 2});
-    grid.fill_box({-half, 0, z}, {half, 5, z}, 1);
-    grid.fill_box({1 - half, 4, z}, {half - 1, 5, z}, kAir);
+    grid.fill_box({{-half, 0, z}, {half + 1, 6, z + 1}}, 1);
+    grid.fill_box({{1 - half, 4, z}, {half, 6, z + 1}}, kAir);
   }
   for (const int z : {12, 24, 36}) {
-    grid.fill_box({0, 5, z}, {0, 34, z}, 2);
-    grid.fill_box({-9, 26, z}, {9, 26, z}, 2);
-    grid.fill_box({-8, 12, z}, {8, 25, z}, 3);
+    grid.fill_box({{0, 5, z}, {1, 35, z + 1}}, 2);
+    grid.fill_box({{-9, 26, z}, {10, 27, z + 1}}, 2);
+    grid.fill_box({{-8, 12, z}, {9, 26, z + 1}}, 3);
   }
   return grid;
 }
@@ -95,15 +95,15 @@ inline Grid voxels_of(Model model) {
     for (int i = 0; i < 40; ++i) {
       const auto coordinate = [&] { return static_cast<int>(random() % 41); };
       const IVec3 at{coordinate(), coordinate(), coordinate()};
-      grid.fill_box(at, at + IVec3(static_cast<int>(random() % 9)), static_cast<VoxelType>(1 + random() % 3));
+      grid.fill_box({at, at + IVec3(static_cast<int>(random() % 9)) + 1}, static_cast<VoxelType>(1 + random() % 3));
     }
   }
   if (model == Model::Terrain) {
     grid.edit({IVec3(0), IVec3(200, 60, 200)}, [](IVec3 v, VoxelType) { return terrain_at(v); });
   }
   if (model == Model::Comb) {
-    grid.fill_box({0, 0, 0}, {40, 2, 30}, 2);
-    for (int x = 0; x <= 40; x += 2) grid.fill_box({x, 3, 0}, {x, 24, 30}, x % 4 == 0 ? 1 : 3);
+    grid.fill_box({{0, 0, 0}, {41, 3, 31}}, 2);
+    for (int x = 0; x <= 40; x += 2) grid.fill_box({{x, 3, 0}, {x + 1, 25, 31}}, x % 4 == 0 ? 1 : 3);
   }
   return grid;
 }

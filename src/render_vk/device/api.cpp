@@ -23,7 +23,7 @@ PFN_vkGetInstanceProcAddr loader() {
 }
 
 Error no_loader() {
-  return fail(ErrorCode::Unsupported, "vulkan: there is no loader (libvulkan.so.1) of version 1.1 or newer here");
+  return make_error(ErrorCode::Unsupported, "vulkan: there is no loader (libvulkan.so.1) of version 1.1 or newer here");
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace quoin::vulkan {
 namespace {
 
 Error refuse(std::string message) {
-  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+  return make_error(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
 Status check_handles(const BorrowedVulkanDevice& lent) {
@@ -20,7 +20,8 @@ Status check_handles(const BorrowedVulkanDevice& lent) {
       std::pair{static_cast<const void*>(lent.device), "device"},
       std::pair{static_cast<const void*>(lent.queue), "queue"}};
   for (const auto& [handle, name] : handles) {
-    if (handle == nullptr) return fail(ErrorCode::InvalidArgument, std::string("vulkan: the ") + name + " is null");
+    if (handle == nullptr)
+      return make_error(ErrorCode::InvalidArgument, std::string("vulkan: the ") + name + " is null");
   }
   return {};
 }
@@ -67,18 +68,18 @@ Status Device::open(const PhysicalDevice& physical) {
 
 Status Device::adopt(const BorrowedVulkanDevice& lent) {
   if (Status whole = check_handles(lent); !whole) return whole;
-  auto api = Api::find(lent.find_function);
+  auto api = Api::find(lent.get_instance_proc_addr);
   if (!api) return api.error();
   api_ = *api;
   if (const char* missing = api_.load_instance(lent.instance))
     return refuse(std::string("the instance lacks ") + missing);
   physical_ = describe(api_, lent.physical_device);
-  const VulkanDevice& description = physical_.description;
+  const VulkanDeviceInfo& description = physical_.description;
   if (!description.missing.empty()) return refuse(description.name + " lacks " + description.missing);
   const VkQueueFlags can = queue_flags(api_, lent.physical_device, lent.queue_family);
   if (can == 0) {
     const std::string family = std::to_string(lent.queue_family);
-    return fail(ErrorCode::InvalidArgument, "vulkan: " + description.name + " has no queue family " + family);
+    return make_error(ErrorCode::InvalidArgument, "vulkan: " + description.name + " has no queue family " + family);
   }
   if ((can & VK_QUEUE_COMPUTE_BIT) == 0) return refuse(description.name + ": the queue does not compute");
   physical_.queue_family = lent.queue_family;
@@ -132,7 +133,7 @@ Error Device::error_of(VkResult result, const std::string& doing) const {
     case VK_ERROR_TOO_MANY_OBJECTS:
       return {ErrorCode::LimitExceeded, who + "out of blocks of memory while " + doing, {}, {}};
     case VK_ERROR_DEVICE_LOST:
-      return {ErrorCode::Unsupported, who + "the device was lost while " + doing, {}, {}};
+      return {ErrorCode::DeviceLost, who + "the device was lost while " + doing, {}, {}};
     default:
       return {
           ErrorCode::Unsupported, who + "failed while " + doing + " (VkResult " + std::to_string(result) + ")", {}, {}};

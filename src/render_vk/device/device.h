@@ -23,7 +23,7 @@ class Device {
 
   [[nodiscard]] const Api& api() const { return api_; }
   [[nodiscard]] VkDevice handle() const { return handle_; }
-  [[nodiscard]] const VulkanDevice& description() const { return physical_.description; }
+  [[nodiscard]] const VulkanDeviceInfo& description() const { return physical_.description; }
   /// What it can do, and how it is known to Vulkan.
   [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
   [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }

@@ -10,7 +10,7 @@ namespace {
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
 Error refuse(std::string message) {
-  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+  return make_error(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
 bool has_validation(const Api& api) {
@@ -183,7 +183,7 @@ Status VulkanInstance::list_devices() {
 }
 
 Result<PhysicalDevice> VulkanInstance::choose(const std::string& wanted) const {
-  std::vector<VulkanDevice> descriptions;
+  std::vector<VulkanDeviceInfo> descriptions;
   for (const PhysicalDevice& device : devices_) descriptions.push_back(device.description);
   const auto chosen = choose_vulkan_device(descriptions, wanted);
   if (!chosen) return chosen.error();

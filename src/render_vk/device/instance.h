@@ -20,7 +20,7 @@ struct PhysicalDevice {
   std::uint32_t queue_family = 0;
   bool draws_triangles = false;  ///< that queue
   bool draws_lines = false;      ///< for the edges of triangles
-  VulkanDevice description;
+  VulkanDeviceInfo description;
 };
 
 /// A device as it is, with the first queue family that will do best.

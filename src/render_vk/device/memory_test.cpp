@@ -77,7 +77,7 @@ TEST_F(VulkanMemory, AFullMemoryIsAnErrorAndNoMore) {
 
 TEST_F(VulkanMemory, ALostDeviceIsSaidToBe) {
   const Error lost = device_->error_of(VK_ERROR_DEVICE_LOST, "drawing");
-  EXPECT_EQ(lost.code, ErrorCode::Unsupported);
+  EXPECT_EQ(lost.code, ErrorCode::DeviceLost);
   EXPECT_EQ(lost.message, "vulkan: " + device_->description().name + ": the device was lost while drawing");
 }
 

@@ -151,8 +151,8 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL without_a_function(VkInstance instance,
 
 TEST_F(VulkanBorrowed, DevicesThatLackSomethingAreRefused) {
   BorrowedVulkanDevice lent = own_->lent();
-  const auto as_found = [&](VulkanFunctionFinder find) {
-    lent.find_function = find;
+  const auto as_found = [&](VulkanGetInstanceProcAddr find) {
+    lent.get_instance_proc_addr = find;
     return describe_vulkan_device(own_->instance, own_->physical, find);
   };
   EXPECT_EQ(as_found(real())->missing, "");

@@ -12,25 +12,25 @@ namespace quoin {
 using vulkan::Api;
 
 static_assert(std::is_same_v<VulkanImageHandle, VkImage>);
-static_assert(std::is_same_v<VulkanFunctionFinder, PFN_vkGetInstanceProcAddr>);
+static_assert(std::is_same_v<VulkanGetInstanceProcAddr, PFN_vkGetInstanceProcAddr>);
 static_assert(std::is_same_v<VulkanFunction, PFN_vkVoidFunction>);
 
-Result<std::vector<VulkanDevice>> vulkan_devices() {
+Result<std::vector<VulkanDeviceInfo>> vulkan_devices() {
   const auto instance = vulkan::VulkanInstance::create({});
   if (!instance) return instance.error();
-  std::vector<VulkanDevice> devices;
+  std::vector<VulkanDeviceInfo> devices;
   for (const vulkan::PhysicalDevice& device : (*instance)->devices()) devices.push_back(device.description);
   return devices;
 }
 
-Result<VulkanDevice> describe_vulkan_device(VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
-                                            VulkanFunctionFinder find_function) {
-  if (instance == nullptr) return fail(ErrorCode::InvalidArgument, "vulkan: the instance is null");
-  if (physical_device == nullptr) return fail(ErrorCode::InvalidArgument, "vulkan: the physical device is null");
-  auto api = Api::find(find_function);
+Result<VulkanDeviceInfo> describe_vulkan_device(VkInstance_T* instance, VkPhysicalDevice_T* physical_device,
+                                                VulkanGetInstanceProcAddr get_instance_proc_addr) {
+  if (instance == nullptr) return make_error(ErrorCode::InvalidArgument, "vulkan: the instance is null");
+  if (physical_device == nullptr) return make_error(ErrorCode::InvalidArgument, "vulkan: the physical device is null");
+  auto api = Api::find(get_instance_proc_addr);
   if (!api) return api.error();
   if (const char* missing = api->load_instance(instance)) {
-    return fail(ErrorCode::Unsupported, std::string("vulkan: the instance lacks ") + missing);
+    return make_error(ErrorCode::Unsupported, std::string("vulkan: the instance lacks ") + missing);
   }
   return vulkan::describe(*api, physical_device).description;
 }

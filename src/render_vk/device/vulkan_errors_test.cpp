@@ -23,7 +23,7 @@ TEST(Vulkan, SaysWhatDevicesThereAreOrWhatIsMissing) {
     return;
   }
   EXPECT_FALSE(devices->empty());
-  for (const VulkanDevice& device : *devices) EXPECT_FALSE(device.name.empty() || device.kind.empty());
+  for (const VulkanDeviceInfo& device : *devices) EXPECT_FALSE(device.name.empty() || device.kind.empty());
   if (!renderer) {
     EXPECT_NE(renderer.error().message.find(" lacks "), std::string::npos) << renderer.error().message;
   }
@@ -93,7 +93,7 @@ TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, stone);
   const InstanceHandle instance = place(scene, std::move(grid));
   EXPECT_GT(taken(scene, camera, options).pixels_hit, 0);
   Grid& voxels = scene.edit(scene.instances()[instance].grid).grid;
@@ -106,7 +106,7 @@ TEST_F(VulkanErrors, AListenerCanStopIt) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, stone);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, stone);
   place(scene, std::move(grid));
   ASSERT_TRUE(renderer_->update(scene));
   const Camera camera = towards({30, 20, 30}, {5, 5, 5});

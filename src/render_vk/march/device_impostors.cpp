@@ -141,7 +141,7 @@ Status DeviceImpostors::draw(const Scene& scene, const FarImpostors& far, const 
     placement.far.push_back(shown);
     number += drawn->faces->faces.size();
     if (number <= std::numeric_limits<std::uint32_t>::max()) continue;
-    return fail(ErrorCode::LimitExceeded, "vulkan: impostors of more than 2^32 faces in a picture");
+    return make_error(ErrorCode::LimitExceeded, "vulkan: impostors of more than 2^32 faces in a picture");
   }
   return {};
 }

@@ -65,7 +65,8 @@ std::size_t VulkanPicture::bytes() const {
 }
 
 Result<Image> VulkanPicture::read() const {
-  if (impl_->samples == 0) return fail(ErrorCode::InvalidArgument, "vulkan: nothing was drawn that could be read");
+  if (impl_->samples == 0)
+    return make_error(ErrorCode::InvalidArgument, "vulkan: nothing was drawn that could be read");
   vulkan::Device& device = *impl_->device;
   auto landing =
       vulkan::Buffer::create(device, impl_->colours.size(), vulkan::Buffer::Where::Read, "reading a picture");
@@ -89,7 +90,7 @@ Status VulkanPicture::write(const Image& image) {
   const std::size_t pixels =
       has_pixels ? static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) : 0;
   if (pixels == 0 || image.rgb.size() != 3 * pixels) {
-    return fail(ErrorCode::InvalidArgument, "vulkan: a picture without pixels");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: a picture without pixels");
   }
   if (Status sized = impl_->resize(image.width, image.height); !sized) return sized;
   vulkan::Device& device = *impl_->device;

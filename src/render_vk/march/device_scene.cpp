@@ -130,7 +130,8 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
   std::vector<std::pair<KnownGrid*, const Grid*>> all;
   for (const GridHandle handle : changed) {
     KnownGrid& known = grids_.find(handle)->second;
-    if (is_too_wide(known.bounds)) return fail(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
+    if (is_too_wide(known.bounds))
+      return make_error(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
     all.emplace_back(&known, &scene.grids()[handle].grid);
   }
   parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->trees.update(*all[i].second, scene.types); });
@@ -151,7 +152,7 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   bool places = false;
   const std::vector<GridHandle> changed = changed_grids(scene, filter, places);
   if (placement_.placed.size() > kMaxInstances) {
-    return fail(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
+    return make_error(ErrorCode::LimitExceeded, "vulkan: more than 16,777,216 instances");
   }
   if (Status done = update_grids(scene, changed, threads); !done) return done;
   if (places) finish_placed(scene);

@@ -12,7 +12,7 @@ using vulkan::info_of;
 const char* const kDoing = "putting a picture into an image";
 
 Error wrong(const std::string& message) {
-  return fail(ErrorCode::InvalidArgument, "vulkan: " + message);
+  return make_error(ErrorCode::InvalidArgument, "vulkan: " + message);
 }
 
 bool has_red_first(std::uint32_t format) {
@@ -40,9 +40,9 @@ std::string size_text(int width, int height) {
 Status check(const VulkanImageTarget& target, int width, int height) {
   if (target.image == VK_NULL_HANDLE) return wrong("the image is null");
   if (!has_red_first(target.format) && !has_blue_first(target.format)) {
-    return fail(ErrorCode::Unsupported,
-                "vulkan: pictures go into images of R8G8B8A8 and B8G8R8A8, UNORM and SRGB, not of VkFormat " +
-                    std::to_string(target.format));
+    return make_error(ErrorCode::Unsupported,
+                      "vulkan: pictures go into images of R8G8B8A8 and B8G8R8A8, UNORM and SRGB, not of VkFormat " +
+                          std::to_string(target.format));
   }
   if (target.width <= 0 || target.height <= 0)
     return wrong("an image of " + size_text(target.width, target.height) + " pixels");

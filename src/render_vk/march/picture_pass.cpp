@@ -260,7 +260,7 @@ Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& o
     for (int sample = 0; sample < options.samples && done; ++sample) {
       done = take_sample(tile, sample);
       count += 1.0;
-      if (done && progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+      if (done && progress && !progress(count / all)) return make_error(ErrorCode::Cancelled, "cancelled");
     }
     if (done) done = read_tile(tile, picture);
   }
@@ -306,7 +306,7 @@ Status PicturePass::add_samples(PictureImpl& picture, const RenderOptions& optio
       const auto some = std::span(tiles).subspan(first, std::min(at_once, tiles.size() - first));
       if (Status done = take_sample(some, picture.samples + sample); !done) return done;
       count += static_cast<double>(some.size());
-      if (progress && !progress(count / all)) return fail(ErrorCode::Cancelled, "cancelled");
+      if (progress && !progress(count / all)) return make_error(ErrorCode::Cancelled, "cancelled");
     }
   }
   return resolve(tiles);

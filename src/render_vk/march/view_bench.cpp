@@ -88,7 +88,7 @@ void on_processor(benchmark::State& state, const World& world, const RenderOptio
     fail_unless(picture.has_value(), "the picture's success", 0);
     rays = picture->rays;
   }
-  state.SetLabel(std::to_string(resolve(Threads{})) + " threads");
+  state.SetLabel(std::to_string(thread_count(Threads{})) + " threads");
   count(state, rays);
 }
 

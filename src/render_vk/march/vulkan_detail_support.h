@@ -42,7 +42,7 @@ inline GridHandle add_blobs(Scene& scene, std::uint32_t seed, int count = 30) {
   for (int i = 0; i < count; ++i) {
     const auto coordinate = [&] { return 16 * (static_cast<int>(random() % 10) - 5); };
     const IVec3 at{coordinate(), coordinate(), coordinate()};
-    grid.grid.fill_box(at, at + IVec3(15 + 16 * static_cast<int>(random() % 3)),
+    grid.grid.fill_box({at, at + IVec3(15 + 16 * static_cast<int>(random() % 3)) + 1},
                        static_cast<VoxelType>(1 + random() % 4));
   }
   grid.pivot = DVec3(1.5, -2.0, 0.25);

@@ -96,7 +96,7 @@ TEST_F(VulkanDetail, EditsReachHalvedGrids) {
     Grid& grid = scene_.edit(edited).grid;
     const auto coordinate = [&] { return 16 * (static_cast<int>(random() % 14) - 7); };
     const IVec3 at{coordinate(), coordinate(), coordinate()};
-    grid.fill_box(at, at + IVec3(31), round == 2 ? kAir : VoxelType{2});
+    grid.fill_box({at, at + 32}, round == 2 ? kAir : VoxelType{2});
     compare(camera, options, "after_edit_" + std::to_string(round));
   }
 }
@@ -112,7 +112,7 @@ TEST_F(VulkanDetail, AnEditSendsWhatItChanged) {
   static_cast<void>(taken_as_is(camera, options));
   const std::uint64_t of_a_picture = memory.written() - before;
   Grid& grid = scene_.edit(edited).grid;
-  grid.fill_box({0, 0, 0}, {15, 15, 15}, grid.get({0, 0, 0}) == 1 ? VoxelType{2} : VoxelType{1});
+  grid.fill_box({{0, 0, 0}, {16, 16, 16}}, grid.get({0, 0, 0}) == 1 ? VoxelType{2} : VoxelType{1});
   ASSERT_TRUE(renderer_->update(scene_));
   const std::uint64_t after = memory.written();
   static_cast<void>(taken_as_is(camera, options));

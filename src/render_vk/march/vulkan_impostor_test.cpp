@@ -28,7 +28,7 @@ class VulkanImpostors : public vulkan_test::VulkanDetailTest {
     ImpostorWorld world(model);
     scene_ = std::move(world.scene);
     SceneGrid slab;
-    slab.grid.fill_box({-300, 0, -300}, {300, 0, 300}, 2);
+    slab.grid.fill_box({{-300, 0, -300}, {301, 1, 301}}, 2);
     Instance ground;
     ground.grid = scene_.add_grid(std::move(slab));
     ground.position = {0, -1.2 * world.radius, 0};
@@ -125,7 +125,7 @@ TEST_F(VulkanImpostors, EditsAndRemovalsReachThem) {
   const RenderOptions options = in_detail(256, 192, 128);
   compare(camera, options, "far_before");
   const std::uint64_t both = impostor_bytes();
-  scene_.edit(grids[0]).grid.fill_box({-40, -40, -40}, {80, 60, 70}, 2);
+  scene_.edit(grids[0]).grid.fill_box({{-40, -40, -40}, {81, 61, 71}}, 2);
   compare(camera, options, "far_edited");
   for (const InstanceHandle handle : scene_.instances().handles()) {
     if (scene_.instances()[handle].grid == grids[0]) scene_.remove_instance(handle);

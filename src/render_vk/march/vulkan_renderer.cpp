@@ -74,7 +74,7 @@ Result<VulkanRenderer> VulkanRenderer::create(const BorrowedVulkanDevice& device
   return VulkanRenderer(std::move(*impl));
 }
 
-const VulkanDevice& VulkanRenderer::device() const {
+const VulkanDeviceInfo& VulkanRenderer::device() const {
   return impl_->device->description();
 }
 
@@ -109,7 +109,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (Status status = check(camera, options); !status) return status;
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
   if (target.device != impl_->device.get()) {
-    return fail(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
   }
   if (Status status = target.resize(options.width, options.height); !status) return status;
   // Samples of meshes, and of pictures that were written, have no sums to add to.
@@ -120,7 +120,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   QUOIN_ASSERT(is_same(target.camera, camera), "a picture's samples are of one camera");
   QUOIN_ASSERT(is_same(target.light, options.light), "a picture's samples are of one light");
   if (target.samples + options.samples > kMaxSamples) {
-    return fail(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
+    return make_error(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
   const auto subject = Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();

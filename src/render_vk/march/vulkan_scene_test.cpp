@@ -39,14 +39,14 @@ Types add_types(Scene& scene) {
 
 Grid hut(const Types& types, bool has_glass = true) {
   Grid grid;
-  grid.fill_box({0, 0, 0}, {19, 0, 19}, types.wall);
-  grid.fill_box({4, 1, 4}, {15, 8, 15}, types.wall);
-  grid.fill_box({5, 1, 5}, {14, 8, 14}, kAir);
-  for (int i = 0; i < 5; ++i) grid.fill_box({3 + i, 9 + i, 3 + i}, {16 - i, 9 + i, 16 - i}, types.roof);
-  grid.fill_box({8, 3, 15}, {11, 6, 15}, has_glass ? types.glass : kAir);
-  grid.fill_box({15, 3, 8}, {15, 6, 11}, has_glass ? types.glass : kAir);
+  grid.fill_box({{0, 0, 0}, {20, 1, 20}}, types.wall);
+  grid.fill_box({{4, 1, 4}, {16, 9, 16}}, types.wall);
+  grid.fill_box({{5, 1, 5}, {15, 9, 15}}, kAir);
+  for (int i = 0; i < 5; ++i) grid.fill_box({{3 + i, 9 + i, 3 + i}, {17 - i, 10 + i, 17 - i}}, types.roof);
+  grid.fill_box({{8, 3, 15}, {12, 7, 16}}, has_glass ? types.glass : kAir);
+  grid.fill_box({{15, 3, 8}, {16, 7, 12}}, has_glass ? types.glass : kAir);
   grid.set({10, 1, 17}, types.lamp);
-  if (has_glass) grid.fill_box({0, 1, 17}, {4, 2, 19}, types.water);
+  if (has_glass) grid.fill_box({{0, 1, 17}, {5, 3, 20}}, types.water);
   return grid;
 }
 
@@ -76,7 +76,7 @@ Scene village(DVec3 centre, bool has_glass) {
     add_instance(scene, grid, position, rotation, std::exp(unit(random)), i % 3 == 0);
   }
   SceneGrid ground;
-  ground.grid.fill_box({-60, -13, -60}, {60, -10, 60}, types.wall);
+  ground.grid.fill_box({{-60, -13, -60}, {61, -9, 61}}, types.wall);
   place(scene, ground.grid.snapshot(), centre);
   return scene;
 }
@@ -91,7 +91,7 @@ TEST_F(VulkanScene, ManyInstances) {
   const Types types = add_types(scene);
   SceneGrid small;
   small.grid.fill_sphere({0, 0, 0}, 3, types.roof);
-  small.grid.fill_box({-1, 3, -1}, {1, 4, 1}, types.glass);
+  small.grid.fill_box({{-1, 3, -1}, {2, 5, 2}}, types.glass);
   const GridHandle grid = scene.add_grid(std::move(small));
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -172,10 +172,10 @@ TEST_F(VulkanScene, FromInsideGlassAndStone) {
   const Types types = add_types(scene);
   Grid grid;
   const VoxelType clear = add_type(scene, {60, 140, 220, 9}, Visibility::Transparent);
-  grid.fill_box({0, 0, 0}, {30, 30, 30}, clear);
-  grid.fill_box({0, 0, 0}, {30, 3, 30}, types.wall);
+  grid.fill_box({{0, 0, 0}, {31, 31, 31}}, clear);
+  grid.fill_box({{0, 0, 0}, {31, 4, 31}}, types.wall);
   grid.fill_sphere({20, 8, 20}, 5, types.roof);
-  grid.fill_box({8, 4, 24}, {12, 12, 26}, types.glass);
+  grid.fill_box({{8, 4, 24}, {13, 13, 27}}, types.glass);
   place(scene, std::move(grid));
   compare(scene, towards({4.3, 15.2, 5.1}, {20, 8, 20}), sized(96, 72), "under_water");
   compare(scene, towards({10.4, 8.3, 25.6}, {20, 8, 20}), sized(96, 72), "in_glass");
@@ -188,13 +188,13 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   const VoxelType clear = add_type(scene, {250, 230, 240, 12}, Visibility::Transparent);
   const VoxelType other = add_type(scene, {200, 250, 210, 20}, Visibility::Transparent);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {80, 0, 20}, types.wall);
-  grid.fill_box({0, 0, 0}, {0, 20, 20}, types.roof);
-  for (int x = 4; x < 78; x += 2) grid.fill_box({x, 1, 2}, {x, 14, 18}, x % 4 == 0 ? clear : other);
+  grid.fill_box({{0, 0, 0}, {81, 1, 21}}, types.wall);
+  grid.fill_box({{0, 0, 0}, {1, 21, 21}}, types.roof);
+  for (int x = 4; x < 78; x += 2) grid.fill_box({{x, 1, 2}, {x + 1, 15, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(grid));
   // A second grid whose panes touch those of the first.
   Grid beside;
-  for (int x = 4; x < 40; x += 2) beside.fill_box({x + 1, 1, 2}, {x + 1, 7, 18}, x % 4 == 0 ? clear : other);
+  for (int x = 4; x < 40; x += 2) beside.fill_box({{x + 1, 1, 2}, {x + 2, 8, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(beside));
   RenderOptions options = sized(96, 72);
   options.light.sun = {1.0, 0.25, 0.1};
@@ -205,9 +205,9 @@ TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {15, 0, 15}, types.wall);
+  grid.fill_box({{0, 0, 0}, {16, 1, 16}}, types.wall);
   for (int i = 0; i < 12; ++i) {
-    grid.fill_box({20'000 + i, 0, 2 * i}, {20'000 + i, 1 + i, 2 * i + 3}, i % 2 != 0 ? types.roof : types.wall);
+    grid.fill_box({{20'000 + i, 0, 2 * i}, {20'000 + i + 1, 2 + i, 2 * i + 4}}, i % 2 != 0 ? types.roof : types.wall);
   }
   place(scene, std::move(grid));
   compare(scene, towards({3.2, 6.1, 7.7}, {20'000, 6, 15}, 2e-3), sized(96, 72), "corridor");

@@ -36,7 +36,7 @@ Grid hills(VoxelType ground, VoxelType stone, int edge) {
   for (int x = 0; x < edge; x += 4) {
     for (int z = 0; z < edge; z += 4) {
       const int height = 20 + static_cast<int>(12.0 * std::sin(x * 0.06) + 9.0 * std::cos(z * 0.09));
-      grid.fill_box({x, 0, z}, {x + 3, height, z + 3}, (x / 16 + z / 16) % 2 == 0 ? ground : stone);
+      grid.fill_box({{x, 0, z}, {x + 4, height + 1, z + 4}}, (x / 16 + z / 16) % 2 == 0 ? ground : stone);
     }
   }
   return grid;
@@ -63,9 +63,9 @@ TEST_F(VulkanUpdate, AnEditSendsWhatItChangedAndNoMore) {
   };
   edited("one_voxel", [&] { grid.set({100, 60, 100}, stone); });
   edited("hole", [&] { grid.fill_sphere({70, 8, 90}, 12, kAir); });
-  edited("glass", [&] { grid.fill_box({80, 30, 80}, {100, 50, 82}, glass); });
-  edited("new_chunk_below", [&] { grid.fill_box({-70, 0, 60}, {-66, 30, 64}, stone); });
-  edited("chunk_away", [&] { grid.fill_box({-70, 0, 60}, {-66, 30, 64}, kAir); });
+  edited("glass", [&] { grid.fill_box({{80, 30, 80}, {101, 51, 83}}, glass); });
+  edited("new_chunk_below", [&] { grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, stone); });
+  edited("chunk_away", [&] { grid.fill_box({{-70, 0, 60}, {-65, 31, 65}}, kAir); });
 }
 
 TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
@@ -73,10 +73,10 @@ TEST_F(VulkanUpdate, InstancesAndTypesComeAndGo) {
   const VoxelType stone = add_type(scene, {140, 140, 150});
   const VoxelType brick = add_type(scene, {170, 80, 60});
   Grid floor;
-  floor.fill_box({0, 0, 0}, {63, 1, 63}, stone);
+  floor.fill_box({{0, 0, 0}, {64, 2, 64}}, stone);
   place(scene, std::move(floor));
   Grid tower;
-  tower.fill_box({0, 0, 0}, {7, 23, 7}, brick);
+  tower.fill_box({{0, 0, 0}, {8, 24, 8}}, brick);
   const InstanceHandle first = place(scene, tower.snapshot(), {12, 2, 12});
   const Camera camera = towards({90, 60, 100}, {30, 8, 30});
   const auto then = [&](const char* name) {
@@ -112,7 +112,7 @@ TEST_F(VulkanUpdate, AnotherSceneWithTheSameHandlesAndVersions) {
     Scene scene;
     const VoxelType stone = add_type(scene, {140, 140, 150});
     Grid grid;
-    grid.fill_box({0, 0, 0}, {size, size, size}, stone);
+    grid.fill_box({{0, 0, 0}, {size + 1, size + 1, size + 1}}, stone);
     place(scene, std::move(grid));
     ASSERT_TRUE(renderer_->update(scene));
     expect_current(scene, camera, "scene_" + std::to_string(size));
@@ -171,7 +171,7 @@ TEST_F(VulkanUpdate, HundredsOfTypesInOneChunk) {
   }
   for (const int types : {1, 3, 14, 200, 700}) {
     Grid grid;
-    grid.fill_box({0, 0, 0}, {63, 9, 63}, 1);
+    grid.fill_box({{0, 0, 0}, {64, 10, 64}}, 1);
     grid.edit({{0, 10, 0}, {64, 30, 64}}, [&](IVec3 voxel, VoxelType) {
       const auto type = static_cast<VoxelType>(1 + random() % static_cast<unsigned>(types));
       return (voxel.x + voxel.z) % 16 < voxel.y - 8 ? kAir : type;

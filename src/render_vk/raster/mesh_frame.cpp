@@ -264,7 +264,7 @@ std::int64_t MeshFrameData::triangles() const {
 
 Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances, const Camera& camera,
                                       const MeshPictureOptions& options, int subpixels) {
-  if (is_flat(camera)) return fail(ErrorCode::InvalidArgument, "camera: directions must not lie in one plane");
+  if (is_flat(camera)) return make_error(ErrorCode::InvalidArgument, "camera: directions must not lie in one plane");
   MeshFrameData data;
   View view(camera, options);
   std::vector<Space> spaces;

@@ -41,7 +41,7 @@ void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::
 
 // What a device would read beside the surface's memory.
 Status check(const ChunkSurface& surface) {
-  const auto refuse = [](const char* message) { return fail(ErrorCode::InvalidArgument, message); };
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (surface.style == SurfaceStyle::Blocky) {
     if (surface.opaque_quads > surface.quads.size()) return refuse("surface: more opaque quads than quads");
     return {};

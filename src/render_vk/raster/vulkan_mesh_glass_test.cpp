@@ -44,11 +44,11 @@ Scene panes(const std::vector<VoxelType Types::*>& panes) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
-  grid.fill_box({0, 0, -5}, {39, 39, -1}, types.wall);
-  grid.fill_box({0, 20, 0}, {39, 20, 0}, types.wall);
+  grid.fill_box({{0, 0, -5}, {40, 40, 0}}, types.wall);
+  grid.fill_box({{0, 20, 0}, {40, 21, 1}}, types.wall);
   int z = 10;
   for (const auto type : panes) {
-    grid.fill_box({4, 4, z}, {35, 35, z}, types.*type);
+    grid.fill_box({{4, 4, z}, {36, 36, z + 1}}, types.*type);
     z += 70;
   }
   place(scene, std::move(grid));
@@ -76,7 +76,7 @@ TEST_F(VulkanMeshGlass, OrderIsThatOfTheCameraAndNotOfChunksOrInstances) {
   const Types types = add_types(scene);
   const auto pane = [&](VoxelType type, double z) {
     Grid grid;
-    grid.fill_box({0, 0, 0}, {19, 19, 0}, type);
+    grid.fill_box({{0, 0, 0}, {20, 20, 1}}, type);
     place(scene, std::move(grid), {0, 0, z});
   };
   pane(types.red, 10);
@@ -95,8 +95,8 @@ TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {19, 19, 0}, types.red);
-  grid.fill_box({0, 0, 10}, {9, 19, 10}, types.wall);
+  grid.fill_box({{0, 0, 0}, {20, 20, 1}}, types.red);
+  grid.fill_box({{0, 0, 10}, {10, 20, 11}}, types.wall);
   place(scene, std::move(grid));
   compare(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
 }

@@ -29,11 +29,11 @@ Grid hut(Scene& scene) {
   const VoxelType roof = add_type(scene, {150, 40, 30});
   const VoxelType lamp = add_type(scene, {255, 220, 120}, Visibility::Opaque, 0.4F);
   Grid grid;
-  grid.fill_box({0, 0, 0}, {19, 0, 19}, wall);
-  grid.fill_box({4, 1, 4}, {15, 8, 15}, wall);
-  grid.fill_box({5, 1, 5}, {14, 8, 14}, kAir);
-  for (int i = 0; i < 5; ++i) grid.fill_box({3 + i, 9 + i, 3 + i}, {16 - i, 9 + i, 16 - i}, roof);
-  grid.fill_box({8, 3, 15}, {11, 6, 15}, kAir);
+  grid.fill_box({{0, 0, 0}, {20, 1, 20}}, wall);
+  grid.fill_box({{4, 1, 4}, {16, 9, 16}}, wall);
+  grid.fill_box({{5, 1, 5}, {15, 9, 15}}, kAir);
+  for (int i = 0; i < 5; ++i) grid.fill_box({{3 + i, 9 + i, 3 + i}, {17 - i, 10 + i, 17 - i}}, roof);
+  grid.fill_box({{8, 3, 15}, {12, 7, 16}}, kAir);
   grid.set({10, 1, 17}, lamp);
   return grid;
 }
@@ -116,8 +116,8 @@ TEST_F(VulkanMeshLight, BrightnessHasNoLimit) {
   const VoxelType sun = add_type(scene, {255, 255, 255}, Visibility::Opaque, std::numeric_limits<float>::infinity());
   const VoxelType black = add_type(scene, {0, 0, 0});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {4, 4, 4}, sun);
-  grid.fill_box({5, 0, 0}, {9, 4, 4}, black);
+  grid.fill_box({{0, 0, 0}, {5, 5, 5}}, sun);
+  grid.fill_box({{5, 0, 0}, {10, 5, 5}}, black);
   place(scene, std::move(grid));
   RenderOptions options = without_shadows(sized(64, 64));
   options.light.exposure = 1e300;
@@ -127,8 +127,8 @@ TEST_F(VulkanMeshLight, BrightnessHasNoLimit) {
 TEST_F(VulkanMeshLight, TypesThatAreNotRegisteredAreMagenta) {
   Scene scene;
   Grid grid;
-  grid.fill_box({0, 0, 0}, {4, 4, 4}, 77);
-  grid.fill_box({5, 0, 0}, {9, 4, 4}, 65'535);
+  grid.fill_box({{0, 0, 0}, {5, 5, 5}}, 77);
+  grid.fill_box({{5, 0, 0}, {10, 5, 5}}, 65'535);
   place(scene, std::move(grid));
   compare(scene, towards({5, 9, 20}, {5, 2, 2}), without_shadows(sized(64, 64)), "unregistered");
 }
@@ -198,8 +198,8 @@ TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
   Scene scene;
   const VoxelType stone = add_type(scene, {140, 140, 150});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 0, 9}, stone);
-  grid.fill_box({0, 1, 0}, {4, 1, 9}, stone);
+  grid.fill_box({{0, 0, 0}, {10, 1, 10}}, stone);
+  grid.fill_box({{0, 1, 0}, {5, 2, 10}}, stone);
   place(scene, std::move(grid));
   put(scene, blocky_surfaces(scene));
   // From above, 20 pixels a voxel; x = 5 to 6 is a step lower and dark along its left.

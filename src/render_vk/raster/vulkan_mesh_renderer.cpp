@@ -65,7 +65,7 @@ Status check(const Camera& camera, const MeshPictureOptions& options) {
   request.light = options.light;
   if (Status right = check(camera, request); !right) return right;
   if (std::find(kSamples.begin(), kSamples.end(), options.samples) == kSamples.end()) {
-    return fail(ErrorCode::InvalidArgument, "samples: of meshes must be 1, 2, 4 or 8");
+    return make_error(ErrorCode::InvalidArgument, "samples: of meshes must be 1, 2, 4 or 8");
   }
   return {};
 }
@@ -140,13 +140,13 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   const auto largest = static_cast<std::int64_t>(impl_->pass->largest_edge());
   if (options.width > largest || options.height > largest) {
     const std::string edge = std::to_string(largest);
-    return fail(ErrorCode::InvalidArgument, who + " draws meshes of at most " + edge + " x " + edge + " pixels");
+    return make_error(ErrorCode::InvalidArgument, who + " draws meshes of at most " + edge + " x " + edge + " pixels");
   }
   if (options.wireframe != Wireframe::Off && !device.physical().draws_lines) {
-    return fail(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
+    return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
   }
   if (target.device != &device) {
-    return fail(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer than the meshes");
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer than the meshes");
   }
   // Nothing was updated yet, or that failed: then there are no types either.
   if (impl_->surface_table.empty()) impl_->instances.clear();

@@ -37,8 +37,8 @@ Scene white_room(std::mt19937& random) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});
   Grid grid;
-  grid.fill_box({-48, -48, -48}, {47, 47, 47}, white);
-  grid.fill_box({-40, -40, -40}, {39, 39, 39}, kAir);
+  grid.fill_box({{-48, -48, -48}, {48, 48, 48}}, white);
+  grid.fill_box({{-40, -40, -40}, {40, 40, 40}}, kAir);
   const auto within = [&](int low, int high) {
     return low + static_cast<int>(random() % static_cast<unsigned>(high - low + 1));
   };
@@ -143,7 +143,7 @@ Scene white_cube() {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {9, 9, 9}, white);
+  grid.fill_box({{0, 0, 0}, {10, 10, 10}}, white);
   place(scene, std::move(grid));
   return scene;
 }
@@ -186,7 +186,7 @@ TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});
   Grid grid;
-  grid.fill_box({0, 0, 0}, {15, 0, 15}, white);
+  grid.fill_box({{0, 0, 0}, {16, 1, 16}}, white);
   place(scene, std::move(grid));
   const SurfaceUpdate slab = blocky_surfaces(scene, false)[0];
   const auto floor = std::make_shared<ChunkSurface>();

@@ -35,8 +35,8 @@ Scene boxes() {
   Scene scene;
   const VoxelType red = add_type(scene, {200, 40, 40});
   Grid grid;
-  grid.fill_box({10, 10, 10}, {29, 29, 29}, red);
-  grid.fill_box({138, 10, 10}, {157, 29, 29}, red);
+  grid.fill_box({{10, 10, 10}, {30, 30, 30}}, red);
+  grid.fill_box({{138, 10, 10}, {158, 30, 30}}, red);
   place(scene, std::move(grid));
   return scene;
 }
@@ -57,12 +57,12 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
     vulkan_test::VulkanMeshTest::expect_like(drawn(before_boxes(), mesh_options(options)),
                                              render_test::taken(scene, before_boxes(), options), name);
   };
-  grid.fill_box({10, 30, 10}, {14, 40, 14}, 1);
+  grid.fill_box({{10, 30, 10}, {15, 41, 15}}, 1);
   update.surface = blocky_surface(grid, scene.types, {0, 0, 0});
   ASSERT_TRUE(meshes_->put(std::vector{update}));
   expect_current("replaced");
   EXPECT_EQ(meshes_->stats().chunks, 2U);
-  grid.fill_box({0, 0, 0}, {63, 63, 63}, kAir);
+  grid.fill_box({{0, 0, 0}, {64, 64, 64}}, kAir);
   update.surface = nullptr;
   ASSERT_TRUE(meshes_->put(std::vector{update, update}));
   expect_current("removed");
@@ -78,7 +78,7 @@ TEST_F(VulkanMeshUpdate, OfOneChunkInOneCallTheLastCounts) {
   const std::vector<SurfaceUpdate> right = blocky_surfaces(scene);
   SurfaceUpdate wrong = right[0];
   Grid other;
-  other.fill_box({0, 0, 0}, {60, 60, 60}, 1);
+  other.fill_box({{0, 0, 0}, {61, 61, 61}}, 1);
   wrong.surface = blocky_surface(other, scene.types, {0, 0, 0});
   const RenderOptions options = without_shadows(sized(160, 90));
   put(scene, {wrong, right[0], wrong, right[0], right[1]});

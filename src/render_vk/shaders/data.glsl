@@ -55,7 +55,7 @@ struct Point {
   vec4 inside;  // where in the voxel; w: t
   uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
 };
-// Of an impostor the kind is kSurface | kIsFar, with the corner levels and open rays of its face from bit 8 on.
+// Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
 // A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
 // enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside.

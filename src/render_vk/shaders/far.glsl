@@ -37,7 +37,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fa
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer FarParts {
   uvec2 at[];
 };
-// Voxel, and type | corner levels << 16 | direction << 24 | open rays << 27.
+// Voxel, and type | corner occlusion << 16 | direction << 24 | open rays << 27.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer VoxelFaces {
   ivec4 at[];
 };

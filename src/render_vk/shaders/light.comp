@@ -107,8 +107,8 @@ float vertex_occlusion(bool side_u, bool side_v, bool corner) {
   return side_u && side_v ? 3.0 : float(side_u) + float(side_v) + float(corner);
 }
 
-// The corner levels that a blocky mesh carries, counted around the face: light/corner_light.h.
-vec4 corner_levels(Tree opaque, ivec3 voxel, uint face) {
+// The occlusion of the corners that a blocky mesh carries, counted around the face: light/corner_light.h.
+vec4 corner_occlusion(Tree opaque, ivec3 voxel, uint face) {
   int u = kFaceU[face];
   int v = kFaceV[face];
   ivec3 front = voxel;
@@ -130,11 +130,11 @@ vec4 corner_levels(Tree opaque, ivec3 voxel, uint face) {
 }
 
 // Interpolated over the mesh's two triangles.
-float level_at(vec4 levels, uint face, vec3 inside) {
-  float a = levels.x;
-  float b = levels.y;
-  float c = levels.z;
-  float d = levels.w;
+float occlusion_at(vec4 corners, uint face, vec3 inside) {
+  float a = corners.x;
+  float b = corners.y;
+  float c = corners.z;
+  float d = corners.w;
   float x = clamp(inside[kFaceU[face]], 0.0, 1.0);
   float y = clamp(inside[kFaceV[face]], 0.0, 1.0);
   if (!(a + c > b + d)) {
@@ -149,8 +149,8 @@ float level_at(vec4 levels, uint face, vec3 inside) {
 float openness_of_far(Point point) {
   uint light = point.what.z >> 8;
   if (!has(kOcclusionVertex)) return float(light >> 8) / 9.0;
-  vec4 levels = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
-  return 1.0 - level_at(levels, point.what.y, point.inside.xyz) / 3.0;
+  vec4 corners = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
+  return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
 }
 
 // Where a ray meets a face: put onto it, and a little inside its edges.
@@ -202,7 +202,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   if (has(kOcclusionRays)) openness = float(open) / float(frame().occlusion_count);
   if (has(kOcclusionVertex)) {
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    openness = 1.0 - level_at(corner_levels(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
+    openness = 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
 }
 

@@ -130,7 +130,7 @@ class BoxFiller {
   void fill_part(const IBox& voxels) {
     if (voxels.empty() || box_.is_apart_from(voxels)) return;
     if (box_.holds_all(voxels)) {
-      changed_ += grid_.fill_box(voxels.min, voxels.max - 1, type_);
+      changed_ += grid_.fill_box(voxels, type_);
       return;
     }
     const IVec3 first = chunk_of(voxels.min);

@@ -35,7 +35,7 @@ Placed random_placement(Random& random, double distance) {
   Placed placed;
   SceneGrid grid;
   grid.pivot = random.vector() * 50.0;
-  grid.grid.fill_box({-70, -30, -20}, {10, 30, 66}, 7);
+  grid.grid.fill_box({{-70, -30, -20}, {11, 31, 67}}, 7);
   for (int i = 0; i < 500; ++i) grid.grid.set(IVec3(random.vector() * 60.0), static_cast<VoxelType>(i % 5));
   Instance instance;
   instance.position = random.vector() * distance;

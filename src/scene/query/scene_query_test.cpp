@@ -275,7 +275,7 @@ TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
   scene.types = stone_and_ghost();
   SceneGrid grid;
   grid.pivot = DVec3(5.0, 2.0, 1.0);
-  grid.grid.fill_box({0, 0, 0}, {31, 31, 31}, 1);
+  grid.grid.fill_box({{0, 0, 0}, {32, 32, 32}}, 1);
   Instance instance;
   instance.grid = scene.add_grid(std::move(grid));
   instance.position = DVec3(100.0, 0.0, 0.0);

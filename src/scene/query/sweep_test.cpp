@@ -107,7 +107,7 @@ TEST(Sweep, StopsExactlyBeforeTheFirstOverlap) {
 TEST(Sweep, NeverTunnelsAtAnySpeed) {
   Random random(8);
   Grid wall;
-  wall.fill_box({-40, -40, 0}, {40, 40, 0}, 1);
+  wall.fill_box({{-40, -40, 0}, {41, 41, 1}}, 1);
   const Scene scene = scene_of(std::move(wall), random.rotation());
   const SceneTracer tracer(scene);
   const DVec3 normal = scene.instances()[scene.instances().handles()[0]].rotation * DVec3(0, 0, 1);
@@ -147,7 +147,7 @@ TEST(Sweep, RestingNeitherSinksNorJitters) {
   Random random(14);
   for (const DVec3 away : {DVec3(0.0), DVec3(1e9, 1e9, -1e9)}) {
     Grid floor;
-    floor.fill_box({-30, -2, -30}, {30, 0, 30}, 1);
+    floor.fill_box({{-30, -2, -30}, {31, 1, 31}}, 1);
     const DQuat rotation = random.rotation();
     const Scene scene = scene_of(std::move(floor), rotation, away);
     const SceneTracer tracer(scene);
@@ -167,8 +167,8 @@ TEST(Sweep, RestingNeitherSinksNorJitters) {
 
 TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
   Grid room;
-  room.fill_box({0, 0, 0}, {20, 20, 20}, 1);
-  room.fill_box({1, 1, 1}, {19, 19, 19}, kAir);  // its faces are at 1 and 20
+  room.fill_box({{0, 0, 0}, {21, 21, 21}}, 1);
+  room.fill_box({{1, 1, 1}, {20, 20, 20}}, kAir);  // its faces are at 1 and 20
   Random random(17);
   for (int turn = 0; turn < 4; ++turn) {
     const DQuat rotation = turn == 0 ? DQuat(1, 0, 0, 0) : random.rotation();
@@ -196,7 +196,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
 
 TEST(Sweep, MovesOutOfWhatItStartsIn) {
   Grid floor;
-  floor.fill_box({-5, -3, -5}, {5, 0, 5}, 1);
+  floor.fill_box({{-5, -3, -5}, {6, 1, 6}}, 1);
   const Scene scene = scene_of(std::move(floor));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 1.2, 0.5}, DVec3(0.4), {1, 0, 0, 0}};

@@ -21,7 +21,7 @@ inline Scene mixed_scene(std::int64_t count) {
   std::vector<GridHandle> grids;
   for (const int edge : {8, 30, 90, 200, 500}) {
     SceneGrid grid;
-    grid.grid.fill_box({0, 0, 0}, IVec3(edge - 1), 1);
+    grid.grid.fill_box({{0, 0, 0}, IVec3(edge)}, 1);
     grids.push_back(scene.add_grid(std::move(grid)));
   }
   for (std::int64_t i = 0; i < count; ++i) {

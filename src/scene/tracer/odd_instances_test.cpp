@@ -27,7 +27,7 @@ struct SlabScene {
   SlabScene() {
     EXPECT_TRUE(scene.types.add({}).has_value());
     SceneGrid slab;
-    slab.grid.fill_box({4, 0, 0}, {20, 1, 7}, 1);
+    slab.grid.fill_box({{4, 0, 0}, {21, 2, 8}}, 1);
     grid = scene.add_grid(std::move(slab));
   }
   Instance instance(DQuat rotation = {1.0, 0.0, 0.0, 0.0}) const {

@@ -198,7 +198,7 @@ TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
   Scene scene;
   scene.types = stone_and_glass();
   SceneGrid glass;
-  glass.grid.fill_box({0, 0, 0}, {0, 0, 2}, 2);
+  glass.grid.fill_box({{0, 0, 0}, {1, 1, 3}}, 2);
   SceneGrid stone;
   stone.grid.set({0, 0, 0}, 1);
   scene.add_instance({"", scene.add_grid(std::move(glass))});

@@ -89,12 +89,12 @@ class ChangingScene {
       grid.set(at, below(3) == 0 ? kAir : type());
     } else {
       const IVec3 size(1 + 2 * below(30), 1 + 2 * below(30), 1 + 2 * below(30));
-      grid.fill_box(at, at + size, below(4) == 0 ? kAir : type());
+      grid.fill_box({at, at + size + 1}, below(4) == 0 ? kAir : type());
     }
   }
   void empty(Grid& grid) {
     if (below(2) == 0) grid.clear();
-    if (!grid.bounds().empty()) grid.fill_box(grid.bounds().min, grid.bounds().max, kAir);
+    if (!grid.bounds().empty()) grid.fill_box(grid.bounds(), kAir);
   }
   // Another in its place.
   void replace_grid() {
@@ -273,7 +273,7 @@ struct TwoCubes {
   }
   GridHandle add_cube() {
     SceneGrid cube;
-    cube.grid.fill_box({0, 0, 0}, {99, 9, 9}, 1);
+    cube.grid.fill_box({{0, 0, 0}, {100, 10, 10}}, 1);
     return scene.add_grid(std::move(cube));
   }
 };

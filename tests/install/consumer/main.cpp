@@ -12,7 +12,7 @@ int main() {
   const auto type = scene.types.add(stone);
   if (!type) return 1;
   quoin::SceneGrid box;
-  box.grid.fill_box({0, 0, 0}, {9, 9, 9}, *type);
+  box.grid.fill_box({{0, 0, 0}, {10, 10, 10}}, *type);
   const quoin::GridHandle handle = scene.add_grid(std::move(box));
   quoin::Instance placed;
   placed.grid = handle;

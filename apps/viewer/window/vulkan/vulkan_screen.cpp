@@ -16,13 +16,13 @@ namespace quoin::viewer {
 Result<WindowDeviceOptions> device_options(SDL_Window* window) {
   unsigned count = 0;
   if (SDL_Vulkan_GetInstanceExtensions(window, &count, nullptr) == SDL_FALSE) {
-    return fail(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
+    return make_error(ErrorCode::Unsupported, "cannot draw in a window by Vulkan: " + sdl_says());
   }
   std::vector<const char*> names(count);
   SDL_Vulkan_GetInstanceExtensions(window, &count, names.data());
   WindowDeviceOptions options;
   options.instance_extensions.assign(names.begin(), names.end());
-  options.find_function = reinterpret_cast<PFN_vkGetInstanceProcAddr>(SDL_Vulkan_GetVkGetInstanceProcAddr());
+  options.get_instance_proc_addr = reinterpret_cast<PFN_vkGetInstanceProcAddr>(SDL_Vulkan_GetVkGetInstanceProcAddr());
   options.make_surface = [window](VkInstance instance) {
     VkSurfaceKHR surface = VK_NULL_HANDLE;
     return SDL_Vulkan_CreateSurface(window, instance, &surface) == SDL_TRUE ? surface : VK_NULL_HANDLE;

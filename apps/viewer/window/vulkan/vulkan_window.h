@@ -46,7 +46,7 @@ struct Overlay {
 /// Shows pictures in a device's window: those of a renderer on that device.
 ///
 /// Colours: a picture's bytes are the window's.
-/// Threads: the renderer's. Errors: Unsupported when the device or the window was lost; LimitExceeded.
+/// Threads: the renderer's. Errors: DeviceLost; Unsupported when the window was lost; LimitExceeded.
 class VulkanWindow {
  public:
   /// `vsync`: pictures wait for the display; without, where the device can, they do not. Shares `device`.

@@ -198,7 +198,7 @@ TEST_F(VulkanWindowTest, WhatCannotBeIsTold) {
   wrong.device = "no such device";
   expect_refusal(wrong, "there is no device \"no such device\"; there is 0 ");
   wrong = options(false);
-  wrong.find_function = nullptr;
+  wrong.get_instance_proc_addr = nullptr;
   expect_refusal(wrong, "there is no loader");
 }
 

@@ -13,7 +13,7 @@ using MessageListener = std::function<void(const std::string&)>;
 constexpr const char* kValidationLayer = "VK_LAYER_KHRONOS_validation";
 
 Error refuse(std::string message) {
-  return fail(ErrorCode::Unsupported, "vulkan: " + std::move(message));
+  return make_error(ErrorCode::Unsupported, "vulkan: " + std::move(message));
 }
 
 bool has_validation(const VulkanFunctions& api) {
@@ -66,13 +66,13 @@ WindowDevice::~WindowDevice() {
 }
 
 Status WindowDevice::open(const WindowDeviceOptions& options) {
-  if (!api_.load(options.find_function)) return refuse("there is no loader that is complete here");
+  if (!api_.load(options.get_instance_proc_addr)) return refuse("there is no loader that is complete here");
   if (Status made = make_instance(options); !made) return made;
   surface_ = options.make_surface(instance_);
   if (surface_ == VK_NULL_HANDLE) return refuse("the window cannot show pictures");
   const std::vector<Candidate> all = candidates();
   if (all.empty()) return refuse("there is no driver for any graphics device here");
-  std::vector<VulkanDevice> descriptions;
+  std::vector<VulkanDeviceInfo> descriptions;
   descriptions.reserve(all.size());
   for (const Candidate& one : all) descriptions.push_back(one.description);
   const auto chosen = choose_vulkan_device(descriptions, options.device);
@@ -203,7 +203,7 @@ BorrowedVulkanDevice WindowDevice::lent() const {
   lent.queue = queue_;
   lent.queue_family = queue_family_;
   lent.fill_mode_non_solid = draws_lines_;
-  lent.find_function = api_.vkGetInstanceProcAddr;
+  lent.get_instance_proc_addr = api_.vkGetInstanceProcAddr;
   return lent;  // the window's thread alone uses the queue
 }
 
@@ -225,13 +225,14 @@ Status WindowDevice::check(VkResult result, const std::string& doing) const {
     case VK_ERROR_OUT_OF_DEVICE_MEMORY:
     case VK_ERROR_OUT_OF_HOST_MEMORY:
     case VK_ERROR_TOO_MANY_OBJECTS:
-      return fail(ErrorCode::LimitExceeded, who + "out of memory while " + doing);
+      return make_error(ErrorCode::LimitExceeded, who + "out of memory while " + doing);
     case VK_ERROR_DEVICE_LOST:
-      return fail(ErrorCode::Unsupported, who + "the device was lost while " + doing);
+      return make_error(ErrorCode::DeviceLost, who + "the device was lost while " + doing);
     case VK_ERROR_SURFACE_LOST_KHR:
-      return fail(ErrorCode::Unsupported, who + "the window was lost while " + doing);
+      return make_error(ErrorCode::Unsupported, who + "the window was lost while " + doing);
     default:
-      return fail(ErrorCode::Unsupported, who + "failed while " + doing + " (VkResult " + std::to_string(result) + ")");
+      return make_error(ErrorCode::Unsupported,
+                        who + "failed while " + doing + " (VkResult " + std::to_string(result) + ")");
   }
 }
 

@@ -16,7 +16,7 @@ namespace quoin::viewer {
 /// What a window and its user want of a device.
 struct WindowDeviceOptions {
   std::string device;  ///< as VulkanOptions::device
-  PFN_vkGetInstanceProcAddr find_function = nullptr;
+  PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
   std::vector<std::string> instance_extensions;  ///< that windows take
   /// Makes the window's surface, which the device destroys; null where that fails.
   std::function<VkSurfaceKHR(VkInstance instance)> make_surface;
@@ -56,7 +56,7 @@ class WindowDevice {
   struct Candidate {
     VkPhysicalDevice handle = VK_NULL_HANDLE;
     std::uint32_t queue_family = 0;
-    VulkanDevice description;
+    VulkanDeviceInfo description;
   };
 
   explicit WindowDevice(const WindowDeviceOptions& options) : listener_(options.on_validation_message) {}
