@@ -233,7 +233,8 @@ Grid make_ship(const Palette& p) {
     for (int y = 0; y <= rail; ++y) {
       const int width = std::max(0, half - std::max(0, 3 - y));
       grid.fill_box({{-width, y, z}, {width + 1, y + 1, z + 1}}, y == rail || y % 3 == 2 ? p.plank : p.wood);
-      if (y > 4) grid.fill_box({{-width + 1, y, z}, {width, y + 1, z + 1}}, quoin::kAir);
+      const int inside = std::abs(width - 1);
+      if (y > 4) grid.fill_box({{-inside, y, z}, {inside + 1, y + 1, z + 1}}, quoin::kAir);
     }
   }
   for (const int z : {11, 23}) {

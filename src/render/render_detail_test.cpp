@@ -51,7 +51,8 @@ Model ship() {
     for (int y = 0; y < 32; ++y) {
       const int half = std::max(0, static_cast<int>(std::lround(27.0 * taper)) - std::max(0, 15 - y));
       grid.fill_box({{-half, y, z}, {half + 1, y + 1, z + 1}}, y % 7 == 5 ? plank : wood);
-      if (y > 24) grid.fill_box({{-half + 3, y, z}, {half - 2, y + 1, z + 1}}, kAir);
+      const int inside = std::abs(half - 3);
+      if (y > 24) grid.fill_box({{-inside, y, z}, {inside + 1, y + 1, z + 1}}, kAir);
     }
   }
   for (const int z : {60, 123}) {

@@ -142,7 +142,7 @@ TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {
   grid.for_each([&](IVec3 v, VoxelType) {
     for (const Direction d : kDirections) {
       EXPECT_EQ(face_occlusion(grid.neighbourhood(chunk_of(v)), types, local_of(v), d),
-                oracle::levels_of(grid, types, v, d));
+                oracle::corners_of_face(grid, types, v, d));
     }
   });
 }
