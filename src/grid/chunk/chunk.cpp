@@ -142,7 +142,7 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
 
 // The palette index of a type, adding it where it is new; may widen the voxels. Beside its callers, so that
 // setting a voxel costs no call of it.
-std::uint32_t Chunk::index_for(VoxelType type) {
+inline std::uint32_t Chunk::index_for(VoxelType type) {
   ChunkStorage& m = *storage_;
   if (m.direct()) return type;
   if (m.palette[m.recent] != type) m.recent = find_or_add(type);
