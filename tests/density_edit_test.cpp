@@ -10,7 +10,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 
 namespace quoin {
 namespace {

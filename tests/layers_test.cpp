@@ -164,7 +164,7 @@ std::vector<std::string> circle_in(const Graph& graph) {
 TEST(Layers, AWrongIncludeIsABreach) {
   EXPECT_TRUE(breach("grid", 1, "quoin/mesh/quad.h").has_value());
   EXPECT_TRUE(breach("mesh", 2, "trace/ray.h").has_value()) << "siblings";
-  EXPECT_TRUE(breach("io", 5, "quoin/render/camera.h").has_value()) << "siblings";
+  EXPECT_TRUE(breach("io", 5, "quoin/render/cpu_renderer.h").has_value()) << "siblings";
   EXPECT_TRUE(breach("grid", 1, "../mesh/watertight.h").has_value());
   EXPECT_FALSE(breach("io", 5, "quoin/mesh/quad.h").has_value());
   EXPECT_FALSE(breach("mesh", 2, "mesh/blocky/watertight.h").has_value());
@@ -195,9 +195,9 @@ TEST(Layers, NoSourceIncludesUpwardsOrSideways) {
 
 TEST(Layers, APrivateHeaderThatIsNotLentIsATrespass) {
   EXPECT_TRUE(trespass("io", {"grid/chunk/packed_row.h", true}).has_value());
-  EXPECT_TRUE(trespass("mesh", {"grid/grid_impl.h", true}).has_value());
+  EXPECT_TRUE(trespass("mesh", {"grid/chunk_table.h", true}).has_value());
   EXPECT_FALSE(trespass("mesh", {"grid/chunk/packed_row.h", true}).has_value());
-  EXPECT_FALSE(trespass("grid", {"grid/grid_impl.h", true}).has_value());
+  EXPECT_FALSE(trespass("grid", {"grid/chunk_table.h", true}).has_value());
   EXPECT_FALSE(trespass("mesh", {"core/srgb.h", true}).has_value());
   EXPECT_FALSE(trespass("mesh", {"quoin/grid/grid.h", false}).has_value());
 }
@@ -260,6 +260,29 @@ TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
     std::string way;
     for (const std::string& room : circle_in(rooms)) way += (way.empty() ? "" : " -> ") + room;
     EXPECT_EQ(way, "") << "in " << layer;
+  }
+}
+
+// A header that only tests include says so by its name, and one that says so is included by nothing else.
+TEST(Layers, WhatIsForTestsSaysSo) {
+  std::set<std::string> used;
+  for (const char* top : {"src", "apps"}) {
+    for (const Source& source : sources_of(top)) {
+      for (const Include& include : source.includes) {
+        if (!include.quoted) continue;
+        const std::string name = fs::path(include.path).filename().string();
+        if (!is_for_tests(source.file)) {
+          used.insert(name);
+          EXPECT_FALSE(is_for_tests(name)) << source.file << " includes " << include.path;
+        }
+      }
+    }
+  }
+  for (const char* top : {"src", "apps"}) {
+    for (const Source& source : sources_of(top)) {
+      if (source.file.extension() != ".h" || is_for_tests(source.file)) continue;
+      EXPECT_TRUE(used.contains(source.file.filename().string())) << source.file << " is included by tests alone";
+    }
   }
 }
 

@@ -11,7 +11,7 @@
 #include <quoin/mesh/simplify.h>
 
 #include "io/mesh_file_for_tests.h"
-#include "io/volume/for_tests.h"
+#include "io/volume/volume_for_tests.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {

@@ -4,7 +4,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/mesh/blocky_mesh.h>
 
-#include "mesh/blocky/watertight_check.h"
+#include "mesh/blocky/watertight_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -74,7 +74,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit"}));
   command
       .add_option("--ao", arguments.occlusion,
-                  "Ambient occlusion by rays, or by the vertex levels that meshes carry (default rays)")
+                  "Ambient occlusion by rays, or that of the vertices of blocky meshes (default rays)")
       ->check(CLI::IsMember({"rays", "vertex"}));
   command.add_option("--ao-rays", arguments.render.light.occlusion_rays, "Rays a point for --ao rays (default 9)")
       ->check(CLI::Range(1, kMaxSamples));

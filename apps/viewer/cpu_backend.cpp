@@ -22,10 +22,6 @@ constexpr std::array kDivisors = {8, 4, 2, 1};
 constexpr int kSampleFactor = 4;
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 /// One of the pictures that lead to the settled one.
 struct Stage {
   int divisor = 1;

@@ -21,10 +21,6 @@ using Clock = std::chrono::steady_clock;
 constexpr std::array kDivisors = {8, 4, 2, 1};
 constexpr int kMeshSamples = 4;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
   std::snprintf(buffer.data(), buffer.size(), format, value);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -16,6 +17,10 @@
 #include <quoin/scene/scene_query.h>
 
 namespace quoin::viewer {
+
+inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 /// For how long a picture that is shown for a moment has impostors built.
 inline constexpr double kImpostorSeconds = 0.01;

@@ -37,7 +37,7 @@ class ChangeJournal {
   ChangeJournal() : container_(next_journal()) {}
   ChangeJournal(const ChangeJournal& other)
       : container_(other.container_), is_copy_(true), first_(other.first_), end_(other.end_), blocks_(other.blocks_) {
-    // The records stay as they are from now on, and later ones are kept for who reads only copies.
+    // The records stay as they are from now on, and later ones are kept for consumers that read only copies.
     other.observe();
     seen_.store(other.seen_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }

@@ -34,8 +34,8 @@ SrgbEncoder::SrgbEncoder() {
 }
 
 const SrgbEncoder& SrgbEncoder::shared() {
-  static const SrgbEncoder kEncoder;
-  return kEncoder;
+  static const SrgbEncoder encoder;
+  return encoder;
 }
 
 }  // namespace quoin

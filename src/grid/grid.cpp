@@ -102,14 +102,15 @@ struct Grid::Impl {
   BoundsCache bounds;
   std::int64_t voxel_count = 0;  // that are not air
 
-  // Books an edit of one chunk, and drops the chunk where nothing is left in it.
-  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit) {
+  // Books an edit of one chunk, tells whoever follows the grid, and drops the chunk where nothing is left in it.
+  void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
     // Before anything that may throw: the storage that was known may be gone.
     entries.voxels_changed(slot);
     if (edit.voxels != 0) {
       journal.begin_change();
       edit.record.chunk = chunk;
       journal.note(slot.entry->serial, edit.record, entries.size());
+      notice.give();
     }
     const int voxels = non_air_count(slot.entry->chunk);
     voxel_count += voxels - slot.entry->counted;
@@ -120,28 +121,30 @@ struct Grid::Impl {
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
-  std::int64_t edit_box(const LongBox& wanted, bool create, Change&& change);
+  std::int64_t edit_box(const LongBox& wanted, bool create, EditNotice& notice, Change&& change);
   template <class Change>
-  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, Change& change);
+  std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
+                          Change& change);
 };
 
 template <class Change>
-std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, Change& change) {
+std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
+                                    Change& change) {
   VoxelEdit edit;
   entries.voxels_will_change(slot);
   try {
     change(chunk, slot.entry->chunk, part, edit);
   } catch (...) {
     edit.add_all();
-    finish_edit(chunk, slot, edit);
+    finish_edit(chunk, slot, edit, notice);
     throw;
   }
-  finish_edit(chunk, slot, edit);
+  finish_edit(chunk, slot, edit, notice);
   return edit.voxels;
 }
 
 template <class Change>
-std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& change) {
+std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice& notice, Change&& change) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
@@ -151,7 +154,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
-          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), change);
+          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
         }
       }
     }
@@ -160,7 +163,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, Change&& c
   std::vector<IVec3> present;
   entries.for_each_in(chunks, [&](IVec3 at, const ChunkEntry&) { present.push_back(at); });
   std::sort(present.begin(), present.end(), by_zyx);
-  for (const IVec3 at : present) changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), change);
+  for (const IVec3 at : present) changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), notice, change);
   return changed;
 }
 
@@ -192,7 +195,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
     if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
     edit.add_all();
-    impl_->finish_edit(at, slot, edit);
+    impl_->finish_edit(at, slot, edit, notice_);
     throw;
   }
   edit.voxels = 1;
@@ -203,8 +206,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   } else {
     edit.record.add(local.y, local.z, std::uint64_t{1} << local.x);
   }
-  impl_->finish_edit(at, slot, edit);
-  notice_.give();
+  impl_->finish_edit(at, slot, edit, notice_);
   return true;
 }
 
@@ -214,30 +216,28 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
   if (mask == 0 || !is_inside_world(at)) return 0;
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
   VoxelEdit edit;
-  notice_.give();
   try {
     edit.add(local.y, local.z, slot.entry->chunk.write_row(local.y, local.z, mask, types));
   } catch (...) {
     edit.add_all();
-    impl_->finish_edit(at, slot, edit);
+    impl_->finish_edit(at, slot, edit, notice_);
     throw;
   }
-  impl_->finish_edit(at, slot, edit);
+  impl_->finish_edit(at, slot, edit, notice_);
   return edit.voxels;
 }
 
 std::int64_t Grid::fill_box(const IBox& box, VoxelType type) {
-  notice_.give();
-  return impl_->edit_box(box_from(box), type != kAir, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
-    chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
-  });
+  return impl_->edit_box(
+      box_from(box), type != kAir, notice_, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+        chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
+      });
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
   if (!(radius >= 0.0) || !std::isfinite(radius) || !is_finite(centre)) return 0;
   const LongBox box = box_around(centre - radius, centre + radius);
-  notice_.give();
-  return impl_->edit_box(box, type != kAir, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+  return impl_->edit_box(box, type != kAir, notice_, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     const DVec3 local_centre = centre - DVec3(at) * double{kChunkEdge} - 0.5;
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
@@ -256,19 +256,19 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
 }
 
 std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change) {
-  notice_.give();
-  return impl_->edit_box(box_from(wanted), true, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
-    std::array<VoxelType, kChunkEdge> row{};
-    const auto first = static_cast<std::size_t>(part.min.x);
-    const auto count = static_cast<std::size_t>(part.max.x - part.min.x);
-    for (int z = part.min.z; z < part.max.z; ++z) {
-      for (int y = part.min.y; y < part.max.y; ++y) {
-        chunk.read_row(y, z, row);
-        change(at * kChunkEdge + IVec3{part.min.x, y, z}, std::span(row).subspan(first, count));
-        edit.add(y, z, chunk.write_row(y, z, row));
-      }
-    }
-  });
+  return impl_->edit_box(box_from(wanted), true, notice_,
+                         [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+                           std::array<VoxelType, kChunkEdge> row{};
+                           const auto first = static_cast<std::size_t>(part.min.x);
+                           const auto count = static_cast<std::size_t>(part.max.x - part.min.x);
+                           for (int z = part.min.z; z < part.max.z; ++z) {
+                             for (int y = part.min.y; y < part.max.y; ++y) {
+                               chunk.read_row(y, z, row);
+                               change(at * kChunkEdge + IVec3{part.min.x, y, z}, std::span(row).subspan(first, count));
+                               edit.add(y, z, chunk.write_row(y, z, row));
+                             }
+                           }
+                         });
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
@@ -280,8 +280,7 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
   VoxelEdit edit;
   difference_of_types(slot.entry->chunk, voxels, edit);
   slot.entry->chunk = std::move(voxels);
-  impl_->finish_edit(at, slot, edit);
-  notice_.give();
+  impl_->finish_edit(at, slot, edit, notice_);
   return edit.voxels;
 }
 

@@ -1,7 +1,10 @@
 // What functions of grids require.
 
+#include <array>
+
 #include <gtest/gtest.h>
 
+#include <quoin/core/ref.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/downsample.h>
 #include <quoin/grid/grid.h>
@@ -15,6 +18,20 @@ TEST(ChunkDeathTest, AVoxelOutsideIsAMistake) {
   Chunk chunk;
   QUOIN_EXPECT_MISTAKE((void)chunk.get(0, 64, 0), "0 <= x, y, z < 64");
   QUOIN_EXPECT_MISTAKE(chunk.set(-1, 0, 0, 1), "0 <= x, y, z < 64");
+}
+
+TEST(ChunkDeathTest, ARowOutsideIsAMistake) {
+  Chunk chunk;
+  std::array<VoxelType, kChunkEdge> row{};
+  QUOIN_EXPECT_MISTAKE(chunk.read_row(0, 64, row), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE(chunk.fill_row(-1, 0, 1, 1), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE(chunk.write_row(64, 0, row), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)chunk.row_mask(0, -1, 1), "0 <= y, z < 64");
+}
+
+TEST(RefDeathTest, AskingNobodyIsAMistake) {
+  struct Object : RefCounted {};
+  QUOIN_EXPECT_MISTAKE((void)Ref<Object>().is_shared(), "there is an object");
 }
 
 TEST(DensityDeathTest, ASampleOutsideIsAMistake) {

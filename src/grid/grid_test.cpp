@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 
 namespace quoin {
 namespace {

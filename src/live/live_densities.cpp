@@ -28,9 +28,9 @@ ChunkDifference everything() {
 
 // Which samples differ; null is far air.
 ChangeReach density_difference(const DensityChunk* before, const DensityChunk* after) {
-  static const DensityChunk kFarAir(DensityNeighbourhood{}.outside);
-  const DensityChunk& a = before == nullptr ? kFarAir : *before;
-  const DensityChunk& b = after == nullptr ? kFarAir : *after;
+  static const DensityChunk far_air(DensityNeighbourhood{}.outside);
+  const DensityChunk& a = before == nullptr ? far_air : *before;
+  const DensityChunk& b = after == nullptr ? far_air : *after;
   ChangeReach found;
   std::array<Half, kChunkEdge> old_row;
   std::array<Half, kChunkEdge> new_row;

@@ -38,7 +38,7 @@ struct LiveChunk {
   [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
 };
 
-/// Of all grids.
+/// Totals over all grids.
 struct LiveTotals {
   std::uint64_t serial = 0;  ///< of the job that was made last
   std::size_t unfinished = 0;

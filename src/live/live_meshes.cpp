@@ -17,28 +17,28 @@ std::size_t ChunkSurface::bytes() const {
 
 struct LiveMeshes::Impl {
   explicit Impl(const LiveMeshOptions& options)
-      : book(options,
-             [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
-  MeshScheduler book;
+      : scheduler(options,
+                  [options](LiveJob& job, LiveWorkspace& workspace) { make_live_surface(options, job, workspace); }) {}
+  MeshScheduler scheduler;
 };
 
 LiveMeshes::LiveMeshes(const LiveMeshOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 LiveMeshes::~LiveMeshes() = default;
 
 void LiveMeshes::update(const Scene& scene, DVec3 eye) {
-  impl_->book.update(scene, eye);
+  impl_->scheduler.update(scene, eye);
 }
 std::vector<SurfaceUpdate> LiveMeshes::take() {
-  return impl_->book.take();
+  return impl_->scheduler.take();
 }
 std::size_t LiveMeshes::pending() const {
-  return impl_->book.pending();
+  return impl_->scheduler.pending();
 }
 void LiveMeshes::finish(const Scene& scene, DVec3 eye) {
-  impl_->book.finish(scene, eye);
+  impl_->scheduler.finish(scene, eye);
 }
 LiveMeshes::Stats LiveMeshes::stats() const {
-  return impl_->book.stats();
+  return impl_->scheduler.stats();
 }
 
 }  // namespace quoin

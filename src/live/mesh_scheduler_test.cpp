@@ -84,9 +84,9 @@ TEST(MeshScheduler, TheNearestChunksComeFirst) {
   instance.mirrored = true;
   GatedWork gated(blocky(1));
   gated.open();
-  MeshScheduler book(blocky(1), gated.work());
+  MeshScheduler scheduler(blocky(1), gated.work());
   // Mirrored, chunk i lies from -32 i to -32 i - 32.
-  book.finish(one.scene, {-32 * 120.0, 0.0, 15.0});
+  scheduler.finish(one.scene, {-32 * 120.0, 0.0, 15.0});
   const std::vector<GatedWork::Started> started = gated.started();
   ASSERT_EQ(started.size(), 200U);
   EXPECT_TRUE(started[0].chunk.x == 119 || started[0].chunk.x == 120);
@@ -98,18 +98,18 @@ TEST(MeshScheduler, AnEyeThatMovedIsServedBeforeWhatWaitsForWorkers) {
   OneGrid one;
   fill_row(one.grid(), 200);
   GatedWork gated(blocky(1));
-  MeshScheduler book(blocky(1), gated.work());
-  book.update(one.scene, {0.0, 30.0, 30.0});
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {0.0, 30.0, 30.0});
   gated.wait_for_started(1);
-  book.update(one.scene, {64 * 150.0 + 30.0, 30.0, 30.0});
+  scheduler.update(one.scene, {64 * 150.0 + 30.0, 30.0, 30.0});
   gated.let_through(1);
   gated.wait_for_started(2);
   EXPECT_EQ(gated.started()[1].chunk.x, 150);
-  EXPECT_EQ(book.pending(), 200U);
+  EXPECT_EQ(scheduler.pending(), 200U);
   gated.open();
-  book.finish(one.scene, {});
-  EXPECT_EQ(book.take().size(), 200U);
-  EXPECT_EQ(book.stats().chunks_meshed, 200);
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 200U);
+  EXPECT_EQ(scheduler.stats().chunks_meshed, 200);
 }
 
 TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
@@ -118,16 +118,16 @@ TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
     for (int x = 0; x < 64; ++x) one.grid().set({64 * i + x, x, x / 2}, static_cast<VoxelType>(1 + x % 3));
   }
   GatedWork gated(blocky(1));
-  MeshScheduler book(blocky(1), gated.work());
+  MeshScheduler scheduler(blocky(1), gated.work());
   const auto storage = [&](int chunk) { return one.grid().find_chunk({chunk, 0, 0})->storage(); };
-  book.update(one.scene, {});
+  scheduler.update(one.scene, {});
   gated.wait_for_started(1);
   const ChunkStorage* before = storage(90);
   one.grid().set({64 * 90 + 5, 40, 40}, 1);
   EXPECT_NE(storage(90), before) << "workers are to see what was there";
   gated.open();
-  book.finish(one.scene, {});
-  EXPECT_EQ(book.take().size(), 100U);
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 100U);
   before = storage(91);
   one.grid().set({64 * 91 + 5, 40, 40}, 1);
   EXPECT_EQ(storage(91), before) << "nobody shares it any more";
@@ -137,40 +137,40 @@ TEST(MeshScheduler, OfSeveralEditsBeforeItsTurnTheLastCounts) {
   OneGrid one;
   fill_row(one.grid(), 2);
   GatedWork gated(blocky(1));
-  MeshScheduler book(blocky(1), gated.work());
-  book.update(one.scene, {});
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {});
   gated.wait_for_started(1);  // chunk 0; chunk 1 waits
   for (int i = 1; i <= 5; ++i) {
     one.grid().set({64 + 4 * i, 4, 4}, 1);
-    book.update(one.scene, {});
+    scheduler.update(one.scene, {});
   }
   gated.open();
-  book.finish(one.scene, {});
-  EXPECT_EQ(book.stats().chunks_meshed, 2);
-  for (const SurfaceUpdate& update : book.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.stats().chunks_meshed, 2);
+  for (const SurfaceUpdate& update : scheduler.take()) EXPECT_EQ(faces_of(update), update.chunk.x == 0 ? 6U : 36U);
 }
 
 TEST(MeshScheduler, AnEditDuringMeshingGivesBothInOrder) {
   OneGrid one;
   fill_row(one.grid(), 1);
   GatedWork gated(blocky(1));
-  MeshScheduler book(blocky(1), gated.work());
-  book.update(one.scene, {});
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {});
   gated.wait_for_started(1);
   one.grid().set({3, 3, 3}, 1);
-  book.update(one.scene, {});
+  scheduler.update(one.scene, {});
   gated.let_through(1);
   gated.wait_for_started(2);
-  std::vector<SurfaceUpdate> first = book.take();
+  std::vector<SurfaceUpdate> first = scheduler.take();
   ASSERT_EQ(first.size(), 1U);
   EXPECT_EQ(faces_of(first[0]), 6U);
-  EXPECT_EQ(book.pending(), 1U);
+  EXPECT_EQ(scheduler.pending(), 1U);
   gated.open();
-  book.finish(one.scene, {});
-  std::vector<SurfaceUpdate> second = book.take();
+  scheduler.finish(one.scene, {});
+  std::vector<SurfaceUpdate> second = scheduler.take();
   ASSERT_EQ(second.size(), 1U);
   EXPECT_EQ(faces_of(second[0]), 12U);
-  EXPECT_EQ(book.pending(), 0U);
+  EXPECT_EQ(scheduler.pending(), 0U);
 }
 
 TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
@@ -179,16 +179,16 @@ TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
     OneGrid one;
     fill_row(one.grid(), 1);
     GatedWork gated(blocky(1));
-    MeshScheduler book(blocky(1), gated.work());
-    book.update(one.scene, {});
+    MeshScheduler scheduler(blocky(1), gated.work());
+    scheduler.update(one.scene, {});
     gated.wait_for_started(1);
     one.grid() = Grid();
     if (replaced) one.grid().fill_box({{30, 30, 30}, {32, 31, 31}}, 1);
-    book.update(one.scene, {});
-    EXPECT_EQ(book.pending(), replaced ? 1U : 0U);
+    scheduler.update(one.scene, {});
+    EXPECT_EQ(scheduler.pending(), replaced ? 1U : 0U);
     gated.open();
-    book.finish(one.scene, {});
-    const std::vector<SurfaceUpdate> taken = book.take();
+    scheduler.finish(one.scene, {});
+    const std::vector<SurfaceUpdate> taken = scheduler.take();
     ASSERT_EQ(taken.size(), replaced ? 1U : 0U);
     if (replaced) {
       EXPECT_EQ(faces_of(taken[0]), 10U);
@@ -200,7 +200,7 @@ TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
 TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   LiveMeshOptions options = blocky(4);
   OneGrid one;
-  MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
     // Jobs of one chunk overtake each other.
     if (job.serial % 3 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     make_live_surface(options, job, workspace);
@@ -209,7 +209,7 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   std::mt19937 random(3);
   std::size_t edits = 0;
   const auto take = [&] {
-    for (const SurfaceUpdate& update : book.take()) {
+    for (const SurfaceUpdate& update : scheduler.take()) {
       EXPECT_GT(faces_of(update), faces[update.chunk.x]);
       faces[update.chunk.x] = faces_of(update);
     }
@@ -217,11 +217,11 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   for (int i = 0; i < 1000; ++i) {
     const IVec3 at{64 * static_cast<int>(random() % 2) + 2 * (i % 30) + 1, 2 * (i / 30 % 30) + 1, 2 * (i / 900) + 1};
     edits += one.grid().set(at, 1) ? 1 : 0;
-    book.update(one.scene, {});
+    scheduler.update(one.scene, {});
     if (random() % 4 == 0) take();
     if (random() % 16 == 0) std::this_thread::sleep_for(std::chrono::microseconds(500));
   }
-  book.finish(one.scene, {});
+  scheduler.finish(one.scene, {});
   take();
   EXPECT_EQ(faces[0] + faces[1], 6 * edits);
 }
@@ -246,16 +246,16 @@ TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
     called.notify_all();
   };
   std::atomic<int> as_before{0};
-  MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+  MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
     make_live_surface(options, job, workspace);
     as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
   });
   const DVec3 eye{0.0, -1'000'000.0, 0.0};  // the lower row, which is edited, comes first
   const auto come_to_the_end = [&] {
     for (int seen = -1;;) {
-      book.update(one.scene, eye);
-      (void)book.take();
-      if (book.pending() == 0) return true;
+      scheduler.update(one.scene, eye);
+      (void)scheduler.take();
+      if (scheduler.pending() == 0) return true;
       std::unique_lock lock(mutex);
       if (!called.wait_for(lock, std::chrono::seconds(20), [&] { return calls != seen; })) return false;
       seen = calls;
@@ -274,30 +274,30 @@ TEST(MeshScheduler, MemoryThatRunsOutIsTriedAgain) {
     OneGrid one;
     one.grid().fill_box({{25, 25, 25}, {36, 36, 36}}, 1);
     std::atomic<int> calls{0};
-    MeshScheduler book(options, [&](LiveJob& job, LiveWorkspace& workspace) {
+    MeshScheduler scheduler(options, [&](LiveJob& job, LiveWorkspace& workspace) {
       if (++calls % 2 == 1) throw std::bad_alloc();
       make_live_surface(options, job, workspace);
     });
     ShownSurfaces shown;
     int updates = 0;
     do {
-      book.update(one.scene, {});
-      shown.apply(book.take());
+      scheduler.update(one.scene, {});
+      shown.apply(scheduler.take());
       ++updates;
-    } while (book.pending() != 0 && updates < 100'000'000);
+    } while (scheduler.pending() != 0 && updates < 100'000'000);
     expect_surfaces(shown, one.scene, options);
-    EXPECT_EQ(book.stats().out_of_memory, calls / 2);
-    EXPECT_GT(book.stats().out_of_memory, 0);
+    EXPECT_EQ(scheduler.stats().out_of_memory, calls / 2);
+    EXPECT_GT(scheduler.stats().out_of_memory, 0);
   }
 }
 
 TEST(MeshScheduler, FinishSaysSoWhereMemoryNeverSuffices) {
   OneGrid one;
   fill_row(one.grid(), 3);
-  MeshScheduler book(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
-  EXPECT_THROW(book.finish(one.scene, {}), std::bad_alloc);
-  EXPECT_EQ(book.pending(), 3U);
-  EXPECT_TRUE(book.take().empty());
+  MeshScheduler scheduler(blocky(2), [](LiveJob&, LiveWorkspace&) { throw std::bad_alloc(); });
+  EXPECT_THROW(scheduler.finish(one.scene, {}), std::bad_alloc);
+  EXPECT_EQ(scheduler.pending(), 3U);
+  EXPECT_TRUE(scheduler.take().empty());
 }
 
 TEST(MeshScheduler, EndsWithoutMeshingWhatWaits) {
@@ -306,12 +306,12 @@ TEST(MeshScheduler, EndsWithoutMeshingWhatWaits) {
   std::atomic<int> started{0};
   std::atomic<int> ended{0};
   {
-    MeshScheduler book(blocky(2), [&](LiveJob&, LiveWorkspace&) {
+    MeshScheduler scheduler(blocky(2), [&](LiveJob&, LiveWorkspace&) {
       ++started;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
       ++ended;
     });
-    book.update(one.scene, {});
+    scheduler.update(one.scene, {});
     while (started == 0) std::this_thread::yield();
   }
   EXPECT_EQ(started, ended);

@@ -10,7 +10,7 @@
 
 #include <quoin/scene/level_of_detail.h>
 
-#include "scene/tracer/mixed_scene.h"
+#include "scene/tracer/mixed_scene_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -71,7 +71,7 @@ struct Scene::Book {
   Book() = default;
   Book(const Book& other) : journal(other.journal), grid_serials(other.grid_serials), serials(other.serials) {}
 
-  std::mutex mutex;  // of those who ask at once
+  std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
   std::vector<std::uint64_t> grid_serials;  // by slot, of the last records in the journal
   std::vector<std::uint64_t> serials;       // likewise of instances

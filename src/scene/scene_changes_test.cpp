@@ -4,6 +4,7 @@
 
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -146,6 +147,35 @@ TEST(SceneChanges, EditsThroughAReferenceThatWasKeptAreTold) {
   EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first}) << "another in its place";
   kept.set({1, 1, 1}, 1);
   EXPECT_EQ(moved.changes_since(cursor).grids, std::vector<GridHandle>{first});
+}
+
+TEST(SceneChanges, AnEditThatThrowsIsTold) {
+  Scene scene;
+  const GridHandle handle = scene.add_grid({});
+  Grid& grid = scene.edit(handle).grid;
+  ChangeCursor cursor = scene.cursor();
+  const auto pick = [](IVec3 voxel, VoxelType) {
+    if (voxel.y == 1) throw std::runtime_error("enough");
+    return VoxelType{1};
+  };
+  EXPECT_THROW(grid.edit({{0, 0, 0}, {4, 4, 4}}, pick), std::runtime_error);
+  EXPECT_EQ(grid.voxel_count(), 4);
+  EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
+  EXPECT_EQ(grid.fill_box({{0, 0, 0}, {4, 1, 1}}, 1), 0);
+  EXPECT_TRUE(scene.changes_since(cursor).empty()) << "an edit that changes nothing";
+}
+
+// What a callback sees of its own edit is told, and so is the rest of it.
+TEST(SceneChanges, AnEditThatIsLookedAtHalfwayIsToldToItsEnd) {
+  Scene scene;
+  const GridHandle handle = scene.add_grid({});
+  Grid& grid = scene.edit(handle).grid;
+  ChangeCursor cursor = scene.cursor();
+  grid.edit({{60, 0, 0}, {70, 1, 1}}, [&](IVec3 voxel, VoxelType) {
+    if (voxel.x == 64) EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
+    return VoxelType{1};
+  });
+  EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
 }
 
 TEST(SceneChanges, DifferentGridsMayBeEditedAtOnce) {

@@ -18,11 +18,6 @@ constexpr std::uint32_t kForest = 0x700;
 constexpr std::uint32_t kCover = 0x800;
 constexpr std::uint32_t kSpeckle = 0x900;
 
-double smooth_step(double low, double high, double x) {
-  const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
-}
-
 // Levels in parts of the height that ground may take.
 constexpr double kSea = 0.24;
 constexpr double kSnow = 0.74;

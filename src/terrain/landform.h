@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,12 @@ enum class Surface : std::uint8_t { Grass, Meadow, Earth, Stone, Sand, Gravel, S
 inline constexpr int kSurfaces = 7;
 /// Bare rock shows a band of darker stone once in so many layers.
 inline constexpr int kStrata = 11;
+
+/// 0 up to `low`, 1 from `high` on, and a smooth cubic between.
+inline double smooth_step(double low, double high, double x) {
+  const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
 
 /// A column of ground before caves, plants and rocks.
 struct Column {

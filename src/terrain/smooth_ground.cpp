@@ -41,11 +41,6 @@ constexpr float kSteepNormal = 0.62F;
 constexpr float kSoilDepth = 3.5F;
 constexpr float kTurfDepth = 2.2F;
 
-double smooth_step(double low, double high, double x) {
-  const double t = std::clamp((x - low) * (1.0 / (high - low)), 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
-}
-
 // What covers flat ground, by height.
 struct Cover {
   VoxelType turf = kAir;

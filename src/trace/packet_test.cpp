@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
 

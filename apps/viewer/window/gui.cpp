@@ -94,9 +94,9 @@ Status Gui::load_font() {
   // Drawn in pixels, so that letters are sharp, and placed in the window's units.
   const auto pixels_per_unit = static_cast<float>(screen_->pixels_per_unit());
   const float size = std::round(kFontSize * static_cast<float>(scale_) * pixels_per_unit);
-  static const std::array<ImWchar, 7> kRanges = {0x20, 0x17F, 0x370, 0x52F, 0x2010, 0x2193, 0};
+  static const std::array<ImWchar, 7> ranges = {0x20, 0x17F, 0x370, 0x52F, 0x2010, 0x2193, 0};
   const char* path = find_font();
-  if (path == nullptr || io.Fonts->AddFontFromFileTTF(path, size, nullptr, kRanges.data()) == nullptr) {
+  if (path == nullptr || io.Fonts->AddFontFromFileTTF(path, size, nullptr, ranges.data()) == nullptr) {
     ImFontConfig config;
     config.SizePixels = size;
     io.Fonts->AddFontDefault(&config);

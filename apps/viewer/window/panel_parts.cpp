@@ -6,13 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <utility>
 
-#include <unistd.h>
-
 #include "viewer/sun.h"
+#include "viewer/window/process_memory.h"
 
 namespace quoin::viewer {
 
@@ -100,15 +98,6 @@ void draw_new_colour(ViewState& state) {
     ImGui::CloseCurrentPopup();
   }
   ImGui::EndPopup();
-}
-
-/// The total memory of the process; 0 where the system does not say.
-double resident_megabytes() {
-  std::ifstream in("/proc/self/statm");
-  long long total = 0;
-  long long resident = 0;
-  in >> total >> resident;
-  return static_cast<double>(resident) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
 void row(const char* name, const char* format, double value) {

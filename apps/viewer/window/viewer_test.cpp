@@ -12,7 +12,8 @@
 #include <quoin/render/cpu_renderer.h>
 
 #include "viewer/viewer_fixture.h"
-#include "viewer/window/process_facts.h"
+#include "viewer/window/process_facts_for_tests.h"
+#include "viewer/window/process_memory.h"
 
 namespace quoin::viewer {
 namespace {

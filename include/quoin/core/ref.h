@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// Counts the owners of an object that is shared until it is written: derive from it, own by Ref. A copy of the object
@@ -61,7 +63,10 @@ class Ref {
   bool operator==(std::nullptr_t) const { return object_ == nullptr; }
 
   /// Whether there are other owners. Requires: it is not null.
-  [[nodiscard]] bool is_shared() const { return object_->owners_.load(std::memory_order_acquire) != 1; }
+  [[nodiscard]] bool is_shared() const {
+    QUOIN_ASSERT(object_ != nullptr, "there is an object");
+    return object_->owners_.load(std::memory_order_acquire) != 1;
+  }
   /// Copies what it shares; then it is the only owner. Requires: it is not null.
   void make_own() {
     if (is_shared()) *this = Ref(new T(*object_));

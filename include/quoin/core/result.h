@@ -31,7 +31,7 @@ struct Error {
 /// "castle.vox: byte 1204: chunk SIZE claims 4294967295 x 40 x 40 voxels"; parts that are absent are left out.
 [[nodiscard]] std::string to_string(const Error& error);
 
-/// A value, or why there is none: a tl::expected that an Error becomes by itself, so that who calls hands it on by
+/// A value, or why there is none: a tl::expected to which an Error converts implicitly, so callers propagate one with
 /// `return loaded.error();`. Used for outside data only; a programmer's mistake asserts.
 template <class T>
 class [[nodiscard]] Result : public tl::expected<T, Error> {

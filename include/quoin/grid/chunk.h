@@ -59,7 +59,8 @@ class Chunk {
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
   [[nodiscard]] VoxelType get(IVec3 local) const { return get(local.x, local.y, local.z); }
 
-  /// Sets the voxels of one row whose bits are set in `mask`; returns which of them had another type before.
+  /// Sets the voxels of one row along x whose bits are set in `mask`; returns which of them had another type before.
+  /// Requires: 0 <= y, z < 64.
   std::uint64_t fill_row(int y, int z, std::uint64_t mask, VoxelType type);
   /// Sets the 64 voxels of one row; returns which of them had another type before.
   std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
@@ -76,7 +77,7 @@ class Chunk {
   /// Sets the voxels of a box (clipped to the chunk); calls `on_change` for every row in which some had another type.
   void fill_box(const IBox& box, VoxelType type, FunctionRef<void(int y, int z, std::uint64_t changed)> on_change);
 
-  /// Which of a row's voxels have this type.
+  /// Which of a row's voxels have this type. Requires: as for every row, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;
 
   /// The one type of the whole chunk, if it is stored as such.
@@ -93,7 +94,7 @@ class Chunk {
   /// The same types everywhere, however they are stored. Cost: none where storage is shared; O(voxels) otherwise.
   [[nodiscard]] bool operator==(const Chunk& other) const;
   /// A number that says what the voxels are, whatever edits led to them and however they are stored: equal for equal
-  /// chunks, on every machine. Not for those who mean harm. Cost: up to 0.1 ms; it is not kept.
+  /// chunks, on every machine. Not collision-resistant against an adversary. Cost: up to 0.1 ms; it is not kept.
   [[nodiscard]] std::uint64_t content_hash() const;
   /// How many voxels have this type. Cost: O(palette), or O(voxels) at 16 bits a voxel.
   [[nodiscard]] int count(VoxelType type) const;

@@ -131,7 +131,6 @@ class DensityGrid {
   explicit DensityGrid(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
-  EditNotice notice_;
 };
 
 }  // namespace quoin

@@ -114,7 +114,7 @@ class Grid {
     });
   }
   /// Calls `visit(first voxel, types)` for the rows along x of the tight bounds of each chunk, in the same order; there
-  /// may be air among the types. They are good within the call.
+  /// may be air among the types. Valid only during the call.
   void for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType> types)> visit) const;
   /// Bytes held, also those that snapshots share.
   [[nodiscard]] std::size_t bytes() const;
@@ -147,7 +147,7 @@ class GridReader {
   }
 
  private:
-  // One number, which who reads along x makes once a row.
+  // One key, computed once a row by whoever reads along x.
   static std::uint64_t both(int y, int z) {
     return std::uint64_t{static_cast<std::uint32_t>(y)} << 32 | static_cast<std::uint32_t>(z);
   }

@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// Triangles of one surface of any mesh, for whoever reads them without minding who made them. Arrays of vertices have
+/// Triangles of one surface of any mesh, whichever mesher made them. Arrays of vertices have
 /// one entry a vertex. A view is one of two kinds:
 ///
 /// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or none.

@@ -88,7 +88,7 @@ class DetailSelector {
   ///
   /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
   ///
-  /// Requires: width and height are positive, `camera` is one that takes pictures; it is always the same scene or its
+  /// Requires: width and height are positive, `camera` is valid for rendering; it is always the same scene or its
   ///           snapshots, edited between calls as you like.
   /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when it was edited.
   void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,

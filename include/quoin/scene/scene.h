@@ -96,9 +96,10 @@ class Scene {
   [[nodiscard]] const SlotMap<SceneGrid>& grids() const { return grids_; }
   [[nodiscard]] const SlotMap<Instance>& instances() const { return instances_; }
   /// A grid, to be edited, now or later: the scene learns of every edit of its voxels. Name, pivot and canvas are to be
-  /// changed before the next `changes_since`, since this call is what books that. Requires: the handle names a grid.
+  /// changed before the next `changes_since`, since this call is what records the change.
+  /// Requires: the handle names a grid.
   [[nodiscard]] SceneGrid& edit(GridHandle handle);
-  /// An instance, to be changed before the next `changes_since`: this call is what books the change.
+  /// An instance, to be changed before the next `changes_since`: this call is what records it.
   /// Requires: the handle names an instance.
   [[nodiscard]] Instance& edit(InstanceHandle handle);
 

@@ -19,7 +19,7 @@
 
 namespace quoin {
 
-/// What makes a body no other than bigger, turned, moved and perhaps mirrored.
+/// A similarity transform: scale, rotation, translation, and perhaps a reflection.
 struct Similarity {
   DVec3 position{0.0};
   DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length but 0

@@ -54,7 +54,7 @@ class SceneTracer {
   /// that was built anew. Returns whether grids that are traced, or their types' transparency, are other than before:
   /// what was made of them is then out of date.
   ///
-  /// Requires: nothing reads it meanwhile. What `with_detail` returned is good no longer.
+  /// Requires: nothing reads it meanwhile. What `with_detail` returned is invalidated.
   /// Cost:     of what changed: OccupancyTree::update for the chunks of a grid that is placed; of its halved ones only
   ///           what the edit can have changed, when they are next asked for. For an instance that moved: its transform,
   ///           and its share of the tree of instances, which is built anew, O(n log n), when instances come or go or

@@ -127,6 +127,7 @@ void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t b
 }
 
 std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   if (storage_ == nullptr) return type == uniform_ ? kAllVoxels : 0;
   const ChunkStorage& m = *storage_;
   std::uint32_t index = type;
@@ -172,6 +173,7 @@ std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type
 }
 
 std::uint64_t Chunk::fill_row(int y, int z, std::uint64_t mask, VoxelType type) {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   const std::optional<VoxelType> old = one_type_of_row(*this, y, z);
   const auto where = [&](VoxelType wanted) {
     if (old.has_value()) return *old == wanted ? kAllVoxels : 0;
@@ -253,6 +255,7 @@ std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const
 }
 
 void Chunk::read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   if (storage_ == nullptr) {
     std::fill(out.begin(), out.end(), uniform_);
     return;

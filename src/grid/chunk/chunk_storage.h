@@ -74,7 +74,7 @@ struct ChunkStorage : RefCounted {
   [[nodiscard]] std::uint64_t* row(std::uint32_t slot, int row_in_slab) {
     return const_cast<std::uint64_t*>(std::as_const(*this).row(slot, row_in_slab));
   }
-  // By shifts: who waits for the slot waits less than for a multiplication.
+  // By shifts: less latency than a multiplication.
   [[nodiscard]] std::uint32_t read(std::uint32_t slot, int row_in_slab, int x) const {
     const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
     const unsigned bit = static_cast<unsigned>(x) << log;

@@ -75,7 +75,6 @@ std::int64_t remove_shape(DensityStore& store, const Shape& shape, double blend)
 }  // namespace
 
 bool DensityGrid::set(IVec3 sample, DensitySample value) {
-  notice_.give();
   const auto replace = [&](IVec3 start, int, int, SampleRow& row) {
     const auto i = static_cast<std::size_t>(sample.x - start.x);
     row.densities[i] = value.density;
@@ -89,7 +88,6 @@ bool DensityGrid::set(IVec3 sample, DensitySample value) {
 std::int64_t DensityGrid::edit_rows(
     const IBox& box,
     FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change) {
-  notice_.give();
   const auto change_part = [&](IVec3 start, int first, int end, SampleRow& row) {
     const auto from = static_cast<std::size_t>(first);
     const auto count = static_cast<std::size_t>(end - first);
@@ -102,22 +100,18 @@ std::int64_t DensityGrid::edit_rows(
 }
 
 std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend) {
-  notice_.give();
   return add_shape(impl_->store, Sphere(centre, radius), material, blend);
 }
 
 std::int64_t DensityGrid::remove_sphere(DVec3 centre, double radius, double blend) {
-  notice_.give();
   return remove_shape(impl_->store, Sphere(centre, radius), blend);
 }
 
 std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend) {
-  notice_.give();
   return add_shape(impl_->store, RoundedBox(min, max, rounding), material, blend);
 }
 
 std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, double blend) {
-  notice_.give();
   return remove_shape(impl_->store, RoundedBox(min, max, rounding), blend);
 }
 
@@ -126,7 +120,6 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec
   const Brush brush(centre, radius, strength);
   const Plane plane(point, normal);
   if (!brush.is_sound() || !plane.is_sound()) return 0;
-  notice_.give();
   DensityStore& store = impl_->store;
   const double band = store.band();
   const auto choose = [&](IVec3 chunk) {

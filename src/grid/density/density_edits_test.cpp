@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 #include "grid/density/density_oracle.h"
 
 namespace quoin {

@@ -35,12 +35,10 @@ VoxelType DensityGrid::material(IVec3 sample) const {
 
 void DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
   impl_->store.put(chunk, std::move(samples));
-  notice_.give();
 }
 
 void DensityGrid::clear() {
   impl_->store.clear();
-  notice_.give();
 }
 
 const DensityChunk* DensityGrid::find_chunk(IVec3 chunk) const {

@@ -126,7 +126,6 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
 std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   const Brush brush(centre, radius, strength);
   if (!brush.is_sound()) return 0;
-  notice_.give();
   DensityStore& store = impl_->store;
   const LongBox box = clipped(box_around(brush.sphere().min(), brush.sphere().max()));
   if (is_empty(box)) return 0;

@@ -99,7 +99,23 @@ TEST_F(PictureFiles, ABrokenPfmSaysWhere) {
   EXPECT_EQ(error("Pf\n268435456 268435456\n-1\n"), "byte 26: it claims 268435456 x 268435456 pixels and holds 0");
 }
 
-TEST_F(PictureFiles, EveryInputOfTheCorpusGivesAPictureOrAnError) {
+TEST_F(PictureFiles, EveryInputOfThePngCorpusGivesAPictureOrAnError) {
+  int inputs = 0;
+  int pictures = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/png")) {
+    const auto bytes = read_file(entry.path());
+    ASSERT_TRUE(bytes);
+    ++inputs;
+    const auto picture = read_png(*bytes);
+    if (!picture) continue;
+    ++pictures;
+    EXPECT_EQ(picture->rgb.size(), static_cast<std::size_t>(3 * picture->width * picture->height)) << entry.path();
+  }
+  EXPECT_GT(inputs, 6);
+  EXPECT_GT(pictures, 4);
+}
+
+TEST_F(PictureFiles, EveryInputOfThePfmCorpusGivesAPictureOrAnError) {
   int inputs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/pfm")) {
     const auto bytes = read_file(entry.path());

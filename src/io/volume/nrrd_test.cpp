@@ -2,7 +2,7 @@
 
 #include <glm/matrix.hpp>
 
-#include "io/volume/for_tests.h"
+#include "io/volume/volume_for_tests.h"
 
 namespace quoin {
 namespace {

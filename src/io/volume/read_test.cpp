@@ -4,7 +4,7 @@
 #include <quoin/io/formats.h>
 
 #include "io/gltf/glb_for_tests.h"
-#include "io/volume/for_tests.h"
+#include "io/volume/volume_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "io/volume/for_tests.h"
+#include "io/volume/volume_for_tests.h"
 
 /// Any bytes must give a volume that is what it says, within the limit, or an error of one line.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

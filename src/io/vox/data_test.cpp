@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <quoin/io/file.h>
 
-#include "io/vox/for_tests.h"
+#include "io/vox/vox_for_tests.h"
 
 /// Real files: 152 of them lie beside the source tree, with what others counted in them, on machines that have them.
 namespace quoin {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 
-#include "io/vox/for_tests.h"
+#include "io/vox/vox_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "io/vox/for_tests.h"
+#include "io/vox/vox_for_tests.h"
 
 /// Any bytes must give a scene or an error, and a scene must survive writing and reading again.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "core/death_for_tests.h"
-#include "io/vox/for_tests.h"
 #include "io/vox/materials.h"
 #include "io/vox/orientation.h"
 #include "io/vox/read.h"
+#include "io/vox/vox_for_tests.h"
 #include "io/vox/write.h"
 
 namespace quoin {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/blocky/watertight_check.h"
+#include "mesh/blocky/watertight_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {

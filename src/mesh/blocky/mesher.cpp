@@ -190,9 +190,14 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
     if (!region.empty()) {
-      const bool transparent = blocky::holds_transparent(*centre, types);
-      scratch_->kernel.mesh({&chunks, &types, region, options.merge, options.occlusion, transparent, false}, *scratch_,
-                            out);
+      const blocky::Job job{.chunks = &chunks,
+                            .types = &types,
+                            .region = region,
+                            .merge = options.merge,
+                            .occlusion = options.occlusion,
+                            .has_transparent = blocky::holds_transparent(*centre, types),
+                            .one_type = false};
+      scratch_->kernel.mesh(job, *scratch_, out);
     }
   }
   out.resize(scratch_->quads);
@@ -212,7 +217,13 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
   blocky::Scratch& s = *scratch_;
-  scratch_->kernel.find_faces({&chunks, &types, region, false, false, blocky::holds_transparent(*centre, types), false},
+  scratch_->kernel.find_faces({.chunks = &chunks,
+                               .types = &types,
+                               .region = region,
+                               .merge = false,
+                               .occlusion = false,
+                               .has_transparent = blocky::holds_transparent(*centre, types),
+                               .one_type = false},
                               s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};

@@ -8,7 +8,7 @@
 
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 namespace quoin {
@@ -53,7 +53,7 @@ Chunk box_chunk(const IBox& box, VoxelType type = 1) {
   return chunk;
 }
 
-TEST(GreedyQuads, EmptyChunkHasNone) {
+TEST(BlockyMesher, EmptyChunkHasNone) {
   QuadBuffer quads(5);
   BlockyMesher().mesh(lone(Chunk()), oracle::mixed_types(), {}, quads);
   EXPECT_TRUE(quads.empty());
@@ -61,14 +61,14 @@ TEST(GreedyQuads, EmptyChunkHasNone) {
   EXPECT_TRUE(quads.empty());
 }
 
-TEST(GreedyQuads, OneVoxelHasSix) {
+TEST(BlockyMesher, OneVoxelHasSix) {
   QuadBuffer quads;
   BlockyMesher().mesh(lone(box_chunk({{5, 6, 7}, {6, 7, 8}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
   for (const Quad& quad : quads) EXPECT_EQ(quad.voxel(), IVec3(5, 6, 7));
 }
 
-TEST(GreedyQuads, SolidCubeHasSix) {
+TEST(BlockyMesher, SolidCubeHasSix) {
   QuadBuffer quads;
   BlockyMesher().mesh(lone(box_chunk({{0, 0, 0}, {32, 32, 32}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
@@ -77,11 +77,11 @@ TEST(GreedyQuads, SolidCubeHasSix) {
   EXPECT_EQ(quads[0].size_u(), 64);
 }
 
-TEST(GreedyQuads, SlabTopIsOne) {
+TEST(BlockyMesher, SlabTopIsOne) {
   EXPECT_EQ(quad_count(box_chunk({{0, 4, 0}, {32, 5, 32}}), Direction::PosY), 1);
 }
 
-TEST(GreedyQuads, CheckerboardLayerTopHas512) {
+TEST(BlockyMesher, CheckerboardLayerTopHas512) {
   Chunk chunk;
   for (int z = 0; z < 32; ++z) {
     for (int x = z & 1; x < 32; x += 2) chunk.set(x, 4, z, 1);
@@ -89,7 +89,7 @@ TEST(GreedyQuads, CheckerboardLayerTopHas512) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY), 512);
 }
 
-TEST(GreedyQuads, CheckerboardOfTwoTypesTopHas1024) {
+TEST(BlockyMesher, CheckerboardOfTwoTypesTopHas1024) {
   Chunk chunk;
   for (int z = 0; z < 32; ++z) {
     for (int x = 0; x < 32; ++x) chunk.set(x, 4, z, static_cast<VoxelType>(1 + ((x ^ z) & 1)));
@@ -97,7 +97,7 @@ TEST(GreedyQuads, CheckerboardOfTwoTypesTopHas1024) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY), 1'024);
 }
 
-TEST(GreedyQuads, FloorSplitsAlongAWallsFoot) {
+TEST(BlockyMesher, FloorSplitsAlongAWallsFoot) {
   Chunk chunk = box_chunk({{0, 0, 0}, {16, 1, 16}});
   chunk.fill_box({{0, 1, 8}, {16, 4, 9}}, 1, [](int, int, std::uint64_t) {});
   // On either side: the floor away from the wall, the row at its foot, and that row's two ends, where the wall's end
@@ -106,7 +106,7 @@ TEST(GreedyQuads, FloorSplitsAlongAWallsFoot) {
   EXPECT_EQ(quad_count(chunk, Direction::PosY, false), 3);
 }
 
-TEST(GreedyQuads, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
+TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
   const VoxelRegistry types = workloads::glass_types();
   QuadOptions options;
   options.region = workloads::kInterior;
@@ -127,7 +127,7 @@ TEST(GreedyQuads, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
   }
 }
 
-TEST(GreedyQuads, BuriedChunkIsAnsweredFromThePalettes) {
+TEST(BlockyMesher, BuriedChunkIsAnsweredFromThePalettes) {
   const Chunk full(1);
   Neighbourhood n;
   n.chunks.fill(&full);
@@ -276,7 +276,7 @@ TEST_P(ManyTypes, MeshLikeAnyOther) {
 
 INSTANTIATE_TEST_SUITE_P(Counts, ManyTypes, testing::Values(3, 12, 40, 250, 1'000));
 
-TEST(GreedyQuads, RegionsEmitOnlyTheirOwnVoxels) {
+TEST(BlockyMesher, RegionsEmitOnlyTheirOwnVoxels) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = oracle::random_world(21, {IVec3{0}, IVec3{64}}, 5, 0.05);
   std::mt19937 random(5);
@@ -295,7 +295,7 @@ TEST(GreedyQuads, RegionsEmitOnlyTheirOwnVoxels) {
   }
 }
 
-TEST(GreedyQuads, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
+TEST(BlockyMesher, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
   const VoxelRegistry types = oracle::mixed_types();
   std::mt19937 random(17);
   Grid grid = oracle::random_world(31, {IVec3{-70, -70, -70}, IVec3{70, 70, 70}}, 5, 0.01);

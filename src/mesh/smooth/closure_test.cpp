@@ -7,7 +7,7 @@
 
 #include <quoin/mesh/smooth_mesh.h>
 
-#include "mesh/smooth/surface_check.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {

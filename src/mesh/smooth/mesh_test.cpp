@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/smooth/oracle.h"
-#include "mesh/smooth/surface_check.h"
+#include "mesh/smooth/smooth_oracle.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -7,8 +7,8 @@
 #include <quoin/mesh/smooth.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "mesh/smooth/oracle.h"
-#include "mesh/smooth/surface_check.h"
+#include "mesh/smooth/smooth_oracle.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {

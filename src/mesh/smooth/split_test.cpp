@@ -12,7 +12,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "core/death_for_tests.h"
-#include "mesh/smooth/surface_check.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "core/death_for_tests.h"
 #include "mesh/smooth/levels.h"
-#include "mesh/smooth/oracle.h"
-#include "mesh/smooth/surface_check.h"
+#include "mesh/smooth/smooth_oracle.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {

@@ -140,11 +140,11 @@ void put_block_occlusion(VertexFormat format, const Source& occlusion) {
   std::transform(brightness.begin(), brightness.end(), bytes.begin(), unorm8);
   switch (format) {
     case VertexFormat::Float32:
-      return occlusion.template put<float>([&](std::uint8_t level) { return brightness[level & 3U]; });
+      return occlusion.template put<float>([&](std::uint8_t value) { return brightness[value & 3U]; });
     case VertexFormat::Unorm8:
-      return occlusion.template put<std::uint8_t>([&](std::uint8_t level) { return bytes[level & 3U]; });
+      return occlusion.template put<std::uint8_t>([&](std::uint8_t value) { return bytes[value & 3U]; });
     default:
-      return occlusion.template put<std::uint8_t>([](std::uint8_t level) { return level; });
+      return occlusion.template put<std::uint8_t>([](std::uint8_t value) { return value; });
   }
 }
 

@@ -184,6 +184,7 @@ Status VulkanInstance::list_devices() {
 
 Result<PhysicalDevice> VulkanInstance::choose(const std::string& wanted) const {
   std::vector<VulkanDeviceInfo> descriptions;
+  descriptions.reserve(devices_.size());
   for (const PhysicalDevice& device : devices_) descriptions.push_back(device.description);
   const auto chosen = choose_vulkan_device(descriptions, wanted);
   if (!chosen) return chosen.error();

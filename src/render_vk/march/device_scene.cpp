@@ -199,6 +199,7 @@ Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
 
 Status DeviceScene::put_grids() {
   std::vector<ShaderGrid> table;
+  table.reserve(grids_.size());
   for (const auto& [handle, grid] : grids_) table.push_back(grid.voxels.shader_grid());
   if (!is_same(table, grid_table_)) {
     grid_table_ = std::move(table);

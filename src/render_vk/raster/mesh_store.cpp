@@ -32,7 +32,7 @@ void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::
   const Vec3 position = mesh.positions.data()[i];
   for (int axis = 0; axis < 3; ++axis) words.push_back(std::bit_cast<std::uint32_t>(position[axis]));
   words.push_back(octahedral(mesh.normals.data()[i]));
-  const float open = mesh.occlusion.size() == 0 ? 1.0F : 1.0F - std::clamp(mesh.occlusion.data()[i], 0.0F, 1.0F);
+  const float open = mesh.occlusion.empty() ? 1.0F : 1.0F - std::clamp(mesh.occlusion.data()[i], 0.0F, 1.0F);
   const LinearRgba16 albedo = surface.albedo[i];
   words.push_back(albedo[0] | std::uint32_t{albedo[1]} << 16);
   words.push_back(albedo[2] | static_cast<std::uint32_t>(std::lround(open * 65535.0F)) << 16);
@@ -49,7 +49,7 @@ Status check(const ChunkSurface& surface) {
   const SmoothChunkMesh& mesh = surface.smooth;
   const std::size_t count = mesh.positions.size();
   const bool is_whole = mesh.normals.size() == count && surface.albedo.size() == count &&
-                        surface.types.size() == count && (mesh.occlusion.size() == 0 || mesh.occlusion.size() == count);
+                        surface.types.size() == count && (mesh.occlusion.empty() || mesh.occlusion.size() == count);
   if (!is_whole) return refuse("surface: its vertices' arrays are not of one size");
   if (mesh.indices.size() % 3 != 0) return refuse("surface: its indices are no whole triangles");
   const bool is_inside =

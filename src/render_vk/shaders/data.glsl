@@ -1,4 +1,4 @@
-// What the shaders read and write; src/render_vk/shader_data.h says the same to the compiler of the processor's side.
+// What the shaders read and write; src/render_vk/march/shader_data.h says the same to the compiler of the processor's side.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 

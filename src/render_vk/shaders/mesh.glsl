@@ -1,4 +1,4 @@
-// What the shaders of meshes read; src/render_vk/mesh_shader_data.h says the same to the compiler of the processor's
+// What the shaders of meshes read; src/render_vk/raster/mesh_shader_data.h says the same to the compiler of the processor's
 // side. Vectors are read as a whole: see docs/decisions/040.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "scene/query/query_support.h"
+#include "scene/query/query_in_grid.h"
 
 namespace quoin {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <limits>
 
-#include "scene/query/query_support.h"
+#include "scene/query/query_in_grid.h"
 
 namespace quoin {
 namespace {

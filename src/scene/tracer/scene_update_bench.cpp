@@ -11,7 +11,7 @@
 
 #include <quoin/scene/scene_tracer.h>
 
-#include "scene/tracer/mixed_scene.h"
+#include "scene/tracer/mixed_scene_for_tests.h"
 
 namespace quoin {
 namespace {

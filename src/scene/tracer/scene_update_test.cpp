@@ -9,7 +9,7 @@
 
 #include <quoin/scene/scene_query.h>
 
-#include "grid/change_follower.h"
+#include "grid/change_follower_for_tests.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {

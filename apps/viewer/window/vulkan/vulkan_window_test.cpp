@@ -11,7 +11,8 @@
 
 #include "core/death_for_tests.h"
 #include "viewer/viewer_fixture.h"
-#include "viewer/window/process_facts.h"
+#include "viewer/window/process_facts_for_tests.h"
+#include "viewer/window/process_memory.h"
 #include "viewer/window/screen.h"
 #include "viewer/window/viewer.h"
 #include "vulkan_screen.h"

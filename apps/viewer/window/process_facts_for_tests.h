@@ -5,11 +5,8 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <thread>
-
-#include <unistd.h>
 
 namespace quoin::viewer {
 
@@ -31,14 +28,6 @@ inline std::size_t threads_after_joining(std::size_t expected) {
     count = threads();
   }
   return count;
-}
-
-inline double resident_megabytes() {
-  std::ifstream in("/proc/self/statm");
-  long long total = 0;
-  long long resident = 0;
-  in >> total >> resident;
-  return static_cast<double>(resident) * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
 }  // namespace quoin::viewer

@@ -1,0 +1,18 @@
+#include <quoin/io/picture_files.h>
+
+#include <cstdlib>
+
+/// Any bytes must give a picture of the size that it claims, or an error of one line.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto picture = quoin::read_png({reinterpret_cast<const std::byte*>(data), size});
+  if (!picture) {
+    if (quoin::to_string(picture.error()).find('\n') != std::string::npos) std::abort();
+    return 0;
+  }
+  if (picture->width <= 0 || picture->height <= 0) std::abort();
+  if (picture->rgb.size() !=
+      std::size_t{3} * static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height)) {
+    std::abort();
+  }
+  return 0;
+}
