@@ -172,7 +172,9 @@ TEST(SceneChanges, AnEditThatIsLookedAtHalfwayIsToldToItsEnd) {
   Grid& grid = scene.edit(handle).grid;
   ChangeCursor cursor = scene.cursor();
   grid.edit({{60, 0, 0}, {70, 1, 1}}, [&](IVec3 voxel, VoxelType) {
-    if (voxel.x == 64) EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
+    if (voxel.x == 64) {
+      EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
+    }
     return VoxelType{1};
   });
   EXPECT_EQ(scene.changes_since(cursor).grids, std::vector<GridHandle>{handle});
