@@ -31,7 +31,7 @@ inline bool shows(const VoxelRegistry& types, VoxelType a, VoxelType b) {
   return a != kAir && (b == kAir || (types[b].visibility == Visibility::Transparent && a != b));
 }
 
-/// Levels by asking for each of the three voxels of each corner.
+/// Occlusion by asking for each of the three voxels of each corner.
 inline FaceOcclusion corners_of_face(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
   const FaceFrame& frame = frame_of(d);
   FaceOcclusion corners{};

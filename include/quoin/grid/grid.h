@@ -50,7 +50,7 @@ class Grid {
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
   /// one edit. Returns how many changed.
   std::int64_t write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
-  /// Sets all voxels of a box. Returns how many changed.
+  /// Sets all voxels of a box (half open: `max` excluded; an empty one changes nothing). Returns how many changed.
   /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel. It cannot be
   /// cancelled: a box of millions of chunks is better filled piece by piece.
   std::int64_t fill_box(const IBox& box, VoxelType type);

@@ -107,7 +107,7 @@ class Scene {
   /// own `changes_since` tells, which types those of `types`.
   /// Cost: O(grids and instances that changed), whatever the size of the scene. See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
-  /// Whether that would tell of anything. Cost: as `changes_since`.
+  /// Whether that would tell of anything; of `types` they tell themselves. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   /// A cursor at the present: it will be told what changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
@@ -131,8 +131,9 @@ class Scene {
 
 /// A point of the instance's grid (voxels) in the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);
-/// The same for all points, as a matrix. For a shader take the camera's position from the last column in double first:
-/// far from the origin floats cannot tell neighbouring voxels apart.
+/// The same for all points, as a matrix; a mirrored instance's has a negative determinant, so its triangles turn their
+/// other side. For a shader subtract the camera's position from the last column in double first: far from the origin
+/// floats cannot tell neighbouring voxels apart.
 [[nodiscard]] glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid);
 /// A point of the world in the instance's grid (voxels): the inverse of `world_from_grid`, to the rounding of the
 /// point's own doubles. NaN in every component where the instance has no place, which `Instance::rotation` describes.

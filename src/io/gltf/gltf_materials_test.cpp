@@ -24,12 +24,12 @@ TEST_F(GltfMaterials, OcclusionIsLinearGreyWithFullAlphaAndCanBeLeftOut) {
   EXPECT_EQ(glb.document["accessors"][accessor]["type"], "VEC4");
   EXPECT_EQ(glb.document["accessors"][accessor]["normalized"], true);
   const auto colours = glb.array<std::array<std::uint8_t, 4>>(accessor);
-  const auto& levels = meshes->parts[0].surfaces[0].block_occlusion;
-  ASSERT_EQ(colours.size(), levels.size());
-  constexpr std::array<std::uint8_t, 4> grey_of_level = {255, 191, 128, 64};
+  const auto& occlusion = meshes->parts[0].surfaces[0].block_occlusion;
+  ASSERT_EQ(colours.size(), occlusion.size());
+  constexpr std::array<std::uint8_t, 4> grey_of = {255, 191, 128, 64};
   std::set<std::uint8_t> seen;
   for (std::size_t i = 0; i < colours.size(); ++i) {
-    const std::uint8_t grey = grey_of_level[levels[i]];
+    const std::uint8_t grey = grey_of[occlusion[i]];
     EXPECT_EQ(colours[i], (std::array<std::uint8_t, 4>{grey, grey, grey, 255}));
     seen.insert(grey);
   }

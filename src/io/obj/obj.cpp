@@ -256,7 +256,7 @@ class ObjText {
   const MaterialPalette& palette_;
   ObjLines lines_;
   BlockWriter& out_;
-  std::array<std::string, 4> greys_;  ///< " r g b" by level of occlusion
+  std::array<std::string, 4> greys_;  ///< " r g b" by occlusion
   std::uint64_t vertices_ = 0;
   std::uint64_t normals_ = 0;
 };

@@ -18,7 +18,7 @@ static_assert(std::endian::native == std::endian::little, "the format written is
 
 constexpr std::size_t kVertexBytes = 6 * 4 + 3;  // position and normal as floats, red, green and blue as bytes
 constexpr std::size_t kFaceBytes = 1 + 3 * 4;    // the byte 3 and three int
-constexpr std::size_t kLevels = 4;
+constexpr std::size_t kOcclusions = 4;
 
 using Srgb = std::array<std::uint8_t, 3>;
 
@@ -36,20 +36,20 @@ std::string header_of(const Counts& counts) {
   return text + "property list uchar int vertex_indices\nend_header\n";
 }
 
-/// The colour of every type at every level of occlusion, [type * kLevels + level].
+/// The colour of every type at every occlusion, [type * kOcclusions + occlusion].
 std::vector<Srgb> colours_of(const VoxelRegistry& types) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   // By way of 16 bits, as smooth meshes hold their colours.
-  const auto darkened = [&](std::uint8_t byte, std::uint8_t level) {
+  const auto darkened = [&](std::uint8_t byte, std::uint8_t occlusion) {
     const auto linear = static_cast<std::uint16_t>(std::lround(linear_from_srgb(byte) * 65'535.0F));
-    return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(level));
+    return encode(static_cast<float>(linear) / 65'535.0F * occlusion_brightness(occlusion));
   };
   std::vector<Srgb> colours;
-  colours.reserve(types.size() * kLevels);
+  colours.reserve(types.size() * kOcclusions);
   for (std::size_t type = 0; type < types.size(); ++type) {
     const Rgba8 colour = types[static_cast<VoxelType>(type)].colour;
-    for (std::uint8_t level = 0; level < kLevels; ++level) {
-      colours.push_back({darkened(colour.r, level), darkened(colour.g, level), darkened(colour.b, level)});
+    for (std::uint8_t occlusion = 0; occlusion < kOcclusions; ++occlusion) {
+      colours.push_back({darkened(colour.r, occlusion), darkened(colour.g, occlusion), darkened(colour.b, occlusion)});
     }
   }
   return colours;
@@ -73,10 +73,10 @@ void write_vertices(const MeshView& view, const VertexTransform& transform, cons
     return;
   }
   const auto normals = transform.face_normals();
-  const bool has_levels = !view.block_occlusion.empty();
+  const bool has_occlusion = !view.block_occlusion.empty();
   for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
     put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
-               colours[view.types[i] * kLevels + (has_levels ? view.block_occlusion[i] : 0)], out);
+               colours[view.types[i] * kOcclusions + (has_occlusion ? view.block_occlusion[i] : 0)], out);
   }
 }
 

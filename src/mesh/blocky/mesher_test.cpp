@@ -162,7 +162,7 @@ class RandomWorld : public testing::TestWithParam<World> {
   Grid world(IVec3 shift = IVec3{0}) const { return grid_of(GetParam(), shift); }
 };
 
-TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndLevels) {
+TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndOcclusion) {
   const VoxelRegistry types = oracle::mixed_types();
   const Grid grid = world();
   for (const bool occlusion : {true, false}) {

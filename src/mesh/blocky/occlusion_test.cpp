@@ -110,7 +110,7 @@ TEST(VertexOcclusion, IsThreeBetweenTwoSidesAndACountOtherwise) {
   EXPECT_EQ(vertex_occlusion(true, true, true), 3);
 }
 
-TEST(VertexOcclusion, BrightnessFallsByAQuarterALevel) {
+TEST(VertexOcclusion, BrightnessFallsByQuarters) {
   EXPECT_EQ(occlusion_brightness(0), 1.0F);
   EXPECT_EQ(occlusion_brightness(1), 0.75F);
   EXPECT_EQ(occlusion_brightness(2), 0.5F);

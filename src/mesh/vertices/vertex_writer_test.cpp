@@ -121,7 +121,7 @@ TEST(VertexWriter, AgreesWithALayoutThatTheCompilerKnows) {
     Vec3 position;
     std::uint16_t type;
     std::uint8_t face;
-    std::uint8_t level;
+    std::uint8_t occlusion;
     float u;
     float v;
   };
@@ -146,7 +146,7 @@ TEST(VertexWriter, AgreesWithALayoutThatTheCompilerKnows) {
                               {VertexAttribute::Position, Float32x3, offsetof(Vertex, position)},
                               {VertexAttribute::Type, Uint16, offsetof(Vertex, type)},
                               {VertexAttribute::Face, Uint8, offsetof(Vertex, face)},
-                              {VertexAttribute::Occlusion, Uint8, offsetof(Vertex, level)}}},
+                              {VertexAttribute::Occlusion, Uint8, offsetof(Vertex, occlusion)}}},
                             types);
   std::vector<std::byte> found(writer.bytes_needed(expected.size()));
   writer.write(quads, origin, found);

@@ -42,7 +42,7 @@ struct ImpostorFaces {
   struct Face {
     IVec3 voxel{0};
     VoxelType type = kAir;
-    std::uint8_t occlusion = 0;  ///< the four corners' levels, two bits each
+    std::uint8_t occlusion = 0;  ///< of the four corners, two bits each
     Direction direction : 3 = Direction::PosX;
     std::uint8_t open_rays : 4 = kRays;  ///< of so many occlusion rays from the face's middle
     static constexpr int kRays = 9;

@@ -59,7 +59,7 @@ void main() {
   }
   uvec2 bits = Pairs(data).at[number];
 
-  uint levels = bits.x >> 30 | (bits.y & 63) << 2;
+  uint corners = bits.x >> 30 | (bits.y & 63) << 2;
   uint face = bits.y >> 7 & 7;
   // The corners of a flipped quad are counted from the next one, which turns the diagonal.
   uint corner = ((index & 3) + (bits.y >> 6 & 1)) & 3;
@@ -92,5 +92,5 @@ void main() {
   point[u] += is_east ? wide_u : -wide_u;
   point[v] += is_north ? wide_v : -wide_v;
   gl_Position = clip_from(clip, point);
-  colour = colour_of(bits.y >> 10 & 0xFFFF, face, 1.0 - float(levels >> 2 * corner & 3) / 3.0, placed);
+  colour = colour_of(bits.y >> 10 & 0xFFFF, face, 1.0 - float(corners >> 2 * corner & 3) / 3.0, placed);
 }
