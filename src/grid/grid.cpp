@@ -228,10 +228,10 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
 }
 
 std::int64_t Grid::fill_box(const IBox& box, VoxelType type) {
-  return impl_->edit_box(
-      box_from(box), type != kAir, notice_, [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
-        chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
-      });
+  const auto fill = [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+    chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
+  };
+  return impl_->edit_box(box_from(box), type != kAir, notice_, fill);
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
@@ -256,19 +256,19 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
 }
 
 std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change) {
-  return impl_->edit_box(box_from(wanted), true, notice_,
-                         [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
-                           std::array<VoxelType, kChunkEdge> row{};
-                           const auto first = static_cast<std::size_t>(part.min.x);
-                           const auto count = static_cast<std::size_t>(part.max.x - part.min.x);
-                           for (int z = part.min.z; z < part.max.z; ++z) {
-                             for (int y = part.min.y; y < part.max.y; ++y) {
-                               chunk.read_row(y, z, row);
-                               change(at * kChunkEdge + IVec3{part.min.x, y, z}, std::span(row).subspan(first, count));
-                               edit.add(y, z, chunk.write_row(y, z, row));
-                             }
-                           }
-                         });
+  const auto change_part = [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+    std::array<VoxelType, kChunkEdge> row{};
+    const auto first = static_cast<std::size_t>(part.min.x);
+    const auto count = static_cast<std::size_t>(part.max.x - part.min.x);
+    for (int z = part.min.z; z < part.max.z; ++z) {
+      for (int y = part.min.y; y < part.max.y; ++y) {
+        chunk.read_row(y, z, row);
+        change(at * kChunkEdge + IVec3{part.min.x, y, z}, std::span(row).subspan(first, count));
+        edit.add(y, z, chunk.write_row(y, z, row));
+      }
+    }
+  };
+  return impl_->edit_box(box_from(wanted), true, notice_, change_part);
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {

@@ -13,10 +13,13 @@
 #include "core/death_for_tests.h"
 #include "mesh/manifold.h"
 #include "mesh/smooth/cell.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 
 namespace {
+
+using oracle::signed_volume;
 
 using Field = std::function<float(Vec3)>;
 
@@ -69,17 +72,6 @@ std::size_t open_edges(const SmoothMesh& mesh) {
     open += count == 1 && back != uses.end() && back->second == 1 && edge.first != edge.second ? 0 : 1;
   }
   return open;
-}
-
-double volume(const SmoothMesh& mesh) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    const DVec3 a(mesh.positions[mesh.indices[i]]);
-    const DVec3 b(mesh.positions[mesh.indices[i + 1]]);
-    const DVec3 c(mesh.positions[mesh.indices[i + 2]]);
-    sum += glm::dot(a, glm::cross(b, c)) / 6.0;
-  }
-  return sum;
 }
 
 float sphere(Vec3 p) {
@@ -172,7 +164,7 @@ TEST_F(Simplify, WithoutAnErrorOnlyFlatPlacesLoseTriangles) {
   EXPECT_EQ(*reached, 0.0F);
   EXPECT_GT(mesh.indices.size(), whole.indices.size() * 9 / 10);
   EXPECT_EQ(open_edges(mesh), 0U);
-  EXPECT_NEAR(volume(mesh), volume(whole), 1e-3 * volume(whole));
+  EXPECT_NEAR(signed_volume(mesh), signed_volume(whole), 1e-3 * signed_volume(whole));
   EXPECT_TRUE(mesh.occlusion.empty());
 }
 
@@ -185,14 +177,14 @@ TEST(Manifold, SheetsThatShareAnEdgeAreSeparated) {
   // Two tetrahedra on the edge 0-1, and a pair of triangles back to back.
   mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3, 0, 4, 1, 0, 1, 5, 0, 5, 4, 1, 4, 5, 2, 3, 4, 4, 3, 2};
   EXPECT_GT(open_edges(mesh), 0U);
-  const double before = volume(mesh);
+  const double before = signed_volume(mesh);
   make_manifold(mesh);
   EXPECT_EQ(open_edges(mesh), 0U);
   EXPECT_EQ(mesh.indices.size(), 24U);
   EXPECT_EQ(mesh.positions.size(), 8U) << "both ends of the edge twice";
   EXPECT_EQ(mesh.types.size(), 8U);
   EXPECT_TRUE(mesh.occlusion.empty());
-  EXPECT_EQ(volume(mesh), before);
+  EXPECT_EQ(signed_volume(mesh), before);
 }
 
 TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
@@ -204,7 +196,7 @@ TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
   // Two tetrahedra; the last vertex is of neither.
   mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3, 0, 4, 5, 0, 6, 4, 0, 5, 6, 4, 6, 5};
   ASSERT_EQ(open_edges(mesh), 0U);
-  const double before = volume(mesh);
+  const double before = signed_volume(mesh);
   make_manifold(mesh);
   ASSERT_EQ(mesh.positions.size(), 9U) << "the common vertex twice";
   EXPECT_EQ(mesh.positions[8], Vec3(0));
@@ -212,7 +204,7 @@ TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
   EXPECT_EQ(std::count(mesh.indices.begin(), mesh.indices.end(), 8U), 3);
   EXPECT_EQ(mesh.normals.size(), 9U);
   EXPECT_EQ(open_edges(mesh), 0U);
-  EXPECT_EQ(volume(mesh), before);
+  EXPECT_EQ(signed_volume(mesh), before);
 }
 
 TEST(Manifold, SoundMeshesStayAsTheyAre) {
@@ -239,10 +231,10 @@ TEST(Manifold, SurfacesThatTouchInManyEdgesBecomeClosedOnes) {
     };
     SmoothMesh mesh = surface_of(noise, 16);
     EXPECT_GT(open_edges(mesh), 100U);
-    const double before = volume(mesh);
+    const double before = signed_volume(mesh);
     make_manifold(mesh);
     EXPECT_EQ(open_edges(mesh), 0U);
-    EXPECT_NEAR(volume(mesh), before, 1e-6 * before);
+    EXPECT_NEAR(signed_volume(mesh), before, 1e-6 * before);
   }
 }
 
