@@ -126,12 +126,21 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
   const std::string plain = bytes("out.png");
   for (const std::string flags :
        {"--view front", "--view top", "--sun=-1,1,0", "--preset no-shadows", "--preset no-ao", "--preset unlit",
-        "--ao vertex", "--ao-rays 6", "--ao-affects all", "--exposure 0.5", "--samples 4",
-        "--camera 30,30,30 --look-at 0,0,0", "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
+        "--preset ao", "--preset unlit --ao vertex", "--ao-distance 0.4", "--shadow-distance 0.4", "--ao vertex",
+        "--ao-rays 6", "--ao-affects all", "--exposure 0.5", "--samples 4", "--camera 30,30,30 --look-at 0,0,0",
+        "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
     drawn(base + " " + flags);
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }
-  drawn(base + " --preset full --ao rays --ao-rays 9 --ao-affects ambient --exposure 1 --samples 1 --view iso");
+  drawn(base + " --preset unlit");
+  const std::string unlit = bytes("out.png");
+  for (const std::string flags : {"--ao vertex", "--ao rays", "--ao rays --ao-distance 0.4"}) {
+    drawn(base + " --preset unlit " + flags);
+    EXPECT_NE(bytes("out.png"), unlit) << flags;
+  }
+  drawn(
+      base +
+      " --preset full --ao rays --ao-rays 9 --ao-distance 6 --ao-affects ambient --exposure 1 --samples 1 --view iso");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
@@ -204,7 +213,12 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--ao-rays 5000", "--ao-rays: "},
       {out + "--ao vertex --ao-rays 9", "--ao-rays needs --ao rays"},
       {out + "--preset no-ao --ao rays", "--ao: the preset no-ao has no ambient occlusion"},
-      {out + "--preset unlit --ao-affects all", "--ao-affects: the preset unlit has no ambient occlusion"},
+      {out + "--preset unlit --ao-affects all", "--ao-affects: the preset unlit has no ambient occlusion without --ao"},
+      {out + "--preset unlit --ao rays --ao-affects all", "--ao-affects: the preset unlit has no light"},
+      {out + "--preset ao --ao-affects all", "--ao-affects: the preset ao has no light"},
+      {out + "--ao vertex --ao-distance 3", "--ao-distance needs --ao rays"},
+      {out + "--ao-distance -1", "--ao-distance: must be a number of at least 0"},
+      {out + "--preset ao --shadow-distance 3", "--shadow-distance: the preset ao has no shadows"},
       {out + "--exposure -1", "--exposure: must be a number of at least 0"},
       {out + "--exposure 1e", "--exposure: must be"},
       {out + "--samples 0", "--samples: "},

@@ -46,9 +46,9 @@ std::optional<double> read_angle(const std::string& text) {
   return degrees && *degrees > 0.0 && *degrees < 180.0 ? degrees : std::nullopt;
 }
 
-std::optional<double> read_exposure(const std::string& text) {
-  const auto exposure = parse_number(text);
-  return exposure && *exposure >= 0.0 ? exposure : std::nullopt;
+std::optional<double> read_not_negative(const std::string& text) {
+  const auto number = parse_number(text);
+  return number && *number >= 0.0 ? number : std::nullopt;
 }
 
 std::optional<PictureSize> read_size(const std::string& text) {
@@ -70,8 +70,11 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--sun", "X,Y,Z", "Direction towards the sun (default 0.371,0.743,0.223)");
-  command.add_option("--preset", arguments.preset, "Light: full, no-shadows, no-ao or unlit (default full)")
-      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit"}));
+  command
+      .add_option("--preset", arguments.preset,
+                  "Light: full, no-shadows, no-ao, unlit (own colours, with --ao times occlusion), or ao (occlusion "
+                  "alone, in grey) (default full)")
+      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao"}));
   command
       .add_option("--ao", arguments.occlusion,
                   "Ambient occlusion by rays, or that of the vertices of blocky meshes (default rays)")
@@ -82,6 +85,8 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       .add_option("--ao-affects", arguments.occlusion_affects,
                   "What occlusion darkens: ambient light, or all (default ambient)")
       ->check(CLI::IsMember({"ambient", "all"}));
+  add_text_option(command, "--ao-distance", "VOXELS", "How far the rays of --ao rays reach (default 6)");
+  add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
   add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
 }
 
@@ -161,19 +166,30 @@ std::string fault_of_camera(const CLI::App& command, const RenderArguments& argu
 }
 
 std::string fault_of_light(const CLI::App& command, const RenderArguments& arguments) {
-  const bool has_occlusion = arguments.preset == "full" || arguments.preset == "no-shadows";
-  for (const char* option : {"--ao", "--ao-rays", "--ao-affects"}) {
+  const std::string& preset = arguments.preset;
+  const bool is_lit = preset == "full" || preset == "no-shadows";
+  const bool has_occlusion = is_lit || preset == "ao" || (preset == "unlit" && command.count("--ao") > 0);
+  for (const char* option : {"--ao", "--ao-rays", "--ao-distance", "--ao-affects"}) {
     if (command.count(option) > 0 && !has_occlusion) {
-      return std::string(option) + ": the preset " + arguments.preset + " has no ambient occlusion";
+      return std::string(option) + ": the preset " + preset + " has no ambient occlusion" +
+             (preset == "unlit" ? " without --ao" : "");
     }
   }
-  if (command.count("--ao-rays") > 0 && arguments.occlusion != "rays") return "--ao-rays needs --ao rays";
+  if (command.count("--ao-affects") > 0 && !is_lit) return "--ao-affects: the preset " + preset + " has no light";
+  for (const char* option : {"--ao-rays", "--ao-distance"}) {
+    if (command.count(option) > 0 && arguments.occlusion != "rays") return std::string(option) + " needs --ao rays";
+  }
+  const bool has_shadows = preset == "full" || preset == "no-ao";
+  if (command.count("--shadow-distance") > 0 && !has_shadows) {
+    return "--shadow-distance: the preset " + preset + " has no shadows";
+  }
   return "";
 }
 
 /// Reads the options that are texts to CLI11; returns what is wrong with the first wrong one, or "".
 std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   const std::string three = "three numbers, as in 1,-2.5,3";
+  const std::string at_least_0 = "a number of at least 0";
   LightOptions& light = arguments.render.light;
   PictureSize size{arguments.render.width, arguments.render.height};
   const std::array faults = {
@@ -183,7 +199,9 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--look-at", parse_triple, three, arguments.target),
       read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),
       read_option(command, "--sun", read_direction, "three numbers that are not all 0, as in 1,2,-0.5", light.sun),
-      read_option(command, "--exposure", read_exposure, "a number of at least 0", light.exposure)};
+      read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
+      read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
+      read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure)};
   arguments.render.width = size.width;
   arguments.render.height = size.height;
   const auto* const wrong =
@@ -225,7 +243,10 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;
   if (arguments.preset == "no-ao") light.occlusion = OcclusionMode::Off;
   if (arguments.preset == "no-shadows") light.shadows = false;
-  if (arguments.preset == "unlit") light.lit = false;
+  if (arguments.preset == "ao") light.shading = Shading::Occlusion;
+  if (arguments.preset == "unlit") {
+    light.shading = command.count("--ao") > 0 ? Shading::UnlitWithOcclusion : Shading::Unlit;
+  }
   arguments.render.depth = !arguments.depth.empty();
   arguments.render.threads = arguments.common.threads;
   return "";

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <map>
 #include <mutex>
 #include <new>
 #include <thread>
@@ -87,6 +88,7 @@ struct CpuBackend::Impl {
   CpuBackendOptions options;
   std::function<void()> on_frame;
   CpuRenderer renderer;
+  std::map<int, DetailSelector> selectors;  // by divisor: pictures of another size are another view
 
   std::mutex mutex;  // guards what follows, but for the atomic ones
   std::condition_variable wake;
@@ -157,8 +159,10 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t number = request_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
-  auto picture = renderer.render(wanted.camera, options_for(wanted, now, options.threads),
-                                 [&](double) { return !halt && (is_first || request_number == number); });
+  RenderOptions render = options_for(wanted, now, options.threads);
+  render.selector = &selectors[now.divisor];
+  auto picture =
+      renderer.render(wanted.camera, render, [&](double) { return !halt && (is_first || request_number == number); });
   const double seconds = seconds_since(start);
   lock.lock();
   if (!picture && picture.error().code == ErrorCode::Cancelled) return;
@@ -195,7 +199,7 @@ void CpuBackend::show(const ViewRequest& request) {
   {
     const std::lock_guard lock(impl_->mutex);
     if (impl_->request && is_same(*impl_->request, request)) return;
-    impl_->is_camera_new = !impl_->request || !is_same(impl_->request->camera, request.camera) || impl_->is_camera_new;
+    impl_->is_camera_new = !impl_->request || impl_->request->camera != request.camera || impl_->is_camera_new;
     impl_->request = request;
     impl_->stage.reset();
     impl_->is_done = false;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -82,7 +83,8 @@ struct DeviceBackend::Impl {
   std::shared_ptr<VulkanPicture> picture;
   std::unique_ptr<Meshes> meshes;
   int divisor = 1;
-  double seconds_per_sample = 0.0;  // and pixel; 0: not known
+  std::map<int, DetailSelector> selectors;  // by divisor: pictures of another size are another view
+  double seconds_per_sample = 0.0;          // and pixel; 0: not known
 };
 
 DeviceBackend::DeviceBackend(const Scene& scene, const DeviceBackendOptions& options, OpenDevice open_device,
@@ -141,7 +143,6 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   wanted.height = request->height;
   wanted.samples = std::min(request->samples, kMeshSamples);
   wanted.light = request->light;
-  wanted.shading = request->shading;
   wanted.wireframe = request->wireframe;
   divisor = 1;
   if (Status drawn = meshes->renderer.draw(*picture, request->camera, wanted); !drawn) {
@@ -191,6 +192,7 @@ Status DeviceBackend::Impl::draw_stage() {
   wanted.light = request->light;
   wanted.detail_colours = request->detail_colours;
   if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  wanted.selector = &selectors[divisor];
   // What is shown for a moment does not wait for impostors.
   if (divisor > 1) wanted.impostor_seconds = kImpostorSeconds;
   const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;

@@ -157,13 +157,13 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   const auto backend = backend_of(document);
   std::vector<Image> all;
   for (const DrawMode mode : {DrawMode::Rays, DrawMode::Blocks, DrawMode::Smooth}) {
-    for (const MeshShading shading : {MeshShading::Lit, MeshShading::Occlusion, MeshShading::Normals}) {
+    for (const Shading shading : {Shading::Lit, Shading::Occlusion, Shading::Normals}) {
       for (const Wireframe wireframe : {Wireframe::Off, Wireframe::Over, Wireframe::Only}) {
-        // Rays have neither, and lines alone no shading.
-        if (mode == DrawMode::Rays && (shading != MeshShading::Lit || wireframe != Wireframe::Off)) continue;
-        if (wireframe == Wireframe::Only && shading != MeshShading::Lit) continue;
+        // Rays have no edges, and lines alone no shading.
+        if (mode == DrawMode::Rays && wireframe != Wireframe::Off) continue;
+        if (wireframe == Wireframe::Only && shading != Shading::Lit) continue;
         ViewRequest request = request_for(document, mode);
-        request.shading = shading;
+        request.light.shading = shading;
         request.wireframe = wireframe;
         backend->show(request);
         const auto pictures = settle(*backend);
@@ -173,7 +173,7 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
       }
     }
   }
-  EXPECT_EQ(all.size(), 15U);
+  EXPECT_EQ(all.size(), 17U);
 }
 
 TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {

@@ -54,27 +54,37 @@ void read_sun(const Json& object, DVec3& sun) {
   if (direction != DVec3{0.0}) sun = direction;
 }
 
+constexpr std::array kShadings = {"lit", "unlit", "unlit with occlusion", "occlusion", "normals"};
+constexpr std::array kOcclusionModes = {"off", "rays", "vertex"};
+constexpr std::array kModes = {"rays", "blocks", "smooth"};
+
+// One of an enumeration's names, in their order.
+template <class Names, class Value>
+void read_name(const Json& object, const char* key, const Names& names, Value& value) {
+  const Json* found = find(object, key);
+  if (found == nullptr || !found->is_string()) return;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (*found == names[i]) value = static_cast<Value>(i);
+  }
+}
+
 void read_light(const Json& object, LightOptions& light) {
   read_sun(object, light.sun);
-  read_flag(object, "lit", light.lit);
+  bool is_lit = true;
+  read_flag(object, "lit", is_lit);  // what earlier versions wrote
+  if (!is_lit) light.shading = Shading::Unlit;
+  read_name(object, "shading", kShadings, light.shading);
   read_flag(object, "shadows", light.shadows);
   read_number(object, "exposure", 0.0, 100.0, light.exposure);
-  bool has_occlusion = light.occlusion != OcclusionMode::Off;
-  read_flag(object, "occlusion", has_occlusion);
-  light.occlusion = has_occlusion ? OcclusionMode::Rays : OcclusionMode::Off;
+  bool has_occlusion = true;
+  read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
+  if (!has_occlusion) light.occlusion = OcclusionMode::Off;
+  read_name(object, "occlusion", kOcclusionModes, light.occlusion);
+  read_number(object, "occlusion_distance", 0.0, 4096.0, light.occlusion_distance);
+  read_number(object, "shadow_distance", 0.0, 4096.0, light.shadow_distance);
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   read_flag(object, "occlusion_darkens_all", is_all);
   light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
-}
-
-constexpr std::array kModes = {"rays", "blocks", "smooth"};
-
-void read_mode(const Json& object, DrawMode& mode) {
-  const Json* found = find(object, "mode");
-  if (found == nullptr || !found->is_string()) return;
-  for (std::size_t i = 0; i < kModes.size(); ++i) {
-    if (*found == kModes[i]) mode = static_cast<DrawMode>(i);
-  }
 }
 
 void read_recent(const Json& object, std::vector<std::string>& recent) {
@@ -122,7 +132,7 @@ Settings parse_settings(std::string_view json) {
   if (find(object, "ui_scale") != nullptr) read_number(object, "ui_scale", 0.5, 4.0, settings.ui_scale);
   read_whole(object, "samples", 1, 256, settings.samples);
   read_flag(object, "detail_by_pixels", settings.detail_by_pixels);
-  read_mode(object, settings.mode);
+  read_name(object, "mode", kModes, settings.mode);
   if (const Json* light = find(object, "light"); light != nullptr && light->is_object()) {
     read_light(*light, settings.light);
   }
@@ -141,12 +151,14 @@ std::string to_json(const Settings& settings) {
                  {"mode", kModes[static_cast<std::size_t>(settings.mode)]},
                  {"light",
                   {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
-                   {"lit", light.lit},
+                   {"shading", kShadings[static_cast<std::size_t>(light.shading)]},
                    {"shadows", light.shadows},
-                   {"occlusion", light.occlusion != OcclusionMode::Off},
+                   {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion)]},
+                   {"occlusion_distance", light.occlusion_distance},
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
                    {"exposure", light.exposure}}},
                  {"recent", settings.recent}};
+  if (std::isfinite(light.shadow_distance)) object["light"]["shadow_distance"] = light.shadow_distance;
   if (settings.ui_scale > 0.0) object["ui_scale"] = settings.ui_scale;
   return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

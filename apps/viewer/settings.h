@@ -23,7 +23,6 @@ struct Settings {
   int samples = 16;
   bool detail_by_pixels = false;
   bool detail_colours = false;  ///< not remembered, as the two after it
-  MeshShading shading = MeshShading::Lit;
   Wireframe wireframe = Wireframe::Off;
   DrawMode mode = DrawMode::Rays;
   LightOptions light;

@@ -26,6 +26,9 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.occlusion = OcclusionMode::Off;
   settings.light.occlusion_affects = OcclusionAffects::All;
   settings.light.exposure = 1.25;
+  settings.light.shading = Shading::UnlitWithOcclusion;
+  settings.light.occlusion_distance = 12.5;
+  settings.light.shadow_distance = 64.0;
   settings.note_recent("/tmp/a.vox");
   settings.note_recent("/tmp/b\n\xff.vox");
   const Status written = write_settings(settings, path);
@@ -38,22 +41,41 @@ TEST(Settings, ComeBackAsTheyWere) {
   EXPECT_EQ(back.ui_scale, 1.5);
   EXPECT_EQ(back.samples, 4);
   EXPECT_TRUE(back.detail_by_pixels);
-  EXPECT_EQ(back.light.sun, settings.light.sun);
-  EXPECT_FALSE(back.light.shadows);
-  EXPECT_EQ(back.light.occlusion, OcclusionMode::Off);
-  EXPECT_EQ(back.light.occlusion_affects, OcclusionAffects::All);
-  EXPECT_EQ(back.light.exposure, 1.25);
+  EXPECT_TRUE(back.light == settings.light);
   ASSERT_EQ(back.recent.size(), 2U);
   EXPECT_EQ(back.recent[1], "/tmp/a.vox");
 }
 
+TEST(Settings, WhatEarlierVersionsWroteIsRead) {
+  const LightOptions light = parse_settings(R"({"light": {"lit": false, "shadows": true, "occlusion": false}})").light;
+  EXPECT_EQ(light.shading, Shading::Unlit);
+  EXPECT_EQ(light.occlusion, OcclusionMode::Off);
+  EXPECT_EQ(parse_settings(R"({"light": {"lit": true, "occlusion": true}})").light, LightOptions{});
+}
+
 TEST(Settings, NonsenseIsLeftOut) {
   const std::string defaults = to_json(Settings{});
-  for (const char* text :
-       {"", "{", "[]", "7", "null", "\xff\xfe", "{\"width\": \"wide\"}", "{\"width\": 1e300}", "{\"height\": -5}",
-        "{\"samples\": 2.5}", "{\"light\": []}", "{\"light\": {\"sun\": [0,0,0]}}", "{\"light\": {\"sun\": [1,2]}}",
-        "{\"light\": {\"sun\": [1,2,null]}}", "{\"light\": {\"exposure\": 1e400}}", "{\"recent\": {}}",
-        "{\"recent\": [1, \"\"]}", "{\"fly\": 1}", "{\"ui_scale\": 0}"}) {
+  for (const char* text : {"",
+                           "{",
+                           "[]",
+                           "7",
+                           "null",
+                           "\xff\xfe",
+                           "{\"width\": \"wide\"}",
+                           "{\"width\": 1e300}",
+                           "{\"height\": -5}",
+                           "{\"samples\": 2.5}",
+                           "{\"light\": []}",
+                           "{\"light\": {\"sun\": [0,0,0]}}",
+                           "{\"light\": {\"sun\": [1,2]}}",
+                           "{\"light\": {\"sun\": [1,2,null]}}",
+                           "{\"light\": {\"exposure\": 1e400}}",
+                           "{\"recent\": {}}",
+                           "{\"recent\": [1, \"\"]}",
+                           "{\"light\": {\"shading\": \"dark\"}}",
+                           "{\"light\": {\"occlusion_distance\": -1}}",
+                           "{\"fly\": 1}",
+                           "{\"ui_scale\": 0}"}) {
     EXPECT_EQ(to_json(parse_settings(text)), defaults) << text;
   }
   EXPECT_EQ(parse_settings("{\"height\": false, \"width\": 800}").width, 800) << "the rest counts";

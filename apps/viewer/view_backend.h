@@ -42,13 +42,11 @@ struct ViewRequest {
   bool detail_colours = false;    ///< rays: instances in colours that tell their detail
   int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted
   DrawMode mode = DrawMode::Rays;
-  MeshShading shading = MeshShading::Lit;  ///< of meshes
-  Wireframe wireframe = Wireframe::Off;    ///< of meshes
+  Wireframe wireframe = Wireframe::Off;  ///< of meshes
 };
 
 /// Whether both want the same picture.
 [[nodiscard]] bool is_same(const ViewRequest& a, const ViewRequest& b);
-[[nodiscard]] bool is_same(const Camera& a, const Camera& b);
 
 /// A picture of what was asked for last, or of what was asked for a moment before.
 struct ViewFrame {

@@ -17,6 +17,10 @@ float linear_from_srgb(std::uint8_t encoded) {
   return static_cast<float>(decode(encoded / 255.0L));
 }
 
+float linear_from_srgb(float encoded) {
+  return static_cast<float>(decode(encoded));
+}
+
 SrgbEncoder::SrgbEncoder() {
   for (std::size_t byte = 1; byte < 256; ++byte) {
     const long double exact = decode((static_cast<long double>(byte) - 0.5L) / 255.0L);

@@ -10,6 +10,8 @@ namespace quoin {
 ///
 /// Source: IEC 61966-2-1. Computed in long double, rounded to float once.
 [[nodiscard]] float linear_from_srgb(std::uint8_t encoded);
+/// The same of a value between bytes: `encoded` is 0 to 1 for bytes 0 to 255.
+[[nodiscard]] float linear_from_srgb(float encoded);
 
 /// Turns linear light into sRGB bytes, rounded to the nearest: exactly, for every float. Less than 0 and NaN give 0,
 /// more than 1 gives 255.

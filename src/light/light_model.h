@@ -17,6 +17,11 @@ constexpr float kAmbient = 0.15F;
 constexpr float kAmbientWithoutOcclusion = 0.10F;
 constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it darkens everything
 
+/// Whether values are shown instead of colours.
+[[nodiscard]] inline bool shows_values(Shading shading) {
+  return shading == Shading::Occlusion || shading == Shading::Normals;
+}
+
 /// The unit vector towards the sun.
 [[nodiscard]] inline DVec3 to_sun(const LightOptions& options) {
   // Scaled first: the square of a very small or large number is 0 or infinite.

@@ -9,6 +9,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/srgb.h"
 #include "light/corner_light.h"
 #include "light/glass.h"
 #include "light/light_model.h"
@@ -54,6 +55,7 @@ std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint
 
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
+  const OcclusionDirections::Fixed* directions = nullptr;  // where all pixels have the same
   RayPacket origins;
   std::size_t size = 0;
   std::array<const SurfacePoint*, RayPacket::kSize> points{};
@@ -103,19 +105,26 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
   }
 }
 
-std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const {
+bool Lighting::needs_openness() const {
+  return options_.occlusion != OcclusionMode::Off && options_.shading != Shading::Unlit &&
+         options_.shading != Shading::Normals;
+}
+
+std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample) const {
   QUOIN_ASSERT(colours.size() >= points.size(), "a colour for every point");
-  if (!options_.lit) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
-    }
+  if (options_.shading != Shading::Lit && !needs_openness()) {
+    for (std::size_t i = 0; i < points.size(); ++i) colours[i] = shade(points[i], {}, 1.0F);
     return 0;
   }
   std::int64_t rays = 0;
+  OcclusionDirections::Fixed directions;
+  if (directions_.is_fixed())
+    directions = directions_.turned(OcclusionDirections::turn_of(sample, directions_.count()));
   std::array<Vec3, RayPacket::kSize> lit;
   const std::vector<std::uint32_t> order = coherent_order(points);
   for (std::size_t begin = 0; begin < order.size();) {
     Group group;
+    if (directions_.is_fixed()) group.directions = &directions;
     while (begin + group.size < order.size() && group.size < RayPacket::kSize) {
       const SurfacePoint& next = points[order[begin + group.size]];
       if (group.size > 0 && next.placed != group.placed) break;
@@ -135,7 +144,8 @@ double Lighting::voxels_per_cell(std::int32_t placed) const {
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
   std::array<Vec3, RayPacket::kSize> sunlight{};
   std::array<float, RayPacket::kSize> openness{};
-  const std::int64_t rays = find_sunlight(group, sunlight) + find_openness(group, openness);
+  std::int64_t rays = find_openness(group, openness);
+  if (options_.shading == Shading::Lit) rays += find_sunlight(group, sunlight);
   for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], sunlight[i], openness[i]);
   return rays;
 }
@@ -173,7 +183,7 @@ void Lighting::tint_sunlight(const Group& group, const RayPacket& rays, std::spa
 }
 
 std::int64_t Lighting::find_openness(const Group& group, std::span<float> openness) const {
-  if (options_.occlusion == OcclusionMode::Off) return 0;
+  if (!needs_openness()) return 0;
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = std::max(group.points[i]->openness, 0.0F);
   if (group.unknown == 0) return 0;
   if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
@@ -210,16 +220,17 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
 }
 
 void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const {
-  if (directions_.is_fixed() && group.is_one_face) {
-    const DVec3 direction = directions_.fixed(index_of(group.points[0]->face), ray);
+  const auto number = static_cast<std::size_t>(ray);
+  if (group.directions != nullptr && group.is_one_face) {
+    const DVec3 direction = (*group.directions)[index_of(group.points[0]->face)][number];
     rays.direction_x.fill(direction.x), rays.direction_y.fill(direction.y), rays.direction_z.fill(direction.z);
     return;
   }
   for (std::size_t i = 0; i < group.size; ++i) {
     const SurfacePoint& point = *group.points[i];
     const std::size_t face = index_of(point.face);
-    set_direction(rays, i,
-                  directions_.is_fixed() ? directions_.fixed(face, ray) : directions_.spread(face, ray, point.pixel));
+    const bool is_fixed = group.directions != nullptr;
+    set_direction(rays, i, is_fixed ? (*group.directions)[face][number] : directions_.spread(face, ray, point.pixel));
   }
 }
 
@@ -228,7 +239,36 @@ const Surface& Lighting::surface_at(const SurfacePoint& point) const {
   return detail_surfaces_[static_cast<std::size_t>(point.placed)];
 }
 
+Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
+  const FaceFrame& frame = frame_of(point.face);
+  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
+  const Vec3 normal = Vec3(placed.world_axes[frame.axis]) * static_cast<float>(frame.sign);
+  Vec3 colour;
+  for (int axis = 0; axis < 3; ++axis) colour[axis] = linear_from_srgb(0.5F + 0.5F * normal[axis]);
+  return colour;
+}
+
+// `openness`: 1 where it is not known.
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
+  const bool is_surface = point.kind == PointKind::Surface;
+  switch (options_.shading) {
+    case Shading::Lit:
+      return shade_lit(point, sunlight, openness);
+    case Shading::Occlusion:
+      return Vec3(is_surface ? linear_from_srgb(openness) : 0.0F);
+    case Shading::Normals:
+      return is_surface ? normal_colour(point) : Vec3(0.0F);
+    case Shading::Unlit:
+    case Shading::UnlitWithOcclusion:
+      break;
+  }
+  if (point.kind == PointKind::Glow) return Vec3(0.0F);
+  const Vec3 colour = surface_at(point).colour;
+  const bool is_plain = options_.shading == Shading::Unlit || !is_surface;
+  return is_plain ? colour : colour * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
+}
+
+Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 sunlight, float openness) const {
   const Surface& surface = surface_at(point);
   if (point.kind == PointKind::Unlit) return surface.colour;
   Vec3 colour = surface.emitted;

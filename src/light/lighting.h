@@ -39,7 +39,7 @@ struct SurfacePoint {
 ///
 /// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way; without occlusion the ambient
 /// term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was
-/// hit, of the full one also where a halved one is traced.
+/// hit, of the full one also where a halved one is traced. Other shadings: see Shading.
 class Lighting {
  public:
   /// `view` and `surfaces` must outlive it. Requires: `check` accepts the options.
@@ -50,8 +50,8 @@ class Lighting {
   /// Linear light of each point, not clamped; returns how many rays that took.
   ///
   /// Requires: as many places in `colours` as points. The result for a point does not depend on the others; neighbours
-  /// should lie side by side, since sixteen are traced together.
-  std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours) const;
+  /// should lie side by side, since sixteen are traced together. `sample`: of each pixel, which they are of.
+  std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample = 0) const;
 
   [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }
 
@@ -73,6 +73,9 @@ class Lighting {
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
+  [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 sunlight, float openness) const;
+  [[nodiscard]] Vec3 normal_colour(const SurfacePoint& point) const;
+  [[nodiscard]] bool needs_openness() const;
 
   const SceneView* view_;
   const VoxelRegistry* types_;

@@ -34,7 +34,7 @@ OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(ray
     const auto [n, u, v] = basis_of(face);
     fixed_[face] = {n, (n + u) * half, (n - u) * half, (n + v) * half, (n - v) * half};
     if (rays == 6) {
-      fixed_[face][5] = DVec3(kFaceFrames[face].sign * third);
+      fixed_[face][5] = (n + u + v) * third;
       continue;
     }
     for (std::size_t i = 0; i < 4; ++i) {
@@ -48,6 +48,30 @@ OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(ray
   for (std::size_t i = 0; i < kTurns; ++i) {
     turns_.push_back(angle(2.0 * std::numbers::pi * static_cast<double>(i) / kTurns));
   }
+}
+
+OcclusionDirections::Angle OcclusionDirections::turn_of(int sample, int rays) {
+  if (rays != 9 || sample == 0) return {};
+  // Multiples of the golden ratio leave no large gaps, however many are taken.
+  const double share = std::fmod(sample * (std::numbers::phi - 1.0), 1.0);
+  const double radians = 0.5 * std::numbers::pi * share;
+  return {std::cos(radians), std::sin(radians)};
+}
+
+OcclusionDirections::Fixed OcclusionDirections::turned(Angle turn) const {
+  QUOIN_ASSERT(is_fixed_, "directions that all pixels have");
+  Fixed all = fixed_;
+  if (turn.sine == 0.0) return all;
+  for (std::size_t face = 0; face < all.size(); ++face) {
+    const FaceFrame& frame = kFaceFrames[face];
+    for (DVec3& direction : all[face]) {
+      const double u = direction[frame.u];
+      const double v = direction[frame.v];
+      direction[frame.u] = turn.cosine * u - turn.sine * v;
+      direction[frame.v] = turn.sine * u + turn.cosine * v;
+    }
+  }
+  return all;
 }
 
 DVec3 OcclusionDirections::spread(std::size_t face, int ray, std::uint32_t hash) const {

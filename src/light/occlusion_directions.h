@@ -12,9 +12,10 @@ namespace quoin {
 
 /// Where the occlusion rays of each face point, as unit vectors in the grid's frame.
 ///
-/// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) times the normal's
-///    sign: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four diagonals. Any other
-///    number: cosine-weighted, one ray in each of as many rings of equal weight, a golden angle apart; the whole is
+/// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) with the normal's
+///    sign along the normal: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four
+///    diagonals; each further sample of a pixel turns them about the normal, or flat faces would keep bands at any
+///    number of samples. Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden angle apart; the whole is
 ///    turned and shifted within the rings by a hash of the pixel.
 class OcclusionDirections {
  public:
@@ -31,18 +32,26 @@ class OcclusionDirections {
   /// Requires: not `is_fixed`. `hash`: of the pixel.
   [[nodiscard]] DVec3 spread(std::size_t face, int ray, std::uint32_t hash) const;
 
-  /// What `spread` is made of: the rings' angles, and those by which pixels turn them; empty where it is not.
   struct Angle {
-    double cosine;
-    double sine;
+    double cosine = 1.0;
+    double sine = 0.0;
   };
+  /// By how much a pixel's sample turns the nine about the normal, from u towards v: less than a quarter, over which
+  /// the samples are spread evenly; not at all for the first, nor where there are not nine.
+  [[nodiscard]] static Angle turn_of(int sample, int rays);
+
+  using Fixed = std::array<std::array<DVec3, 9>, 6>;
+  /// All fixed directions, by face, so turned. Requires: `is_fixed`.
+  [[nodiscard]] Fixed turned(Angle turn) const;
+
+  /// What `spread` is made of: the rings' angles, and those by which pixels turn them; empty where it is not.
   [[nodiscard]] const std::vector<Angle>& ring_angles() const { return ring_angles_; }
   [[nodiscard]] const std::vector<Angle>& turns() const { return turns_; }
 
  private:
   int count_;
   bool is_fixed_;
-  std::array<std::array<DVec3, 9>, 6> fixed_{};
+  Fixed fixed_{};
   std::vector<Angle> ring_angles_;
   std::vector<Angle> turns_;
 };

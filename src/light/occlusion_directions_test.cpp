@@ -1,8 +1,11 @@
 #include "light/occlusion_directions.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -30,17 +33,58 @@ std::vector<DVec3> fixed_set(int rays, Direction face) {
 }
 
 TEST(OcclusionDirections, SixAreTheLopsidedReference) {
-  const auto up = fixed_set(6, Direction::PosY);
-  ASSERT_EQ(up.size(), 6U);
-  for (const DVec3 wanted :
-       {DVec3(0, 1, 0), DVec3(1, 1, 0), DVec3(-1, 1, 0), DVec3(0, 1, 1), DVec3(0, 1, -1), DVec3(1, 1, 1)}) {
-    EXPECT_TRUE(holds(up, wanted));
+  for (const Direction face : kDirections) {
+    SCOPED_TRACE(static_cast<int>(face));
+    const auto all = fixed_set(6, face);
+    ASSERT_EQ(all.size(), 6U);
+    const DVec3 n(normal_of(face));
+    EXPECT_TRUE(holds(all, n));
+    for (int axis = 0; axis < 3; ++axis) {
+      DVec3 tangent(0.0);
+      tangent[axis] = 1.0;
+      if (n[axis] != 0.0) continue;
+      EXPECT_TRUE(holds(all, n + tangent));
+      EXPECT_TRUE(holds(all, n - tangent));
+    }
   }
-  const auto left = fixed_set(6, Direction::NegX);
-  for (const DVec3 wanted :
-       {DVec3(-1, 0, 0), DVec3(-1, 1, 0), DVec3(-1, -1, 0), DVec3(-1, 0, 1), DVec3(-1, 0, -1), DVec3(-1, -1, -1)}) {
-    EXPECT_TRUE(holds(left, wanted));
+  // Of the sixth only the component along the normal changes its sign.
+  EXPECT_TRUE(holds(fixed_set(6, Direction::PosX), {1, 1, 1}));
+  EXPECT_TRUE(holds(fixed_set(6, Direction::NegX), {-1, 1, 1}));
+  EXPECT_TRUE(holds(fixed_set(6, Direction::PosY), {1, 1, 1}));
+  EXPECT_TRUE(holds(fixed_set(6, Direction::NegY), {1, -1, 1}));
+  EXPECT_TRUE(holds(fixed_set(6, Direction::PosZ), {1, 1, 1}));
+  EXPECT_TRUE(holds(fixed_set(6, Direction::NegZ), {1, 1, -1}));
+}
+
+TEST(OcclusionDirections, NineTurnAboutTheNormalFromSampleToSample) {
+  const OcclusionDirections nine(9);
+  std::set<double> angles;
+  for (int sample = 0; sample < 64; ++sample) {
+    const auto turn = OcclusionDirections::turn_of(sample, 9);
+    const double angle = std::atan2(turn.sine, turn.cosine);
+    EXPECT_TRUE(angle >= 0.0 && angle < std::numbers::pi / 2);
+    angles.insert(angle);
+    const auto turned = nine.turned(turn);
+    for (const Direction face : kDirections) {
+      const auto f = static_cast<std::size_t>(face);
+      const DVec3 n(normal_of(face));
+      for (int ray = 0; ray < 9; ++ray) {
+        const DVec3 before = nine.fixed(f, ray);
+        const DVec3 after = turned[f][static_cast<std::size_t>(ray)];
+        EXPECT_NEAR(glm::dot(before, n), glm::dot(after, n), 1e-12);
+        EXPECT_NEAR(glm::length(after), 1.0, 1e-12);
+        if (sample == 0) {
+          EXPECT_EQ(before, after) << "the first sample stays as it is";
+        }
+      }
+    }
   }
+  double last = 0.0;
+  double gap = 0.0;
+  for (const double angle : angles) gap = std::max(gap, angle - std::exchange(last, angle));
+  EXPECT_EQ(angles.size(), 64U);
+  EXPECT_LT(gap, 2.0 * std::numbers::pi / 2 / 64) << "spread evenly";
+  EXPECT_EQ(OcclusionDirections::turn_of(7, 6).sine, 0.0) << "the six are the reference's";
 }
 
 TEST(OcclusionDirections, NineHaveAllFourDiagonals) {

@@ -26,8 +26,8 @@ inline bool operator<(const SurfaceUpdate& a, const SurfaceUpdate& b) {
   return a.grid == b.grid ? by_zyx(a.chunk, b.chunk) : a.grid < b.grid;
 }
 
-// The oracles take a hundred times as long under the thread sanitizer.
-#ifdef __SANITIZE_THREAD__
+// The oracles take up to a hundred times as long under the sanitizers.
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 inline constexpr bool kIsSlow = true;
 #else
 inline constexpr bool kIsSlow = false;

@@ -32,7 +32,7 @@ void all_threads(benchmark::State& state) {
 }
 void unlit(benchmark::State& state) {
   LightOptions light;
-  light.lit = false;
+  light.shading = Shading::Unlit;
   picture(state, light);
 }
 void vertex(benchmark::State& state) {

@@ -165,7 +165,7 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   grid.set({2, 1, 0}, type);  // right of the middle and above it, seen along -Z
   place(scene, std::move(grid));
   RenderOptions options = sized(80, 80);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const Picture picture = taken(scene, towards({0, 0, 10}, {0, 0, 0}, 2.0 * std::atan(0.4)), options);
   // At distance 9 the picture reaches 3.6 up from the middle: 11.1 pixels a voxel.
   EXPECT_EQ(pixel_at(picture, 40 + 27, 40 - 16), encoded(linear(red)));
@@ -188,7 +188,7 @@ TEST(CpuRenderer, UnlitColoursAreThoseOfThePalette) {
   }
   place(scene, std::move(grid));
   RenderOptions options = sized(16, 16);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   options.light.exposure = 3.0;
   options.samples = 3;
   const Picture picture = taken(scene, from_above(8, 5, 8, 16), options);
@@ -204,7 +204,7 @@ TEST(CpuRenderer, SamplesSoftenEdgesOnly) {
   grid.fill_box({{0, 0, 0}, {4, 4, 4}}, add_type(scene, {255, 255, 255, 255}));
   place(scene, std::move(grid));
   RenderOptions options = sized(64, 64);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const Camera camera = towards({9, 7, 11}, {2, 2, 2});
   const Picture one = taken(scene, camera, options);
   options.samples = 16;

@@ -12,7 +12,9 @@ std::vector<SelectedInstance> select(const Scene& scene, InstanceFilter filter, 
   DetailPolicy policy = *options.detail;
   policy.instances = filter;
   std::vector<SelectedInstance> selected;
-  DetailSelector().select(scene, camera, options.width, options.height, policy, selected);
+  DetailSelector without_memory;
+  DetailSelector& selector = options.selector != nullptr ? *options.selector : without_memory;
+  selector.select(scene, camera, options.width, options.height, policy, selected);
   return selected;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -309,7 +310,7 @@ TEST(RenderDetail, ColoursTellTheDetail) {
   place(scene, std::move(slab));
   RenderOptions options = sized(4, 4);
   options.detail_colours = true;
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const auto colour_with = [&](const DetailPolicy& policy, double view_height) {
     options.detail = policy;
     return pixel_at(taken(scene, from_above(0.5, 10, 0.5, view_height), options), 1, 1);
@@ -325,6 +326,50 @@ TEST(RenderDetail, ColoursTellTheDetail) {
   EXPECT_TRUE(once[0] > once[2] && once[1] > once[2]) << "yellow";
   EXPECT_TRUE(often[0] > often[1] && often[1] < once[1]) << "orange";
   EXPECT_TRUE(far[2] > far[0] && far[2] > far[1]) << "blue";
+}
+
+// Distances from a model at which what is chosen of it changes, the nearest first.
+std::vector<double> thresholds_of(const Model& model, const DetailPolicy& policy) {
+  std::vector<double> found;
+  std::vector<SelectedInstance> selected;
+  int last = -1;
+  for (double distance = 0.5 * model.radius(); distance < 400.0 * model.radius(); distance *= 1.001) {
+    DetailSelector().select(model.scene, towards({0, 0, distance}, {0, 0, 0}, kFov), 64, 64, policy, selected);
+    const int now = static_cast<int>(selected.at(0).detail) * 10 + selected[0].level;
+    if (last >= 0 && now != last) found.push_back(distance);
+    last = now;
+  }
+  return found;
+}
+
+TEST(RenderDetail, NoViewTremblesAtAnyThreshold) {
+  const Model model = blobs();
+  const CpuRenderer renderer(model.scene);
+  RenderOptions options = sized(64, 64);
+  options.detail_colours = true;
+  options.light.shading = Shading::Unlit;
+  for (const auto rule : {DetailPolicy::Rule::ByPixels, DetailPolicy::Rule::ByRadius}) {
+    options.detail.emplace().rule = rule;
+    options.detail->far_pixels = 12;
+    const std::vector<double> thresholds = thresholds_of(model, *options.detail);
+    EXPECT_GE(thresholds.size(), 3U);
+    int changes_without = 0;
+    for (const double threshold : thresholds) {
+      DetailSelector view;
+      std::set<Pixel> with_memory;
+      std::set<Pixel> without;
+      for (int frame = 0; frame < 12; ++frame) {
+        const Camera camera = towards({0, 0, threshold * (1.0 + (frame % 2 == 0 ? 0.005 : -0.005))}, {0, 0, 0}, kFov);
+        options.selector = &view;
+        with_memory.insert(pixel_at(renderer.render(camera, options).value(), 32, 32));
+        options.selector = nullptr;
+        without.insert(pixel_at(renderer.render(camera, options).value(), 32, 32));
+      }
+      EXPECT_EQ(with_memory.size(), 1U) << threshold;
+      changes_without += static_cast<int>(without.size()) - 1;
+    }
+    EXPECT_GE(changes_without, 2) << "each picture by itself has no memory";
+  }
 }
 
 }  // namespace

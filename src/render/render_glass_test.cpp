@@ -43,7 +43,7 @@ TEST(RenderGlass, PanesTintByTheirThicknessAndShowTheirOwnColour) {
     grid.fill_box({{-5, 3, -5}, {6, 3 + thickness, 6}}, s.glass);
     place(s.scene, std::move(grid));
     RenderOptions options = sized(4, 4);
-    options.light.lit = false;
+    options.light.shading = Shading::Unlit;
     const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
     const auto length = static_cast<float>(thickness);
     const Vec3 expected =
@@ -142,7 +142,7 @@ TEST(RenderGlass, SeenFromInsideTintsOnly) {
   grid.fill_box({{-9, 0, -9}, {10, 10, 10}}, s.glass);
   place(s.scene, std::move(grid));
   RenderOptions options = sized(3, 3);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const Picture picture = taken(s.scene, from_above(0, 2.5, 0, 2), options);
   expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * power(through_one(), 2.5F)), 1);
   EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);

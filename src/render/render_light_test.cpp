@@ -1,7 +1,11 @@
 // Pictures whose light is known by analysis.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+
+#include <glm/gtc/quaternion.hpp>
 
 #include "render/render_test_support.h"
 
@@ -223,8 +227,121 @@ TEST(RenderLight, UnregisteredTypesShow) {
   add_type(scene, kGrey);
   place(scene, floor_of(777));
   RenderOptions options = sized(2, 2);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 9, 0, 4), options), 0, 0), (Pixel{255, 0, 255}));
+}
+
+TEST(RenderLight, TheSixthOcclusionRayIsTheReferences) {
+  for (const Direction face : kDirections) {
+    SCOPED_TRACE(static_cast<int>(face));
+    Scene scene;
+    const Camera camera = sixth_ray_blocked(scene, face);
+    RenderOptions options = sized(1, 1);
+    options.light.occlusion_rays = 6;
+    options.light.shading = Shading::Occlusion;
+    EXPECT_NEAR(pixel_at(taken(scene, camera, options), 0, 0)[0], 255.0 * 5 / 6, 0.51);
+  }
+}
+
+// A floor with a step along x = 5: there the occlusion of vertices falls from 2 to 0 within one voxel.
+Scene with_step(Rgba8 colour) {
+  Scene scene;
+  const VoxelType type = add_type(scene, colour);
+  Grid grid;
+  grid.fill_box({{0, -1, 0}, {10, 0, 10}}, type);
+  grid.fill_box({{0, 0, 0}, {5, 1, 10}}, type);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
+  const Rgba8 colour{200, 120, 40, 255};
+  const Scene scene = with_step(colour);
+  const Camera camera = from_above(5, 30, 5, 10);
+  RenderOptions options = sized(200, 200);
+  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.exposure = 3.0;  // light has no say
+  options.light.shading = Shading::Occlusion;
+  const Picture grey = taken(scene, camera, options);
+  options.light.shading = Shading::UnlitWithOcclusion;
+  const Picture classic = taken(scene, camera, options);
+  options.light.shading = Shading::Unlit;
+  const Picture unlit = taken(scene, camera, options);
+  EXPECT_EQ(pixel_at(unlit, 101, 100), (Pixel{colour.r, colour.g, colour.b}));
+  EXPECT_EQ(classic.rays, unlit.rays) << "one to each pixel";
+  for (const int x : {101, 105, 110, 118, 150}) {
+    const float open = std::min(1.0F / 3.0F + 2.0F / 3.0F * (static_cast<float>(x) + 0.5F - 100.0F) / 20.0F, 1.0F);
+    const Pixel found = pixel_at(grey, x, 95);
+    EXPECT_NEAR(found[0], 255.0F * open, 0.51F) << x;
+    EXPECT_TRUE(found[0] == found[1] && found[1] == found[2]);
+    const Pixel expected = encoded(linear(colour) * (0.25F + 0.75F * open));
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixel_at(classic, x, 95)[c], expected[c], 1) << x;
+  }
+  options.light.occlusion = OcclusionMode::Off;
+  options.light.shading = Shading::UnlitWithOcclusion;
+  EXPECT_EQ(taken(scene, camera, options).colour.rgb, unlit.colour.rgb);
+  options.light.shading = Shading::Occlusion;
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 101, 100), (Pixel{255, 255, 255}));
+}
+
+TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
+  const Scene scene = with_step({200, 120, 40, 255});
+  RenderOptions options = sized(100, 1);
+  options.light.shading = Shading::Occlusion;
+  const Picture picture = taken(scene, from_above(6, 30, 5, 0.04), options);
+  std::set<int> levels;
+  for (int x = 0; x < 100; ++x) levels.insert(pixel_at(picture, x, 0)[0]);
+  for (const int level : levels) {
+    EXPECT_LT(std::abs(std::remainder(level * 9.0 / 255.0, 1.0)), 0.02) << level;
+  }
+  EXPECT_GT(levels.size(), 1U);
+  options.light.occlusion_distance = 0.0;
+  const Picture open = taken(scene, from_above(6, 30, 5, 0.04), options);
+  EXPECT_EQ(pixel_at(open, 45, 0)[0], 255) << "rays of no length";
+}
+
+// With the nine as they are there would be steps of a ninth at any number of samples.
+TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({{-1, 0, -40}, {0, 30, 40}}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(160, 1);
+  options.light.shading = Shading::Occlusion;
+  const Camera camera = from_above(4.3, 20, 0.37, 0.05);
+  const auto largest_step = [&](int samples) {
+    options.samples = samples;
+    const Picture picture = taken(scene, camera, options);
+    int largest = 0;
+    for (int x = 1; x < 160; ++x) {
+      largest = std::max(largest, std::abs(pixel_at(picture, x, 0)[0] - pixel_at(picture, x - 1, 0)[0]));
+    }
+    return largest;
+  };
+  EXPECT_GE(largest_step(1), 28);
+  EXPECT_LE(largest_step(64), 12);
+}
+
+TEST(RenderLight, NormalsAreThoseOfTheWorldAndGlassIsAsGoodAsStone) {
+  Scene scene;
+  const VoxelType glass = add_type(scene, {60, 140, 220, 100}, Visibility::Transparent);
+  Grid grid = floor_of(glass);
+  const InstanceHandle instance = place(scene, std::move(grid));
+  RenderOptions options = sized(3, 3);
+  options.light.shading = Shading::Normals;
+  const Camera camera = from_above(0, 30, 0, 2);
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 1, 1), (Pixel{128, 255, 128}));
+  scene.edit(instance).rotation = glm::angleAxis(0.5, DVec3(0, 0, 1));
+  const Pixel turned = pixel_at(taken(scene, camera, options), 1, 1);
+  EXPECT_NEAR(turned[0], 255 * (0.5 - 0.5 * std::sin(0.5)), 0.6);
+  EXPECT_NEAR(turned[1], 255 * (0.5 + 0.5 * std::cos(0.5)), 0.6);
+  options.light.shading = Shading::Occlusion;
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 1, 1), (Pixel{255, 255, 255}));
+  Camera inside = camera;
+  inside.position.y = -0.5;
+  inside.position.x = 0.1;
+  EXPECT_NE(pixel_at(taken(scene, inside, options), 1, 1), (Pixel{255, 255, 255})) << "what one looks from is nothing";
 }
 
 }  // namespace

@@ -173,7 +173,7 @@ TEST(RenderScene, AtEqualDepthTheLowerHandleWins) {
       place(world.scene, std::move(slab));
     }
     RenderOptions options = sized(8, 8);
-    options.light.lit = false;
+    options.light.shading = Shading::Unlit;
     const Picture picture = taken(world.scene, from_above(0.5, 9, 0.5, 4), options);
     for (int i = 0; i < 64; ++i) EXPECT_EQ(pixel_at(picture, i % 8, i / 8), pixel_at(picture, 0, 0));
     seen.at(is_reversed) = pixel_at(picture, 0, 0);

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/core/direction.h>
 #include <quoin/render/cpu_renderer.h>
 
 #include "core/srgb.h"
@@ -90,6 +91,31 @@ inline Vec3 linear(Rgba8 colour) {
 inline Pixel encoded(Vec3 light) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   return {encode(light.x), encode(light.y), encode(light.z)};
+}
+
+/// A plate whose face towards `face` has a blocker where only the reference's sixth occlusion ray from the face's middle
+/// meets it, and a camera that sees that middle in one pixel.
+inline Camera sixth_ray_blocked(Scene& scene, Direction face) {
+  const VoxelType type = add_type(scene, {188, 188, 188, 255});
+  const FaceFrame& frame = frame_of(face);
+  IVec3 half(12);
+  half[frame.axis] = 0;
+  Grid grid;
+  grid.fill_box({-half, half + 1}, type);
+  IVec3 blocker(2);
+  blocker[frame.axis] = 3 * frame.sign;
+  grid.set(blocker, type);
+  place(scene, std::move(grid));
+  const DVec3 normal(normal_of(face));
+  Camera camera;
+  camera.position = DVec3(0.5) + normal * 30.0;
+  camera.forward = -normal;
+  camera.up = DVec3(0.0);
+  camera.up[frame.u] = 1.0;
+  camera.right = glm::cross(camera.forward, camera.up);
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 0.01;
+  return camera;
 }
 
 /// The pixels in which two pictures of one size differ by more than `tolerance` in a channel.

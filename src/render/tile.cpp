@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 
 #include "core/srgb.h"
+#include "light/light_model.h"
 #include "light/sky.h"
 #include "render/on_face.h"
 
@@ -42,6 +43,7 @@ void Tile::take_sample(int sample) {
   points_.clear();
   targets_.clear();
   sample_seed_ = hash_of(static_cast<std::uint32_t>(sample), 0);
+  sample_number_ = sample;
   const PixelPoint point = sample_point(sample);
   if (far_ != nullptr) context_->impostors->draw(column_, row_, point, *far_);
   RayPacket rays;
@@ -106,8 +108,10 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   const Surfaces& surfaces = context_->lighting->surfaces();
   find_glass(*context_->view, surfaces, ray, max_t, glass_);
   Vec3 passed(1.0F);
+  const bool as_solid = shows_values(context_->options->light.shading);
   for (const GlassBody& body : glass_) {
-    const GlassLook look = look_of(surfaces[body.type], body);
+    if (as_solid && body.starts_inside) continue;
+    const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surfaces[body.type], body);
     SurfacePoint& point = add_point(pixel, passed * look.own);
     point.voxel = body.voxel;
     point.face = body.face;
@@ -142,7 +146,7 @@ void Tile::light_points() {
     if (point.type == kAir) point.type = reader->get(point.voxel);
   }
   lit_.resize(points_.size());
-  rays_ += context_->lighting->light(points_, lit_);
+  rays_ += context_->lighting->light(points_, lit_, sample_number_);
   for (std::size_t i = 0; i < points_.size(); ++i) sample_[targets_[i].pixel] += targets_[i].weight * lit_[i];
 }
 

@@ -62,6 +62,7 @@ class Tile {
   int column_;
   int row_;
   std::uint32_t sample_seed_ = 0;
+  int sample_number_ = 0;
   std::int64_t rays_ = 0;
   std::int64_t pixels_hit_ = 0;
   std::array<Vec3, kPixels> sum_{};     // of the samples so far

@@ -58,24 +58,40 @@ bool is_far(const ScreenSize& size, const DetailPolicy& policy) {
          size.diameter_pixels <= policy.far_pixels;
 }
 
-ScreenSize scaled(const ScreenSize& size, double by) {
-  return {size.voxel_pixels * by, size.diameter_pixels * by};
-}
+// What an instance measures in a view.
+struct Measure {
+  ScreenSize size;
+  double distance = 0.0;
+  double radius = 0.0;
 
-// The last choice stays while a size within the hysteresis of this one would give it.
-Choice chosen_by_pixels(const ScreenSize& size, const DetailPolicy& policy, const Choice* last) {
+  // As if it were seen through a lens.
+  [[nodiscard]] Measure zoomed(double by) const {
+    return {{size.voxel_pixels * by, size.diameter_pixels * by}, distance / by, radius};
+  }
+  [[nodiscard]] Detail detail(const DetailPolicy& policy) const {
+    return policy.rule == DetailPolicy::Rule::ByPixels ? detail_by_pixels(size, policy)
+                                                       : detail_by_radius(distance, radius, policy);
+  }
+  [[nodiscard]] int halvings(const DetailPolicy& policy) const {
+    const int least = policy.rule == DetailPolicy::Rule::ByPixels ? 0 : 1;
+    return std::max(halvings_for(size.voxel_pixels, policy), least);
+  }
+};
+
+// The last choice stays while a measure within the hysteresis of this one would give it.
+Choice chosen(const Measure& measure, const DetailPolicy& policy, const Choice* last) {
   const bool has_room = last != nullptr && policy.hysteresis > 0.0;
   const double room = has_room ? 1.0 + policy.hysteresis : 1.0;
-  const ScreenSize larger = scaled(size, room);
+  const Measure larger = measure.zoomed(room);
   Choice choice;
-  choice.detail = detail_by_pixels(larger, policy);
-  int halvings = halvings_for(larger.voxel_pixels, policy);
+  choice.detail = larger.detail(policy);
+  int halvings = larger.halvings(policy);
   if (has_room) {
-    const ScreenSize smaller = scaled(size, 1.0 / room);
+    const Measure smaller = measure.zoomed(1.0 / room);
     if (choice.detail != Detail::Far) {
-      choice.detail = std::clamp(last->detail, choice.detail, detail_by_pixels(smaller, policy));
+      choice.detail = std::clamp(last->detail, choice.detail, smaller.detail(policy));
     }
-    halvings = std::clamp<int>(last->level, halvings, halvings_for(smaller.voxel_pixels, policy));
+    halvings = std::clamp<int>(last->level, halvings, smaller.halvings(policy));
   }
   choice.level = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
   return choice;
@@ -126,8 +142,7 @@ struct DetailSelector::Impl {
   void look_at_grid(GridHandle handle, const SceneGrid& grid);
   std::span<const Seen> look_at_instances(const Scene& scene, DVec3 camera, const Frustum& frustum,
                                           InstanceFilter filter);
-  Choice choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
-                const DetailPolicy& policy);
+  Choice choose(InstanceHandle handle, const Measure& measure, const DetailPolicy& policy);
 };
 
 void DetailSelector::Impl::look_at_grids(const Scene& scene) {
@@ -179,18 +194,10 @@ std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instan
   return {seen.data(), count};
 }
 
-Choice DetailSelector::Impl::choose(InstanceHandle handle, const ScreenSize& size, double distance, double radius,
-                                    const DetailPolicy& policy) {
+Choice DetailSelector::Impl::choose(InstanceHandle handle, const Measure& measure, const DetailPolicy& policy) {
   if (handle.index >= choices.size()) choices.resize(handle.index + std::size_t{1});
   Choice& last = choices[handle.index];
-  Choice choice;
-  if (policy.rule == DetailPolicy::Rule::ByPixels) {
-    choice = chosen_by_pixels(size, policy, last.generation == handle.generation ? &last : nullptr);
-  } else {
-    choice.detail = detail_by_radius(distance, radius, policy);
-    const int halvings = std::max(halvings_for(size.voxel_pixels, policy), 1);
-    choice.level = static_cast<std::uint8_t>(choice.detail == Detail::Near ? 0 : halvings);
-  }
+  Choice choice = chosen(measure, policy, last.generation == handle.generation ? &last : nullptr);
   choice.generation = handle.generation;
   last = choice;
   return choice;
@@ -210,8 +217,8 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
   const PixelScale pixels(camera, height);
   for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.instances)) {
     const double distance = glm::length(seen.centre);
-    const ScreenSize size = pixels.of(distance, seen.radius, seen.voxel_size);
-    const Choice choice = impl_->choose(seen.instance, size, distance, seen.radius, policy);
+    const Measure measure{pixels.of(distance, seen.radius, seen.voxel_size), distance, seen.radius};
+    const Choice choice = impl_->choose(seen.instance, measure, policy);
     out.push_back({seen.instance, choice.detail, choice.level, distance});
   }
 }

@@ -213,7 +213,6 @@ void App::ask_for_picture() {
   request.detail_by_pixels = state_.settings.detail_by_pixels;
   request.detail_colours = state_.settings.detail_colours;
   request.mode = state_.settings.mode;
-  request.shading = state_.settings.shading;
   request.wireframe = state_.settings.wireframe;
   // What was drawn before is another picture, however good.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;

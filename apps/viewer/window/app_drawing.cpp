@@ -43,8 +43,8 @@ bool App::run_draw_command(Command command) {
       settings.wireframe = next(settings.wireframe, 3);
       break;
     case Command::NextShading:
-      settings.shading = next(settings.shading, 3);
-      break;
+      settings.light.shading = next(settings.light.shading, 5);
+      return true;
     case Command::DetailColours:
       show_detail(!settings.detail_colours);
       return true;
@@ -52,7 +52,7 @@ bool App::run_draw_command(Command command) {
       return false;
   }
   if (settings.mode == DrawMode::Rays) {
-    state_.tell("drawn as blocks: only meshes have edges and shadings");
+    state_.tell("drawn as blocks: only meshes have edges");
     draw_as(DrawMode::Blocks);
   }
   return true;

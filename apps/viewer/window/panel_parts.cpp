@@ -183,10 +183,6 @@ void draw_picture_part(ViewState& state) {
     ImGui::EndDisabled();
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
   } else {
-    int shading = static_cast<int>(settings.shading);
-    if (ImGui::Combo("shading", &shading, "lit\0occlusion alone\0normals\0")) {
-      settings.shading = static_cast<MeshShading>(shading);
-    }
     int edges = static_cast<int>(settings.wireframe);
     if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);
@@ -200,12 +196,40 @@ void draw_picture_part(ViewState& state) {
   }
 }
 
+void draw_occlusion(LightOptions& light, bool has_rays) {
+  int mode = static_cast<int>(light.occlusion);
+  if (ImGui::Combo("occlusion", &mode, "off\0by rays\0of vertices\0"))
+    light.occlusion = static_cast<OcclusionMode>(mode);
+  if (!has_rays && ImGui::IsItemHovered()) ImGui::SetTooltip("meshes carry that of their vertices");
+  ImGui::BeginDisabled(!has_rays || light.occlusion != OcclusionMode::Rays);
+  auto reach = static_cast<float>(light.occlusion_distance);
+  if (ImGui::SliderFloat("its rays reach", &reach, 0.5F, 64.0F, "%.1f voxels",
+                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
+    light.occlusion_distance = reach;
+  }
+  ImGui::EndDisabled();
+}
+
+// The slider's end stands for any distance.
+void draw_shadow_distance(LightOptions& light) {
+  constexpr float kEnd = 4096.0F;
+  const bool is_any = !(light.shadow_distance < static_cast<double>(kEnd));
+  float reach = is_any ? kEnd : static_cast<float>(light.shadow_distance);
+  if (ImGui::SliderFloat("shadows reach", &reach, 1.0F, kEnd, is_any ? "any distance" : "%.0f voxels",
+                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
+    light.shadow_distance = reach < kEnd ? static_cast<double>(reach) : LightOptions{}.shadow_distance;
+  }
+}
+
 void draw_light_part(ViewState& state) {
   if (!heading("Light")) return;
   LightOptions& light = state.settings.light;
-  ImGui::Checkbox("lit", &light.lit);
-  ImGui::BeginDisabled(!light.lit);
-  ImGui::SameLine();
+  int shading = static_cast<int>(light.shading);
+  if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit with occlusion\0occlusion alone\0normals\0")) {
+    light.shading = static_cast<Shading>(shading);
+  }
+  draw_occlusion(light, state.settings.mode == DrawMode::Rays);
+  ImGui::BeginDisabled(light.shading != Shading::Lit);
   const bool has_shadows = state.settings.mode == DrawMode::Rays;
   ImGui::BeginDisabled(!has_shadows);
   bool shows_shadows = light.shadows && has_shadows;
@@ -214,15 +238,14 @@ void draw_light_part(ViewState& state) {
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip("meshes carry no shadows; marched rays do (F5)");
   }
-  bool has_occlusion = light.occlusion != OcclusionMode::Off;
-  if (ImGui::Checkbox("occlusion", &has_occlusion)) {
-    light.occlusion = has_occlusion ? OcclusionMode::Rays : OcclusionMode::Off;
-  }
-  bool is_all = light.occlusion_affects == OcclusionAffects::All;
   ImGui::SameLine();
-  if (ImGui::Checkbox("of all light", &is_all)) {
+  bool is_all = light.occlusion_affects == OcclusionAffects::All;
+  if (ImGui::Checkbox("occlusion of all light", &is_all)) {
     light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
   }
+  ImGui::BeginDisabled(!shows_shadows);
+  draw_shadow_distance(light);
+  ImGui::EndDisabled();
   draw_sun(light);
   auto exposure = static_cast<float>(light.exposure);
   if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",

@@ -74,7 +74,7 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
   }
   const bool has_meshes = state.settings.mode != DrawMode::Rays;
   menu_item(Command::NextWireframe, choice, true, has_meshes && state.settings.wireframe != Wireframe::Off);
-  menu_item(Command::NextShading, choice, true, has_meshes && state.settings.shading != MeshShading::Lit);
+  menu_item(Command::NextShading, choice, true, state.settings.light.shading != Shading::Lit);
   menu_item(Command::DetailColours, choice, true, state.settings.detail_colours);
   ImGui::Separator();
   menu_item(Command::CameraMode, choice);

@@ -22,10 +22,20 @@ enum class OcclusionAffects : std::uint8_t {
   All,      ///< everything, times 1 - 0.75 * occlusion
 };
 
-/// How surfaces are lit; the same for every renderer.
+/// What the colour of a surface says.
+enum class Shading : std::uint8_t {
+  Lit,                 ///< the sun, ambient light and emission: the reference model
+  Unlit,               ///< the voxels' own colours, nothing else
+  UnlitWithOcclusion,  ///< own colours times 1 - 0.75 * occlusion: the classic block look, without any light
+  Occlusion,           ///< occlusion alone, in grey: a pixel's byte is 255 (1 - occlusion)
+  Normals,             ///< of faces, in the world, as colours: bytes are 255 (0.5 + 0.5 n)
+};
+
+/// How surfaces are lit; the same for every renderer. Where values are shown instead of colours (Occlusion, Normals)
+/// what is transparent is drawn as if it were not, and what is seen from inside is black. Only Lit knows an exposure.
 struct LightOptions {
   DVec3 sun{0.371, 0.743, 0.223};  ///< from the surface towards the sun; any length but 0
-  bool lit = true;                 ///< false: the voxels' own colours, nothing else
+  Shading shading = Shading::Lit;
   bool shadows = true;
   OcclusionMode occlusion = OcclusionMode::Rays;
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
@@ -33,6 +43,8 @@ struct LightOptions {
   double occlusion_distance = 6.0;  ///< voxels
   double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels
   double exposure = 1.0;
+
+  bool operator==(const LightOptions&) const = default;
 };
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of

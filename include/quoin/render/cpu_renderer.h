@@ -23,9 +23,13 @@ struct RenderOptions {
   int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
   bool depth = false;  ///< also the distances
   LightOptions light;
-  /// How instances are drawn; without, all are Near. A picture knows nothing of the one before it: there is no
-  /// hysteresis. Whether hidden instances are drawn is for the renderer to say, not the policy.
+  /// How instances are drawn; without, all are Near. Whether hidden instances are drawn is for the renderer to say, not
+  /// the policy.
   std::optional<DetailPolicy> detail;
+  /// Of the view that the picture is of: remembers what was chosen in the one before, so that models do not tremble
+  /// between two details. Null: a picture knows nothing of any other, and there is no hysteresis. Pictures that share
+  /// one are taken one after another, of one scene; it must outlive the call.
+  DetailSelector* selector = nullptr;
   /// For how long impostors that are missing, or older than their grid, may be built, and not at all while another
   /// picture has some built; grids whose are not ready then are traced, or shown as they were. Only without a limit is
   /// a picture the same whenever it is taken. Their occlusion by rays is that of nine rays of 6 voxels within the grid.

@@ -14,12 +14,6 @@
 
 namespace quoin {
 
-enum class MeshShading : std::uint8_t {
-  Lit,        ///< colours in the reference model of light, without shadows
-  Occlusion,  ///< occlusion alone, in grey: a pixel's byte is 255 (1 - occlusion)
-  Normals,    ///< in colours: bytes are 255 (0.5 + 0.5 n), in the world
-};
-
 enum class Wireframe : std::uint8_t {
   Off,
   Over,  ///< the edges of triangles over the surfaces: dark, but on what is nearly black
@@ -32,7 +26,6 @@ struct MeshPictureOptions {
   int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
   /// `shadows` and `occlusion_rays` mean nothing here: any occlusion but Off is that of the meshes' vertices.
   LightOptions light;
-  MeshShading shading = MeshShading::Lit;
   Wireframe wireframe = Wireframe::Off;
 };
 

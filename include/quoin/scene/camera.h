@@ -25,6 +25,8 @@ struct Camera {
   Projection projection = Projection::Perspective;
   double vertical_fov = 1.0;  ///< perspective: radians, more than 0 and less than pi
   double view_height = 1.0;   ///< orthographic: world units from the picture's lower to its upper edge
+
+  bool operator==(const Camera&) const = default;
 };
 
 /// A perspective camera at `position` that looks at `target`, upright (+Y up; where it looks straight up or down, the

@@ -30,7 +30,7 @@ struct ContentSphere {
 /// Which detail is chosen.
 struct DetailPolicy {
   enum class Rule : std::uint8_t {
-    ByRadius,  ///< by the distance from the content's centre, in radii of the content: stateless
+    ByRadius,  ///< by the distance from the content's centre, in radii of the content
     ByPixels,  ///< by what a voxel and the whole grid span in the picture
   };
   Rule rule = Rule::ByPixels;
@@ -41,8 +41,8 @@ struct DetailPolicy {
   /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9 (docs/decisions/026).
   double cell_pixels = 0.4;
   int far_pixels = 128;  ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
-  /// ByPixels: a detail is left only once the measure is beyond its threshold by this share. 0: no memory of the last
-  /// choice.
+  /// A detail, or a level, is left only once the measure is beyond its threshold by this share. 0: no memory of the
+  /// last choice.
   double hysteresis = 0.1;
   InstanceFilter instances = InstanceFilter::Visible;  ///< of which it is chosen
 };
@@ -73,7 +73,8 @@ struct SelectedInstance {
 /// The coarsest level at which grids are traced.
 inline constexpr int kMaxGridLevel = 4;
 
-/// Chooses what is drawn, and how; remembers the last choice of each instance (hysteresis) and each grid's content.
+/// Chooses what is drawn, and how, in one view (a window, a split screen's half, a mirror): remembers the last choice of
+/// each instance there (hysteresis), and each grid's content.
 /// Lifetime: the scene is only read within calls.
 class DetailSelector {
  public:

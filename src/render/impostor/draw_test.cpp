@@ -146,7 +146,7 @@ TEST(DrawImpostors, ShowsThePaletteOfTheDay) {
   World world(Model::Box);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.0, 60.0, 70);
   RenderOptions options = sized(70, 70);
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   for (const VoxelType type : {VoxelType{1}, VoxelType{2}}) {
     VoxelProperties black;
     black.colour = {0, 0, 0, 255};

@@ -50,7 +50,7 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   EXPECT_EQ(found.overlap, 1.0);
   EXPECT_LE(found.difference, 2.0) << "with the castle's shadow on the ground";
   options.detail_colours = true;
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const Pixel middle = pixel_at(taken(world.scene, camera, options), 74, 74);
   EXPECT_GT(middle[2], middle[0]) << "far is blue";
 }

@@ -199,7 +199,10 @@ std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
   const LightOptions& light = options.light;
   std::uint32_t flags = 0;
   if (camera.projection == Camera::Projection::Perspective) flags |= kPerspective;
-  if (light.lit) flags |= kLit;
+  if (light.shading == Shading::Lit) flags |= kLit;
+  if (light.shading == Shading::UnlitWithOcclusion) flags |= kUnlitOcclusion;
+  if (light.shading == Shading::Occlusion) flags |= kShowOcclusion;
+  if (light.shading == Shading::Normals) flags |= kShowNormals;
   if (light.shadows) flags |= kShadows;
   if (light.occlusion == OcclusionMode::Rays) flags |= kOcclusionRays;
   if (light.occlusion == OcclusionMode::Vertex) flags |= kOcclusionVertex;

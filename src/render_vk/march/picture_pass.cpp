@@ -63,6 +63,7 @@ Status PicturePass::upload(const std::vector<T>& values, std::uint64_t& address)
 
 Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
   FrameData data = make_frame(*placement_, camera, options);
+  occlusion_rays_ = options.light.occlusion_rays;
   frame_ = data.frame;
   frame_.grids = placement_->grids;
   frame_.last_surface = scene_->last_surface();
@@ -149,6 +150,9 @@ ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
   push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
   push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
+  const OcclusionDirections::Angle turn = OcclusionDirections::turn_of(sample, occlusion_rays_);
+  push.turn_cosine = static_cast<float>(turn.cosine);
+  push.turn_sine = static_cast<float>(turn.sine);
   push.first = sample == 0 ? 1 : 0;
   return push;
 }

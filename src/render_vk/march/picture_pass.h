@@ -68,6 +68,7 @@ class PicturePass {
   ShaderFrame frame_;
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;
+  int occlusion_rays_ = 0;
   std::vector<FarTiles::Range> far_;  // of the tiles
   Place far_place_;                   // depths and numbers of a tile's impostors, half each
   Buffer output_;                     // colours, depths, counters

@@ -107,6 +107,9 @@ constexpr std::uint32_t kOcclusionVertex = 16;
 constexpr std::uint32_t kAffectsAll = 32;
 constexpr std::uint32_t kFixedDirections = 64;
 constexpr std::uint32_t kDetailColours = 128;
+constexpr std::uint32_t kUnlitOcclusion = 256;
+constexpr std::uint32_t kShowOcclusion = 512;
+constexpr std::uint32_t kShowNormals = 1024;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;
@@ -185,6 +188,8 @@ struct ShaderPush {
   float point_y = 0.5F;
   float point_low_x = 0.0F;
   float point_low_y = 0.0F;
+  float turn_cosine = 1.0F;
+  float turn_sine = 0.0F;
   std::uint32_t seed = 0;
   std::uint32_t first = 0;
   std::uint32_t round = 0;
@@ -207,6 +212,6 @@ static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
 static_assert(sizeof(ShaderPlaced) == 368 && sizeof(ShaderFrame) == 15 * 16 + 20 * 8 + 16 * 4);
-static_assert(sizeof(ShaderPush) == 72 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderPush) == 80 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -55,7 +55,7 @@ RenderOptions options_for(int height, Kind kind) {
   options.height = height;
   options.width = height * 16 / 9;
   options.light.occlusion_rays = 6;
-  if (kind == Kind::Primary) options.light.lit = false;
+  if (kind == Kind::Primary) options.light.shading = Shading::Unlit;
   if (kind == Kind::Shadow) options.light.occlusion = OcclusionMode::Off;
   return options;
 }

@@ -30,7 +30,7 @@ void full(benchmark::State& state) {
 }
 void unlit(benchmark::State& state) {
   LightOptions light;
-  light.lit = false;
+  light.shading = Shading::Unlit;
   picture(state, light);
 }
 void vertex(benchmark::State& state) {

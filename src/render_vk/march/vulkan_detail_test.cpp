@@ -67,7 +67,7 @@ TEST_F(VulkanDetail, EveryKindOfLightOnHalvedGrids) {
   with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
   with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
   with("short", [](RenderOptions& o) { o.light.shadow_distance = 20.0; });
-  with("unlit", [](RenderOptions& o) { o.light.lit = false; });
+  with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
   with("samples", [](RenderOptions& o) { o.samples = 3; });
 }
 
@@ -197,7 +197,7 @@ TEST_F(VulkanDetail, ColoursTellTheDetail) {
   RenderOptions options = in_detail(320, 200, 0);
   options.detail_colours = true;
   compare(camera, options, "detail_colours");
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   compare(camera, options, "detail_colours_unlit");
 }
 

@@ -65,7 +65,7 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
   with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
   with("all", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
   with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
-  with("unlit", [](RenderOptions& o) { o.light.lit = false; });
+  with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
   with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
   with("samples", [](RenderOptions& o) { o.samples = 5; });
   with("colours", [](RenderOptions& o) { o.detail_colours = true; });

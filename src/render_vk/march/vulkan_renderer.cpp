@@ -34,18 +34,6 @@ class Subject {
   std::optional<vulkan::Placement> detailed_;
 };
 
-[[maybe_unused]] bool is_same(const Camera& a, const Camera& b) {
-  return a.position == b.position && a.right == b.right && a.up == b.up && a.forward == b.forward &&
-         a.projection == b.projection && a.vertical_fov == b.vertical_fov && a.view_height == b.view_height;
-}
-
-[[maybe_unused]] bool is_same(const LightOptions& a, const LightOptions& b) {
-  return a.sun == b.sun && a.lit == b.lit && a.shadows == b.shadows && a.occlusion == b.occlusion &&
-         a.occlusion_affects == b.occlusion_affects && a.occlusion_rays == b.occlusion_rays &&
-         a.occlusion_distance == b.occlusion_distance && a.shadow_distance == b.shadow_distance &&
-         a.exposure == b.exposure;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<VulkanRenderer::Impl>> VulkanRenderer::Impl::create(
@@ -117,8 +105,8 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (is_new || target.sums.handle() == VK_NULL_HANDLE) {
     if (Status status = target.begin_sums(camera, options.light); !status) return status;
   }
-  QUOIN_ASSERT(is_same(target.camera, camera), "a picture's samples are of one camera");
-  QUOIN_ASSERT(is_same(target.light, options.light), "a picture's samples are of one light");
+  QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
+  QUOIN_ASSERT(target.light == options.light, "a picture's samples are of one light");
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }

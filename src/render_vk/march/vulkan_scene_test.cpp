@@ -13,7 +13,9 @@ namespace {
 
 using render_test::add_type;
 using render_test::from_above;
+using render_test::pixel_at;
 using render_test::place;
+using render_test::sixth_ray_blocked;
 using render_test::sized;
 using render_test::towards;
 using vulkan_test::expect_equal;
@@ -147,7 +149,7 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
   });
   with("no_occlusion", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
   with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
-  with("unlit", [](RenderOptions& o) { o.light.lit = false; });
+  with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
   with("all_rays", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
   with("six_rays", [](RenderOptions& o) { o.light.occlusion_rays = 6; });
   with("hashed_rays", [](RenderOptions& o) { o.light.occlusion_rays = 13; });
@@ -162,9 +164,36 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
   with("many_tiles", [](RenderOptions& o) {
     o.width = 530;
     o.height = 20;
-    o.light.lit = false;
+    o.light.shading = Shading::Unlit;
   });
   with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+}
+
+TEST_F(VulkanScene, EveryShading) {
+  Scene scene;
+  scene.edit(place(scene, hut(add_types(scene)))).rotation = glm::angleAxis(0.4, glm::normalize(DVec3(1, 3, 2)));
+  const Camera camera = towards({34, 26, 46}, {9, 5, 9});
+  RenderOptions options = sized(96, 72);
+  for (const Shading shading : {Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
+    for (const OcclusionMode mode : {OcclusionMode::Rays, OcclusionMode::Vertex, OcclusionMode::Off}) {
+      options.light.shading = shading;
+      options.light.occlusion = mode;
+      options.samples = mode == OcclusionMode::Rays ? 3 : 1;
+      compare(scene, camera, options,
+              "shading_" + std::to_string(static_cast<int>(shading)) + "_" + std::to_string(static_cast<int>(mode)));
+    }
+  }
+}
+
+TEST_F(VulkanScene, TheSixthOcclusionRayIsTheReferences) {
+  for (const Direction face : kDirections) {
+    Scene scene;
+    const Camera camera = sixth_ray_blocked(scene, face);
+    RenderOptions options = sized(1, 1);
+    options.light.occlusion_rays = 6;
+    options.light.shading = Shading::Occlusion;
+    EXPECT_NEAR(pixel_at(taken(scene, camera, options), 0, 0)[0], 255.0 * 5 / 6, 0.51) << static_cast<int>(face);
+  }
 }
 
 TEST_F(VulkanScene, FromInsideGlassAndStone) {

@@ -130,7 +130,11 @@ Vec4 clip_point(const View& view, DVec3 in_view) {
 
 // The light of a face, which is linear in how open it is: without openness, and what that adds.
 std::array<float, 2> light_of(float diffuse, const LightOptions& options) {
-  if (!options.lit) return {1.0F, 0.0F};
+  if (options.shading == Shading::Unlit) return {1.0F, 0.0F};
+  if (options.shading == Shading::UnlitWithOcclusion) {
+    const bool is_off = options.occlusion == OcclusionMode::Off;
+    return is_off ? std::array{1.0F, 0.0F} : std::array{kLeastOfAll, 1.0F - kLeastOfAll};
+  }
   if (options.occlusion == OcclusionMode::Off) return {kAmbientWithoutOcclusion + diffuse, 0.0F};
   if (options.occlusion_affects == OcclusionAffects::Ambient) return {diffuse, kAmbient};
   const float all = kAmbient + diffuse;
@@ -201,10 +205,11 @@ void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData&
 }
 
 std::uint32_t flags_of(const MeshPictureOptions& options) {
-  if (options.shading == MeshShading::Occlusion) return kMeshShowOcclusion;
-  if (options.shading == MeshShading::Normals) return kMeshShowNormals;
+  const Shading shading = options.light.shading;
   std::uint32_t flags = 0;
-  if (options.light.lit) flags |= kMeshLit;
+  if (shading == Shading::Occlusion) flags |= kMeshShowOcclusion;
+  if (shading == Shading::Normals) flags |= kMeshShowNormals;
+  if (shading == Shading::Lit) flags |= kMeshLit;
   if (options.light.occlusion != OcclusionMode::Off) flags |= kMeshHasOcclusion;
   if (options.light.occlusion_affects == OcclusionAffects::All) flags |= kMeshAffectsAll;
   return flags;
@@ -223,7 +228,7 @@ void set_frame(const View& view, const MeshPictureOptions& options, MeshFrameDat
   frame.ground_is_full = sky::kGroundIsFull;
   frame.sun = to_vec4(to_sun(options.light));
   frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
-  frame.exposure = options.light.lit ? exposure_of(options.light) : 1.0F;
+  frame.exposure = options.light.shading == Shading::Lit ? exposure_of(options.light) : 1.0F;
 }
 
 // Axes in one plane see nothing of space; products of near to perpendicular unit vectors are near to 1.
@@ -284,7 +289,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
                    [](const MeshDraw& a, const MeshDraw& b) { return a.distance < b.distance; });
   set_frame(view, options, data);
   // Where values are shown instead of colours, what is transparent is drawn like anything else.
-  if (options.shading == MeshShading::Lit) order_glass(spaces, view, data);
+  if (!shows_values(options.light.shading)) order_glass(spaces, view, data);
   return data;
 }
 

@@ -59,7 +59,7 @@ TEST_F(VulkanMeshGlass, PanesOfOneVoxelAreThoseOfTheProcessor) {
   RenderOptions options = without_shadows(sized(120, 120));
   const Camera camera = straight({20.03, 20.02, 500}, 44);
   for (const bool is_lit : {true, false}) {
-    options.light.lit = is_lit;
+    options.light.shading = is_lit ? Shading::Lit : Shading::Unlit;
     const std::string name = is_lit ? "lit" : "unlit";
     const auto expect_same = [&](const std::vector<VoxelType Types::*>& types, const std::string& which) {
       compare(panes(types), camera, options, which + name);

@@ -107,7 +107,12 @@ TEST_F(VulkanMeshLight, LightHasTheSameOptions) {
   compare(scene, camera, options, "no_occlusion");
   options.light.exposure = 2.5;
   compare(scene, camera, options, "exposed");
-  options.light.lit = false;
+  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.shading = Shading::UnlitWithOcclusion;
+  compare(scene, camera, options, "unlit_with_occlusion");
+  options.light.shading = Shading::Normals;
+  compare(scene, camera, options, "normals");
+  options.light.shading = Shading::Unlit;
   compare(scene, camera, options, "unlit");
 }
 
@@ -159,7 +164,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   expect(0.5F * (colour * (0.10F + up) + colour * 0.125F), "without occlusion");
   options.light.sun = {0, -1, 0};
   expect(0.5F * (colour * 0.10F + colour * 0.125F), "the sun below");
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   expect(colour, "unlit");
 }
 
@@ -205,9 +210,9 @@ TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
   // From above, 20 pixels a voxel; x = 5 to 6 is a step lower and dark along its left.
   const Camera camera = from_above(5, 10, 5, 10);
   MeshPictureOptions options = mesh_options(sized(200, 200));
-  options.shading = MeshShading::Normals;
+  options.light.shading = Shading::Normals;
   EXPECT_LE(glm::length(byte_at(drawn(camera, options), 150, 100) - Vec3(127.5F, 255.0F, 127.5F)), 2.0F);
-  options.shading = MeshShading::Occlusion;
+  options.light.shading = Shading::Occlusion;
   const Image grey = drawn(camera, options);
   EXPECT_EQ(byte_at(grey, 180, 100), Vec3(255.0F));
   // Both sides' voxels touch the corners at x = 5: level 2, so openness 1/3, and 1 a voxel further.

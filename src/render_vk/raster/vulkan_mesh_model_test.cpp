@@ -32,9 +32,9 @@ class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
     options.wireframe = Wireframe::Only;
     images.push_back(shown(camera, options, name + "_edges_only"));
     options.wireframe = Wireframe::Off;
-    options.shading = MeshShading::Occlusion;
+    options.light.shading = Shading::Occlusion;
     images.push_back(shown(camera, options, name + "_occlusion"));
-    options.shading = MeshShading::Normals;
+    options.light.shading = Shading::Normals;
     images.push_back(shown(camera, options, name + "_normals"));
     for (std::size_t i = 0; i < images.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) EXPECT_NE(images[i].rgb, images[j].rgb) << name << ' ' << i << ' ' << j;

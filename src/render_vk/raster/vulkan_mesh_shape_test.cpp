@@ -58,7 +58,7 @@ TEST_F(VulkanMeshShape, MergedFacesHaveNoHolesBetweenThem) {
   const Scene scene = white_room(random);
   put(scene, blocky_surfaces(scene));
   MeshPictureOptions options = mesh_options(sized(320, 180));
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   std::uniform_real_distribution<double> anywhere(-36, 36);
   int holes = 0;
   for (int i = 0; i < 40; ++i) {
@@ -93,7 +93,7 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   instance.voxel_size = 0.5;
   const InstanceHandle placed = scene.add_instance(instance);
   MeshPictureOptions options = mesh_options(sized(160, 160));
-  options.shading = MeshShading::Normals;
+  options.light.shading = Shading::Normals;
   const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
   for (const bool mirrored : {false, true}) {
     scene.edit(placed).mirrored = mirrored;
@@ -127,7 +127,7 @@ TEST_F(VulkanMeshShape, SmoothSurfacesAreClosed) {
   scene.add_instance({"", handle});
   put(scene, smooth_surfaces(handle, field, scene.types));
   MeshPictureOptions options = mesh_options(sized(320, 180));
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   const unsigned seed = 6;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> anywhere(5, 55);
@@ -154,7 +154,7 @@ TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
   // A quarter of a pixel off, so that no edge runs between two pixels.
   const Camera camera = from_above(5.05, 30, 5.05, 20);
   MeshPictureOptions options = mesh_options(sized(100, 100));
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   options.wireframe = Wireframe::Only;
   const auto is_dark = [](const Image& image, int x, int y) { return byte_at(image, x, y).x < 60.0F; };
   const Image only = drawn(camera, options);
@@ -196,7 +196,7 @@ TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
   floor->opaque_quads = floor->quads.size();
   put(scene, {{slab.grid, slab.chunk, floor}});
   MeshPictureOptions options = mesh_options(sized(400, 300));
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   // From above, flat over it, and from far away; orthographic too.
   for (const DVec3 eye : {DVec3(9, 30, 21), DVec3(9, 3, 26), DVec3(5000, 3000, 8000)}) {
     Camera camera = towards(eye, {8, 1, 8}, 0.9 * 30 / std::max(30.0, glm::length(eye)));
@@ -226,7 +226,7 @@ TEST_F(VulkanMeshShape, SamplesAreResolvedInLinearLight) {
   // The cube's edges run through the middles of pixels.
   const Camera camera = from_above(5.1, 30, 5.1, 20);
   MeshPictureOptions options = mesh_options(sized(100, 100));
-  options.light.lit = false;
+  options.light.shading = Shading::Unlit;
   VulkanPicture picture(*renderer_);
   for (const int samples : {1, 2, 4, 8}) {
     options.samples = samples;

@@ -10,6 +10,9 @@ const uint kOcclusionVertex = 16;
 const uint kAffectsAll = 32;
 const uint kFixedDirections = 64;
 const uint kDetailColours = 128;
+const uint kUnlitOcclusion = 256;
+const uint kShowOcclusion = 512;
+const uint kShowNormals = 1024;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
@@ -191,6 +194,7 @@ layout(push_constant) uniform Push {
   ivec2 size;       // of the tile
   vec2 point;       // of the sample, within pixels
   vec2 point_low;   // what is left of that
+  vec2 turn;        // of the sample: cosine and sine of what turns nine fixed directions of occlusion
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample

@@ -46,7 +46,14 @@ uint hash_of(uint a, uint b) {
 
 vec3 occlusion_direction(uint face, int ray, uint hash) {
   Vectors directions = Vectors(frame().directions);
-  if (has(kFixedDirections)) return directions.at[face * 9 + ray].xyz;
+  if (has(kFixedDirections)) {
+    vec3 fixed_one = directions.at[face * 9 + ray].xyz;
+    float u = fixed_one[kFaceU[face]];
+    float v = fixed_one[kFaceV[face]];
+    fixed_one[kFaceU[face]] = push.turn.x * u - push.turn.y * v;
+    fixed_one[kFaceV[face]] = push.turn.y * u + push.turn.x * v;
+    return fixed_one;
+  }
   vec2 ring = directions.at[ray].xy;
   vec2 turn = Vectors(frame().turns).at[hash % kTurns].xy;
   float shift = (float(hash / kTurns) + 0.5) * (float(kTurns) / 4294967296.0);
@@ -173,7 +180,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   ivec3 base = point.voxel.xyz & ~63;
   vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
   origin[axis] += frame().lift / cells * sign_of(face);
-  int first = has(kShadows) && cosine > 0.0 ? -1 : 0;
+  int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
   bool is_far = (point.what.z & kIsFar) != 0;
   int count = has(kOcclusionRays) && !is_far ? frame().occlusion_count : 0;
   ivec2 pixel = push.corner + tile_pixel();
@@ -206,13 +213,36 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   }
 }
 
+// The light that shows as an sRGB value.
+vec3 linear_from_srgb(vec3 value) {
+  return mix(pow((value + 0.055) / 1.055, vec3(2.4)), value / 12.92, lessThanEqual(value, vec3(0.04045)));
+}
+
+vec3 unlit_colour(Point point, uint slot, vec3 colour) {
+  bool shows_values = has(kShowOcclusion) || has(kShowNormals);
+  if (kind_of(point) != kSurface) return shows_values || kind_of(point) == kGlow ? vec3(0.0) : colour;
+  if (has(kShowNormals)) {
+    vec3 axis = placed_at(point.voxel.w).view_axes[axis_of(point.what.y)].xyz;
+    return linear_from_srgb(0.5 + 0.5 * sign_of(point.what.y) * axis / length(axis));
+  }
+  if (!has(kShowOcclusion) && !has(kUnlitOcclusion)) return colour;
+  vec3 sunlight;
+  float openness = 1.0;
+  if (has(kOcclusionRays) || has(kOcclusionVertex)) {
+    trace_light(point, placed_at(point.voxel.w), slot, sunlight, openness);
+  }
+  if (has(kShowOcclusion)) return linear_from_srgb(vec3(openness));
+  float least = frame().light.z;
+  return colour * (least + (1.0 - least) * openness);
+}
+
 vec3 light_of(Point point, uint slot) {
   Surface surface = surface_of(point.what.x);
   if (has(kDetailColours)) {
     surface.colour = placed_at(point.voxel.w).detail_colour.xyz;
     surface.emitted = vec3(0.0);
   }
-  if (!has(kLit)) return kind_of(point) == kGlow ? vec3(0.0) : surface.colour;
+  if (!has(kLit)) return unlit_colour(point, slot, surface.colour);
   if (kind_of(point) == kUnlit) return surface.colour;
   vec3 colour = surface.emitted;
   if (kind_of(point) == kSurface) {
@@ -261,10 +291,13 @@ bool light_pixel(uint slot, inout State state) {
       }
       is_first = false;
       bool starts_inside = body.what.z != 0;
+      // Where values are shown, glass is as good as stone, but for what one looks from.
+      bool shows_values = has(kShowOcclusion) || has(kShowNormals);
+      if (shows_values && starts_inside) continue;
       Surface surface = surface_of(body.what.x);
       point = point_of(body);
-      weight *= own_share(surface, body.lengths.z, starts_inside);
-      state.weight.xyz *= passed_by(surface, body.lengths.z, starts_inside);
+      weight *= shows_values ? 1.0 : own_share(surface, body.lengths.z, starts_inside);
+      state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, starts_inside);
     } else {
       is_done = true;
       if (!is_last) break;
