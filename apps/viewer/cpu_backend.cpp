@@ -48,7 +48,7 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
   options.light = request.light;
   options.threads = threads;
   // What is shown for a moment does not wait for impostors.
-  if (stage.divisor > 1) options.impostor_seconds = kImpostorSeconds;
+  if (stage.divisor > 1) options.impostor_seconds = 0.0;
   options.detail_colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;

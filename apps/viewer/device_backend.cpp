@@ -194,7 +194,7 @@ Status DeviceBackend::Impl::draw_stage() {
   if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   wanted.selector = &selectors[divisor];
   // What is shown for a moment does not wait for impostors.
-  if (divisor > 1) wanted.impostor_seconds = kImpostorSeconds;
+  if (divisor > 1) wanted.impostor_seconds = 0.0;
   const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
   const Clock::time_point start = Clock::now();
   if (Status drawn = renderer->draw(*picture, request->camera, wanted, accumulation); !drawn) return drawn;

@@ -22,9 +22,6 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// For how long a picture that is shown for a moment has impostors built.
-inline constexpr double kImpostorSeconds = 0.01;
-
 /// What the scene is drawn as.
 enum class DrawMode : std::uint8_t {
   Rays,    ///< a ray-marched picture

@@ -59,7 +59,11 @@ class ProgressOfTiles {
 
 struct CpuRenderer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
-      : scene(&of_scene), instances(filter), tracer(of_scene, filter, threads), surfaces(of_scene.types) {}
+      : scene(&of_scene),
+        instances(filter),
+        tracer(of_scene, filter, threads),
+        surfaces(of_scene.types),
+        detail(threads) {}
 
   const Scene* scene;
   InstanceFilter instances;

@@ -1,7 +1,6 @@
 #include "render/picture_detail.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 
 namespace quoin {
@@ -41,21 +40,11 @@ PictureDetail DetailChooser::choose(const Scene& scene, InstanceFilter filter, c
   return detail;
 }
 
-// One picture at a time has impostors built: another would find some of them being built, and go on without. It waits
-// where it has all the time there is, else takes what is there.
 FarImpostors DetailChooser::take_far(const Scene& scene, const std::vector<SelectedInstance>& selected,
                                      const RenderOptions& options) {
   const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
   if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
-  std::unique_lock lock(building_, std::defer_lock);
-  const bool may_wait = options.impostor_seconds == std::numeric_limits<double>::infinity();
-  if (may_wait) {
-    lock.lock();
-  } else {
-    static_cast<void>(lock.try_lock());
-  }
-  const double seconds = lock.owns_lock() ? options.impostor_seconds : 0.0;
-  return take_impostors(impostors_, scene, selected, seconds, options.threads);
+  return take_impostors(impostors_, scene, selected, options.impostor_seconds, {options.impostor_edge});
 }
 
 }  // namespace quoin

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <mutex>
 #include <vector>
 
 #include <quoin/render/cpu_renderer.h>
@@ -22,6 +21,9 @@ struct PictureDetail {
 /// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
 class DetailChooser {
  public:
+  /// `threads`: those that build impostors; as ImpostorCacheOptions.
+  explicit DetailChooser(Threads threads = {}) : impostors_({FarImpostors::kMaxBytes, threads}) {}
+
   /// Nothing without RenderOptions::detail. Requires: nobody edits the scene meanwhile; it is always the same one.
   [[nodiscard]] PictureDetail choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options);
@@ -33,8 +35,7 @@ class DetailChooser {
   [[nodiscard]] FarImpostors take_far(const Scene& scene, const std::vector<SelectedInstance>& selected,
                                       const RenderOptions& options);
 
-  ImpostorCache impostors_{{FarImpostors::kMaxBytes}};
-  std::mutex building_;  // impostors
+  ImpostorCache impostors_;
 };
 
 }  // namespace quoin

@@ -35,6 +35,7 @@ Status check(const Camera& camera, const RenderOptions& options) {
     return refuse("size: more than 268,435,456 pixels");
   }
   if (std::isnan(options.impostor_seconds)) return refuse("impostor_seconds: must be a number");
+  if (options.impostor_edge < 16 || options.impostor_edge > 1024) return refuse("impostor_edge: must be 16 to 1024");
   if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
   if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
   return check(options.light);

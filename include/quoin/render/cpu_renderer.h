@@ -30,10 +30,12 @@ struct RenderOptions {
   /// between two details. Null: a picture knows nothing of any other, and there is no hysteresis. Pictures that share
   /// one are taken one after another, of one scene; it must outlive the call.
   DetailSelector* selector = nullptr;
-  /// For how long impostors that are missing, or older than their grid, may be built, and not at all while another
-  /// picture has some built; grids whose are not ready then are traced, or shown as they were. Only without a limit is
-  /// a picture the same whenever it is taken. Their occlusion by rays is that of nine rays of 6 voxels within the grid.
+  /// For how long a picture waits for impostors that are missing or older than their grid. Threads of the renderer's
+  /// own build them, whatever is drawn meanwhile; grids whose are not ready are traced, or shown as they were. Only
+  /// without a limit is a picture the same whenever it is taken; 0 is for frames. Their occlusion by rays is that of
+  /// nine rays of 6 voxels within the grid.
   double impostor_seconds = std::numeric_limits<double>::infinity();
+  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots: ImpostorOptions::edge
   /// Instances in colours that tell their detail instead of their own: Near green, Mid yellow to orange the more often
   /// halved, Far blue.
   bool detail_colours = false;

@@ -2,7 +2,11 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/packet.h>
 
 #include "light/corner_light.h"
@@ -16,9 +20,9 @@ namespace {
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 26;  // of the box that faces are found in all at once
 
 // Texels a side: so many that one is no larger than a voxel, as far as the memory for that is worth it.
-int edge_for(const ContentSphere& content) {
-  const double voxels = 2.0 * snapshot_camera(content, 0, Impostor::kEdge).half_size();
-  return voxels <= Impostor::kEdge ? Impostor::kEdge : 2 * Impostor::kEdge;
+int edge_for(const ContentSphere& content, const ImpostorOptions& options) {
+  const double voxels = 2.0 * snapshot_camera(content, 0, options.edge).half_size();
+  return voxels <= options.edge ? options.edge : 2 * options.edge;
 }
 
 std::uint8_t packed(const FaceOcclusion& corners) {
@@ -27,78 +31,178 @@ std::uint8_t packed(const FaceOcclusion& corners) {
   return static_cast<std::uint8_t>(all);
 }
 
-// How many of the rays of OcclusionDirections reach open space from the middle of each face; by sixteens, which mostly
-// are of one direction.
-void count_open_rays(const OccupancyTree& opaque, std::vector<ImpostorFaces::Face>& faces) {
+constexpr double kOcclusionReach = LightOptions{}.occlusion_distance;
+
+// How many of the rays of OcclusionDirections reach open space from the middle of each of the faces at `wanted`; by
+// sixteens, which mostly are of one direction.
+void count_open_rays(const OccupancyTree& opaque, std::span<const std::uint32_t> wanted,
+                     std::vector<ImpostorFaces::Face>& faces) {
   constexpr double kLift = 0.01;
   constexpr int kRays = ImpostorFaces::Face::kRays;
   const OcclusionDirections directions(kRays);
   RayPacket rays;
-  rays.max_t.fill(LightOptions{}.occlusion_distance);
-  for (std::size_t begin = 0; begin < faces.size(); begin += RayPacket::kSize) {
-    const std::size_t size = std::min<std::size_t>(RayPacket::kSize, faces.size() - begin);
+  rays.max_t.fill(kOcclusionReach);
+  for (std::size_t begin = 0; begin < wanted.size(); begin += RayPacket::kSize) {
+    const std::size_t size = std::min<std::size_t>(RayPacket::kSize, wanted.size() - begin);
     rays.active = (1U << size) - 1U;
     for (std::size_t i = 0; i < size; ++i) {
-      const ImpostorFaces::Face& face = faces[begin + i];
+      const ImpostorFaces::Face& face = faces[wanted[begin + i]];
       const DVec3 origin = DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
       rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
     }
     std::array<int, RayPacket::kSize> open{};
     for (int ray = 0; ray < kRays; ++ray) {
       for (std::size_t i = 0; i < size; ++i) {
-        const DVec3 direction = directions.fixed(static_cast<std::size_t>(faces[begin + i].direction), ray);
+        const auto side = static_cast<std::size_t>(faces[wanted[begin + i]].direction);
+        const DVec3 direction = directions.fixed(side, ray);
         rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
       }
       const std::uint32_t blocked = any_hits(opaque, rays);
       for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
     }
-    for (std::size_t i = 0; i < size; ++i) faces[begin + i].open_rays = static_cast<std::uint8_t>(open[i] & 15);
+    for (std::size_t i = 0; i < size; ++i) {
+      faces[wanted[begin + i]].open_rays = static_cast<std::uint8_t>(open[i] & 15);
+    }
   }
 }
 
-template <class IsOpaque>
-void put_faces(const std::vector<SeenFace>& seen, GridReader& reader, IsOpaque is_opaque, ImpostorFaces& out) {
+// What is known of the faces of an impostor that was, where nothing near them has changed.
+class KnownFaces {
+ public:
+  KnownFaces() = default;
+  KnownFaces(const ImpostorFaces& before, std::span<const IBox> changed) : faces_(before.faces) {
+    // A voxel changes the light of whatever an occlusion ray may reach from.
+    constexpr int kReach = static_cast<int>(kOcclusionReach) + 2;
+    for (const IBox& box : changed) near_.push_back({box.min - kReach, box.max + kReach});
+  }
+
+  // Null where it has to be made. Requires: faces are asked for in the order of their list.
+  [[nodiscard]] const ImpostorFaces::Face* find(const VoxelFace& face) {
+    // Mostly the two lists go in step.
+    const auto next = [&] { return VoxelFace{faces_[next_].voxel, faces_[next_].direction}; };
+    while (next_ < faces_.size() && next() != face && comes_before(next(), face)) ++next_;
+    if (next_ == faces_.size() || next() != face) return nullptr;
+    const auto is_near = [&](const IBox& box) { return box.contains(face.voxel); };
+    return std::any_of(near_.begin(), near_.end(), is_near) ? nullptr : &faces_[next_];
+  }
+
+ private:
+  std::span<const ImpostorFaces::Face> faces_;
+  std::vector<IBox> near_;
+  std::size_t next_ = 0;
+};
+
+// Of a grid that is to have an impostor.
+struct Subject {
+  const Grid* grid;
+  const VoxelRegistry* types;
+  const OccupancyTree* opaque;
+  ContentSphere content;
+  int edge = 0;
+  std::optional<ImpostorShell> shell;  // none where there are very many faces
+
+  Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const ImpostorOptions& options)
+      : grid(&of_grid), types(&of_types), opaque(&tree), content(content_sphere(of_grid)) {
+    if (tree.bounds().empty()) return;
+    edge = edge_for(content, options);
+    // Beyond that, a ray for each texel takes less time.
+    const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
+    shell = ImpostorShell::build(tree, kMaxVoxels, max_faces);
+  }
+
+  [[nodiscard]] bool is_opaque(IVec3 voxel, GridReader& reader) const {
+    return shell ? shell->is_occupied(voxel) : types->is_opaque(reader.get(voxel));
+  }
+};
+
+void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownFaces known, ImpostorFaces& out) {
+  GridReader reader(*subject.grid);
+  GridReader beside(*subject.grid);
+  std::vector<std::uint32_t> fresh;
   out.faces.reserve(seen.size());
   for (const SeenFace& each : seen) {
-    const auto [voxel, direction] = each.face;
     ImpostorFaces::Face& face = out.faces.emplace_back();
-    face.voxel = voxel;
-    face.direction = direction;
-    face.type = reader.get(voxel);
-    face.occlusion = packed(corner_occlusion(is_opaque, voxel, direction));
+    if (const ImpostorFaces::Face* same = known.find(each.face); same != nullptr) {
+      face = *same;
+      continue;
+    }
+    fresh.push_back(static_cast<std::uint32_t>(out.faces.size() - 1));
+    face.voxel = each.face.voxel;
+    face.direction = each.face.direction;
+    face.type = reader.get(face.voxel);
+    face.occlusion = packed(
+        corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, beside); }, face.voxel, face.direction));
   }
+  count_open_rays(*subject.opaque, fresh, out.faces);
+}
+
+std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std::vector<SeenFace>& seen,
+                                              KnownFaces known) {
+  auto faces = std::make_shared<ImpostorFaces>();
+  faces->edge = subject.edge;
+  faces->is_whole = subject.shell.has_value();
+  faces->centre = subject.content.centre;
+  for (std::size_t level = 0; level < faces->levels.size(); ++level) {
+    faces->levels[level] = faces_of_level(seen, level, subject.edge >> level, subject.content);
+  }
+  faces->unseen = unseen_faces(seen, subject.content);
+  put_faces(subject, seen, std::move(known), *faces);
+  return faces;
+}
+
+// Around what changed, if that is so little that the rest is worth keeping.
+std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const IBox& content) {
+  constexpr std::size_t kMaxBoxes = 16;
+  constexpr double kMaxShare = 1.0 / 16.0;  // of the content's volume
+  if (changes.all || changes.items.size() > kMaxBoxes) return std::nullopt;
+  const auto volume = [](const IBox& box) {
+    const DVec3 size(box.max - box.min);
+    return size.x * size.y * size.z;
+  };
+  std::vector<IBox> boxes;
+  double sum = 0.0;
+  for (const ChunkChange& change : changes.items) {
+    const IVec3 corner = change.chunk * kChunkEdge;
+    boxes.push_back({corner + change.box.min, corner + change.box.max});
+    sum += volume(boxes.back());
+  }
+  if (sum > kMaxShare * volume(content)) return std::nullopt;
+  return boxes;
 }
 
 }  // namespace
 
-Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque) {
+Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
+                         const ImpostorOptions& options) {
+  QUOIN_ASSERT(options.edge >= 16 && options.edge <= 1024, "16 to 1,024 texels");
+  const Subject subject(grid, types, opaque, options);
   Impostor made;
-  made.content_ = content_sphere(grid);
+  made.options_ = options;
+  made.content_ = subject.content;
   made.box_ = opaque.bounds();
   if (made.is_empty()) return made;
-  auto faces = std::make_shared<ImpostorFaces>();
-  const int edge = edge_for(made.content_);
-  // Beyond that, a ray for each texel takes less time.
-  const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
-  const std::optional<ImpostorShell> shell = ImpostorShell::build(opaque, kMaxVoxels, max_faces);
-  const std::vector<SeenFace> seen =
-      shell ? faces_seen_of(*shell, made.box_, made.content_, edge) : faces_seen_by_rays(opaque, made.content_, edge);
-  faces->edge = edge;
-  faces->centre = made.content_.centre;
-  for (std::size_t level = 0; level < faces->levels.size(); ++level) {
-    faces->levels[level] = faces_of_level(seen, level, edge >> level, made.content_);
-  }
-  faces->unseen = unseen_faces(seen, made.content_);
-  GridReader reader(grid);
-  if (shell) {
-    put_faces(
-        seen, reader, [&](IVec3 voxel) { return shell->is_occupied(voxel); }, *faces);
-  } else {
-    put_faces(
-        seen, reader, [&](IVec3 voxel) { return types.is_opaque(reader.get(voxel)); }, *faces);
-  }
-  count_open_rays(opaque, faces->faces);
-  made.faces_ = std::move(faces);
+  const std::vector<SeenFace> seen = subject.shell
+                                         ? faces_seen_of(*subject.shell, made.box_, subject.content, subject.edge)
+                                         : faces_seen_by_rays(opaque, subject.content, subject.edge);
+  made.faces_ = faces_of(subject, seen, {});
+  return made;
+}
+
+Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const {
+  if (changes.empty()) return *this;
+  const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
+  const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
+  const Subject subject(grid, types, opaque, options_);
+  const bool is_comparable = !is_empty() && changed && faces_->is_whole && subject.shell &&
+                             subject.edge == faces_->edge && subject.content.centre == content_.centre &&
+                             subject.content.radius == content_.radius;
+  if (!is_comparable) return build(grid, types, opaque, options_);
+  Impostor made;
+  made.options_ = options_;
+  made.content_ = content_;
+  made.box_ = opaque.bounds();
+  const std::vector<SeenFace> seen = faces_seen_after(*faces_, *subject.shell, content_, *changed);
+  made.faces_ = faces_of(subject, seen, KnownFaces(*faces_, *changed));
   return made;
 }
 

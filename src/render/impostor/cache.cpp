@@ -2,199 +2,319 @@
 
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
 #include <deque>
 #include <map>
 #include <mutex>
+#include <new>
 #include <optional>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace quoin {
 namespace {
 
-// Which voxels an impostor was made of.
+using Clock = std::chrono::steady_clock;
+
+// What an impostor is made of.
 struct Origin {
   ChangeCursor grid;
   std::uint64_t types = 0;  // how often the transparency of types had changed
+  int edge = 0;
+};
+
+// What a worker needs to build one.
+struct Job {
+  Grid voxels;  // a snapshot
+  Origin origin;
+  GridChanges changes;  // since the impostor that the job will find, or all
+  std::shared_ptr<const VoxelRegistry> types;
 };
 
 struct Entry {
   std::shared_ptr<const Impostor> impostor;  // null until the first is ready
   Origin origin;
+  std::optional<Job> waiting;
+  std::optional<Origin> building;
   std::uint64_t last_use = 0;
-  bool is_waiting = false;
+
+  // Of the newest that there is, is being built or waits.
+  [[nodiscard]] const Origin* newest() const {
+    if (waiting) return &waiting->origin;
+    return building ? &*building : impostor != nullptr ? &origin : nullptr;
+  }
 };
+using Entries = std::map<GridHandle, Entry>;
 
 }  // namespace
 
+// All that follows is guarded by the mutex.
 struct ImpostorCache::Impl {
-  ImpostorCacheOptions options;
+  explicit Impl(const ImpostorCacheOptions& given) : options(given) {}
+  ~Impl();
+
+  void look_at(const VoxelRegistry& types);
+  void ask(Entry& entry, GridHandle handle, const Grid& grid, int edge);
+  void start_workers();
+  void work();
+  [[nodiscard]] Entries::iterator next_to_build();
+  void build(Entries::iterator entry, std::unique_lock<std::mutex>& lock);
+  void put(GridHandle handle, const Origin& origin, std::shared_ptr<const Impostor> made);
+  void release(Entry& entry);
+  void drop(Entries::iterator entry);
+  bool make_room(std::size_t bytes, std::uint64_t used_before);
+  bool has_room(const Entry& entry);
+  void forget_missing(const Scene& scene);
+  void free_unused(std::unique_lock<std::mutex>& lock);
+
+  const ImpostorCacheOptions options;
   mutable std::mutex mutex;
-  std::map<GridHandle, Entry> entries;
-  std::deque<GridHandle> waiting;
+  std::condition_variable wake;   // of workers: there is something to build, or the end
+  std::condition_variable ready;  // of who waits: something was built
+  Entries entries;
+  std::deque<GridHandle> queue;  // of the entries that wait
+  std::size_t building = 0;
   ImpostorCacheStats stats;
   std::uint64_t built_bytes = 0;
   ChangeCursor followed_types;
+  std::shared_ptr<const VoxelRegistry> types;
   std::uint64_t types_changed = 0;  // how often, in whether they are transparent
-  std::uint64_t round = 0;          // of build_some
-
-  std::optional<GridHandle> take_waiting() {
-    const std::lock_guard lock(mutex);
-    if (waiting.empty()) return std::nullopt;
-    const GridHandle next = waiting.front();
-    waiting.pop_front();
-    return next;
-  }
-
-  void drop(std::map<GridHandle, Entry>::iterator entry) {
-    release(entry->second);
-    entries.erase(entry);
-  }
-
-  void release(Entry& entry) {
-    if (entry.impostor == nullptr) return;
-    --stats.held;
-    stats.bytes -= entry.impostor->bytes();
-    entry.impostor = nullptr;
-  }
-
-  // Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
-  bool make_room(std::size_t bytes, std::uint64_t used_before) {
-    while (stats.bytes + bytes > options.max_bytes) {
-      auto oldest = entries.end();
-      for (auto each = entries.begin(); each != entries.end(); ++each) {
-        if (each->second.impostor == nullptr || each->second.is_waiting || each->second.last_use >= used_before)
-          continue;
-        if (oldest == entries.end() || each->second.last_use < oldest->second.last_use) oldest = each;
-      }
-      if (oldest == entries.end()) return false;
-      ++stats.dropped;
-      drop(oldest);
-    }
-    return true;
-  }
-
-  void forget(GridHandle grid) {
-    const std::lock_guard lock(mutex);
-    if (const auto entry = entries.find(grid); entry != entries.end()) drop(entry);
-  }
-
-  // Whether the grid is still to be built, going by the mean size of those that were. Where there is no room it is
-  // forgotten until it is asked for again.
-  bool has_room(GridHandle grid) {
-    const std::lock_guard lock(mutex);
-    const auto entry = entries.find(grid);
-    if (entry == entries.end()) return false;
-    const std::size_t likely = stats.built == 0 ? 1 : built_bytes / stats.built;
-    if (entry->second.impostor != nullptr || make_room(likely, entry->second.last_use)) return true;
-    entries.erase(entry);
-    return false;
-  }
-
-  // Requires: the lock.
-  [[nodiscard]] Origin origin_of(const Grid& grid) const { return {grid.cursor(), types_changed}; }
-  [[nodiscard]] bool is_current(const Entry& entry, const Grid& grid) const {
-    return entry.origin.types == types_changed && !grid.has_changed_since(entry.origin.grid);
-  }
-
-  void look_at(const VoxelRegistry& types) {
-    const std::lock_guard lock(mutex);
-    if (has_other_visibility(types.changes_since(followed_types))) ++types_changed;
-  }
-
-  void put(GridHandle grid, const Origin& origin, std::shared_ptr<const Impostor> made) {
-    const std::lock_guard lock(mutex);
-    const auto entry = entries.try_emplace(grid).first;
-    const std::size_t bytes = made->bytes();
-    ++stats.built;
-    built_bytes += bytes;
-    release(entry->second);
-    if (!make_room(bytes, entry->second.last_use)) {
-      ++stats.dropped;
-      entries.erase(entry);
-      return;
-    }
-    ++stats.held;
-    stats.bytes += bytes;
-    entry->second = {std::move(made), origin, entry->second.last_use, false};
-  }
-
-  void forget_missing(const Scene& scene) {
-    const std::lock_guard lock(mutex);
-    for (auto each = entries.begin(); each != entries.end();) {
-      const auto entry = each++;
-      if (!entry->second.is_waiting && scene.grids().find(entry->first) == nullptr) drop(entry);
-    }
-    ++round;
-  }
-
-  void build(const Scene& scene, GridHandle handle) {
-    const SceneGrid* grid = scene.grids().find(handle);
-    if (grid == nullptr) return forget(handle);
-    if (!has_room(handle)) return;
-    Origin origin;
-    {
-      const std::lock_guard lock(mutex);
-      origin = origin_of(grid->grid);
-    }
-    try {
-      put(handle, origin, std::make_shared<Impostor>(Impostor::build(grid->grid, scene.types)));
-    } catch (...) {
-      // It may be asked for again.
-      const std::lock_guard lock(mutex);
-      if (const auto entry = entries.find(handle); entry != entries.end()) entry->second.is_waiting = false;
-      throw;
-    }
-  }
+  std::uint64_t round = 0;          // up to a wait
+  // What was replaced while somebody held it: freed by a worker, since that takes a while.
+  std::vector<std::shared_ptr<const Impostor>> replaced;
+  bool has_unused = false;  // among these, perhaps
+  bool is_stopped = false;
+  std::vector<std::thread> workers;
 };
 
-ImpostorCache::ImpostorCache(const ImpostorCacheOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->options = options;
+ImpostorCache::Impl::~Impl() {
+  {
+    const std::lock_guard lock(mutex);
+    is_stopped = true;
+  }
+  wake.notify_all();
+  for (std::thread& worker : workers) worker.join();
 }
+
+void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
+  const bool is_other = has_other_visibility(now.changes_since(followed_types));
+  if (is_other) ++types_changed;
+  if (is_other || types == nullptr) types = std::make_shared<const VoxelRegistry>(now);
+}
+
+// Puts the grid's present state into the queue, in place of an older one that waits there.
+void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const Grid& grid, int edge) {
+  const bool is_new = !entry.waiting.has_value();
+  Job job{grid.snapshot(), {grid.cursor(), types_changed, edge}, {}, types};
+  const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
+  if (base != nullptr && base->types == types_changed && base->edge == edge) {
+    ChangeCursor cursor = base->grid;
+    job.changes = job.voxels.changes_since(cursor);
+  } else {
+    job.changes.all = true;
+  }
+  entry.waiting = std::move(job);
+  if (!is_new) return;
+  queue.push_back(handle);
+  start_workers();
+  wake.notify_one();
+}
+
+void ImpostorCache::Impl::start_workers() {
+  if (!workers.empty()) return;
+  const unsigned machine = thread_count({});
+  const unsigned count = options.threads.count != 0 ? options.threads.count : std::max(machine, 2U) - 1;
+  for (unsigned i = 0; i < count; ++i) workers.emplace_back([this] { work(); });
+}
+
+void ImpostorCache::Impl::work() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    Entries::iterator next = entries.end();
+    wake.wait(lock, [&] { return is_stopped || has_unused || (next = next_to_build()) != entries.end(); });
+    if (is_stopped) return;
+    if (next != entries.end()) build(next, lock);
+    free_unused(lock);
+  }
+}
+
+// The first that waits and is not being built already; it is taken from the queue.
+Entries::iterator ImpostorCache::Impl::next_to_build() {
+  for (auto each = queue.begin(); each != queue.end(); ++each) {
+    const auto entry = entries.find(*each);
+    if (entry->second.building) continue;
+    queue.erase(each);
+    return entry;
+  }
+  return entries.end();
+}
+
+void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::mutex>& lock) {
+  std::optional<Job> job = std::exchange(entry->second.waiting, std::nullopt);
+  if (!has_room(entry->second)) {
+    drop(entry);  // until it is asked for again
+    ready.notify_all();
+    return;
+  }
+  const GridHandle handle = entry->first;
+  const std::shared_ptr<const Impostor> before = entry->second.impostor;
+  entry->second.building = job->origin;
+  ++building;
+  lock.unlock();
+  std::shared_ptr<const Impostor> made;
+  const bool is_again = before != nullptr && !job->changes.all;
+  try {
+    made = std::make_shared<const Impostor>(is_again ? before->rebuilt(job->voxels, *job->types, job->changes)
+                                                     : Impostor::build(job->voxels, *job->types, {job->origin.edge}));
+  } catch (const std::bad_alloc&) {
+    // Nothing was made.
+  }
+  const Origin origin = job->origin;
+  job.reset();  // what only the snapshot holds goes without the lock
+  lock.lock();
+  --building;
+  if (made != nullptr) {
+    stats.rebuilt += static_cast<std::uint64_t>(is_again);
+    put(handle, origin, std::move(made));
+  } else {
+    ++stats.out_of_memory;
+    Entry& failed = entries.find(handle)->second;
+    failed.building.reset();
+    if (failed.waiting) failed.waiting->changes = {true, {}};
+  }
+  ready.notify_all();
+  wake.notify_all();
+}
+
+void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shared_ptr<const Impostor> made) {
+  const auto entry = entries.find(handle);
+  entry->second.building.reset();
+  const std::size_t bytes = made->bytes();
+  ++stats.built;
+  built_bytes += bytes;
+  release(entry->second);
+  if (!make_room(bytes, entry->second.last_use)) {
+    ++stats.dropped;
+    if (entry->second.waiting) entry->second.waiting->changes = {true, {}};
+    drop(entry);
+    return;
+  }
+  ++stats.held;
+  stats.bytes += bytes;
+  entry->second.impostor = std::move(made);
+  entry->second.origin = origin;
+}
+
+void ImpostorCache::Impl::release(Entry& entry) {
+  if (entry.impostor == nullptr) return;
+  --stats.held;
+  stats.bytes -= entry.impostor->bytes();
+  replaced.push_back(std::exchange(entry.impostor, nullptr));
+  has_unused = true;
+}
+
+// What is being built or waits stays, without an impostor.
+void ImpostorCache::Impl::drop(Entries::iterator entry) {
+  release(entry->second);
+  if (!entry->second.building && !entry->second.waiting) entries.erase(entry);
+}
+
+// Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
+bool ImpostorCache::Impl::make_room(std::size_t bytes, std::uint64_t used_before) {
+  while (stats.bytes + bytes > options.max_bytes) {
+    auto oldest = entries.end();
+    for (auto each = entries.begin(); each != entries.end(); ++each) {
+      const Entry& entry = each->second;
+      if (entry.impostor == nullptr || entry.waiting || entry.building || entry.last_use >= used_before) continue;
+      if (oldest == entries.end() || entry.last_use < oldest->second.last_use) oldest = each;
+    }
+    if (oldest == entries.end()) return false;
+    ++stats.dropped;
+    drop(oldest);
+  }
+  return true;
+}
+
+// Going by the mean size of those that were built.
+bool ImpostorCache::Impl::has_room(const Entry& entry) {
+  const std::size_t likely = stats.built == 0 ? 1 : built_bytes / stats.built;
+  return entry.impostor != nullptr || make_room(likely, entry.last_use);
+}
+
+void ImpostorCache::Impl::forget_missing(const Scene& scene) {
+  for (auto each = entries.begin(); each != entries.end();) {
+    const auto entry = each++;
+    if (scene.grids().find(entry->first) != nullptr) continue;
+    if (entry->second.waiting) {
+      entry->second.waiting.reset();
+      std::erase(queue, entry->first);
+    }
+    drop(entry);
+  }
+  ++round;
+}
+
+// What somebody still holds is looked at again when the next one is replaced.
+void ImpostorCache::Impl::free_unused(std::unique_lock<std::mutex>& lock) {
+  has_unused = false;
+  const auto kept = std::partition(replaced.begin(), replaced.end(),
+                                   [](const std::shared_ptr<const Impostor>& each) { return each.use_count() > 1; });
+  std::vector<std::shared_ptr<const Impostor>> unused(std::make_move_iterator(kept),
+                                                      std::make_move_iterator(replaced.end()));
+  replaced.erase(kept, replaced.end());
+  lock.unlock();
+  unused.clear();
+  lock.lock();
+}
+
+ImpostorCache::ImpostorCache(const ImpostorCacheOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 ImpostorCache::ImpostorCache(ImpostorCache&&) noexcept = default;
 ImpostorCache& ImpostorCache::operator=(ImpostorCache&&) noexcept = default;
 ImpostorCache::~ImpostorCache() = default;
 
-std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHandle grid) {
+std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHandle grid,
+                                                    const ImpostorOptions& options) {
   const SceneGrid* named = scene.grids().find(grid);
   if (named == nullptr) return nullptr;
   const std::lock_guard lock(impl_->mutex);
+  impl_->look_at(scene.types);
   Entry& entry = impl_->entries[grid];
   entry.last_use = impl_->round;
-  if ((entry.impostor == nullptr || !impl_->is_current(entry, named->grid)) && !entry.is_waiting) {
-    impl_->waiting.push_back(grid);
-    entry.is_waiting = true;
-  }
+  const Origin* newest = entry.newest();
+  const bool is_current = newest != nullptr && newest->types == impl_->types_changed && newest->edge == options.edge &&
+                          !named->grid.has_changed_since(newest->grid);
+  if (!is_current) impl_->ask(entry, grid, named->grid, options.edge);
   return entry.impostor;
 }
 
-std::size_t ImpostorCache::build_some(const Scene& scene, double budget_seconds, Threads threads) {
-  using Clock = std::chrono::steady_clock;
-  const auto begin = Clock::now();
-  impl_->look_at(scene.types);
-  const auto is_over = [&] { return !(std::chrono::duration<double>(Clock::now() - begin).count() < budget_seconds); };
-  const std::size_t count = thread_count(threads);
-  parallel_for(count, threads, [&](std::size_t i) {
-    bool is_first = i == 0;
-    while (is_first || !is_over()) {
-      is_first = false;
-      const std::optional<GridHandle> next = impl_->take_waiting();
-      if (!next) return;
-      impl_->build(scene, *next);
+std::size_t ImpostorCache::wait(const Scene& scene, double seconds) {
+  Impl& me = *impl_;
+  std::unique_lock lock(me.mutex);
+  const auto is_ready = [&] { return me.queue.empty() && me.building == 0; };
+  if (seconds == std::numeric_limits<double>::infinity()) {
+    while (!is_ready()) {
+      const auto next = me.next_to_build();
+      next != me.entries.end() ? me.build(next, lock) : me.ready.wait(lock);
     }
-  });
-  impl_->forget_missing(scene);
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->waiting.size();
+  } else if (seconds > 0.0) {
+    constexpr double kLongest = 1e6;  // what clocks can count
+    me.ready.wait_for(lock, std::chrono::duration<double>(std::min(seconds, kLongest)), is_ready);
+  }
+  me.forget_missing(scene);
+  if (me.has_unused) me.wake.notify_one();
+  return me.queue.size() + me.building;
 }
 
 void ImpostorCache::update_types(const VoxelRegistry& types) {
+  const std::lock_guard lock(impl_->mutex);
   impl_->look_at(types);
 }
 
 ImpostorCacheStats ImpostorCache::stats() const {
   const std::lock_guard lock(impl_->mutex);
   ImpostorCacheStats stats = impl_->stats;
-  stats.waiting = impl_->waiting.size();
+  stats.waiting = impl_->queue.size() + impl_->building;
   return stats;
 }
 

@@ -48,8 +48,9 @@ struct ImpostorFaces {
     static constexpr int kRays = 9;
   };
 
-  int edge = 0;       ///< texels a side of the finest snapshots
-  DVec3 centre{0.0};  ///< of the content, in the grid
+  int edge = 0;           ///< texels a side of the finest snapshots
+  bool is_whole = false;  ///< `faces` are all that the opaque voxels have, in the order of ImpostorShell::faces
+  DVec3 centre{0.0};      ///< of the content, in the grid
   std::array<Level, kLevels> levels;
   /// Faces in crevices that no snapshot looked into but a camera may: drawn with the finest level, where nothing of
   /// that is before them. Of grids with very many faces they are not known.

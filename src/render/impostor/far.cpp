@@ -1,15 +1,14 @@
 #include "render/impostor/far.h"
 
 #include <algorithm>
-#include <chrono>
+#include <limits>
 
 namespace quoin {
 namespace {
 
-// Grids that are asked for at once; no more, so that what they take beyond the limit is little.
+// Grids that are waited for at once where there is no limit of time; no more, so that what they take beyond the limit
+// of memory is little.
 constexpr std::size_t kAtOnce = 16;
-
-using Clock = std::chrono::steady_clock;
 
 // The grids of the far ones, each once, in the order of the instances.
 std::vector<GridHandle> far_grids(const Scene& scene, std::span<const SelectedInstance> selected) {
@@ -26,18 +25,18 @@ std::vector<GridHandle> far_grids(const Scene& scene, std::span<const SelectedIn
 }  // namespace
 
 FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene, std::span<const SelectedInstance> selected,
-                            double seconds, Threads threads) {
+                            double seconds, const ImpostorOptions& options) {
   FarImpostors far;
-  const auto begin = Clock::now();
   const std::vector<GridHandle> grids = far_grids(scene, selected);
+  const bool is_unlimited = seconds == std::numeric_limits<double>::infinity();
+  const std::size_t at_once = is_unlimited ? kAtOnce : std::max<std::size_t>(grids.size(), 1);
   std::size_t bytes = 0;
-  for (std::size_t i = 0; i < grids.size() && bytes < FarImpostors::kMaxBytes; i += kAtOnce) {
-    const auto some = std::span(grids).subspan(i, std::min(kAtOnce, grids.size() - i));
-    for (const GridHandle grid : some) static_cast<void>(cache.find(scene, grid));
-    const double left = seconds - std::chrono::duration<double>(Clock::now() - begin).count();
-    if (left > 0.0) cache.build_some(scene, left, threads);
+  for (std::size_t i = 0; i < grids.size() && bytes < FarImpostors::kMaxBytes; i += at_once) {
+    const auto some = std::span(grids).subspan(i, std::min(at_once, grids.size() - i));
+    for (const GridHandle grid : some) static_cast<void>(cache.find(scene, grid, options));
+    cache.wait(scene, seconds);
     for (const GridHandle grid : some) {
-      std::shared_ptr<const Impostor> found = cache.find(scene, grid);
+      std::shared_ptr<const Impostor> found = cache.find(scene, grid, options);
       if (found == nullptr) continue;
       bytes += found->bytes();
       if (bytes > FarImpostors::kMaxBytes) break;

@@ -25,6 +25,7 @@ struct FarImpostors {
 /// Without a limit of time it depends on the scene alone which instances have one: grids are taken in the order of the
 /// instances.
 [[nodiscard]] FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene,
-                                          std::span<const SelectedInstance> selected, double seconds, Threads threads);
+                                          std::span<const SelectedInstance> selected, double seconds,
+                                          const ImpostorOptions& options);
 
 }  // namespace quoin

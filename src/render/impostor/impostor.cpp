@@ -96,8 +96,8 @@ float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 pos
 
 Impostor::Impostor() : faces_(std::make_shared<const ImpostorFaces>()) {}
 
-Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types) {
-  return build(grid, types, OccupancyTree::build(grid, types, Occupancy::Opaque));
+Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options) {
+  return build(grid, types, OccupancyTree::build(grid, types, Occupancy::Opaque), options);
 }
 
 std::size_t Impostor::bytes() const {

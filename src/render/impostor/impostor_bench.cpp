@@ -1,18 +1,24 @@
 // impostor/build26: all snapshots of the ball W4; render/far1000: a thousand far instances of five grids, 1280x720,
 // traced and drawn from impostors. One thread.
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <numbers>
 #include <random>
+#include <thread>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 #include <glm/geometric.hpp>
 
-#include <quoin/render/impostor.h>
+#include <quoin/render/impostor_cache.h>
+#include <quoin/terrain/terrain.h>
 
 #include "bench/workloads.h"
+#include "render/impostor/far.h"
 
 namespace quoin {
 namespace {
@@ -34,6 +40,102 @@ void build26(benchmark::State& state) {
   }
 }
 BENCHMARK(build26)->Name("impostor/build26")->Unit(benchmark::kMillisecond);
+
+// Caves and hills, 256x113x256 voxels.
+Grid wide_terrain(VoxelRegistry& types) {
+  const auto of_terrain = add_terrain_types(types);
+  fail_unless(of_terrain.has_value(), "no types");
+  return generate_terrain({.seed = 42, .size = {8, 4, 8}}, *of_terrain).value();
+}
+
+void build_terrain(benchmark::State& state) {
+  VoxelRegistry types;
+  const Grid grid = wide_terrain(types);
+  for (auto _ : state) benchmark::DoNotOptimize(Impostor::build(grid, types));
+}
+BENCHMARK(build_terrain)->Name("impostor/terrain/build")->Unit(benchmark::kMillisecond)->Iterations(3);
+
+// After one voxel was taken or set.
+void rebuild_terrain(benchmark::State& state) {
+  VoxelRegistry types;
+  Grid grid = wide_terrain(types);
+  Impostor impostor = Impostor::build(grid, types);
+  ChangeCursor cursor = grid.cursor();
+  std::mt19937 random(4);
+  for (auto _ : state) {
+    const auto coordinate = [&] { return 8 + static_cast<int>(random() % 240); };
+    grid.set({coordinate(), 30 + static_cast<int>(random() % 40), coordinate()},
+             random() % 2 == 0 ? kAir : VoxelType{1});
+    const GridChanges changes = grid.changes_since(cursor);
+    impostor = impostor.rebuilt(grid, types, changes);
+  }
+}
+BENCHMARK(rebuild_terrain)->Name("impostor/terrain/edit")->Unit(benchmark::kMillisecond)->Iterations(10);
+
+// A flight with an edit a frame among 200 models, the largest of 256^3 voxels: what a frame's own thread pays for
+// impostors, while a worker builds them. Counters: milliseconds, of all frames.
+Scene models_of_a_flight() {
+  Scene scene;
+  const auto types = add_terrain_types(scene.types);
+  fail_unless(types.has_value(), "no types");
+  std::mt19937 random(1);
+  const auto below = [&](unsigned limit) { return static_cast<int>(random() % limit); };
+  for (int i = 0; i < 200; ++i) {
+    SceneGrid model;
+    if (i == 0) {
+      model.grid = generate_terrain({.seed = 42, .size = {8, 8, 8}}, *types).value();
+      for (int tower = 0; tower < 60; ++tower) {
+        const int x = below(240);
+        const int z = below(240);
+        model.grid.fill_box({{x, 0, z}, {x + 8, 256, z + 8}}, 2);
+      }
+    } else {
+      for (int box = 0; box < 40; ++box) {
+        const IVec3 at{below(48), below(48), below(48)};
+        model.grid.fill_box({at, at + 1 + below(12)}, static_cast<VoxelType>(1 + below(3)));
+      }
+    }
+    model.pivot = content_sphere(model.grid).centre;
+    Instance instance;
+    instance.grid = scene.add_grid(std::move(model));
+    instance.position = {i % 20 * 120.0, 0.0, i == 0 ? -3500.0 : -1500.0 - i / 20 * 120.0};
+    scene.add_instance(instance);
+  }
+  return scene;
+}
+
+void flight(benchmark::State& state) {
+  using Clock = std::chrono::steady_clock;
+  Scene scene = models_of_a_flight();
+  const std::vector<GridHandle> grids = scene.grids().handles();
+  ImpostorCache cache;
+  DetailSelector view;
+  std::vector<SelectedInstance> selected;
+  std::vector<double> milliseconds;
+  std::mt19937 random(2);
+  for (auto _ : state) {
+    const std::size_t frame = milliseconds.size();
+    Grid& edited = scene.edit(grids[frame % 2 == 0 ? 0 : random() % grids.size()]).grid;
+    const IVec3 size = edited.bounds().max - edited.bounds().min;
+    const auto within = [&](int length) { return static_cast<int>(random() % static_cast<unsigned>(length)); };
+    edited.set(edited.bounds().min + IVec3{within(size.x), within(size.y), within(size.z)},
+               random() % 2 == 0 ? kAir : VoxelType{1});
+    Camera camera;
+    camera.position = {1200.0, 100.0, 1000.0 - static_cast<double>(frame)};
+    view.select(scene, camera, 1280, 720, {}, selected);
+    const auto begin = Clock::now();
+    benchmark::DoNotOptimize(take_impostors(cache, scene, selected, 0.0, {}));
+    const std::chrono::duration<double, std::milli> taken = Clock::now() - begin;
+    milliseconds.push_back(taken.count());
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::sort(milliseconds.begin(), milliseconds.end());
+  state.counters["median"] = milliseconds[milliseconds.size() / 2];
+  state.counters["p99"] = milliseconds[milliseconds.size() * 99 / 100];
+  state.counters["worst"] = milliseconds.back();
+  fail_unless(cache.stats().rebuilt > 10, "nothing was rebuilt");
+}
+BENCHMARK(flight)->Name("impostor/flight200")->Unit(benchmark::kMillisecond)->Iterations(600);
 
 Grid model(int which) {
   Grid grid;

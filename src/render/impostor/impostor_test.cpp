@@ -16,6 +16,7 @@
 
 #include "core/death_for_tests.h"
 #include "light/corner_light.h"
+#include "render/impostor/faces.h"
 #include "render/impostor/snapshot.h"
 #include "render/render_test_support.h"
 
@@ -49,7 +50,7 @@ Grid blobs(unsigned seed) {
 }
 
 Ray ray_of_texel(const SnapshotCamera& camera, int x, int y) {
-  const double half = 0.5 * Impostor::kEdge;
+  const double half = 0.5 * ImpostorOptions{}.edge;
   const DVec3 direction =
       camera.right * (x + 0.5 - half) + camera.up * (half - y - 0.5) + camera.forward * camera.focal;
   return {camera.position, glm::normalize(direction)};
@@ -195,6 +196,144 @@ TEST(Impostor, LeavesTransparentVoxelsOut) {
   EXPECT_TRUE(Impostor::build(grid, scene.types).is_empty());
 }
 
+void expect_same_level(const ImpostorFaces::Level& a, const ImpostorFaces::Level& b) {
+  EXPECT_EQ(a.centre, b.centre);
+  EXPECT_EQ(a.views, b.views);
+  EXPECT_EQ(a.face, b.face);
+  EXPECT_EQ(a.begin, b.begin);
+  EXPECT_EQ(a.groups.centre, b.groups.centre);
+  EXPECT_EQ(a.groups.half, b.groups.half);
+  EXPECT_EQ(a.groups.views, b.groups.views);
+}
+
+void expect_same(const Impostor& a, const Impostor& b) {
+  ASSERT_EQ(a.is_empty(), b.is_empty());
+  EXPECT_EQ(a.box().min, b.box().min);
+  EXPECT_EQ(a.box().max, b.box().max);
+  EXPECT_EQ(a.content().centre, b.content().centre);
+  const ImpostorFaces& x = a.faces();
+  const ImpostorFaces& y = b.faces();
+  EXPECT_EQ(x.edge, y.edge);
+  ASSERT_EQ(x.faces.size(), y.faces.size());
+  int different = 0;
+  for (std::size_t i = 0; i < x.faces.size(); ++i) {
+    const ImpostorFaces::Face& f = x.faces[i];
+    const ImpostorFaces::Face& g = y.faces[i];
+    different += f.voxel != g.voxel || f.direction != g.direction || f.type != g.type || f.occlusion != g.occlusion ||
+                 f.open_rays != g.open_rays;
+  }
+  EXPECT_EQ(different, 0);
+  for (std::size_t level = 0; level < x.levels.size(); ++level) {
+    SCOPED_TRACE(level);
+    expect_same_level(x.levels[level], y.levels[level]);
+  }
+  expect_same_level(x.unseen, y.unseen);
+}
+
+void edit_a_little(Grid& grid, VoxelType types, std::mt19937& random) {
+  const IBox content = grid.bounds();
+  const auto within = [&](int axis) {
+    const int size = content.max[axis] - content.min[axis];
+    return content.min[axis] + static_cast<int>(random() % static_cast<unsigned>(size));
+  };
+  const IVec3 at{within(0), within(1), within(2)};
+  const auto type = static_cast<VoxelType>(random() % types);
+  const int size = random() % 3 == 0 ? 1 + static_cast<int>(random() % 4) : 1;
+  grid.fill_box({at, at + size}, type);
+}
+
+TEST(Impostor, RebuiltAfterAnEditIsBuiltAnewToTheBit) {
+  for (unsigned seed = 1; seed <= 24; ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    VoxelRegistry types = two_types();
+    VoxelProperties glass;
+    glass.visibility = Visibility::Transparent;
+    ASSERT_TRUE(types.add(glass));
+    const ImpostorOptions options{seed % 4 == 0 ? 64 : 128};
+    Grid grid = blobs(seed);
+    grid.fill_box({{-30, -30, -30}, {-28, -28, -28}}, 1);  // so that few edits move the content's sphere
+    grid.fill_box({{60, 60, 60}, {62, 62, 62}}, 1);
+    Impostor impostor = Impostor::build(grid, types, options);
+    ChangeCursor cursor = grid.cursor();
+    for (int round = 0; round < 6; ++round) {
+      for (unsigned edits = 1 + random() % 3; edits > 0; --edits) edit_a_little(grid, 4, random);
+      const Grid snapshot = grid.snapshot();
+      const GridChanges changes = snapshot.changes_since(cursor);
+      impostor = impostor.rebuilt(snapshot, types, changes);
+      expect_same(impostor, Impostor::build(grid, types, options));
+      if (HasFailure()) return;
+    }
+  }
+}
+
+TEST(Impostor, RebuiltKnowsWhatItCannotKeep) {
+  const VoxelRegistry types = two_types();
+  Grid grid = blobs(3);
+  Impostor impostor = Impostor::build(grid, types);
+  ChangeCursor cursor = grid.cursor();
+  const auto expect_right = [&] {
+    const GridChanges changes = grid.changes_since(cursor);
+    impostor = impostor.rebuilt(grid, types, changes);
+    expect_same(impostor, Impostor::build(grid, types));
+  };
+  expect_right();
+  grid.set({90, 3, 3}, 1);  // another sphere
+  expect_right();
+  grid.fill_box({{0, 0, 0}, {40, 40, 40}}, kAir);
+  expect_right();
+  grid.set({90, 3, 3}, kAir);  // nothing is left
+  expect_right();
+  EXPECT_TRUE(impostor.is_empty());
+  grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 2);
+  expect_right();
+  GridChanges all;
+  all.all = true;
+  expect_same(impostor.rebuilt(grid, types, all), impostor);
+}
+
+TEST(Impostor, MoreTexelsShowSmallerThings) {
+  VoxelRegistry types = two_types();
+  Grid grid;
+  for (int x = 0; x < 200; x += 2) grid.fill_box({{x, 0, 0}, {x + 1, 200, 3}}, 2);
+  grid.fill_box({{0, 0, 0}, {200, 200, 1}}, 1);
+  const auto bytes = [&](int edge) { return Impostor::build(grid, types, ImpostorOptions{edge}).bytes(); };
+  EXPECT_LT(bytes(16), bytes(64));
+  EXPECT_LT(bytes(64), bytes(512));
+}
+
+TEST(Impostor, PicturesAreThoseOfTheRenderer) {
+  Scene scene;
+  scene.types = two_types();
+  place(scene, blobs(5));
+  const Grid& grid = scene.grids()[scene.grids().handles()[0]].grid;
+  const std::vector<ImpostorPicture> pictures = impostor_pictures(grid, scene.types, ImpostorOptions{96});
+  ASSERT_EQ(pictures.size(), 26U);
+  RenderOptions options = sized(96, 96);
+  options.light.shading = Shading::Unlit;
+  for (std::size_t view = 0; view < pictures.size(); ++view) {
+    const ImpostorPicture& picture = pictures[view];
+    const Picture truth = taken(scene, picture.camera, options);
+    int different = 0;
+    int covered = 0;
+    for (std::size_t i = 0; i < picture.coverage.size(); ++i) {
+      covered += picture.coverage[i] == 255;
+      ASSERT_EQ(picture.coverage[i] == 255, std::isfinite(picture.depth.values[i]));
+      different += std::isfinite(truth.depth.values[i]) != (picture.coverage[i] == 255);
+      if (picture.coverage[i] == 0 || !std::isfinite(truth.depth.values[i])) continue;
+      different += std::abs(truth.depth.values[i] - picture.depth.values[i]) > 1e-3F;
+      different += truth.colour.rgb[3 * i] != picture.colour.rgb[3 * i];
+    }
+    EXPECT_GT(covered, 500);
+    EXPECT_LE(different, 4) << view << ": but for rounding at edges";
+  }
+  const std::vector<ImpostorPicture> none = impostor_pictures(Grid(), scene.types, ImpostorOptions{16});
+  ASSERT_EQ(none.size(), 26U);
+  for (const ImpostorPicture& picture : none) {
+    EXPECT_EQ(picture.coverage, std::vector<std::uint8_t>(256, 0));
+  }
+}
+
 TEST(ImpostorDeathTest, ThereAre26ViewsAndSnapshotsHaveOneTexelAtLeast) {
   const VoxelRegistry types = two_types();
   const Grid grid = blobs(1);
@@ -202,6 +341,7 @@ TEST(ImpostorDeathTest, ThereAre26ViewsAndSnapshotsHaveOneTexelAtLeast) {
   QUOIN_EXPECT_MISTAKE(static_cast<void>(impostor_view(kImpostorViews)), "index < kImpostorViews");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, -1)), "view >= 0");
   QUOIN_EXPECT_MISTAKE(static_cast<void>(take_snapshot(grid, types, tree, 0, 0)), "edge >= 1");
+  QUOIN_EXPECT_MISTAKE(static_cast<void>(Impostor::build(grid, types, ImpostorOptions{8})), "edge >= 16");
 }
 
 }  // namespace

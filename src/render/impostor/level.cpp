@@ -1,6 +1,7 @@
 #include "render/impostor/seen.h"
 
 #include <algorithm>
+#include <array>
 
 namespace quoin {
 namespace {
@@ -9,12 +10,11 @@ constexpr std::size_t kGroup = ImpostorFaces::kGroup;
 // Texels: how far from its middle a face is taken to reach where voxels are smaller than texels.
 constexpr double kRoom = 0.5;
 
-// Adds copies of the last face that no view saw until there are whole groups.
-void fill_up(ImpostorFaces::Level& level) {
-  while (level.views.size() % kGroup != 0) {
-    for (auto& coordinates : level.centre) coordinates.push_back(coordinates.back());
-    level.views.push_back(0);
-    level.face.push_back(level.face.back());
+// Copies of the last face that no view saw, from `at` to `end`.
+void fill_up(ImpostorFaces::Level& level, std::size_t& at, std::size_t end) {
+  for (; at < end; ++at) {
+    for (auto& coordinates : level.centre) coordinates[at] = coordinates[at - 1];
+    level.face[at] = level.face[at - 1];
   }
 }
 
@@ -38,30 +38,51 @@ void find_groups(ImpostorFaces::Level& level) {
   }
 }
 
+// The numbers of places that each direction takes: of its faces that are there, filled up to whole groups.
+template <class ViewsOf>
+std::array<std::size_t, 6> places_of(const std::vector<SeenFace>& faces, ViewsOf views_of) {
+  std::array<std::size_t, 6> count{};
+  for (const SeenFace& face : faces) {
+    count[static_cast<std::size_t>(face.face.direction)] += static_cast<std::size_t>(views_of(face) != 0);
+  }
+  for (std::size_t& each : count) each = (each + kGroup - 1) / kGroup * kGroup;
+  return count;
+}
+
+void resize(ImpostorFaces::Level& level, std::size_t size) {
+  for (auto& coordinates : level.centre) coordinates.resize(size);
+  level.views.resize(size);
+  level.face.resize(size);
+}
+
 template <class ViewsOf>
 ImpostorFaces::Level level_of(const std::vector<SeenFace>& faces, const ContentSphere& content, double half,
                               ViewsOf views_of) {
   ImpostorFaces::Level level;
   level.size = static_cast<float>(content.radius);
   level.half = static_cast<float>(half);
-  std::size_t direction = 0;
+  const std::array<std::size_t, 6> places = places_of(faces, views_of);
+  for (std::size_t side = 0; side < 6; ++side) {
+    level.begin[side + 1] = level.begin[side] + static_cast<std::uint32_t>(places[side]);
+  }
+  resize(level, level.begin[6]);
+  std::size_t at = 0;
+  std::size_t side = 0;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::uint32_t views = views_of(faces[i]);
     if (views == 0) continue;
-    const auto [voxel, own] = faces[i].face;
-    for (; direction <= static_cast<std::size_t>(own); ++direction) {
-      fill_up(level);
-      level.begin[direction] = static_cast<std::uint32_t>(level.views.size());
+    const auto [voxel, direction] = faces[i].face;
+    for (; side < static_cast<std::size_t>(direction); ++side) fill_up(level, at, level.begin[side + 1]);
+    const FaceFrame& frame = frame_of(direction);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double edge = axis == frame.axis ? 0.5 + 0.5 * frame.sign : 0.5;
+      const auto a = static_cast<int>(axis);
+      level.centre[axis][at] = static_cast<float>(voxel[a] + edge - content.centre[a]);
     }
-    const DVec3 middle = DVec3(voxel) + 0.5 + 0.5 * DVec3(normal_of(own)) - content.centre;
-    for (int axis = 0; axis < 3; ++axis) {
-      level.centre[static_cast<std::size_t>(axis)].push_back(static_cast<float>(middle[axis]));
-    }
-    level.views.push_back(views);
-    level.face.push_back(static_cast<std::uint32_t>(i));
+    level.views[at] = views;
+    level.face[at++] = static_cast<std::uint32_t>(i);
   }
-  fill_up(level);
-  for (; direction <= 6; ++direction) level.begin[direction] = static_cast<std::uint32_t>(level.views.size());
+  for (; side < 6; ++side) fill_up(level, at, level.begin[side + 1]);
   find_groups(level);
   return level;
 }
@@ -77,6 +98,10 @@ ImpostorFaces::Level faces_of_level(const std::vector<SeenFace>& faces, std::siz
 
 ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
   return level_of(faces, content, 0.5, [](const SeenFace& face) { return face.views[0] == 0 ? ~0U : 0U; });
+}
+
+ImpostorFaces::Level seen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {
+  return level_of(faces, content, 0.5, [](const SeenFace& face) { return face.views[0]; });
 }
 
 ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content) {

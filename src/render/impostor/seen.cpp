@@ -39,61 +39,111 @@ raster::Aim aim_of(const SnapshotCamera& camera) {
   return aim;
 }
 
-// The views of each of the faces, in their order.
-class ShellViews {
- public:
-  ShellViews(const std::vector<SeenFace>& faces, const IBox& box, const ContentSphere& content, int edge)
-      : level_(all_faces(faces, content)),
-        box_(box),
-        content_(content),
-        edge_(edge),
-        draw_(raster::draw()),
-        views_(faces.size()) {}
-
-  std::vector<Views> take() {
-    for (int view = 0; view < kImpostorViews; ++view) take(view);
-    return std::move(views_);
+// Draws faces of a level into a snapshot, tile by tile; calls `visit(column, row, face)` for each texel of `area` that
+// shows one.
+template <class Visit>
+void draw_texels(const ImpostorFaces::Level& level, std::uint32_t views, const SnapshotCamera& camera, int edge,
+                 const TexelArea& area, raster::Canvas& canvas, Visit visit) {
+  const raster::Aim aim = aim_of(camera);
+  raster::Job job;
+  job.level = &level;
+  job.views = views;
+  for (int row = 0; row < edge; row += raster::kTile) {
+    for (int column = 0; column < edge; column += raster::kTile) {
+      job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, raster::kTile);
+      job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, raster::kTile);
+      if (job.left >= job.right || job.top >= job.bottom) continue;
+      canvas.clear();
+      raster::set_aim(aim, column + 0.5 - 0.5 * edge, row + 0.5 - 0.5 * edge, job);
+      raster::draw()(job, canvas);
+      for (int y = job.top; y < job.bottom; ++y) {
+        for (int x = job.left; x < job.right; ++x) {
+          const std::size_t i = raster::index_of(x, y);
+          if (!std::isinf(canvas.depth[i])) visit(column + x, row + y, static_cast<std::size_t>(canvas.face[i]));
+        }
+      }
+    }
   }
+}
+
+// Moves the faces of one view after an edit. A texel can only show another face than before where a changed voxel
+// shows; so within the texels of the changed boxes (`core`) all is drawn as it was and as it is, and every face that
+// shows there in either is given the texels it has in a wider area (`around`), which holds all of them.
+class SeenAgain {
+ public:
+  SeenAgain(const std::vector<SeenFace>& old, std::vector<SeenFace>& now, const std::vector<std::uint32_t>& now_of_old,
+            const ContentSphere& content, int edge)
+      : edge_(edge),
+        content_(&content),
+        old_level_(seen_faces(old, content)),
+        now_level_(all_faces(now, content)),
+        now_of_old_(&now_of_old),
+        now_(&now),
+        found_(now.size()) {}
+
+  void take(int view, const IBox& changed) {
+    const SnapshotCamera camera = snapshot_camera(*content_, view, edge_);
+    const TexelArea core = texels_of(camera, {changed.min - 1, changed.max + 1}, edge_);
+    const TexelArea around = widened(core, camera);
+    const std::uint32_t bit = 1U << view;
+    draw_texels(old_level_, bit, camera, edge_, core, canvas_, [&](int, int, std::size_t face) {
+      const std::uint32_t moved = (*now_of_old_)[face];
+      if (moved != kGone) affected_.push_back(moved);
+    });
+    draw_texels(now_level_, ~0U, camera, edge_, around, canvas_, [&](int column, int row, std::size_t face) {
+      mark(found_[face], bit, column, row);
+      shown_.push_back(static_cast<std::uint32_t>(face));
+      if (column >= core.left && column < core.right && row >= core.top && row < core.bottom) {
+        affected_.push_back(static_cast<std::uint32_t>(face));
+      }
+    });
+    for (const std::uint32_t face : affected_) {
+      for (std::size_t level = 0; level < ImpostorFaces::kLevels; ++level) {
+        std::uint32_t& views = (*now_)[face].views[level];
+        views = (views & ~bit) | found_[face][level];
+      }
+    }
+    for (const std::uint32_t face : shown_) found_[face] = {};
+    shown_.clear();
+    affected_.clear();
+  }
+
+  static constexpr std::uint32_t kGone = ~0U;
 
  private:
-  void take(int view) {
-    const SnapshotCamera camera = snapshot_camera(content_, view, edge_);
-    const raster::Aim aim = aim_of(camera);
-    const TexelArea area = texels_of(camera, box_, edge_);
-    raster::Job job;
-    job.level = &level_;
-    job.views = ~0U;
-    for (int row = 0; row < edge_; row += raster::kTile) {
-      for (int column = 0; column < edge_; column += raster::kTile) {
-        job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, raster::kTile);
-        job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, raster::kTile);
-        if (job.left >= job.right || job.top >= job.bottom) continue;
-        canvas_.clear();
-        raster::set_aim(aim, column + 0.5 - 0.5 * edge_, row + 0.5 - 0.5 * edge_, job);
-        draw_(job, canvas_);
-        mark_tile(1U << view, column, row, job);
-      }
-    }
+  // By as much as a face of a voxel may span.
+  [[nodiscard]] TexelArea widened(const TexelArea& area, const SnapshotCamera& camera) const {
+    constexpr double kDiagonal = 1.7320508075688772;  // of a voxel
+    const double texels = kDiagonal * camera.focal / (camera.distance - camera.reach);
+    const int by = static_cast<int>(std::min(std::ceil(texels), static_cast<double>(edge_))) + 1;
+    return {std::max(area.left - by, 0), std::max(area.top - by, 0), std::min(area.right + by, edge_),
+            std::min(area.bottom + by, edge_)};
   }
 
-  void mark_tile(std::uint32_t bit, int column, int row, const raster::Job& job) {
-    for (int y = job.top; y < job.bottom; ++y) {
-      for (int x = job.left; x < job.right; ++x) {
-        const std::size_t i = raster::index_of(x, y);
-        if (std::isinf(canvas_.depth[i])) continue;
-        mark(views_[static_cast<std::size_t>(canvas_.face[i])], bit, column + x, row + y);
-      }
-    }
-  }
-
-  ImpostorFaces::Level level_;
-  IBox box_;
-  ContentSphere content_;
   int edge_;
-  raster::Draw draw_;
+  const ContentSphere* content_;
+  ImpostorFaces::Level old_level_;
+  ImpostorFaces::Level now_level_;
+  const std::vector<std::uint32_t>* now_of_old_;
+  std::vector<SeenFace>* now_;
+  std::vector<Views> found_;             // by face; all 0 between calls
+  std::vector<std::uint32_t> shown_;     // those that are not
+  std::vector<std::uint32_t> affected_;  // may come more than once
   raster::Canvas canvas_;
-  std::vector<Views> views_;
 };
+
+// With the views that its levels tell.
+std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
+  std::vector<SeenFace> seen(faces.faces.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) seen[i].face = {faces.faces[i].voxel, faces.faces[i].direction};
+  for (std::size_t level = 0; level < ImpostorFaces::kLevels; ++level) {
+    const ImpostorFaces::Level& from = faces.levels[level];
+    for (std::size_t i = 0; i < from.views.size(); ++i) {
+      if (from.views[i] != 0) seen[from.face[i]].views[level] = from.views[i];
+    }
+  }
+  return seen;
+}
 
 // The face beside another at the edge towards `sign` along `axis`: in the same plane, or around the edge.
 VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const OccupancyTree& opaque) {
@@ -162,6 +212,14 @@ class MetFaces {
   std::uint32_t last_ = 0;
 };
 
+// All faces, before any view.
+std::vector<SeenFace> unseen_of(const ImpostorShell& shell) {
+  const std::vector<VoxelFace> all = shell.faces();
+  std::vector<SeenFace> faces(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];
+  return faces;
+}
+
 // The bits of 21-bit numbers, three places apart.
 std::uint64_t spread(std::uint64_t bits) {
   bits &= 0x1F'FFFF;
@@ -195,12 +253,37 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 
 std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box, const ContentSphere& content,
                                     int edge) {
-  const std::vector<VoxelFace> all = shell.faces();
-  std::vector<SeenFace> faces(all.size());
-  for (std::size_t i = 0; i < all.size(); ++i) faces[i].face = all[i];
-  const std::vector<Views> views = ShellViews(faces, box, content, edge).take();
-  for (std::size_t i = 0; i < all.size(); ++i) faces[i].views = views[i];
+  std::vector<SeenFace> faces = unseen_of(shell);
+  const ImpostorFaces::Level level = all_faces(faces, content);
+  raster::Canvas canvas;
+  for (int view = 0; view < kImpostorViews; ++view) {
+    const SnapshotCamera camera = snapshot_camera(content, view, edge);
+    draw_texels(level, ~0U, camera, edge, texels_of(camera, box, edge), canvas,
+                [&](int column, int row, std::size_t face) { mark(faces[face].views, 1U << view, column, row); });
+  }
   return faces;
+}
+
+std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
+                                       const ContentSphere& content, std::span<const IBox> changed) {
+  const std::vector<SeenFace> old = seen_of(before);
+  std::vector<SeenFace> now = unseen_of(shell);
+  std::vector<std::uint32_t> now_of_old(old.size(), SeenAgain::kGone);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    // Mostly they go in step.
+    const VoxelFace& face = old[i].face;
+    while (next < now.size() && now[next].face != face && comes_before(now[next].face, face)) ++next;
+    if (next == now.size()) break;
+    if (now[next].face != face) continue;
+    now[next].views = old[i].views;
+    now_of_old[i] = static_cast<std::uint32_t>(next);
+  }
+  SeenAgain again(old, now, now_of_old, content, before.edge);
+  for (int view = 0; view < kImpostorViews; ++view) {
+    for (const IBox& box : changed) again.take(view, box);
+  }
+  return now;
 }
 
 std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content, int edge) {

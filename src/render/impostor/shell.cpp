@@ -22,6 +22,19 @@ IVec3 cells_around(const IBox& box) {
 
 }  // namespace
 
+bool comes_before(const VoxelFace& a, const VoxelFace& b) {
+  if (a.direction != b.direction) return a.direction < b.direction;
+  for (int axis = 2; axis >= 0; --axis) {
+    const int cell_a = a.voxel[axis] >> 2;
+    const int cell_b = b.voxel[axis] >> 2;
+    if (cell_a != cell_b) return cell_a < cell_b;
+  }
+  for (int axis = 2; axis >= 0; --axis) {
+    if (a.voxel[axis] != b.voxel[axis]) return a.voxel[axis] < b.voxel[axis];
+  }
+  return false;
+}
+
 ImpostorShell::ImpostorShell(const IBox& box) : origin_((floor_of(box.min, 2) - 1) * 4), size_(cells_around(box)) {
   cells_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
                 static_cast<std::size_t>(size_.z));

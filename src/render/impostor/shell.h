@@ -18,6 +18,9 @@ struct VoxelFace {
   bool operator==(const VoxelFace&) const = default;
 };
 
+/// The order in which ImpostorShell lists faces: by direction, then by cell of 4^3 voxels, then by voxel; by z, y, x.
+[[nodiscard]] bool comes_before(const VoxelFace& a, const VoxelFace& b);
+
 /// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
 ///
 /// Memory: a bit a voxel of the box and of what lies within four voxels of it.
@@ -26,7 +29,7 @@ class ImpostorShell {
   /// None where the box and what it keeps around it have more than `max_voxels`, or there are more than `max_faces`.
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
-  /// By direction, then by cell of 4^3 voxels.
+  /// In the order of `comes_before`.
   [[nodiscard]] std::vector<VoxelFace> faces() const;
   /// Requires: `voxel` is at most one beside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {

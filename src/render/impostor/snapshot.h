@@ -15,14 +15,6 @@
 
 namespace quoin {
 
-/// The unit vector from the content's centre towards the snapshot's camera, in the grid's own frame.
-/// Requires: 0 <= index < kImpostorViews.
-[[nodiscard]] DVec3 impostor_view(int index);
-
-/// The view whose direction has the largest dot product with `direction` (of any length), the first one on ties; at
-/// most about 27.57 degrees away. None when `direction` is zero or not finite.
-[[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
-
 /// From where a snapshot is taken, in the grid's frame: a pinhole at `position` that looks at the content's centre.
 struct SnapshotCamera {
   DVec3 position{0.0};
