@@ -1,7 +1,6 @@
 #include "file_chooser.h"
 
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,21 @@
 namespace quoin::viewer {
 
 namespace {
+
+// What imgui_stdlib does, which Debian compiles for one standard library only.
+int resize_text(ImGuiInputTextCallbackData* data) {
+  if (data->EventFlag != ImGuiInputTextFlags_CallbackResize) return 0;
+  auto* text = static_cast<std::string*>(data->UserData);
+  text->resize(static_cast<std::size_t>(data->BufTextLen));
+  data->Buf = text->data();
+  return 0;
+}
+
+bool input_text(const char* label, std::string& text, ImGuiInputTextFlags flags) {
+  return ImGui::InputText(label, text.data(), text.capacity() + 1, flags | ImGuiInputTextFlags_CallbackResize,
+                          resize_text, &text);
+}
+
 
 constexpr std::size_t kMaxEntries = 5'000;
 
@@ -161,7 +175,7 @@ std::optional<std::filesystem::path> FileChooser::draw(float scale) {
   if (is_new_) ImGui::SetKeyboardFocusHere();
   is_new_ = false;
   ImGui::SetNextItemWidth(-1.0F);
-  is_accepted |= ImGui::InputText("##name", &name_, ImGuiInputTextFlags_EnterReturnsTrue);
+  is_accepted |= input_text("##name", name_, ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::TextColored({1.0F, 0.65F, 0.4F, 1.0F}, "%s", problem_.c_str());
   is_accepted |= ImGui::Button(purpose_ == Purpose::Open ? "Open" : "Save");
   ImGui::SameLine();
