@@ -69,7 +69,14 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
 }
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
-  add_text_option(command, "--sun", "X,Y,Z", "Direction towards the sun (default 0.371,0.743,0.223)");
+  add_text_option(command, "--sun", "X,Y,Z|off", "Direction towards the sun (default 0.371,0.743,0.223), or night");
+  add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
+  command
+      .add_option("--lamps", arguments.render.light.lamps,
+                  "How many lamps and glowing voxels light a surface at most; 0: they only show their own light "
+                  "(default 64)")
+      ->check(CLI::Range(0, 1024));
+  add_text_option(command, "--lamp-brightness", "X", "Times this much light of lamps on others (default 1)");
   command
       .add_option("--preset", arguments.preset,
                   "Light: full, no-shadows, no-ao, unlit (own colours, with --ao times occlusion), or ao (occlusion "
@@ -179,11 +186,20 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   for (const char* option : {"--ao-rays", "--ao-distance"}) {
     if (command.count(option) > 0 && arguments.occlusion != "rays") return std::string(option) + " needs --ao rays";
   }
+  for (const char* option : {"--lamps", "--lamp-brightness", "--sky-brightness"}) {
+    if (command.count(option) > 0 && (preset == "unlit" || preset == "ao")) {
+      return std::string(option) + ": the preset " + preset + " has no light";
+    }
+  }
   const bool has_shadows = preset == "full" || preset == "no-ao";
   if (command.count("--shadow-distance") > 0 && !has_shadows) {
     return "--shadow-distance: the preset " + preset + " has no shadows";
   }
   return "";
+}
+
+bool is_sun_off(const CLI::App& command) {
+  return command.count("--sun") > 0 && command.get_option("--sun")->results().back() == "off";
 }
 
 /// Reads the options that are texts to CLI11; returns what is wrong with the first wrong one, or "".
@@ -198,7 +214,11 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--camera", parse_triple, three, arguments.position),
       read_option(command, "--look-at", parse_triple, three, arguments.target),
       read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),
-      read_option(command, "--sun", read_direction, "three numbers that are not all 0, as in 1,2,-0.5", light.sun),
+      is_sun_off(command) ? ""
+                          : read_option(command, "--sun", read_direction,
+                                        "three numbers that are not all 0, as in 1,2,-0.5, or off", light.sun),
+      read_option(command, "--sky-brightness", read_not_negative, at_least_0, light.sky_brightness),
+      read_option(command, "--lamp-brightness", read_not_negative, at_least_0, light.lamp_brightness),
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
       read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure)};
@@ -213,6 +233,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
 
 void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_common_options(command, arguments.common);
+  arguments.render.light.lamps = 64;
   command.add_option("-o,--output", arguments.output, "Picture to write: .png")->required()->check(file_name());
   add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
   add_camera_options(command, arguments);
@@ -239,6 +260,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   arguments.has_view = command.count("--view") > 0;
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
+  if (is_sun_off(command)) light.sun_brightness = 0.0;
   light.occlusion = arguments.occlusion == "vertex" ? OcclusionMode::Vertex : OcclusionMode::Rays;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;
   if (arguments.preset == "no-ao") light.occlusion = OcclusionMode::Off;

@@ -135,15 +135,16 @@ bool Document::redo() {
   return !stroke_ && history_.redo(loaded_.scene);
 }
 
-Result<VoxelType> Document::type_of_colour(Rgba8 colour) {
+Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   for (std::size_t type = 1; type < loaded_.scene.types.size(); ++type) {
     const VoxelProperties& known = loaded_.scene.types[static_cast<VoxelType>(type)];
-    if (known.colour == colour && known.visibility == Visibility::Opaque && known.emission == 0.0F) {
+    if (known.colour == colour && known.visibility == Visibility::Opaque && known.emission == emission) {
       return static_cast<VoxelType>(type);
     }
   }
   VoxelProperties properties;
   properties.colour = colour;
+  properties.emission = emission;
   return loaded_.scene.types.add(std::move(properties));
 }
 

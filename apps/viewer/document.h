@@ -53,8 +53,8 @@ class Document {
   bool undo();
   bool redo();
 
-  /// A type of that colour, new if there is none. Errors: LimitExceeded.
-  [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour);
+  /// An opaque type of that colour and emission, new if there is none. Errors: LimitExceeded.
+  [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour, float emission = 0.0F);
 
   /// Writes .vox or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings; those
   /// of write_vox, mesh_scene and write_mesh; Cancelled.

@@ -258,6 +258,9 @@ TEST(Document, ColoursBecomeTypesOnce) {
   const VoxelType fresh = document.type_of_colour({1, 2, 3, 255}).value();
   EXPECT_EQ(fresh, 5);
   EXPECT_EQ(document.type_of_colour({1, 2, 3, 255}).value(), fresh);
+  const VoxelType torch = document.type_of_colour({1, 2, 3, 255}, 8.0F).value();
+  EXPECT_NE(torch, fresh);
+  EXPECT_EQ(document.scene().types[torch].emission, 8.0F);
 }
 
 }  // namespace

@@ -76,6 +76,10 @@ void read_light(const Json& object, LightOptions& light) {
   read_name(object, "shading", kShadings, light.shading);
   read_flag(object, "shadows", light.shadows);
   read_number(object, "exposure", 0.0, 100.0, light.exposure);
+  read_number(object, "sun_brightness", 0.0, 100.0, light.sun_brightness);
+  read_number(object, "sky_brightness", 0.0, 100.0, light.sky_brightness);
+  read_whole(object, "lamps", 0, 1024, light.lamps);
+  read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
   read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
   if (!has_occlusion) light.occlusion = OcclusionMode::Off;
@@ -101,6 +105,12 @@ std::string environment(const char* name) {
 }
 
 }  // namespace
+
+LightOptions default_light() {
+  LightOptions light;
+  light.lamps = 64;
+  return light;
+}
 
 void Settings::note_recent(const std::filesystem::path& file) {
   std::error_code ignored;
@@ -156,6 +166,10 @@ std::string to_json(const Settings& settings) {
                    {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion)]},
                    {"occlusion_distance", light.occlusion_distance},
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
+                   {"sun_brightness", light.sun_brightness},
+                   {"sky_brightness", light.sky_brightness},
+                   {"lamps", light.lamps},
+                   {"lamp_brightness", light.lamp_brightness},
                    {"exposure", light.exposure}}},
                  {"recent", settings.recent}};
   if (std::isfinite(light.shadow_distance)) object["light"]["shadow_distance"] = light.shadow_distance;

@@ -13,6 +13,9 @@
 
 namespace quoin::viewer {
 
+/// What the viewer's light is like until somebody changes it.
+[[nodiscard]] LightOptions default_light();
+
 /// What the viewer remembers from one start to the next.
 struct Settings {
   int width = 1280;  ///< of the window
@@ -25,8 +28,8 @@ struct Settings {
   bool detail_colours = false;  ///< not remembered, as the two after it
   Wireframe wireframe = Wireframe::Off;
   DrawMode mode = DrawMode::Rays;
-  LightOptions light;
-  std::vector<std::string> recent;  ///< files, the newest first
+  LightOptions light = default_light();  ///< not the library's: lamps shine
+  std::vector<std::string> recent;       ///< files, the newest first
 
   /// Puts a file at the front of `recent`, once, and keeps at most ten.
   void note_recent(const std::filesystem::path& file);

@@ -29,6 +29,10 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.shading = Shading::UnlitWithOcclusion;
   settings.light.occlusion_distance = 12.5;
   settings.light.shadow_distance = 64.0;
+  settings.light.sun_brightness = 0.25;
+  settings.light.sky_brightness = 0.0;
+  settings.light.lamps = 12;
+  settings.light.lamp_brightness = 8.0;
   settings.note_recent("/tmp/a.vox");
   settings.note_recent("/tmp/b\n\xff.vox");
   const Status written = write_settings(settings, path);
@@ -50,7 +54,7 @@ TEST(Settings, WhatEarlierVersionsWroteIsRead) {
   const LightOptions light = parse_settings(R"({"light": {"lit": false, "shadows": true, "occlusion": false}})").light;
   EXPECT_EQ(light.shading, Shading::Unlit);
   EXPECT_EQ(light.occlusion, OcclusionMode::Off);
-  EXPECT_EQ(parse_settings(R"({"light": {"lit": true, "occlusion": true}})").light, LightOptions{});
+  EXPECT_EQ(parse_settings(R"({"light": {"lit": true, "occlusion": true}})").light, Settings{}.light);
 }
 
 TEST(Settings, NonsenseIsLeftOut) {

@@ -1,6 +1,8 @@
 #include <quoin/light/light_options.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 namespace quoin {
 
@@ -18,6 +20,14 @@ Status check(const LightOptions& options) {
   if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
     return refuse("exposure: must be finite and not negative");
   }
+  for (const auto& [name, value] : {std::pair{"sun brightness", options.sun_brightness},
+                                    {"sky brightness", options.sky_brightness},
+                                    {"lamp brightness", options.lamp_brightness}}) {
+    if (!std::isfinite(value) || value < 0.0) {
+      return make_error(ErrorCode::InvalidArgument, std::string(name) + ": must be finite and not negative");
+    }
+  }
+  if (options.lamps < 0 || options.lamps > 1024) return refuse("lamps: must be 0 to 1024");
   return {};
 }
 

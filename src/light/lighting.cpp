@@ -13,6 +13,7 @@
 #include "light/corner_light.h"
 #include "light/glass.h"
 #include "light/light_model.h"
+#include "light/sky.h"
 
 namespace quoin {
 namespace {
@@ -84,13 +85,15 @@ struct Lighting::Group {
 };
 
 Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces,
-                   const LightOptions& options, bool detail_colours)
+                   const LightOptions& options, const LampTable* lamps, bool detail_colours)
     : view_(&view),
       types_(&types),
       surfaces_(&surfaces),
+      lamps_(options.lamps > 0 ? lamps : nullptr),
       options_(options),
       directions_(options.occlusion_rays),
-      exposure_(exposure_of(options)) {
+      exposure_(exposure_of(options)),
+      sky_(static_cast<float>(options.sky_brightness)) {
   QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : view.tracer().placed()) {
@@ -100,7 +103,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
     frame.to_sun = glm::transpose(placed.world_axes) * sun;
     for (const Direction face : kDirections) {
       const double cosine = glm::dot(DVec3(normal_of(face)), frame.to_sun);
-      frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0));
+      frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0) * options.sun_brightness);
     }
   }
 }
@@ -142,11 +145,14 @@ double Lighting::voxels_per_cell(std::int32_t placed) const {
 }
 
 std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) const {
-  std::array<Vec3, RayPacket::kSize> sunlight{};
+  std::array<Vec3, RayPacket::kSize> direct{};
   std::array<float, RayPacket::kSize> openness{};
   std::int64_t rays = find_openness(group, openness);
-  if (options_.shading == Shading::Lit) rays += find_sunlight(group, sunlight);
-  for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], sunlight[i], openness[i]);
+  if (options_.shading == Shading::Lit) {
+    rays += find_sunlight(group, direct);
+    if (lamps_ != nullptr) rays += add_lamplight(group, direct);
+  }
+  for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], direct[i], openness[i]);
   return rays;
 }
 
@@ -163,23 +169,88 @@ std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunligh
   rays.direction_y.fill(frame.to_sun.y);
   rays.direction_z.fill(frame.to_sun.z);
   rays.max_t.fill(options_.shadow_distance / voxels_per_cell(group.placed));
+  return shadow(group, rays, sunlight);
+}
+
+std::int64_t Lighting::shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const {
   const std::int64_t count = std::popcount(rays.active);
   const std::uint32_t blocked = view_->any_hits(group.placed, rays);
   for (std::uint32_t left = blocked; left != 0; left &= left - 1) {
-    sunlight[static_cast<std::size_t>(std::countr_zero(left))] = Vec3(0.0F);
+    light[static_cast<std::size_t>(std::countr_zero(left))] = Vec3(0.0F);
   }
   rays.active &= ~blocked;
-  if (view_->tracer().has_transparent() && rays.active != 0) tint_sunlight(group, rays, sunlight);
+  if (view_->tracer().has_transparent() && rays.active != 0) tint(group, rays, light);
   return count;
 }
 
-void Lighting::tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const {
+void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const {
   const RayPacket in_view = view_->view_from_grid(group.placed, rays);
   for (std::uint32_t left = view_->any_transparent(in_view); left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
-    sunlight[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i]);
+    light[i] *= transmittance_along(*view_, *surfaces_, in_view.ray(lane), in_view.max_t[i]);
   }
+}
+
+// Points of one brick have the same list; each point adds its lamps in the list's order, whatever its group.
+std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplight) const {
+  const int level = view_->tracer().placed()[static_cast<std::size_t>(group.placed)].level;
+  std::array<std::span<const std::uint32_t>, RayPacket::kSize> lists;
+  std::uint32_t left = group.surfaces;
+  for (std::uint32_t lanes = left; lanes != 0; lanes &= lanes - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
+    const IVec3 voxel = group.points[i]->voxel << level;
+    lists[i] = lamps_->at({voxel.x >> 4, voxel.y >> 4, voxel.z >> 4}, group.placed);
+    if (lists[i].empty()) left &= ~(1U << i);
+  }
+  std::int64_t rays = 0;
+  while (left != 0) {
+    const auto list = lists[static_cast<std::size_t>(std::countr_zero(left))];
+    std::uint32_t lanes = 0;
+    for (std::uint32_t rest = left; rest != 0; rest &= rest - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(rest));
+      if (lists[i].data() == list.data()) lanes |= 1U << i;
+    }
+    left &= ~lanes;
+    for (const std::uint32_t lamp : list) rays += add_lamp(group, lamps_->lamps[lamp], lanes, lamplight);
+  }
+  return rays;
+}
+
+std::int64_t Lighting::add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
+                                std::span<Vec3> lamplight) const {
+  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(group.placed)];
+  // The difference of two far positions is taken first: it is small.
+  const DVec3 lamp_from_pivot = lamp.position - placed.position;
+  std::array<Vec3, RayPacket::kSize> light;
+  RayPacket rays = group.origins;
+  rays.active = 0;
+  std::uint32_t lit = 0;
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
+    const SurfacePoint& point = *group.points[i];
+    const DVec3 origin{group.origins.origin_x[i], group.origins.origin_y[i], group.origins.origin_z[i]};
+    const DVec3 point_from_pivot = placed.world_axes * ((origin - placed.pivot) * placed.voxel_size);
+    const LampRay ray =
+        lamp_ray(lamp, lamp_from_pivot - point_from_pivot, placed.world_axes * DVec3(normal_of(point.face)));
+    if (ray.light == Vec3(0.0F)) continue;
+    light[i] = ray.light;
+    lit |= 1U << i;
+    if (!(ray.distance > 0.0)) continue;
+    rays.active |= 1U << i;
+    set_direction(rays, i, ray.direction * placed.world_axes);
+    rays.max_t[i] = ray.distance / placed.voxel_size;
+  }
+  const std::int64_t count = options_.shadows && rays.active != 0 ? shadow(group, rays, light) : 0;
+  for (; lit != 0; lit &= lit - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(lit));
+    lamplight[i] += light[i];
+  }
+  return count;
+}
+
+Vec3 Lighting::sky(float up) const {
+  return sky_ * sky_colour(up);
 }
 
 std::int64_t Lighting::find_openness(const Group& group, std::span<float> openness) const {
@@ -249,11 +320,11 @@ Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
 }
 
 // `openness`: 1 where it is not known.
-Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) const {
+Vec3 Lighting::shade(const SurfacePoint& point, Vec3 direct, float openness) const {
   const bool is_surface = point.kind == PointKind::Surface;
   switch (options_.shading) {
     case Shading::Lit:
-      return shade_lit(point, sunlight, openness);
+      return shade_lit(point, direct, openness);
     case Shading::Occlusion:
       return Vec3(is_surface ? linear_from_srgb(openness) : 0.0F);
     case Shading::Normals:
@@ -268,18 +339,18 @@ Vec3 Lighting::shade(const SurfacePoint& point, Vec3 sunlight, float openness) c
   return is_plain ? colour : colour * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
 }
 
-Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 sunlight, float openness) const {
+Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const {
   const Surface& surface = surface_at(point);
   if (point.kind == PointKind::Unlit) return surface.colour;
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {
     Vec3 light(0.0F);
     if (options_.occlusion == OcclusionMode::Off) {
-      light = kAmbientWithoutOcclusion + sunlight;
+      light = sky_ * kAmbientWithoutOcclusion + direct;
     } else if (options_.occlusion_affects == OcclusionAffects::Ambient) {
-      light = kAmbient * openness + sunlight;
+      light = sky_ * kAmbient * openness + direct;
     } else {
-      light = (kAmbient + sunlight) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
+      light = (sky_ * kAmbient + direct) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
     }
     colour += surface.colour * light;
   }

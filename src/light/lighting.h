@@ -8,6 +8,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
 
+#include "light/lamp_table.h"
 #include "light/occlusion_directions.h"
 #include "light/surfaces.h"
 #include "scene/tracer/scene_view.h"
@@ -35,17 +36,18 @@ struct SurfacePoint {
 
 /// The reference model of light: a sun with shadows, an ambient term with occlusion, and what voxels emit.
 ///
-///   colour * (0.15 * openness + diffuse) + emitted, times the exposure,
+///   colour * (0.15 * openness + diffuse + lamplight) + emitted, times the exposure,
 ///
-/// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way; without occlusion the ambient
-/// term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was
+/// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way, as is what lamps add; without
+/// occlusion the ambient term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was
 /// hit, of the full one also where a halved one is traced. Other shadings: see Shading.
 class Lighting {
  public:
-  /// `view` and `surfaces` must outlive it. Requires: `check` accepts the options.
-  /// `detail_colours`: surfaces are of the colour of their grid's detail and emit nothing.
+  /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options.
+  /// `lamps`: of the same placed grids; null: none shines. `detail_colours`: surfaces are of the colour of their grid's
+  /// detail and emit nothing.
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
-           bool detail_colours = false);
+           const LampTable* lamps = nullptr, bool detail_colours = false);
 
   /// Linear light of each point, not clamped; returns how many rays that took.
   ///
@@ -54,6 +56,8 @@ class Lighting {
   std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample = 0) const;
 
   [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }
+  /// What is behind everything. `up`: the y of a unit direction.
+  [[nodiscard]] Vec3 sky(float up) const;
 
  private:
   /// Of one placed grid, in its own frame.
@@ -67,24 +71,31 @@ class Lighting {
   [[nodiscard]] double voxels_per_cell(std::int32_t placed) const;
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
-  void tint_sunlight(const Group& group, const RayPacket& rays, std::span<Vec3> sunlight) const;
+  // Removes from each active lane's light what does not get past what lies on its ray; returns how many were traced.
+  std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
+  void tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const;
+  std::int64_t add_lamplight(const Group& group, std::span<Vec3> lamplight) const;
+  std::int64_t add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
+                        std::span<Vec3> lamplight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;
-  [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 sunlight, float openness) const;
-  [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 sunlight, float openness) const;
+  [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
+  [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 normal_colour(const SurfacePoint& point) const;
   [[nodiscard]] bool needs_openness() const;
 
   const SceneView* view_;
   const VoxelRegistry* types_;
   const Surfaces* surfaces_;
+  const LampTable* lamps_;
   LightOptions options_;
   OcclusionDirections directions_;
   std::vector<Frame> frames_;
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   float exposure_ = 1.0F;
+  float sky_ = 1.0F;  // brightness
 };
 
 }  // namespace quoin

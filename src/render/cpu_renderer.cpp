@@ -70,6 +70,17 @@ struct CpuRenderer::Impl {
   SceneTracer tracer;
   Surfaces surfaces;
   DetailChooser detail;
+  LampCache lamps;
+
+  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const RenderOptions& render) {
+    if (render.light.lamps == 0) return nullptr;
+    std::vector<LampPlace> places;
+    for (const PlacedGrid& each : tracer.placed()) {
+      places.push_back({scene->instances()[each.instance].grid, each.voxels, each.pivot, each.world_axes, each.position,
+                        each.voxel_size, each.opaque, each.transparent});
+    }
+    return lamps.table(*scene, places, render.light, render.threads);
+  }
 };
 
 namespace {
@@ -103,6 +114,7 @@ void CpuRenderer::update(Threads threads) {
   impl_->tracer.update(threads);
   impl_->surfaces = Surfaces(impl_->scene->types);
   impl_->detail.update_types(impl_->scene->types);
+  impl_->lamps.update();
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
@@ -119,7 +131,9 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
-  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, options.detail_colours);
+  const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options);
+  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, lamps.get(),
+                          options.detail_colours);
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;

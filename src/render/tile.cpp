@@ -75,7 +75,7 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
       depth_[pixel] = static_cast<float>(glass_.empty() ? t : glass_.front().t_enter);
       pixels_hit_ += is_hit || !glass_.empty();
     }
-    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * sky_colour(context_->camera->sky_up(rays, i));
+    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * context_->lighting->sky(context_->camera->sky_up(rays, i));
     if (is_hit) add_opaque(lane, rays, hits, pixel, weight);
   }
 }

@@ -111,6 +111,7 @@ Scene Scene::snapshot() const {
   const std::lock_guard lock(book_->mutex);
   book_->collect(grids_, grids_.size() + instances_.size());
   copy.types = types;
+  copy.lamps = lamps;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
     return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas};
   });

@@ -16,4 +16,13 @@ step("${CMAKE_COMMAND}" -G Ninja -S "${WORK_DIR}/consumer" -B "${WORK_DIR}/build
   "-DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix")
 step("${CMAKE_COMMAND}" --build "${WORK_DIR}/build")
 step("${WORK_DIR}/build/consumer")
+# The same program without CMake.
+find_program(pkg_config pkg-config)
+if(pkg_config)
+  file(GLOB_RECURSE found "${WORK_DIR}/prefix/*/quoin.pc")
+  get_filename_component(folder "${found}" DIRECTORY)
+  step("${CMAKE_COMMAND}" -E env "PKG_CONFIG_PATH=${folder}" sh -c
+    "${COMPILER} -std=c++20 '${WORK_DIR}/consumer/main.cpp' $('${pkg_config}' --cflags --libs quoin) -o '${WORK_DIR}/plain'")
+  step("${WORK_DIR}/plain")
+endif()
 step("${WORK_DIR}/prefix/bin/quoin" --help)

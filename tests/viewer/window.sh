@@ -174,7 +174,7 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
     ! cmp -s blocks.png next.png || fail "$key changes nothing"
     mv next.png blocks.png
   done
-  xdotool key --delay 80 F8 F8 F9 F9 F5
+  xdotool key --delay 80 F8 F8 F9 F9 F9 F9 F5
   picture_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
 fi
 

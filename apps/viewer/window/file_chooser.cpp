@@ -28,7 +28,6 @@ bool input_text(const char* label, std::string& text, ImGuiInputTextFlags flags)
                           resize_text, &text);
 }
 
-
 constexpr std::size_t kMaxEntries = 5'000;
 
 std::string lower(std::string text) {

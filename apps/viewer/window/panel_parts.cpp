@@ -77,24 +77,36 @@ void draw_palette(ViewState& state) {
   ImGui::PopStyleVar();
 }
 
-/// A colour that the palette lacks. The registry is part of the scene: it changes only while nothing is drawn.
+/// Chooses a type of that colour for the brush. The registry is part of the scene: it changes only while nothing is
+/// drawn.
+void choose_new_type(ViewState& state, Rgba8 colour, float emission) {
+  const ScenePause pause(*state.open.backend);
+  state.stats.is_settled = false;
+  const auto type = state.open.document->type_of_colour(colour, emission);
+  if (!type) return state.tell(type.error());
+  state.brush.type = *type;
+  const char* what = emission > 0.0F ? "the lamp is type " : "the colour is type ";
+  state.tell(what + std::to_string(*type) + ", and chosen");
+}
+
+/// A colour that the palette lacks, or a lamp.
 void draw_new_colour(ViewState& state) {
   static constexpr const char* kPopup = "new colour";
   static std::array<float, 3> colour{0.8F, 0.5F, 0.3F};
+  static float emission = 0.0F;
   if (ImGui::Button("New colour...") && state.can_edit()) ImGui::OpenPopup(kPopup);
+  ImGui::SameLine();
+  constexpr Rgba8 kTorch{255, 178, 90, 255};
+  constexpr float kTorchEmission = 24.0F;
+  if (ImGui::Button("Torch") && state.can_edit()) choose_new_type(state, kTorch, kTorchEmission);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("a voxel that lights what is around it");
   if (!ImGui::BeginPopup(kPopup)) return;
   ImGui::ColorPicker3("##colour", colour.data(), ImGuiColorEditFlags_NoSidePreview);
+  ImGui::SliderFloat("emits", &emission, 0.0F, 64.0F, emission > 0.0F ? "%.1f" : "nothing",
+                     ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
   if (ImGui::Button("Add") && state.can_edit()) {
     const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround(value * 255.0F)); };
-    const ScenePause pause(*state.open.backend);
-    state.stats.is_settled = false;
-    const auto type = state.open.document->type_of_colour({byte(colour[0]), byte(colour[1]), byte(colour[2]), 255});
-    if (type) {
-      state.brush.type = *type;
-      state.tell("the colour is type " + std::to_string(*type) + ", and chosen");
-    } else {
-      state.tell(type.error());
-    }
+    choose_new_type(state, {byte(colour[0]), byte(colour[1]), byte(colour[2]), 255}, emission);
     ImGui::CloseCurrentPopup();
   }
   ImGui::EndPopup();
@@ -221,6 +233,26 @@ void draw_shadow_distance(LightOptions& light) {
   }
 }
 
+void draw_brightness(const char* name, double& value, float most) {
+  auto shown = static_cast<float>(value);
+  if (ImGui::SliderFloat(name, &shown, 0.0F, most, "%.2f",
+                         ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
+    value = shown;
+  }
+}
+
+void draw_lamps(LightOptions& light, bool has_rays) {
+  draw_brightness("the sun", light.sun_brightness, 4.0F);
+  draw_brightness("the sky", light.sky_brightness, 4.0F);
+  ImGui::BeginDisabled(!has_rays);
+  bool has_lamps = light.lamps > 0;
+  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.lamps = has_lamps ? default_light().lamps : 0;
+  ImGui::BeginDisabled(light.lamps == 0);
+  draw_brightness("lamps", light.lamp_brightness, 64.0F);
+  ImGui::EndDisabled();
+  ImGui::EndDisabled();
+}
+
 void draw_light_part(ViewState& state) {
   if (!heading("Light")) return;
   LightOptions& light = state.settings.light;
@@ -252,8 +284,9 @@ void draw_light_part(ViewState& state) {
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
     light.exposure = exposure;
   }
+  draw_lamps(light, has_shadows);
   ImGui::EndDisabled();
-  if (ImGui::Button("Reset light")) light = LightOptions{};
+  if (ImGui::Button("Reset light")) light = default_light();
 }
 
 void draw_statistics_part(const ViewState& state) {

@@ -43,12 +43,20 @@ struct LightOptions {
   double occlusion_distance = 6.0;  ///< voxels
   double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels
   double exposure = 1.0;
+  double sun_brightness = 1.0;  ///< times the sun's light; 0: night
+  double sky_brightness = 1.0;  ///< times the ambient light, and the sky behind everything
+  /// How many lamps (Scene::lamps, and voxels that emit light, by cells of 4^3) light a surface at most, each with its
+  /// shadow: of those that reach a brick of 16^3 voxels, those that can add most to it. 0: none, and what emits light
+  /// only shows it. 64 is plenty. A lamp fades out where it adds less than 1/4096.
+  int lamps = 0;
+  double lamp_brightness = 1.0;  ///< times what lamps add to others; what they show of themselves stays as it is
 
   bool operator==(const LightOptions&) const = default;
 };
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of
-///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure.
+///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances, exposure or
+///         brightness, fewer than 0 or more than 1,024 lamps.
 [[nodiscard]] Status check(const LightOptions& options);
 
 }  // namespace quoin

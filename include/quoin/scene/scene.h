@@ -13,6 +13,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/scene/lamp.h>
 
 namespace quoin {
 
@@ -77,6 +78,8 @@ struct SceneChanges {
 class Scene {
  public:
   VoxelRegistry types;
+  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::lamps says whether they shine.
+  std::vector<Lamp> lamps;
 
   Scene();
   Scene(Scene&&) noexcept;

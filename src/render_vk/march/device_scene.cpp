@@ -166,6 +166,18 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   return put_grids();
 }
 
+std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
+  std::vector<LampPlace> places;
+  for (const DevicePlaced& each : placement_.placed) {
+    const PlacedGrid& placed = each.placed;
+    const GridHandle grid = scene.instances()[placed.instance].grid;
+    const TreeCache& trees = grids_.find(grid)->second.trees;
+    places.push_back({grid, &scene.grids()[grid].grid, placed.pivot, placed.world_axes, placed.position,
+                      placed.voxel_size, &trees.opaque(), trees.transparent()});
+  }
+  return places;
+}
+
 Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes) {
   if (bytes.size() > place.size || place.size == 0) {
     memory.release(place);

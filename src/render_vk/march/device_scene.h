@@ -8,6 +8,7 @@
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
+#include "light/lamp_table.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/march/device_grid.h"
 #include "scene/tracer/instance_tree.h"
@@ -54,6 +55,8 @@ class DeviceScene {
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return placement_; }
+  /// Of the scene of the last update, which has not been edited since.
+  [[nodiscard]] std::vector<LampPlace> lamp_places(const Scene& scene) const;
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }

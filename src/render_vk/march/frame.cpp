@@ -1,6 +1,7 @@
 #include "render_vk/march/frame.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -136,13 +137,13 @@ void set_spaces(const DevicePlaced& grid, const GridSpace& space, DVec3 view_ori
   out.ref_view = to_vec4(space.view_axes * (ref - origin), grid.placed.voxels_per_cell());
 }
 
-void set_sun(const PlacedGrid& placed, DVec3 sun, ShaderPlaced& out) {
+void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlaced& out) {
   const DVec3 sun_in_grid = glm::transpose(placed.world_axes) * sun;
   out.to_sun = to_vec4(sun_in_grid);
   for (const Direction face : kDirections) {
     const auto i = static_cast<std::size_t>(face);
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
-    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0));
+    out.diffuse[i / 4][static_cast<int>(i % 4)] = static_cast<float>(std::max(cosine, 0.0) * brightness);
   }
 }
 
@@ -159,12 +160,14 @@ void add_placed(const Placement& scene, const Camera& camera, const RenderOption
     least = std::min(least, depths.back());
   }
   const DVec3 view_origin = rays.forward * least;
+  data.view_origin = view_origin;
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     const DevicePlaced& grid = scene.placed[i];
     ShaderPlaced& placed = data.placed.emplace_back();
     set_start(grid, spaces[i], rays, depths[i], options, placed);
     set_spaces(grid, spaces[i], view_origin, placed);
-    set_sun(grid.placed, sun, placed);
+    set_sun(grid.placed, sun, options.light.sun_brightness, placed);
+    placed.origin = IVec4(grid.origin, grid.placed.level);
     placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.level), 0.0F};
   }
   const double spread = rays.spread(least);
@@ -217,11 +220,12 @@ float capped(double value) {
 
 void set_light(const RenderOptions& options, ShaderFrame& frame) {
   const LightOptions& light = options.light;
-  frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
+  const auto sky = static_cast<float>(light.sky_brightness);
+  frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
   frame.lift = static_cast<float>(kRayLift);
-  frame.sky_zenith = {sky::kZenith, 0.0F};
-  frame.sky_horizon = {sky::kHorizon, 0.0F};
-  frame.sky_ground = {sky::kGround, 0.0F};
+  frame.sky_zenith = {sky * sky::kZenith, 0.0F};
+  frame.sky_horizon = {sky * sky::kHorizon, 0.0F};
+  frame.sky_ground = {sky * sky::kGround, 0.0F};
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
   frame.occlusion_count = light.occlusion_rays;
@@ -255,6 +259,25 @@ FrameData make_frame(const Placement& scene, const Camera& camera, const RenderO
   add_placed(scene, camera, options, rays, data);
   add_directions(options.light.occlusion_rays, data);
   return data;
+}
+
+std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin) {
+  std::vector<ShaderLamp> lamps;
+  lamps.reserve(table.lamps.size());
+  for (const PlacedLamp& from : table.lamps) {
+    ShaderLamp& lamp = lamps.emplace_back();
+    lamp.position = to_vec4(from.position - camera - view_origin, from.reach);
+    const std::array<double, 3> beside = {from.spread_squared, from.cos_inner, from.cos_outer};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<std::size_t>(axis);
+      lamp.axes[i] = to_vec4(from.axes[axis], beside[i]);
+    }
+    for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = {from.power[face], 0.0F};
+    lamp.low = to_vec4(from.low, !from.is_point ? 0.0 : from.cos_inner > -2.0 ? 2.0 : 1.0);
+    lamp.high = to_vec4(from.high);
+    lamp.direction = to_vec4(from.direction);
+  }
+  return lamps;
 }
 
 std::vector<float> srgb_thresholds() {

@@ -5,6 +5,7 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
 
+#include "light/lamp_table.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/march/shader_data.h"
 
@@ -18,10 +19,14 @@ struct FrameData {
   std::vector<Vec4> leaves;
   std::vector<Vec4> directions;
   std::vector<Vec4> turns;
+  DVec3 view_origin{0.0};  ///< of view space, in the world, from the camera
 };
 
 /// All that is in the world is made relative to the camera here, in double precision. Cost: O(instances).
 [[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
+
+/// A table's lamps, from where view space has its origin in the world.
+[[nodiscard]] std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin);
 
 /// The least light of each byte but the first: SrgbEncoder as a table.
 [[nodiscard]] std::vector<float> srgb_thresholds();

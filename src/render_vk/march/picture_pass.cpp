@@ -17,7 +17,7 @@ const char* const kDoing = "drawing";
 
 std::int64_t rays_of_pixel(const RenderOptions& options) {
   const LightOptions& light = options.light;
-  return 2 + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
+  return 2 + light.lamps + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
 }
 
 // The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass
@@ -73,11 +73,22 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   if (done) done = upload(data.leaves, frame_.leaves);
   if (done) done = upload(data.directions, frame_.directions);
   if (done) done = upload(data.turns, frame_.turns);
+  if (done) done = put_lamps(camera, data);
   if (done) done = upload(thresholds(), frame_.thresholds);
   if (done) done = make_tile_buffers(options);
   if (done) done = put_far(options);
   if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
   if (done) done = memory_->flush();
+  return done;
+}
+
+Status PicturePass::put_lamps(const Camera& camera, const FrameData& data) {
+  if (lamps_ == nullptr) return {};
+  frame_.flags |= kLamps;
+  frame_.lamp_mask = static_cast<std::uint32_t>(lamps_->bricks.size() - 1);
+  Status done = upload(shader_lamps(*lamps_, camera.position, data.view_origin), frame_.lamps);
+  if (done) done = upload(lamps_->bricks, frame_.lamp_bricks);
+  if (done) done = upload(lamps_->lists, frame_.lamp_lists);
   return done;
 }
 

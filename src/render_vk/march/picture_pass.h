@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/progress.h>
@@ -18,10 +20,15 @@ namespace quoin::vulkan {
 /// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
 class PicturePass {
  public:
-  /// `placement` is of `scene`.
+  /// `placement` is of `scene`, and so are `lamps`; null: none shines.
   PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
-              const Placement& placement)
-      : device_(&device), memory_(&memory), pipelines_(&pipelines), scene_(&scene), placement_(&placement) {}
+              const Placement& placement, std::shared_ptr<const LampTable> lamps)
+      : device_(&device),
+        memory_(&memory),
+        pipelines_(&pipelines),
+        scene_(&scene),
+        placement_(&placement),
+        lamps_(std::move(lamps)) {}
   ~PicturePass();
   PicturePass(const PicturePass&) = delete;
   PicturePass& operator=(const PicturePass&) = delete;
@@ -44,6 +51,7 @@ class PicturePass {
   Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame(const Camera& camera, const RenderOptions& options);
   Status put_far(const RenderOptions& options);
+  Status put_lamps(const Camera& camera, const FrameData& data);
   void find_hits(VkCommandBuffer commands, const ShaderPush& push) const;
   Status begin(const Camera& camera, const RenderOptions& options);
   Status make_tile_buffers(const RenderOptions& options);
@@ -63,6 +71,7 @@ class PicturePass {
   const Pipelines* pipelines_;
   const DeviceScene* scene_;
   const Placement* placement_;
+  std::shared_ptr<const LampTable> lamps_;
   const PictureImpl* target_ = nullptr;  // null: what is drawn is read
   std::vector<Place> places_;
   ShaderFrame frame_;

@@ -37,6 +37,7 @@ struct VulkanRenderer::Impl {
     if (chooser == nullptr || updated != voxels) chooser = std::make_unique<DetailChooser>();
     voxels = updated;
     instances = filter;
+    lamps.update();
     if (updated == nullptr) return detail.clear();
     chooser->update_types(updated->types);
     detail.look_at(*updated);
@@ -51,6 +52,12 @@ struct VulkanRenderer::Impl {
   const Scene* voxels = nullptr;
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
+  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const RenderOptions& render) {
+    if (render.light.lamps == 0 || voxels == nullptr) return nullptr;
+    return lamps.table(*voxels, scene.lamp_places(*voxels), render.light, render.threads);
+  }
+
+  LampCache lamps;
   std::uint64_t uploaded = 0;
 };
 

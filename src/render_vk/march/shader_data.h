@@ -50,6 +50,17 @@ struct ShaderPlaced {
   Vec4 start_low{0.0F};
   Vec4 start_x_low{0.0F};
   Vec4 start_y_low{0.0F};
+  IVec4 origin{0};
+};
+
+// What src/render_vk/shaders/lamps.glsl declares; bricks are LampTable::Brick.
+struct ShaderLamp {
+  Vec4 position{0.0F};
+  std::array<Vec4, 3> axes{};
+  std::array<Vec4, 6> power{};
+  Vec4 low{0.0F};
+  Vec4 high{0.0F};
+  Vec4 direction{0.0F};
 };
 
 /// An entry of a level of an impostor's; see far.glsl.
@@ -110,6 +121,7 @@ constexpr std::uint32_t kDetailColours = 128;
 constexpr std::uint32_t kUnlitOcclusion = 256;
 constexpr std::uint32_t kShowOcclusion = 512;
 constexpr std::uint32_t kShowNormals = 1024;
+constexpr std::uint32_t kLamps = 2048;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;
@@ -160,6 +172,10 @@ struct ShaderFrame {
   std::uint64_t far_parts = 0;
   std::uint64_t far_depths = 0;
   std::uint64_t far_numbers = 0;
+  std::uint64_t lamps = 0;
+  std::uint64_t lamp_bricks = 0;
+  std::uint64_t lamp_lists = 0;
+  std::uint64_t lamp_pad = 0;
   std::int32_t width = 0;
   std::int32_t height = 0;
   std::uint32_t flags = 0;
@@ -176,6 +192,8 @@ struct ShaderFrame {
   float sky_scale = 0.0F;
   float lift = 0.0F;
   std::uint32_t far_count = 0;
+  std::uint32_t lamp_mask = 0;
+  std::array<std::uint32_t, 3> pad{};
 };
 
 struct ShaderPush {
@@ -211,7 +229,8 @@ struct SwapPush {
 static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
-static_assert(sizeof(ShaderPlaced) == 368 && sizeof(ShaderFrame) == 15 * 16 + 20 * 8 + 16 * 4);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 15 * 16 + 24 * 8 + 20 * 4);
+static_assert(sizeof(ShaderLamp) == 13 * 16);
 static_assert(sizeof(ShaderPush) == 80 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -87,7 +87,8 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
   if (const Status status = check(camera, options); !status) return status.error();
   const auto subject = Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
+                           impl_->lamp_table(options));
   return pass.render(camera, options, progress);
 }
 
@@ -112,7 +113,8 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   }
   const auto subject = Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
-  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement());
+  vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
+                           impl_->lamp_table(options));
   return pass.draw(target, camera, options, progress);
 }
 

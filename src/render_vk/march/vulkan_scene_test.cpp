@@ -273,5 +273,60 @@ TEST_F(VulkanScene, RandomScenesFromRandomPlaces) {
   }
 }
 
+// A hut by night, with lamps of every kind.
+Scene lit_by_night(DVec3 origin) {
+  Scene scene;
+  const Types types = add_types(scene);
+  const VoxelType torch = add_type(scene, {255, 150, 60, 255}, Visibility::Opaque, 6.0F);
+  const VoxelType neon = add_type(scene, {80, 220, 255, 90}, Visibility::Transparent, 3.0F);
+  Grid grid = hut(types);
+  grid.fill_box({{-30, -1, -30}, {50, 0, 50}}, types.wall);
+  for (const IVec3 at : {IVec3{-6, 3, 4}, {22, 5, 9}, {9, 12, 24}, {9, 4, 30}}) grid.set(at, torch);
+  grid.fill_box({{-9, 0, 14}, {-8, 6, 17}}, neon);
+  const InstanceHandle first = place(scene, std::move(grid), origin);
+  scene.edit(first).rotation = glm::angleAxis(0.3, glm::normalize(DVec3(0, 3, 1)));
+  Instance other = scene.instances()[first];
+  other.position += DVec3(70, 4, 10);
+  other.voxel_size = 0.5;
+  other.mirrored = true;
+  scene.add_instance(other);
+  Lamp lamp;
+  lamp.position = origin + DVec3(30, 14, 20);
+  lamp.colour = {0.4F, 0.5F, 1.0F};
+  lamp.intensity = 60.0;
+  scene.lamps.push_back(lamp);
+  lamp.kind = Lamp::Kind::Spot;
+  lamp.position = origin + DVec3(-20, 25, 35);
+  lamp.direction = {1.0, -1.0, -0.8};
+  lamp.colour = Vec3(1.0F);
+  lamp.intensity = 300.0;
+  lamp.inner_angle = 0.1;
+  lamp.outer_angle = 0.45;
+  scene.lamps.push_back(lamp);
+  return scene;
+}
+
+TEST_F(VulkanScene, LampsOfEveryKind) {
+  RenderOptions options = sized(96, 72);
+  options.light.lamps = 64;
+  options.light.sun_brightness = 0.0;
+  options.light.sky_brightness = 0.05;
+  const Scene scene = lit_by_night({0, 0, 0});
+  const Camera camera = towards({50, 36, 76}, {12, 3, 9}, 1.0);
+  compare(scene, camera, options, "lamps");
+  options.light.lamps = 2;
+  compare(scene, camera, options, "two_lamps");
+  options.light.shadows = false;
+  compare(scene, camera, options, "lamps_without_shadows");
+  options.light = {};
+  options.light.lamps = 16;
+  options.light.occlusion_affects = OcclusionAffects::All;
+  options.samples = 2;
+  compare(scene, camera, options, "lamps_by_day");
+  const DVec3 far{1e9, -1e9, 1e9};
+  options.light.sun_brightness = 0.2;
+  compare(lit_by_night(far), towards(far + DVec3(50, 36, 76), far + DVec3(12, 3, 9), 1.0), options, "lamps_far");
+}
+
 }  // namespace
 }  // namespace quoin

@@ -130,14 +130,15 @@ Vec4 clip_point(const View& view, DVec3 in_view) {
 
 // The light of a face, which is linear in how open it is: without openness, and what that adds.
 std::array<float, 2> light_of(float diffuse, const LightOptions& options) {
+  const auto sky = static_cast<float>(options.sky_brightness);
   if (options.shading == Shading::Unlit) return {1.0F, 0.0F};
   if (options.shading == Shading::UnlitWithOcclusion) {
     const bool is_off = options.occlusion == OcclusionMode::Off;
     return is_off ? std::array{1.0F, 0.0F} : std::array{kLeastOfAll, 1.0F - kLeastOfAll};
   }
-  if (options.occlusion == OcclusionMode::Off) return {kAmbientWithoutOcclusion + diffuse, 0.0F};
-  if (options.occlusion_affects == OcclusionAffects::Ambient) return {diffuse, kAmbient};
-  const float all = kAmbient + diffuse;
+  if (options.occlusion == OcclusionMode::Off) return {sky * kAmbientWithoutOcclusion + diffuse, 0.0F};
+  if (options.occlusion_affects == OcclusionAffects::Ambient) return {diffuse, sky * kAmbient};
+  const float all = sky * kAmbient + diffuse;
   return {all * kLeastOfAll, all * (1.0F - kLeastOfAll)};
 }
 
@@ -153,7 +154,8 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
   out.clip[3] = clip_point(view, space.base_in_view);
   for (const Direction face : kDirections) {
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
-    out.light[static_cast<std::size_t>(face)] = light_of(static_cast<float>(std::max(cosine, 0.0)), light);
+    out.light[static_cast<std::size_t>(face)] =
+        light_of(static_cast<float>(std::max(cosine, 0.0) * light.sun_brightness), light);
   }
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
@@ -221,13 +223,14 @@ void set_frame(const View& view, const MeshPictureOptions& options, MeshFrameDat
                    to_vec4(view.rays.forward())};
   data.sky.room = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
   ShaderMeshFrame& frame = data.frame;
-  frame.sky_zenith = {sky::kZenith, 0.0F};
-  frame.sky_horizon = {sky::kHorizon, 0.0F};
-  frame.sky_ground = {sky::kGround, 0.0F};
+  const auto sky = static_cast<float>(options.light.sky_brightness);
+  frame.sky_zenith = {sky * sky::kZenith, 0.0F};
+  frame.sky_horizon = {sky * sky::kHorizon, 0.0F};
+  frame.sky_ground = {sky * sky::kGround, 0.0F};
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
-  frame.sun = to_vec4(to_sun(options.light));
-  frame.light = {kAmbient, kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
+  frame.sun = to_vec4(to_sun(options.light) * options.light.sun_brightness);
+  frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
   frame.exposure = options.light.shading == Shading::Lit ? exposure_of(options.light) : 1.0F;
 }
 

@@ -13,6 +13,7 @@ const uint kDetailColours = 128;
 const uint kUnlitOcclusion = 256;
 const uint kShowOcclusion = 512;
 const uint kShowNormals = 1024;
+const uint kLamps = 2048;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
@@ -50,6 +51,7 @@ struct Placed {
   vec4 start_low;
   vec4 start_x_low;
   vec4 start_y_low;
+  ivec4 origin;  // of the tree's coordinates, in the grid; w: how often that is halved
 };
 
 // What a pixel shows.
@@ -170,6 +172,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 far_parts;    // which of them show in which tile
   uvec2 far_depths;   // of the nearest at each pixel of a tile, as bits, and that one's number
   uvec2 far_numbers;
+  uvec2 lamps;
+  uvec2 lamp_bricks;
+  uvec2 lamp_lists;
+  uvec2 lamp_pad;
   int width;
   int height;
   uint flags;
@@ -186,6 +192,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float sky_scale;   // turns the way from an orthographic picture's middle into the tangent of an angle
   float lift;
   uint far_count;  // 0: nothing is drawn from impostors
+  uint lamp_mask;  // of slots of bricks
+  uint pad0;
+  uint pad1;
+  uint pad2;
 };
 
 layout(push_constant) uniform Push {

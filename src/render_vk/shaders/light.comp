@@ -7,6 +7,7 @@
 #include "glass.glsl"
 #include "count.glsl"
 #include "sky.glsl"
+#include "lamps.glsl"
 
 layout(constant_id = 0) const bool kHasGlass = true;
 
@@ -32,16 +33,6 @@ float sky_up(vec2 point) {
   if (has(kPerspective)) return camera_ray(point).direction.y;
   vec3 d = frame().forward.xyz + picture_vector(point) * frame().sky_scale;
   return d.y / length(d);
-}
-
-// A well-mixed number of one.
-uint mixed(uint x) {
-  x = (x ^ (x >> 16)) * 0x7FEB352Du;
-  x = (x ^ (x >> 15)) * 0x846CA68Bu;
-  return x ^ (x >> 16);
-}
-uint hash_of(uint a, uint b) {
-  return mixed(a * 0x9E3779B9u + b * 0x85EBCA6Bu + 0x27D4EB2Fu);
 }
 
 vec3 occlusion_direction(uint face, int ray, uint hash) {
@@ -236,6 +227,37 @@ vec3 unlit_colour(Point point, uint slot, vec3 colour) {
   return colour * (least + (1.0 - least) * openness);
 }
 
+// What lamps add to a surface point.
+vec3 trace_lamps(Point point, Placed placed, uint slot) {
+  int level = placed.origin.w;
+  uvec2 list = lamps_at(((point.voxel.xyz + placed.origin.xyz) << level) >> 4, point.voxel.w);
+  uint face = point.what.y;
+  int axis = axis_of(face);
+  ivec3 base = point.voxel.xyz & ~63;
+  vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
+  origin[axis] += frame().lift / placed.ref_view.w * sign_of(face);
+  float voxel_size = placed.ref_inside.w;
+  vec3 normal = placed.view_axes[axis].xyz * (sign_of(face) / voxel_size);
+  vec3 from = view_from_grid(placed, GridRay(base, origin, vec3(0.0), 0.0)).origin;
+  vec3 sum = vec3(0.0);
+  for (uint i = 0; i < list.y; ++i) {
+    Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[list.x + i]];
+    vec3 direction;
+    float reach;
+    vec3 light = lamp_light(lamp, lamp.position.xyz - from, normal, direction, reach);
+    if (light == vec3(0.0)) continue;
+    if (has(kShadows) && reach > 0.0) {
+      GridRay ray = GridRay(base, origin, turned(placed.grid_axes, direction) * voxel_size, 0.0);
+      float max_t = reach / voxel_size;
+      ++rays_taken;
+      if (is_blocked(point.voxel.w, placed, ray, max_t)) continue;
+      if (kHasGlass) light *= sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
+    }
+    sum += light;
+  }
+  return sum;
+}
+
 vec3 light_of(Point point, uint slot) {
   Surface surface = surface_of(point.what.x);
   if (has(kDetailColours)) {
@@ -248,7 +270,9 @@ vec3 light_of(Point point, uint slot) {
   if (kind_of(point) == kSurface) {
     vec3 sunlight;
     float openness;
-    trace_light(point, placed_at(point.voxel.w), slot, sunlight, openness);
+    Placed placed = placed_at(point.voxel.w);
+    trace_light(point, placed, slot, sunlight, openness);
+    if (has(kLamps)) sunlight += trace_lamps(point, placed, slot);
     vec4 share = frame().light;
     vec3 light = share.x * openness + sunlight;
     if (!has(kOcclusionRays) && !has(kOcclusionVertex)) {

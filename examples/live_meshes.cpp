@@ -1,0 +1,90 @@
+// Meshes that follow a world while it is edited: workers mesh snapshots, so the game's own thread never waits. A crater
+// field is blown into a plain, a blast a frame: OUT.png, or craters.png, shows the world at the end.
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <tuple>
+
+#include <quoin/io/picture_files.h>
+#include <quoin/live/live_meshes.h>
+#include <quoin/render/cpu_renderer.h>
+
+namespace {
+
+quoin::Result<quoin::GridHandle> add_plain(quoin::Scene& scene) {
+  quoin::SceneGrid plain;
+  int top = 0;
+  for (const auto& [colour, height] :
+       {std::pair{quoin::Rgba8{104, 100, 98, 255}, 10}, {{134, 98, 66, 255}, 6}, {{92, 138, 62, 255}, 2}}) {
+    quoin::VoxelProperties properties;
+    properties.colour = colour;
+    const auto type = scene.types.add(properties);
+    if (!type) return type.error();
+    plain.grid.fill_box({{0, top, 0}, {256, top + height, 256}}, *type);
+    top += height;
+  }
+  const quoin::GridHandle handle = scene.add_grid(std::move(plain));
+  scene.add_instance({"", handle});
+  return handle;
+}
+
+// What a renderer would hold: here only how many triangles there are.
+class Shown {
+ public:
+  void apply(const std::vector<quoin::SurfaceUpdate>& updates) {
+    for (const quoin::SurfaceUpdate& update : updates) {
+      surfaces_[{update.chunk.x, update.chunk.y, update.chunk.z}] = update.surface;  // null: nothing is seen there
+    }
+  }
+  [[nodiscard]] std::int64_t triangles() const {
+    std::int64_t sum = 0;
+    for (const auto& [chunk, surface] : surfaces_) sum += surface == nullptr ? 0 : surface->triangles();
+    return sum;
+  }
+
+ private:
+  std::map<std::tuple<int, int, int>, std::shared_ptr<const quoin::ChunkSurface>> surfaces_;
+};
+
+quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
+  quoin::RenderOptions options;
+  options.width = 480;
+  options.height = 270;
+  options.samples = 4;
+  const quoin::Camera camera = quoin::frame_scene(scene, quoin::View::Iso, 480.0 / 270.0);
+  const auto picture = quoin::CpuRenderer(scene).render(camera, options);
+  if (!picture) return picture.error();
+  const auto size = quoin::write_png(picture->colour, path);
+  return size ? quoin::Status() : size.error();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  quoin::Scene scene;
+  const auto plain = add_plain(scene);
+  if (!plain) return 1;
+  const quoin::DVec3 eye{128.0, 60.0, 128.0};  // chunks near to it come first
+
+  quoin::LiveMeshes meshes{quoin::LiveMeshOptions{}};
+  Shown shown;
+  unsigned random = 1;
+  for (int frame = 0; frame < 60; ++frame) {
+    random = random * 1'664'525U + 1'013'904'223U;
+    const quoin::DVec3 blast{static_cast<double>(random >> 24), 18.0, static_cast<double>(random >> 16 & 255)};
+    scene.edit(*plain).grid.fill_sphere(blast, 5.0 + frame % 9, quoin::kAir);
+    meshes.update(scene, eye);   // takes over what was edited; the cost is that of the change
+    shown.apply(meshes.take());  // what workers have finished, to be uploaded
+  }
+  meshes.finish(scene, eye);
+  shown.apply(meshes.take());
+  const quoin::LiveMeshes::Stats stats = meshes.stats();
+  std::printf("%lld triangles; chunks were meshed %lld times, the last in %.2f ms\n",
+              static_cast<long long>(shown.triangles()), static_cast<long long>(stats.chunks_meshed),
+              1e3 * stats.last_mesh_seconds);
+  const quoin::Status status = draw(scene, argc > 1 ? argv[1] : "craters.png");
+  if (!status) std::fprintf(stderr, "live_meshes: %s\n", quoin::to_string(status.error()).c_str());
+  return status && shown.triangles() > 0 && meshes.pending() == 0 ? 0 : 1;
+}

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/vec.h>
+#include <quoin/light/light_options.h>
+#include <quoin/scene/scene.h>
+#include <quoin/trace/occupancy_tree.h>
+
+#include "light/emissive_cells.h"
+#include "light/occlusion_directions.h"
+
+namespace quoin {
+
+/// What lights others: a Lamp, or the emissive voxels of a cell.
+struct PlacedLamp {
+  DVec3 position{0.0};          ///< in the world
+  glm::dmat3 axes{1.0};         ///< its own axes in the world, unit columns
+  std::array<Vec3, 6> power{};  ///< the light of a white surface that faces it, times the distance's square, of what
+                                ///< shines into each direction of its axes; `power[0]` where it is a point
+  double spread_squared = 0.0;  ///< world units: added to the distance's square
+  DVec3 low{0.0};               ///< its box, from `position` along its axes, in world units: shadow rays end there
+  DVec3 high{0.0};
+  double reach = 0.0;  ///< world units: it fades away towards there
+  bool is_point = false;
+  DVec3 direction{0.0};  ///< a spot's, unit
+  double cos_inner = -2.0;
+  double cos_outer = -3.0;
+};
+
+/// How a lamp lights a point.
+struct LampRay {
+  Vec3 light{0.0F};        ///< of a white surface, if nothing is in between; 0: none
+  DVec3 direction{0.0};    ///< towards the lamp, unit, in the world
+  double distance = -1.0;  ///< world units up to where the lamp begins; not positive: the point lies in it
+};
+
+/// Requires: `normal` is unit. `to_lamp`: from the point to the lamp's position. Both in the world.
+[[nodiscard]] LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal);
+
+/// The lamps of a scene, and which of them light which part of it.
+///
+/// Each brick of 16^3 voxels of each placed grid has a list of the lamps that reach it; where these are more than
+/// `max_lamps`, those that can add most to it, the first of equal ones. So what lights a surface depends on where it
+/// is, and on nothing of the picture.
+struct LampTable {
+  static constexpr int kBrick = 16;
+
+  /// A list; `count` 0: none. Open addressing by `slot_of`.
+  struct Brick {
+    IVec3 brick{0};
+    std::int32_t placed = 0;
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    std::uint32_t pad[2]{};
+  };
+  std::vector<PlacedLamp> lamps;
+  std::vector<Brick> bricks;  ///< a power of two
+  std::vector<std::uint32_t> lists;
+
+  [[nodiscard]] static std::uint32_t slot_of(IVec3 brick, std::int32_t placed) {
+    const auto bits = [](int coordinate) { return static_cast<std::uint32_t>(coordinate); };
+    return hash_of(hash_of(bits(brick.x), bits(brick.y)), hash_of(bits(brick.z), bits(placed)));
+  }
+  /// Of a brick of a placed grid: voxel coordinates of the full grid / 16, rounded down.
+  [[nodiscard]] std::span<const std::uint32_t> at(IVec3 brick, std::int32_t placed) const;
+};
+
+/// A grid in its place.
+struct LampPlace {
+  GridHandle grid;
+  const Grid* voxels = nullptr;
+  DVec3 pivot{0.0};
+  glm::dmat3 axes{1.0};
+  DVec3 position{0.0};
+  double voxel_size = 1.0;
+  const OccupancyTree* opaque = nullptr;
+  const OccupancyTree* transparent = nullptr;  ///< may be null
+};
+
+/// Makes the table of a scene when it is first asked for after an `update`. Threads: any number may call `table`.
+class LampCache {
+ public:
+  /// The scene was edited, or its instances are others.
+  void update();
+
+  /// `places`: in the order of SceneTracer::placed. Null where nothing shines, or the options want no lamps.
+  /// Cost: emissive cells of the chunks that changed; for each brick the lamps near it.
+  [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, std::span<const LampPlace> places,
+                                                       const LightOptions& light, Threads threads);
+
+ private:
+  std::mutex mutex_;
+  std::map<GridHandle, EmissiveCells> cells_;
+  std::shared_ptr<const LampTable> table_;
+  int max_lamps_ = 0;  // of the table; 0: it is out of date
+  double brightness_ = 0.0;
+};
+
+}  // namespace quoin

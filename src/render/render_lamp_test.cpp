@@ -1,0 +1,286 @@
+// Pictures lit by lamps: points, spots and voxels that emit light.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "light/emissive_cells.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr Rgba8 kWhite{255, 255, 255, 255};
+
+RenderOptions by_night(int width, int height) {
+  RenderOptions options = sized(width, height);
+  options.light.occlusion = OcclusionMode::Off;
+  options.light.sun_brightness = 0.0;
+  options.light.sky_brightness = 0.0;
+  options.light.lamps = 64;
+  return options;
+}
+
+// The y = 0 plane is the top of a white floor from -40 to 40.
+Scene floor_by_night() {
+  Scene scene;
+  const VoxelType white = add_type(scene, kWhite);
+  Grid grid;
+  grid.fill_box({{-40, -1, -40}, {40, 0, 40}}, white);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+double fading(double distance, double reach) {
+  return std::pow(1.0 - std::pow(distance / reach, 4.0), 2.0);
+}
+
+void expect_grey(const Picture& picture, int x, int y, double light) {
+  const Pixel found = pixel_at(picture, x, y);
+  const Pixel expected = encoded(Vec3(static_cast<float>(light)));
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 1) << x << ", " << y;
+}
+
+// The middle of a pixel of a picture from above that is `height` high.
+DVec3 floor_at(int x, int y, int size, double height) {
+  return {((x + 0.5) / size - 0.5) * height, 0.0, ((y + 0.5) / size - 0.5) * height};
+}
+
+TEST(RenderLamps, APointFallsOffWithTheSquareOfTheDistance) {
+  Scene scene = floor_by_night();
+  Lamp lamp;
+  lamp.position = {3.0, 5.0, -2.0};
+  lamp.intensity = 20.0;
+  lamp.range = 30.0;
+  scene.lamps.push_back(lamp);
+  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(40, 40));
+  for (int y = 1; y < 40; y += 6) {
+    for (int x = 1; x < 40; x += 6) {
+      const DVec3 to = lamp.position - floor_at(x, y, 40, 40) - DVec3(0.0, 0.01, 0.0);
+      const double d = glm::length(to);
+      expect_grey(picture, x, y, d < 30.0 ? 20.0 * (to.y / d) / (d * d) * fading(d, 30.0) : 0.0);
+    }
+  }
+  EXPECT_EQ(picture.pixels_hit, 1600);
+  EXPECT_EQ(pixel_at(picture, 0, 39), (Pixel{0, 0, 0})) << "beyond its range";
+}
+
+TEST(RenderLamps, ASpotLightsItsCone) {
+  Scene scene = floor_by_night();
+  Lamp lamp;
+  lamp.kind = Lamp::Kind::Spot;
+  lamp.position = {0.0, 10.0, 0.0};
+  lamp.direction = {0.0, -7.0, 0.0};
+  lamp.intensity = 50.0;
+  lamp.inner_angle = 0.2;
+  lamp.outer_angle = 0.5;
+  scene.lamps.push_back(lamp);
+  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(80, 80));
+  for (int x = 0; x < 80; ++x) {
+    const DVec3 to = lamp.position - floor_at(x, 40, 80, 40) - DVec3(0.0, 0.01, 0.0);
+    const double d = glm::length(to);
+    const double cone = std::clamp((to.y / d - std::cos(0.5)) / (std::cos(0.2) - std::cos(0.5)), 0.0, 1.0);
+    expect_grey(picture, x, 40, cone * cone * 50.0 * (to.y / d) / (d * d));
+  }
+}
+
+TEST(RenderLamps, ThingsCastShadowsUnlessToldNotTo) {
+  Scene scene = floor_by_night();
+  Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
+  grid.fill_box({{4, 0, -10}, {5, 4, 10}}, 1);
+  Lamp lamp;
+  lamp.position = {0.0, 2.0, 0.0};
+  lamp.intensity = 10.0;
+  scene.lamps.push_back(lamp);
+  RenderOptions options = by_night(40, 40);
+  const Camera camera = from_above(0, 20, 0, 40);
+  EXPECT_EQ(pixel_at(taken(scene, camera, options), 27, 20), (Pixel{0, 0, 0})) << "behind the wall";
+  EXPECT_GT(pixel_at(taken(scene, camera, options), 13, 20)[0], 30) << "on the other side";
+  options.light.shadows = false;
+  EXPECT_GT(pixel_at(taken(scene, camera, options), 27, 20)[0], 30);
+}
+
+// One voxel, as a lamp of six faces: near to what the faces themselves give.
+TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
+  Scene scene = floor_by_night();
+  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
+  Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
+  grid.set({0, 6, 0}, torch);
+  const Picture picture = taken(scene, from_above(0.5, 4, 0.5, 40), by_night(80, 80));
+  const double reach = std::sqrt(4096.0 * std::sqrt(3.0) * 6.0 / std::numbers::pi);
+  for (int x = 2; x < 80; x += 7) {
+    const DVec3 at = floor_at(x, 30, 80, 40) + DVec3(0.5, 0.0, 0.5);
+    // 16 x 16 patches of each face.
+    double sum = 0.0;
+    for (const Direction face : kDirections) {
+      const FaceFrame& frame = frame_of(face);
+      for (int i = 0; i < 256; ++i) {
+        DVec3 patch(0.0, 6.0, 0.0);
+        patch[frame.axis] += frame.sign > 0 ? 1.0 : 0.0;
+        patch[frame.u] += (i % 16 + 0.5) / 16;
+        patch[frame.v] += (i / 16 + 0.5) / 16;
+        const DVec3 to = patch - at;
+        const double d = glm::length(to);
+        const double shining = -frame.sign * to[frame.axis] / d;
+        if (shining > 0.0) sum += 6.0 / std::numbers::pi / 256 * shining * (to.y / d) / (d * d);
+      }
+    }
+    const double d = glm::length(DVec3(0.5, 6.5, 0.5) - at);
+    const Pixel found = pixel_at(picture, x, 30);
+    const Pixel expected = encoded(Vec3(static_cast<float>(sum * fading(d, reach))));
+    EXPECT_NEAR(found[0], expected[0], 3) << x;
+  }
+}
+
+TEST(RenderLamps, AClosedLanternLightsNothing) {
+  Scene scene = floor_by_night();
+  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 50.0F);
+  Grid& grid = scene.edit(scene.grids().handles()[0]).grid;
+  grid.fill_box({{-2, 3, -2}, {3, 8, 3}}, 1);
+  grid.fill_box({{-1, 4, -1}, {2, 7, 2}}, kAir);
+  grid.set({0, 5, 0}, torch);
+  const RenderOptions options = by_night(40, 40);
+  const Picture picture = taken(scene, towards({0, 2, 30}, {0, 0, 0}, 1.0), options);
+  EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
+  scene.edit(scene.grids().handles()[0]).grid.fill_box({{-2, 5, -1}, {-1, 6, 2}}, kAir);
+  const Picture open = taken(scene, towards({-30, 12, 0}, {0, 0, 0}, 1.0), options);
+  EXPECT_GT(*std::max_element(open.colour.rgb.begin(), open.colour.rgb.end()), 100);
+}
+
+TEST(RenderLamps, LightFollowsEditsAndTypes) {
+  Scene scene = floor_by_night();
+  const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 9.0F);
+  const GridHandle grid = scene.grids().handles()[0];
+  CpuRenderer renderer(scene);
+  const RenderOptions options = by_night(8, 8);
+  const auto light = [&] {
+    renderer.update();
+    return pixel_at(renderer.render(from_above(3, 2, 0, 1), options).value(), 4, 4)[0];
+  };
+  EXPECT_EQ(light(), 0);
+  scene.edit(grid).grid.set({0, 3, 0}, torch);
+  const int lit = light();
+  EXPECT_GT(lit, 20);
+  VoxelProperties brighter = scene.types[torch];
+  brighter.emission = 30.0F;
+  scene.types.replace(torch, brighter);
+  EXPECT_GT(light(), lit);
+  scene.lamps.push_back({"", Lamp::Kind::Point, {3, 4, 0}});
+  const int both = light();
+  scene.edit(grid).grid.set({0, 3, 0}, kAir);
+  EXPECT_LT(light(), both);
+  scene.lamps.clear();
+  EXPECT_EQ(light(), 0);
+}
+
+TEST(RenderLamps, GlassTintsTheirLight) {
+  Scene scene = floor_by_night();
+  const VoxelType glass = add_type(scene, {255, 40, 40, 200}, Visibility::Transparent);
+  scene.edit(scene.grids().handles()[0]).grid.fill_box({{-20, 3, -20}, {20, 4, 20}}, glass);
+  Lamp lamp;
+  lamp.position = {0.0, 8.0, 0.0};
+  lamp.intensity = 60.0;
+  scene.lamps.push_back(lamp);
+  const Pixel tinted = pixel_at(taken(scene, from_above(2, 2, 2, 1), by_night(2, 2)), 0, 0);
+  EXPECT_GT(tinted[0], 20);
+  EXPECT_LT(tinted[1], tinted[0] / 2) << "red";
+}
+
+// Whatever else is in the picture.
+TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
+  Scene scene = floor_by_night();
+  for (int i = 0; i < 200; ++i) {
+    Lamp lamp;
+    lamp.position = {-35.0 + i % 20 * 3.7, 1.5 + i % 3, -35.0 + i / 20 * 7.1};
+    lamp.colour = {0.2F + static_cast<float>(i % 3) * 0.4F, 0.5F, 0.2F + static_cast<float>(i % 5) * 0.2F};
+    lamp.intensity = 0.3 + i % 7;
+    scene.lamps.push_back(lamp);
+  }
+  RenderOptions options = by_night(96, 96);
+  options.light.lamps = 6;
+  const Picture whole = taken(scene, from_above(0, 50, 0, 48), options);
+  options.width = options.height = 32;
+  const Picture part = taken(scene, from_above(8, 50, -8, 16), options);
+  int different = 0;
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 32; ++x) different += pixel_at(part, x, y) != pixel_at(whole, x + 48, y + 16);
+  }
+  EXPECT_EQ(different, 0);
+  options.threads = {1};
+  EXPECT_EQ(taken(scene, from_above(8, 50, -8, 16), options).colour.rgb, part.colour.rgb);
+  options.light.lamps = 200;
+  EXPECT_GT(count_different(taken(scene, from_above(8, 50, -8, 16), options), part, 1), 500) << "more add more";
+}
+
+TEST(RenderLamps, AreOffUnlessAskedFor) {
+  Scene scene = floor_by_night();
+  const Camera camera = towards({0, 20, 30}, {0, 0, 0}, 0.8);
+  RenderOptions options = sized(32, 32);
+  options.light.exposure = 0.3;
+  const Picture before = taken(scene, camera, options);
+  scene.lamps.push_back({"", Lamp::Kind::Point, {0, 4, 0}});
+  EXPECT_EQ(taken(scene, camera, options).colour.rgb, before.colour.rgb);
+  options.light.lamps = 64;
+  EXPECT_NE(taken(scene, camera, options).colour.rgb, before.colour.rgb);
+  options.light.lamps = -1;
+  EXPECT_FALSE(CpuRenderer(scene).render(camera, options).has_value());
+}
+
+TEST(RenderLamps, BadOnesLightNothing) {
+  Scene scene = floor_by_night();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 6; ++i) {
+    Lamp lamp;
+    lamp.position = {0, 4, 0};
+    lamp.kind = Lamp::Kind::Spot;
+    if (i == 0) lamp.position.x = nan;
+    if (i == 1) lamp.intensity = infinity;
+    if (i == 2) lamp.intensity = -1.0;
+    if (i == 3) lamp.range = nan;
+    if (i == 4) lamp.direction = DVec3(0.0);
+    if (i == 5) lamp.colour.x = std::numeric_limits<float>::quiet_NaN();
+    scene.lamps.push_back(lamp);
+  }
+  const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));
+  EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
+}
+
+TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
+  const VoxelType glow = add_type(scene, {60, 220, 90, 120}, Visibility::Transparent, 2.0F);
+  Grid grid;
+  EmissiveCells kept;
+  std::uint32_t random = 7;
+  const auto below = [&](std::uint32_t limit) {
+    random = random * 1'664'525U + 1'013'904'223U;
+    return static_cast<int>((random >> 8) % limit);
+  };
+  for (int round = 0; round < 60; ++round) {
+    const IVec3 at{below(90) - 20, below(90) - 20, below(90) - 20};
+    const std::array<VoxelType, 4> types = {kAir, stone, torch, glow};
+    grid.fill_box({at, at + 1 + below(6)}, types.at(static_cast<std::size_t>(below(4))));
+    kept.update(grid, scene.types);
+    EmissiveCells fresh;
+    fresh.update(grid, scene.types);
+    std::vector<EmissiveCell> a;
+    std::vector<EmissiveCell> b;
+    kept.for_each([&](const EmissiveCell& cell) { a.push_back(cell); });
+    fresh.for_each([&](const EmissiveCell& cell) { b.push_back(cell); });
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].centre, b[i].centre);
+      ASSERT_EQ(a[i].power, b[i].power);
+      ASSERT_EQ(a[i].box.min, b[i].box.min);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin
