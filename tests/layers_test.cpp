@@ -30,14 +30,15 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "trace"}},
     {"grid/chunk/packed_row.h", {"mesh", "trace"}},
     {"grid/chunk_boxes.h", {"trace"}},
-    {"grid/chunk_order.h", {"live", "mesh"}},
+    {"grid/chunk_order.h", {"light", "live", "mesh"}},
     {"grid/coordinate_hash.h", {"live", "trace"}},
     {"grid/density/density_storage.h", {"mesh"}},
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/long_box.h", {"live"}},
     {"light/corner_light.h", {"render"}},
     {"light/glass.h", {"render"}},
-    {"light/light_model.h", {"render_vk"}},
+    {"light/lamp_table.h", {"render_vk"}},
+    {"light/light_model.h", {"render", "render_vk"}},
     {"light/lighting.h", {"render"}},
     {"light/occlusion_directions.h", {"render", "render_vk"}},
     {"light/sky.h", {"render", "render_vk"}},
@@ -55,7 +56,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/instance_tree.h", {"render_vk"}},
     {"scene/tracer/tree_cache.h", {"render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
-    {"trace/tree_view.h", {"render", "render_vk"}},
+    {"trace/tree_view.h", {"light", "render", "render_vk"}},
 };
 
 // A folder with more files is several rooms in one.

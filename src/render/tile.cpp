@@ -9,7 +9,6 @@
 
 #include "core/srgb.h"
 #include "light/light_model.h"
-#include "light/sky.h"
 #include "render/on_face.h"
 
 namespace quoin {

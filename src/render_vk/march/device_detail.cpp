@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "scene/tracer/scene_tracer_impl.h"
@@ -55,7 +56,9 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
   const auto put = [&]() -> Status {
     if (Status done = put_halved(device, scene, detail.selected, options.threads, placement); !done) return done;
     const FarImpostors& far = detail.far;
-    if (Status done = impostors_.draw(scene, far, screen, options.width, options.height, placement); !done) return done;
+    const bool waits = options.impostor_seconds == std::numeric_limits<double>::infinity();
+    Status done = impostors_.draw(scene, far, screen, options.width, options.height, waits, placement);
+    if (!done) return done;
     return memory_->flush();
   };
   // What was half put in place is not kept, whether the device's memory ran out or ours.

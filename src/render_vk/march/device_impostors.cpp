@@ -17,24 +17,27 @@ Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
 }
 
-std::vector<ShaderFarFace> faces_of(const ImpostorFaces::Level& level) {
+const ImpostorFaces::Level& level_of(const ImpostorFaces& faces, std::size_t level) {
+  return level < ImpostorFaces::kLevels ? faces.levels[level] : faces.unseen;
+}
+
+// What fills groups up no view saw, so shaders pass it by.
+std::vector<ShaderFarFace> packed(const ImpostorFaces::Level& level, std::size_t first, std::size_t count) {
   std::vector<ShaderFarFace> faces;
-  for (std::uint32_t direction = 0; direction < 6; ++direction) {
-    for (std::size_t i = level.begin[direction]; i < level.begin[direction + 1]; ++i) {
-      if (level.views[i] == 0) continue;  // fills a group up
-      faces.push_back({{level.centre[0][i], level.centre[1][i], level.centre[2][i], 0.0F},
-                       level.face[i],
-                       level.views[i],
-                       direction});
-    }
+  faces.reserve(count);
+  std::uint32_t direction = 0;
+  for (std::size_t i = first; i < first + count; ++i) {
+    while (i >= level.begin[direction + 1]) ++direction;
+    faces.push_back(
+        {{level.centre[0][i], level.centre[1][i], level.centre[2][i], 0.0F}, level.face[i], level.views[i], direction});
   }
   return faces;
 }
 
-std::vector<ShaderVoxelFace> faces_of(const ImpostorFaces& impostor) {
+std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t first, std::size_t count) {
   std::vector<ShaderVoxelFace> faces;
-  faces.reserve(impostor.faces.size());
-  for (const ImpostorFaces::Face& face : impostor.faces) {
+  faces.reserve(count);
+  for (const ImpostorFaces::Face& face : std::span(impostor.faces).subspan(first, count)) {
     faces.push_back({face.voxel, std::uint32_t{face.type} | std::uint32_t{face.occlusion} << 16 |
                                      static_cast<std::uint32_t>(face.direction) << 24 |
                                      std::uint32_t{face.open_rays} << 27});
@@ -92,49 +95,92 @@ std::uint32_t groups_of(std::uint32_t faces) {
 
 }  // namespace
 
-Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Entry& entry) {
-  entry.last_use = picture_;
-  if (entry.impostor == impostor) return {};
-  memory_->release(entry.place);
-  entry.impostor = nullptr;
+void DeviceImpostors::release(Entry& entry) {
+  memory_->release(entry.whole.place);
+  memory_->release(entry.next.place);
+}
+
+Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
+  memory_->release(sent.place);
+  sent = {};
   const ImpostorFaces& from = impostor->faces();
-  std::vector<ShaderFarFace> all;
-  for (std::size_t i = 0; i < entry.levels.size(); ++i) {
-    const bool is_unseen = i == ImpostorFaces::kLevels;
-    const std::vector<ShaderFarFace> some = faces_of(is_unseen ? from.unseen : from.levels[i]);
-    entry.levels[i] = {all.size() * sizeof(ShaderFarFace), static_cast<std::uint32_t>(some.size()), ~0U};
-    all.insert(all.end(), some.begin(), some.end());
+  std::uint64_t bytes = 0;
+  for (std::size_t i = 0; i < sent.levels.size(); ++i) {
+    const std::size_t count = level_of(from, i).views.size();
+    sent.levels[i] = {bytes, static_cast<std::uint32_t>(count), ~0U};
+    bytes += count * sizeof(ShaderFarFace);
   }
-  const std::vector<ShaderVoxelFace> faces = faces_of(from);
-  const auto of_levels = std::as_bytes(std::span(all));
-  const auto of_faces = std::as_bytes(std::span(faces));
-  const auto place = memory_->allocate(of_levels.size() + of_faces.size(), "uploading impostors");
+  const auto place = memory_->allocate(bytes + from.faces.size() * sizeof(ShaderVoxelFace), "uploading impostors");
   if (!place) return place.error();
-  entry.place = *place;
-  for (ShaderFarLevel& level : entry.levels) level.faces += place->address;
-  entry.faces = place->address + of_levels.size();
-  Status done = memory_->write(entry.place, of_levels);
-  if (done) done = memory_->write(entry.place, of_faces, of_levels.size());
-  if (done) entry.impostor = impostor;
+  sent.place = *place;
+  for (ShaderFarLevel& level : sent.levels) level.faces += place->address;
+  sent.faces = place->address + bytes;
+  sent.impostor = impostor;
+  return {};
+}
+
+Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
+  const ImpostorFaces& from = sent.impostor->faces();
+  Status done;
+  while (done && sent.part < kParts && faces_left > 0) {
+    const bool is_level = sent.part < sent.levels.size();
+    const std::size_t all = is_level ? level_of(from, sent.part).views.size() : from.faces.size();
+    const std::size_t count = std::min(all - sent.at, faces_left);
+    if (is_level) {
+      const std::vector<ShaderFarFace> some = packed(level_of(from, sent.part), sent.at, count);
+      const std::uint64_t first = sent.levels[sent.part].faces - sent.place.address;
+      done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderFarFace));
+    } else {
+      const std::vector<ShaderVoxelFace> some = packed(from, sent.at, count);
+      const std::uint64_t first = sent.faces - sent.place.address;
+      done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderVoxelFace));
+    }
+    faces_left -= count;
+    sent.at += count;
+    if (sent.at < all) continue;
+    ++sent.part;
+    sent.at = 0;
+  }
   return done;
 }
 
+Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Entry& entry, std::size_t& faces_left) {
+  const bool is_known = entry.last_use == picture_;
+  entry.last_use = picture_;
+  if (is_known || entry.whole.impostor == impostor) return {};
+  // What was begun is ended first, or an edit a frame would keep it from ever being whole; but who waits wants the last.
+  const bool waits = faces_left == std::numeric_limits<std::size_t>::max();
+  if (entry.next.impostor == nullptr || (waits && entry.next.impostor != impostor)) {
+    if (Status done = begin(impostor, entry.next); !done) return done;
+  }
+  std::size_t left = faces_left;
+  if (Status done = send_some(entry.next, left); !done) return done;
+  if (!waits) faces_left = left;
+  if (entry.next.part < kParts) return {};
+  memory_->release(entry.whole.place);
+  entry.whole = std::exchange(entry.next, {});
+  return {};
+}
+
 Status DeviceImpostors::draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
-                             int height, Placement& placement) {
+                             int height, bool waits, Placement& placement) {
   ++picture_;
+  std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAPicture;
   std::uint64_t number = 0;
   auto next = placement.placed.begin();
   for (const FarInstance& instance : far.instances) {
     next = find_placed(next, placement.placed.end(), instance.instance);
     if (next == placement.placed.end()) break;
     if (next->placed.instance != instance.instance) continue;
+    const GridHandle grid = scene.instances()[instance.instance].grid;
+    Entry& entry = entries_[grid];
+    if (Status done = put(far.kept.find(grid)->second, entry, faces_left); !done) return done;
+    if (entry.whole.impostor == nullptr) continue;  // it is traced
     next->is_far = true;
     const auto index = static_cast<std::int32_t>(next - placement.placed.begin());
-    const auto drawn = screen.drawn(next->placed, index, *instance.impostor);
+    const auto drawn = screen.drawn(next->placed, index, *entry.whole.impostor);
     if (!drawn) continue;
-    const GridHandle grid = scene.instances()[instance.instance].grid;
-    if (Status done = put(far.kept.find(grid)->second, entries_[grid]); !done) return done;
-    ShaderFar shown = shader_far(entries_[grid], *drawn);
+    ShaderFar shown = shader_far(entry.whole, *drawn);
     set_aim(*drawn, width, height, shown);
     shown.origin = IVec4(next->origin, index);
     shown.first_number = static_cast<std::uint32_t>(number);
@@ -147,15 +193,15 @@ Status DeviceImpostors::draw(const Scene& scene, const FarImpostors& far, const 
 }
 
 // What it is drawn from.
-ShaderFar DeviceImpostors::shader_far(const Entry& entry, const DrawnImpostor& drawn) {
+ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& drawn) {
   const ImpostorFaces::Level& level = drawn.faces->levels[drawn.level];
   const ImpostorFaces::Level& unseen = drawn.faces->unseen;
   ShaderFar far;
   far.size = {level.half, unseen.half, reach_of(level), reach_of(unseen)};
-  far.level = entry.levels[drawn.level];
+  far.level = sent.levels[drawn.level];
   far.level.views = drawn.views;
-  if (drawn.has_unseen()) far.unseen = entry.levels.back();
-  far.faces = entry.faces;
+  if (drawn.has_unseen()) far.unseen = sent.levels.back();
+  far.faces = sent.faces;
   return far;
 }
 
@@ -166,15 +212,15 @@ void DeviceImpostors::drop_unused(std::uint64_t max_bytes) {
       return a.second.last_use < b.second.last_use;
     });
     if (oldest == entries_.end() || oldest->second.last_use == picture_) return;
-    held -= oldest->second.place.size;
-    memory_->release(oldest->second.place);
+    held -= oldest->second.whole.place.size + oldest->second.next.place.size;
+    release(oldest->second);
     entries_.erase(oldest);
   }
 }
 
 std::uint64_t DeviceImpostors::bytes() const {
   std::uint64_t sum = 0;
-  for (const auto& [grid, entry] : entries_) sum += entry.place.size;
+  for (const auto& [grid, entry] : entries_) sum += entry.whole.place.size + entry.next.place.size;
   return sum;
 }
 

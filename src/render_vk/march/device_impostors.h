@@ -19,17 +19,23 @@ namespace quoin::vulkan {
 struct Placement;
 
 /// Impostors in device memory, sent when a picture first shows them and kept from picture to picture.
+///
+/// Where pictures do not wait, one sends no more than `kFacesAPicture`, a fraction of a millisecond: until a new impostor
+/// is there as a whole, the one before it is drawn, and what has none is traced.
 class DeviceImpostors {
  public:
+  static constexpr std::size_t kFacesAPicture = std::size_t{1} << 16;
+
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
   /// Has the far instances of a picture, which is `width` by `height` pixels, drawn from their impostors: rays of the
   /// camera pass them by, and Placement::far says what shows of them. Memory as DeviceDetail::place.
+  /// `waits`: all that is shown is sent first.
   ///
   /// Errors: LimitExceeded when a memory is full, or when those instances' faces are more than 2^32. It then is to be
   ///         cleared.
   [[nodiscard]] Status draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
-                            int height, Placement& placement);
+                            int height, bool waits, Placement& placement);
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
   void drop_unused(std::uint64_t max_bytes);
 
@@ -39,7 +45,7 @@ class DeviceImpostors {
     for (auto entry = entries_.begin(); entry != entries_.end();) {
       const auto each = entry++;
       if (!is_gone(each->first)) continue;
-      memory_->release(each->second.place);
+      release(each->second);
       entries_.erase(each);
     }
   }
@@ -48,15 +54,27 @@ class DeviceImpostors {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  struct Entry {
-    std::shared_ptr<const Impostor> impostor;
+  static constexpr std::size_t kParts = ImpostorFaces::kLevels + 2;  // levels, those that no view saw, faces
+
+  // An impostor in device memory, as far as it has been sent.
+  struct Sent {
+    std::shared_ptr<const Impostor> impostor;  // null: none
     Place place;
     std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // the last: those that no view saw
     std::uint64_t faces = 0;                                          // address
+    std::size_t part = 0;                                             // what is sent next; kParts: it is whole
+    std::size_t at = 0;                                               // and from where on in it
+  };
+  struct Entry {
+    Sent whole;
+    Sent next;
     std::uint64_t last_use = 0;
   };
-  Status put(const std::shared_ptr<const Impostor>& impostor, Entry& entry);
-  [[nodiscard]] static ShaderFar shader_far(const Entry& entry, const DrawnImpostor& drawn);
+  void release(Entry& entry);
+  Status begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent);
+  Status send_some(Sent& sent, std::size_t& faces_left);
+  Status put(const std::shared_ptr<const Impostor>& impostor, Entry& entry, std::size_t& faces_left);
+  [[nodiscard]] static ShaderFar shader_far(const Sent& sent, const DrawnImpostor& drawn);
 
   DeviceMemory* memory_;
   std::map<GridHandle, Entry> entries_;

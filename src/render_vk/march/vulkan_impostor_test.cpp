@@ -2,7 +2,10 @@
 
 // Impostors, drawn by the device and by the processor.
 
+#include <chrono>
 #include <cmath>
+#include <limits>
+#include <thread>
 
 #include "render/impostor/test_support.h"
 #include "render_vk/march/vulkan_detail_support.h"
@@ -87,6 +90,52 @@ TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
   camera.view_height = 2000.0;
   compare(camera, options, "crowd_orthographic");
   EXPECT_GT(impostor_bytes(), 0U);
+}
+
+// Frames do not wait: neither for impostors to be built, nor for all of one to be sent.
+TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
+  SceneGrid large;
+  large.grid.edit({IVec3(0), IVec3(150)}, [](IVec3 v, VoxelType) {
+    return static_cast<VoxelType>((v.x / 2 + v.y / 3 + v.z / 2) % 3 == 0 ? 1 : 0);
+  });
+  ImpostorWorld world(Model::Ball);
+  scene_ = std::move(world.scene);
+  large.pivot = content_sphere(large.grid).centre;
+  Instance instance;
+  instance.grid = scene_.add_grid(std::move(large));
+  instance.position = {0, 0, -20};
+  scene_.add_instance(instance);
+  const Camera camera = towards({700, 500, 1300}, {0, 0, 0}, 0.3);
+  RenderOptions frames = in_detail(96, 96, 200);
+  frames.impostor_seconds = 0.0;
+  RenderOptions waiting = frames;
+  waiting.impostor_seconds = std::numeric_limits<double>::infinity();
+  const auto frames_until = [&](const Picture& wanted) {
+    for (int frame = 1; frame < 2000; ++frame) {
+      if (taken_as_is(camera, frames).colour.rgb == wanted.colour.rgb) return frame;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return -1;
+  };
+  const Picture wanted = render_test::taken(scene_, camera, waiting);
+  ASSERT_TRUE(renderer_->update(scene_));
+  const Picture traced = taken_as_is(camera, sized(96, 96));
+  EXPECT_EQ(taken_as_is(camera, frames).colour.rgb, traced.colour.rgb) << "nothing is there yet";
+  EXPECT_GT(frames_until(taken(scene_, camera, waiting)), 0);
+  // An edit: the old impostor is drawn until the new one is there as a whole.
+  scene_.edit(instance.grid).grid.fill_box({{60, 100, 100}, {90, 150, 150}}, kAir);
+  ASSERT_TRUE(renderer_->update(scene_));
+  const Picture first = taken_as_is(camera, frames);
+  EXPECT_LT(render_test::count_different(first, wanted, 40), 800);
+  const Picture edited = render_test::taken(scene_, camera, waiting);
+  int frame = 0;
+  while (frame < 2000 && render_test::count_different(taken_as_is(camera, frames), edited, 2) > 40) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ++frame;
+  }
+  EXPECT_GT(frame, 2);
+  EXPECT_LT(frame, 2000);
+  EXPECT_EQ(taken_as_is(camera, frames).colour.rgb, taken_as_is(camera, waiting).colour.rgb);
 }
 
 // As far as single precision and further.
