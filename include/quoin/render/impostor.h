@@ -119,7 +119,7 @@ struct FarInstance {
 /// Each is drawn from the views nearest to the direction in which its own frame sees the camera, and every pixel's ray
 /// is met with the faces that these saw, so that silhouettes, depth and roll are right between views. Light is that of
 /// CpuRenderer, with shadows traced through all of `scene`; but where occlusion comes from rays, it is the share of
-/// nine rays of 6 voxels from the face's middle that meet nothing of the grid.
+/// nine rays of 6 voxels from the face's middle that meet nothing of the grid; and lamps add nothing.
 ///
 /// Depth:    nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
 ///           show nothing of an instance keep their colour and depth.

@@ -79,6 +79,7 @@ class Scene {
  public:
   VoxelRegistry types;
   /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::lamps says whether they shine.
+  /// Renderers take over what changed here with their next `update`.
   std::vector<Lamp> lamps;
 
   Scene();
