@@ -19,13 +19,15 @@ class Tool : public ToolTest {};
 TEST_F(Tool, InfoSaysWhatIsInAFile) {
   const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("Voxels: 4 of 2 types"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("Voxels: 4 of 2 types\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
   const ToolRun json = run("info tiny.vox --json");
   ASSERT_EQ(json.status, 0) << json.err;
   const Json object = Json::parse(json.out);
   EXPECT_EQ(object["format"], "vox");
   EXPECT_EQ(object["voxels"], 4);
   EXPECT_EQ(object["types"], 2);
+  EXPECT_EQ(object["faces_visible"], 18);
+  EXPECT_EQ(object["faces_total"], 24);
   ASSERT_EQ(object["grids"].size(), 1U);
   EXPECT_EQ(object["grids"][0]["voxels"], 4);
   EXPECT_EQ(object["grids"][0]["size"], Json({3, 2, 4})) << "MagicaVoxel's z is up";
@@ -74,12 +76,29 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
     for (const char* key : {"read", "mesh", "write"}) EXPECT_GE(object["seconds"][key], 0.0);
     EXPECT_TRUE(object["warnings"].is_array());
     EXPECT_TRUE(exists(name));
-    if (name == "out.vox") continue;
     EXPECT_EQ(object["faces_visible"], 18);
     EXPECT_EQ(object["faces_total"], 24);
+    if (name == "out.vox") continue;
     EXPECT_EQ(object["triangles"], 2 * object["quads"].get<int>());
     EXPECT_GT(object["vertices"], 0);
   }
+}
+
+TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
+  std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(2);
+  std::vector<Json> counts;
+  for (const std::string hidden : {"", " --hidden"}) {
+    for (const std::string command : {"info hidden.vox", "convert hidden.vox a.glb", "convert hidden.vox a.vox",
+                                      "render hidden.vox -o a.png --size 8x8"}) {
+      const ToolRun json = run(command + " --json" + hidden);
+      ASSERT_EQ(json.status, 0) << json.err;
+      const Json object = Json::parse(json.out);
+      counts.push_back({object["faces_visible"], object["faces_total"]});
+    }
+  }
+  for (std::size_t i = 0; i < counts.size(); ++i) EXPECT_EQ(counts[i], counts[i / 4 * 4]);
+  EXPECT_EQ(counts[0], Json({0, 0}));
+  EXPECT_EQ(counts[4], Json({18, 24}));
 }
 
 TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {

@@ -59,6 +59,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     return outcome;
   }
   outcome.files = {options.output};
+  outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   const auto bytes = write_vox(loaded->scene, options.output, outcome.warnings);
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
@@ -73,8 +74,8 @@ Json outcome_json(const Outcome& outcome) {
       {"voxels", outcome.voxels},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.meshes.faces_visible},
-      {"faces_total", outcome.meshes.faces_total},
+      {"faces_visible", outcome.faces.visible},
+      {"faces_total", outcome.faces.total},
       {"quads", outcome.meshes.quads},
       {"triangles", outcome.meshes.triangles},
       {"vertices", outcome.meshes.vertices},
@@ -89,13 +90,12 @@ std::string mesh_text(const Outcome& outcome) {
   const std::string size = with_thousands(outcome.meshes.triangles) + " triangles, " +
                            with_thousands(outcome.meshes.vertices) + " vertices\n";
   if (outcome.mesher == "smooth") return "Mesh: " + size;
-  return "Faces: " + with_thousands(outcome.meshes.faces_visible) + " visible of " +
-         with_thousands(outcome.meshes.faces_total) + " total\nMesh: " + with_thousands(outcome.meshes.quads) +
-         " quads, " + size;
+  return "Mesh: " + with_thousands(outcome.meshes.quads) + " quads, " + size;
 }
 
 std::string outcome_text(const Outcome& outcome) {
   std::string text = (outcome.is_volume ? "Solid samples: " : "Voxels: ") + with_thousands(outcome.voxels) + "\n";
+  if (outcome.faces.total > 0) text += to_string(outcome.faces) + "\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
             (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
@@ -241,6 +241,7 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   outcome.meshes = meshes.stats;
+  outcome.faces = {meshes.stats.faces_visible, meshes.stats.faces_total};
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();

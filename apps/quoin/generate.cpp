@@ -2,6 +2,7 @@
 
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
@@ -31,6 +32,7 @@ struct GenerateOptions {
 struct Outcome {
   std::int64_t voxels = 0;
   std::size_t types = 0;
+  FaceCounts faces;
   std::uint64_t bytes = 0;
   double seconds_generate = 0;
   double seconds_write = 0;
@@ -86,6 +88,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   outcome.types = grid->types().size();
   outcome.seconds_generate = watch.lap();
   const Scene scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
+  outcome.faces = count_faces(scene, InstanceFilter::All, options.threads);
   auto bytes = write_vox(scene, outcome.warnings);
   if (!bytes) {
     bytes.error().path = options.output.string();
@@ -105,6 +108,8 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
           {"size", {size.x * kTerrainUnit, size.y * kTerrainUnit, size.z * kTerrainUnit}},
           {"voxels", outcome.voxels},
           {"types", outcome.types},
+          {"faces_visible", outcome.faces.visible},
+          {"faces_total", outcome.faces.total},
           {"bytes", outcome.bytes},
           {"files", {options.output.string()}},
           {"seconds", {{"generate", outcome.seconds_generate}, {"write", outcome.seconds_write}}},
@@ -115,8 +120,8 @@ std::string outcome_text(const GenerateOptions& options, const Outcome& outcome)
   const IVec3 size = options.terrain.size * kTerrainUnit;
   return "Terrain: seed " + std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " +
          std::to_string(size.y) + " x " + std::to_string(size.z) + "\nVoxels: " + with_thousands(outcome.voxels) +
-         " of " + std::to_string(outcome.types) + " types\nWrote " + options.output.string() + ", " +
-         bytes_for_people(outcome.bytes) + " in " +
+         " of " + std::to_string(outcome.types) + " types\n" + to_string(outcome.faces) + "\nWrote " +
+         options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
          number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
 }
 

@@ -59,7 +59,9 @@ bool can_write(const std::filesystem::path& path) {
 }
 
 Document::Document(LoadedScene loaded, std::filesystem::path path)
-    : loaded_(std::move(loaded)), path_(std::move(path)) {}
+    : loaded_(std::move(loaded)), path_(std::move(path)) {
+  faces_.update(loaded_.scene);
+}
 
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
                                                  const Progress& progress) {

@@ -8,6 +8,7 @@
 
 #include <quoin/core/progress.h>
 #include <quoin/io/vox.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>
 
 #include "brush.h"
@@ -36,6 +37,9 @@ class Document {
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
+  /// The faces of what is drawn, as of now. Cost: that of what was edited since the last time; all were counted when the
+  /// document was made. Requires: no edit is under way on another thread.
+  [[nodiscard]] const FaceCounts& faces() { return faces_.update(loaded_.scene); }
 
   /// Begins a stroke with its first touch, where the user points. False, without a stroke, when the instance or its
   /// grid is gone, or the brush's type is not registered.
@@ -76,6 +80,7 @@ class Document {
   std::int64_t touch(IVec3 voxel);
 
   LoadedScene loaded_;
+  SceneFaces faces_;
   std::filesystem::path path_;
   EditHistory history_;
   std::uint64_t saved_state_ = 0;

@@ -97,6 +97,21 @@ TEST(Brush, ARayInAGridIsTheRayInTheWorld) {
   }
 }
 
+TEST(Document, FacesFollowEdits) {
+  Document document = small_document();
+  const FaceCounts before = document.faces();
+  EXPECT_EQ(before, count_faces(document.scene()));
+  EXPECT_GT(before.visible, 0);
+  const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
+  ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {63, 3, 20}, Direction::PosY)));
+  document.end_stroke();
+  EXPECT_GT(document.faces().total, before.total);
+  EXPECT_EQ(document.faces(), count_faces(document.scene()));
+  EXPECT_TRUE(document.type_of_colour({1, 2, 3, 255}));
+  ASSERT_TRUE(document.undo());
+  EXPECT_EQ(document.faces(), before);
+}
+
 TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
