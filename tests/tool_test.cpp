@@ -67,7 +67,7 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
   const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Faces: 18 visible of 24 total"), std::string::npos) << text.out;
-  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "tiny.ply", "out.vox"}) {
+  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "tiny.ply", "out.vox", "out.json"}) {
     const ToolRun json = run("convert tiny.vox " + name + " --json --threads 2");
     ASSERT_EQ(json.status, 0) << json.err;
     const Json object = Json::parse(json.out);
@@ -78,10 +78,31 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
     EXPECT_TRUE(exists(name));
     EXPECT_EQ(object["faces_visible"], 18);
     EXPECT_EQ(object["faces_total"], 24);
-    if (name == "out.vox") continue;
+    if (name == "out.vox" || name == "out.json") continue;
     EXPECT_EQ(object["triangles"], 2 * object["quads"].get<int>());
     EXPECT_GT(object["vertices"], 0);
   }
+}
+
+TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
+  std::ofstream(folder_.file("turned.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],
+      "instances": [{"file": "a", "name": "first", "position": [0.1, 1e9, -3]},
+                    {"file": "a", "rotation": [0.1, 0.2, 0.3, 0.4], "scale": 0.45, "mirrored": true}],
+      "sun": [1, 2, 3], "camera": {"position": [9, 9, 9], "look_at": [0, 0, 0], "fov": 40}})";
+  const ToolRun refused = run("convert turned.json turned.vox");
+  EXPECT_EQ(refused.status, 1);
+  const Json before = Json::parse(run("info turned.json --json").out);
+  ASSERT_EQ(run("convert turned.json whole.json").status, 0);
+  std::filesystem::remove(folder_.file("tiny.vox"));
+  const ToolRun info = run("info whole.json --json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  const Json object = Json::parse(info.out);
+  EXPECT_EQ(object, before);
+  const Json& instances = object["grids"].at(0)["instances"];
+  EXPECT_EQ(instances.at(0)["name"], "first");
+  EXPECT_EQ(instances.at(1)["scale"], Json({-0.45, 0.45, 0.45}));
+  ASSERT_EQ(run("convert whole.json again.json").status, 0);
+  EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
 }
 
 TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
@@ -105,6 +126,7 @@ TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> files_of = {
       {"a.glb", {"a.glb"}},
       {"b.vox", {"b.vox"}},
+      {"b.json", {"b.json"}},
       {"c.gltf", {"c.gltf", "c.bin"}},
       {"d.obj", {"d.obj", "d.mtl", "d_palette.png"}}};
   run("--version");  // makes the files for its output

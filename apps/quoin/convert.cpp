@@ -60,7 +60,9 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   }
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
-  const auto bytes = write_vox(loaded->scene, options.output, outcome.warnings);
+  ProgressBar bar;
+  const auto bytes =
+      save_scene(*loaded, options.output, outcome.warnings, options.common.threads, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
@@ -269,7 +271,9 @@ void add_convert_command(CLI::App& app, int& status) {
       ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
       "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
+      "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
       "Example: quoin convert castle.vox castle.glb\n"
+      "Example: quoin convert fleet.json whole_fleet.json\n"
       "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
       "Example: quoin convert scan.nii.gz scan.glb --iso 300");
   command->callback([command, options, texts, &status] {

@@ -1,6 +1,5 @@
 #include <memory>
 
-#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/terrain/terrain.h>
@@ -87,16 +86,13 @@ Result<Outcome> generate(const GenerateOptions& options) {
   outcome.voxels = grid->voxel_count();
   outcome.types = grid->types().size();
   outcome.seconds_generate = watch.lap();
-  const Scene scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
-  outcome.faces = count_faces(scene, InstanceFilter::All, options.threads);
-  auto bytes = write_vox(scene, outcome.warnings);
-  if (!bytes) {
-    bytes.error().path = options.output.string();
-    return bytes.error();
-  }
+  LoadedScene made;
+  made.scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
+  outcome.faces = count_faces(made.scene, InstanceFilter::All, options.threads);
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
-  if (auto written = write_file(options.output, *bytes); !written) return written.error();
-  outcome.bytes = bytes->size();
+  const auto bytes = save_scene(made, options.output, outcome.warnings, options.threads, bar.listener("writing"));
+  if (!bytes) return bytes.error();
+  outcome.bytes = *bytes;
   outcome.seconds_write = watch.lap();
   return outcome;
 }
@@ -127,9 +123,9 @@ std::string outcome_text(const GenerateOptions& options, const Outcome& outcome)
 
 int run_generate(GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
-  if (!format || format->format != FileFormat::Vox) {
+  if (!format || format->is_mesh) {
     print_error(options.output.string() +
-                ": a terrain is written as .vox; `quoin convert` turns that into other formats");
+                ": a terrain is written as .vox or .json; `quoin convert` turns that into other formats");
     return kWrongUsage;
   }
   if (const std::string fault = read_options(options); !fault.empty()) {
@@ -155,7 +151,7 @@ void add_generate_command(CLI::App& app, int& status) {
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
   const auto options = std::make_shared<GenerateOptions>();
-  terrain->add_option("OUT", options->output, "File to write: .vox")->required()->check(file_name());
+  terrain->add_option("OUT", options->output, "File to write: .vox, .json")->required()->check(file_name());
   terrain->add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   terrain->add_option(
       "--chunks", options->chunks,

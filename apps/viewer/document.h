@@ -34,6 +34,9 @@ class Document {
   [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
   /// Empty for a scene that came from nowhere.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Whether it may be saved under its own name without a question: that can be written, and it is no scene file that
+  /// names others, whose models would then be in it.
+  [[nodiscard]] bool can_save_in_place() const;
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
@@ -60,12 +63,12 @@ class Document {
   /// A type of that colour, new if there is none. Errors: LimitExceeded.
   [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour);
 
-  /// Writes .vox or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings; those
-  /// of write_vox, mesh_scene and write_mesh; Cancelled.
+  /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings;
+  /// those of save_scene, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
-  /// What was written is what the state `state` held: not dirty while it is in force. A .vox becomes the document's
-  /// own file; a mesh is a copy only, which loses voxels, and changes nothing.
+  /// What was written is what the state `state` held: not dirty while it is in force. A .vox or .json becomes the
+  /// document's own file; a mesh is a copy only, which loses voxels, and changes nothing.
   void note_written(const std::filesystem::path& path, std::uint64_t state);
 
  private:
@@ -87,7 +90,7 @@ class Document {
   std::optional<Stroke> stroke_;
 };
 
-/// Whether a document can be saved under that name: it ends in .vox or .glb.
+/// Whether a document can be saved under that name: it ends in .vox, .json or .glb.
 [[nodiscard]] bool can_write(const std::filesystem::path& path);
 
 }  // namespace quoin::viewer

@@ -22,6 +22,7 @@ struct LoadedScene {
   std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
   std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
   std::optional<Camera> camera;       ///< where the file has one
+  bool names_files = false;           ///< models came from other files, which saving would put into this one
 };
 
 struct LoadOptions {
