@@ -105,6 +105,22 @@ TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
   EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
 }
 
+TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {
+  std::ofstream(folder_.file("file")) << "no folder";
+  for (const std::string command :
+       {"convert tiny.vox none/out.glb", "convert tiny.vox none/out.gltf", "convert tiny.vox none/out.obj",
+        "convert tiny.vox none/out.ply", "convert tiny.vox none/out.vox", "convert tiny.vox none/out.json",
+        "render tiny.vox -o none/out.png", "generate terrain none/out.vox", "generate terrain none/out.json"}) {
+    const ToolRun failed = run(command);
+    EXPECT_EQ(failed.status, 1) << command;
+    const std::string file = command.substr(command.find("none/"));
+    EXPECT_EQ(failed.err, "quoin: " + file + ": there is no folder \"none\" to write it into\n") << command;
+  }
+  EXPECT_EQ(run("render tiny.vox -o out.png --depth none/out.pfm").err,
+            "quoin: none/out.pfm: there is no folder \"none\" to write it into\n");
+  EXPECT_EQ(run("convert tiny.vox file/out.glb").err, "quoin: file/out.glb: \"file\" is no folder to write it into\n");
+}
+
 TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
   std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(2);
   std::vector<Json> counts;

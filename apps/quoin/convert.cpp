@@ -8,6 +8,7 @@
 
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
 #include "scene_warnings.h"
@@ -150,6 +151,10 @@ int run_checked(const ConvertOptions& options, const FormatInfo& format) {
   if (const std::string fault = fault_of_usage(options, *is_volume); !fault.empty()) {
     print_error(fault);
     return kWrongUsage;
+  }
+  if (auto writable = check_outputs({options.output}); !writable) {
+    print_error(writable.error());
+    return kFailed;
   }
   const auto outcome = convert(options, format, *is_volume);
   if (!outcome) {

@@ -89,6 +89,7 @@ Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
     return written;
   }
   if (outcome == Z_BUF_ERROR || (outcome == Z_OK && written == 0 && position_ == file_.size())) {
+    is_cut_off_ = true;
     return make_error(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
   }
   if (outcome == Z_OK) return written;

@@ -43,6 +43,8 @@ class ByteStream {
   /// Where in the file the next byte comes from.
   [[nodiscard]] std::size_t position() const { return position_; }
   [[nodiscard]] bool is_compressed() const { return inflater_ != nullptr; }
+  /// Whether the last read failed because compressed data have no end, rather than because they are damaged.
+  [[nodiscard]] bool is_cut_off() const { return is_cut_off_; }
 
  private:
   struct Inflater;
@@ -52,6 +54,7 @@ class ByteStream {
   std::span<const std::byte> file_;
   std::size_t begin_;
   std::size_t position_;
+  bool is_cut_off_ = false;
   std::unique_ptr<Inflater> inflater_;
 };
 
