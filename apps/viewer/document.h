@@ -40,8 +40,8 @@ class Document {
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
-  /// The faces of what is drawn, as of now. Cost: that of what was edited since the last time; all were counted when the
-  /// document was made. Requires: no edit is under way on another thread.
+  /// The faces of what is drawn, as of now. Cost: that of what was edited since the last time; all were counted when
+  /// the document was made. Requires: no edit is under way on another thread.
   [[nodiscard]] const FaceCounts& faces() { return faces_.update(loaded_.scene); }
 
   /// Begins a stroke with its first touch, where the user points. False, without a stroke, when the instance or its

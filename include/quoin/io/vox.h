@@ -42,7 +42,8 @@ struct LoadOptions {
 /// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
 ///          last key or the end of the animation's range.
 /// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
-/// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is sound.
+/// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
+///          sound.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
 /// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;

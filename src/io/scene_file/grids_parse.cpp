@@ -1,7 +1,8 @@
 #include "io/scene_file/grids_parse.h"
 
-#include <array>
+#include <atomic>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -99,10 +100,31 @@ std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   return "";
 }
 
-void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::vector<SceneGrid>& grids,
-                 Faults& faults) {
-  std::vector<Result<std::vector<PlacedChunk>>> decoded(pieces.size());
-  parallel_for(pieces.size(), {}, [&](std::size_t i) { decoded[i] = decode_voxels(*pieces[i].text, type_count); });
+using Decoded = std::vector<Result<std::vector<PlacedChunk>>>;
+
+/// The chunks of all pieces; nothing where they take more than `max_bytes`.
+std::optional<Decoded> decode(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t max_bytes) {
+  Decoded decoded(pieces.size());
+  std::atomic<std::size_t> bytes = 0;
+  parallel_for(pieces.size(), {}, [&](std::size_t i) {
+    if (bytes > max_bytes) return;
+    decoded[i] = decode_voxels(*pieces[i].text, type_count);
+    if (!decoded[i]) return;
+    for (const PlacedChunk& chunk : *decoded[i]) bytes += voxel_bytes(chunk.voxels);
+  });
+  if (bytes > max_bytes) return std::nullopt;
+  return decoded;
+}
+
+void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t file_bytes,
+                 std::vector<SceneGrid>& grids, Faults& faults) {
+  auto all = decode(pieces, type_count, max_voxel_bytes(file_bytes));
+  if (!all) {
+    faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
+               ErrorCode::LimitExceeded);
+    return;
+  }
+  Decoded& decoded = *all;
   for (std::size_t i = 0; i < pieces.size() && !faults.error(); ++i) {
     const Piece& piece = pieces[i];
     const Place list{nullptr, "grids", std::nullopt};
@@ -129,14 +151,14 @@ VoxelRegistry read_types(const Object& file) {
   return types;
 }
 
-std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count) {
+std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes) {
   std::vector<SceneGrid> grids;
   if (file.find("grids") == nullptr) return grids;
   std::vector<Piece> pieces;
   read_list(file, "grids", kMaxGrids, [&](const Json& each, const Place& place) {
     grids.push_back(grid_of(each, place, grids.size(), pieces, file.faults()));
   });
-  if (!file.faults().error()) read_voxels(pieces, type_count, grids, file.faults());
+  if (!file.faults().error()) read_voxels(pieces, type_count, file_bytes, grids, file.faults());
   return grids;
 }
 

@@ -160,7 +160,7 @@ void check_ids(const SceneFile& scene, Faults& faults) {
   }
 }
 
-void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
+void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene, Faults& faults) {
   const Place root;
   const Object file(json, root, {"quoin_scene", "types", "grids", "files", "instances", "sun", "camera"}, faults);
   const Json* version = file.need("quoin_scene");
@@ -171,7 +171,7 @@ void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
-  scene.grids = read_grids(file, scene.types.size());
+  scene.grids = read_grids(file, scene.types.size(), file_bytes);
   if (file.find("grids") == nullptr || file.find("files") != nullptr) {
     read_list(file, "files", kMaxFiles,
               [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
@@ -233,7 +233,7 @@ Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
   SceneFile scene;
   Faults faults;
   try {
-    read_file_object(Json::parse(chars), scene, faults);
+    read_file_object(Json::parse(chars), chars.size(), scene, faults);
   } catch (const Json::parse_error& error) {
     return make_error(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
   } catch (const Json::exception&) {

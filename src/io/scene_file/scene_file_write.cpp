@@ -167,6 +167,21 @@ Status check_types(const SceneFile& scene) {
   return {};
 }
 
+std::size_t voxel_bytes_of(std::span<const Grid* const> grids) {
+  std::size_t bytes = 0;
+  for (const Grid* grid : grids) {
+    for (const IVec3 chunk : grid->chunks()) bytes += voxel_bytes(*grid->find_chunk(chunk));
+  }
+  return bytes;
+}
+
+Result<std::string> text_of(const SceneFile& scene, std::span<const Grid* const> grids, VoxelCompression compression,
+                            Threads threads, const Progress& progress) {
+  const auto voxels = encode_voxels(grids, compression, threads, progress);
+  if (!voxels) return voxels.error();
+  return SceneText().write(scene, *voxels);
+}
+
 // Whatever the reader refuses is not written. Voxels, which it takes as they are written, are left out here.
 Status check_readable(const SceneFile& scene) {
   const auto text = SceneText().write(scene, SceneText::Voxels(scene.grids.size()));
@@ -210,9 +225,10 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   if (auto sound = check_readable(scene); !sound) return sound.error();
   std::vector<const Grid*> grids;
   for (const SceneGrid& grid : scene.grids) grids.push_back(&grid.grid);
-  const auto voxels = encode_voxels(grids, threads, progress);
-  if (!voxels) return voxels.error();
-  const auto text = SceneText().write(scene, *voxels);
+  auto text = text_of(scene, grids, VoxelCompression::Small, threads, progress);
+  if (text && voxel_bytes_of(grids) > max_voxel_bytes(text->size())) {
+    text = text_of(scene, grids, VoxelCompression::Stored, threads, progress);
+  }
   if (!text) return text.error();
   const auto bytes = std::as_bytes(std::span(*text));
   if (bytes.size() > kMaxSceneFileBytes) {

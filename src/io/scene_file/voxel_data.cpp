@@ -24,9 +24,15 @@ constexpr std::size_t kMaxTypesOfChunk = 65'536;
 constexpr int kMaxPlace = (1 << (31 - kChunkShift)) - 2;
 constexpr int kMinPlace = -kMaxPlace - 1;
 
-// What a piece may expand to: few real ones reach a quarter of it. One that would is stored as it is.
-constexpr std::size_t kMaxRatio = 64;
-constexpr std::size_t kFreeBytes = 4'096;
+// More than all that a piece can hold: chunks of 65,536 types, none of whose slabs is of one.
+constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
+static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
+
+// Real scenes take up to thirty times their text.
+constexpr std::size_t kFreeBytes = std::size_t{64} << 20;
+constexpr std::size_t kBytesPerFileByte = 64;
+// Of the tree above a chunk that lies alone, about.
+constexpr std::size_t kBytesAboveChunk = 1'024;
 
 constexpr int bits_of(std::size_t types) {
   int bits = 1;
@@ -53,8 +59,6 @@ void for_each_run(Voxels voxels, int slab, Visit visit) {
 /// Writes chunk after chunk into bytes.
 class PieceWriter {
  public:
-  PieceWriter() : dense_(kChunkVoxels), index_of_(kMaxTypesOfChunk, kNone) {}
-
   void put(IVec3 place, const Chunk& chunk) {
     put_number(static_cast<std::uint32_t>(place.x));
     put_number(static_cast<std::uint32_t>(place.y));
@@ -84,6 +88,8 @@ class PieceWriter {
   // The chunk's types, and which there are, in the order in which they first occur.
   void read(const Chunk& chunk) {
     palette_.clear();
+    dense_.resize(kChunkVoxels);
+    index_of_.resize(kMaxTypesOfChunk, kNone);
     auto row = dense_.begin();
     for (int z = 0; z < kChunkEdge; ++z) {
       for (int y = 0; y < kChunkEdge; ++y, row += kChunkEdge) {
@@ -124,15 +130,9 @@ class PieceWriter {
   std::vector<VoxelType> palette_;
 };
 
-std::size_t max_expanded(std::size_t compressed) {
-  return kFreeBytes + kMaxRatio * compressed;
-}
-
-std::string text_of(const std::vector<std::byte>& bytes) {
+std::string text_of(const std::vector<std::byte>& bytes, VoxelCompression compression) {
   constexpr int kLevel = 6;
-  std::vector<std::byte> compressed = gzipped(bytes, kLevel);
-  if (bytes.size() > max_expanded(compressed.size())) compressed = gzipped(bytes, 0);
-  return to_base64(compressed);
+  return to_base64(gzipped(bytes, compression == VoxelCompression::Small ? kLevel : 0));
 }
 
 /// Reads a piece, number after number.
@@ -243,10 +243,9 @@ Result<std::vector<std::byte>> expanded(std::string_view piece) {
   if (!compressed) return placed(compressed.error(), "character", "");
   if (!begins_gzip(*compressed)) return make_error(ErrorCode::BadFormat, "no gzip stream");
   ByteStream stream(*compressed, 0, Compression::Gzip);
-  const std::size_t most = max_expanded(compressed->size());
   constexpr std::size_t kStep = std::size_t{1} << 16;
   std::vector<std::byte> bytes;
-  while (bytes.size() <= most) {
+  while (bytes.size() <= kMaxPieceBytes) {
     const std::size_t before = bytes.size();
     bytes.resize(before + std::max(kStep, before));
     const auto count = stream.read(std::span(bytes).subspan(before));
@@ -254,17 +253,23 @@ Result<std::vector<std::byte>> expanded(std::string_view piece) {
     bytes.resize(before + *count);
     if (*count == 0) break;
   }
-  if (bytes.size() > most) {
-    return make_error(ErrorCode::LimitExceeded,
-                      "expands to more than " + std::to_string(kMaxRatio) + " times its size");
-  }
+  if (bytes.size() > kMaxPieceBytes) return make_error(ErrorCode::LimitExceeded, "expands to more than 32 MiB");
   if (stream.remaining() > 0) return make_error(ErrorCode::BadFormat, "something follows the compressed data");
   return bytes;
 }
 
 }  // namespace
 
-Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids, Threads threads,
+std::size_t max_voxel_bytes(std::size_t file_bytes) {
+  return kFreeBytes + kBytesPerFileByte * file_bytes;
+}
+
+std::size_t voxel_bytes(const Chunk& chunk) {
+  return kBytesAboveChunk + chunk.bytes();
+}
+
+Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
+                                                            VoxelCompression compression, Threads threads,
                                                             const Progress& progress) {
   struct Piece {
     std::size_t grid;
@@ -286,7 +291,7 @@ Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid
     PieceWriter writer;
     const Grid& grid = *grids[pieces[i].grid];
     for (const IVec3 chunk : pieces[i].chunks) writer.put(chunk, *grid.find_chunk(chunk));
-    texts[i] = text_of(writer.bytes());
+    texts[i] = text_of(writer.bytes(), compression);
     steps.step();
   });
   if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");

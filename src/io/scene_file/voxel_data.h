@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -27,10 +28,18 @@ namespace quoin {
 
 inline constexpr std::size_t kMaxSceneFileBytes = std::size_t{2} << 30;
 
+/// What chunks may take in memory, all together, of a file of so many bytes; and what a chunk counts as, the tree above
+/// it included. What is written keeps to it: where compressed voxels would take more, they are stored as they are.
+[[nodiscard]] std::size_t max_voxel_bytes(std::size_t file_bytes);
+[[nodiscard]] std::size_t voxel_bytes(const Chunk& chunk);
+
+enum class VoxelCompression : std::uint8_t { Stored, Small };
+
 /// The pieces of each grid, in the order of their chunks. The same voxels give the same text, at any thread count.
 /// Errors: Cancelled when `progress` says so.
 [[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
-                                                                          Threads threads, const Progress& progress);
+                                                                          VoxelCompression compression, Threads threads,
+                                                                          const Progress& progress);
 
 struct PlacedChunk {
   IVec3 place{0};
@@ -40,8 +49,8 @@ struct PlacedChunk {
 /// The chunks of a piece.
 ///
 /// Errors: BadFormat, whose message says at which character of the text, or at which byte of what is in it; also for
-///         types that are not below `type_count`. LimitExceeded for a piece that would expand to more than 64 times its
-///         size, as none that was written does; so memory stays within a multiple of the text's size.
+///         types that are not below `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, as
+///         none that was written does.
 [[nodiscard]] Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count);
 
 }  // namespace quoin
