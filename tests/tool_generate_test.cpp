@@ -58,6 +58,7 @@ TEST_F(ToolGenerate, SaysWhatItMade) {
   const ToolRun result = run("generate terrain hills.vox --chunks 1x1x1");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.out.find("seed 42, 32 x 32 x 32"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("\nFaces: "), std::string::npos) << result.out;
   EXPECT_NE(result.out.find("Wrote hills.vox"), std::string::npos) << result.out;
   EXPECT_NE(run("generate terrain --help").out.find("Example: quoin generate terrain"), std::string::npos);
   EXPECT_NE(run("generate --help").out.find("Example: quoin generate terrain"), std::string::npos);

@@ -44,6 +44,8 @@ TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
   EXPECT_GT(said["rays"], 64 * 48);
   EXPECT_GT(said["pixels_hit"], 100);
   EXPECT_LT(said["pixels_hit"], 64 * 48);
+  EXPECT_EQ(said["faces_visible"], 18);
+  EXPECT_EQ(said["faces_total"], 24);
   EXPECT_EQ(said["backend"], "cpu");
   EXPECT_EQ(said["threads"], 2);
   EXPECT_EQ(said["files"], Json({"out.png"}));
@@ -57,6 +59,7 @@ TEST_F(ToolRender, ItWritesAPictureOfTheSizeAskedForAndSaysSo) {
   const ToolRun text = run("render tiny.vox -o out.png");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Picture: 1280 x 720, "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("\nWrote out.png, "), std::string::npos) << text.out;
 }
 

@@ -19,13 +19,15 @@ class Tool : public ToolTest {};
 TEST_F(Tool, InfoSaysWhatIsInAFile) {
   const ToolRun text = run("info tiny.vox");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("Voxels: 4 of 2 types"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("Voxels: 4 of 2 types\nFaces: 18 visible of 24 total\n"), std::string::npos) << text.out;
   const ToolRun json = run("info tiny.vox --json");
   ASSERT_EQ(json.status, 0) << json.err;
   const Json object = Json::parse(json.out);
   EXPECT_EQ(object["format"], "vox");
   EXPECT_EQ(object["voxels"], 4);
   EXPECT_EQ(object["types"], 2);
+  EXPECT_EQ(object["faces_visible"], 18);
+  EXPECT_EQ(object["faces_total"], 24);
   ASSERT_EQ(object["grids"].size(), 1U);
   EXPECT_EQ(object["grids"][0]["voxels"], 4);
   EXPECT_EQ(object["grids"][0]["size"], Json({3, 2, 4})) << "MagicaVoxel's z is up";
@@ -65,7 +67,7 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
   const ToolRun text = run("convert tiny.vox tiny.glb");
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("Faces: 18 visible of 24 total"), std::string::npos) << text.out;
-  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "tiny.ply", "out.vox"}) {
+  for (const std::string name : {"tiny.glb", "tiny.gltf", "tiny.obj", "tiny.ply", "out.vox", "out.json"}) {
     const ToolRun json = run("convert tiny.vox " + name + " --json --threads 2");
     ASSERT_EQ(json.status, 0) << json.err;
     const Json object = Json::parse(json.out);
@@ -74,18 +76,73 @@ TEST_F(Tool, ConvertWritesEveryFormatAndCounts) {
     for (const char* key : {"read", "mesh", "write"}) EXPECT_GE(object["seconds"][key], 0.0);
     EXPECT_TRUE(object["warnings"].is_array());
     EXPECT_TRUE(exists(name));
-    if (name == "out.vox") continue;
     EXPECT_EQ(object["faces_visible"], 18);
     EXPECT_EQ(object["faces_total"], 24);
+    if (name == "out.vox" || name == "out.json") continue;
     EXPECT_EQ(object["triangles"], 2 * object["quads"].get<int>());
     EXPECT_GT(object["vertices"], 0);
   }
+}
+
+TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
+  std::ofstream(folder_.file("turned.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],
+      "instances": [{"file": "a", "name": "first", "position": [0.1, 1e9, -3]},
+                    {"file": "a", "rotation": [0.1, 0.2, 0.3, 0.4], "scale": 0.45, "mirrored": true}],
+      "sun": [1, 2, 3], "camera": {"position": [9, 9, 9], "look_at": [0, 0, 0], "fov": 40}})";
+  const ToolRun refused = run("convert turned.json turned.vox");
+  EXPECT_EQ(refused.status, 1);
+  const Json before = Json::parse(run("info turned.json --json").out);
+  ASSERT_EQ(run("convert turned.json whole.json").status, 0);
+  std::filesystem::remove(folder_.file("tiny.vox"));
+  const ToolRun info = run("info whole.json --json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  const Json object = Json::parse(info.out);
+  EXPECT_EQ(object, before);
+  const Json& instances = object["grids"].at(0)["instances"];
+  EXPECT_EQ(instances.at(0)["name"], "first");
+  EXPECT_EQ(instances.at(1)["scale"], Json({-0.45, 0.45, 0.45}));
+  ASSERT_EQ(run("convert whole.json again.json").status, 0);
+  EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
+}
+
+TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {
+  std::ofstream(folder_.file("file")) << "no folder";
+  for (const std::string command :
+       {"convert tiny.vox none/out.glb", "convert tiny.vox none/out.gltf", "convert tiny.vox none/out.obj",
+        "convert tiny.vox none/out.ply", "convert tiny.vox none/out.vox", "convert tiny.vox none/out.json",
+        "render tiny.vox -o none/out.png", "generate terrain none/out.vox", "generate terrain none/out.json"}) {
+    const ToolRun failed = run(command);
+    EXPECT_EQ(failed.status, 1) << command;
+    const std::string file = command.substr(command.find("none/"));
+    EXPECT_EQ(failed.err, "quoin: " + file + ": there is no folder \"none\" to write it into\n") << command;
+  }
+  EXPECT_EQ(run("render tiny.vox -o out.png --depth none/out.pfm").err,
+            "quoin: none/out.pfm: there is no folder \"none\" to write it into\n");
+  EXPECT_EQ(run("convert tiny.vox file/out.glb").err, "quoin: file/out.glb: \"file\" is no folder to write it into\n");
+}
+
+TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
+  std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(2);
+  std::vector<Json> counts;
+  for (const std::string hidden : {"", " --hidden"}) {
+    for (const std::string command : {"info hidden.vox", "convert hidden.vox a.glb", "convert hidden.vox a.vox",
+                                      "render hidden.vox -o a.png --size 8x8"}) {
+      const ToolRun json = run(command + " --json" + hidden);
+      ASSERT_EQ(json.status, 0) << json.err;
+      const Json object = Json::parse(json.out);
+      counts.push_back({object["faces_visible"], object["faces_total"]});
+    }
+  }
+  for (std::size_t i = 0; i < counts.size(); ++i) EXPECT_EQ(counts[i], counts[i / 4 * 4]);
+  EXPECT_EQ(counts[0], Json({0, 0}));
+  EXPECT_EQ(counts[4], Json({18, 24}));
 }
 
 TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> files_of = {
       {"a.glb", {"a.glb"}},
       {"b.vox", {"b.vox"}},
+      {"b.json", {"b.json"}},
       {"c.gltf", {"c.gltf", "c.bin"}},
       {"d.obj", {"d.obj", "d.mtl", "d_palette.png"}}};
   run("--version");  // makes the files for its output

@@ -1,101 +1,38 @@
-// Draws a fleet of voxel ships over a generated terrain: one picture in its own colours and one in those of its levels
-// of detail, into the .png files named on the command line.
+// Makes a fleet of voxel ships over a generated terrain, writes it as a scene file, and draws what it reads from that:
+// one picture in its own colours and one in those of its levels of detail. The files are named on the command line.
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include <glm/gtc/quaternion.hpp>
-
+#include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/render/cpu_renderer.h>
-#include <quoin/terrain/terrain.h>
 
-#include "ships.h"
+#include "fleet.h"
 
 namespace {
 
-// The same numbers on every machine.
-class Random {
- public:
-  double between(double low, double high) {
-    state_ = state_ * 1'664'525U + 1'013'904'223U;
-    return low + (high - low) * (state_ >> 8) / 16'777'216.0;
-  }
-
- private:
-  unsigned state_ = 7;
-};
-
-quoin::Status add_terrain(quoin::Scene& scene) {
-  const auto types = quoin::add_terrain_types(scene.types);
-  if (!types) return types.error();
-  constexpr int kUnits = 24;
-  auto grid = quoin::generate_terrain({.seed = 42, .size = {kUnits, 4, kUnits}}, *types);
-  if (!grid) return grid.error();
-  quoin::SceneGrid terrain;
-  terrain.name = "terrain";
-  terrain.grid = std::move(*grid);
-  terrain.pivot = {kUnits * 16.0, 128.0, kUnits * 16.0};
-  quoin::Instance instance{"terrain", scene.add_grid(std::move(terrain))};
-  instance.position = {0, -160, -500};
-  instance.voxel_size = 4.0;
-  scene.add_instance(instance);
-  return {};
+quoin::Result<quoin::LoadedScene> written_and_read(const char* file) {
+  const auto fleet = demo::make_fleet();
+  if (!fleet) return fleet.error();
+  std::vector<std::string> warnings;
+  const auto written = quoin::save_scene(*fleet, file, warnings);
+  if (!written) return written.error();
+  return quoin::load_scene(file);
 }
 
-// In rows that lie further and further back, wider and wider, all under way in about one direction.
-void add_fleet(quoin::Scene& scene, const std::vector<quoin::GridHandle>& ships) {
-  Random random;
-  for (int row = 0; row < 16; ++row) {
-    const double depth = 170.0 + 50.0 * row + 6.5 * row * row;
-    for (int column = 0; column < 12; ++column) {
-      const double across = (column - 5.5 + random.between(-0.3, 0.3)) / 5.5;
-      const double share = random.between(0.0, 1.0);
-      // The large ones keep back: there is no room for them among the first rows.
-      const std::size_t largest = row < 1 ? 1 : row < 4 ? 2 : 3;
-      const std::size_t design = std::min<std::size_t>(share < 0.5    ? 0
-                                                       : share < 0.8  ? 1
-                                                       : share < 0.94 ? 2
-                                                                      : 3,
-                                                       largest);
-      quoin::Instance ship;
-      ship.grid = ships[design];
-      ship.name = "ship " + std::to_string(row * 12 + column);
-      ship.position = {across * depth * 0.75, random.between(-0.12, 0.22) * depth, -depth};
-      ship.rotation = glm::angleAxis(0.7 + random.between(-0.4, 0.4), quoin::DVec3{0, 1, 0}) *
-                      glm::angleAxis(random.between(-0.25, 0.25), quoin::DVec3{0, 0, 1}) *
-                      glm::angleAxis(random.between(-0.1, 0.1), quoin::DVec3{1, 0, 0});
-      ship.voxel_size = 0.45;
-      scene.add_instance(ship);
-    }
-  }
-}
-
-quoin::Status draw(int count, char** files) {
-  quoin::Scene scene;
-  if (auto added = add_terrain(scene); !added) return added;
-  const auto ships = demo::add_ships(scene);
-  if (!ships) return ships.error();
-  add_fleet(scene, *ships);
-  const auto camera = quoin::look_at({0, 30, 60}, {0, -10, -400}, std::numbers::pi / 4);
-  if (!camera) return camera.error();
-  const quoin::CpuRenderer renderer(scene);
-  quoin::RenderOptions options;
-  options.samples = 4;
-  options.detail.emplace();
-  options.light.sun = {-0.4, 0.8, 0.75};
-  options.light.exposure = 1.15;
-  for (int i = 0; i < count; ++i) {
-    options.detail_colours = i == 1;
-    const auto picture = renderer.render(*camera, options);
+quoin::Status draw(const char* scene_file, const std::vector<const char*>& pictures) {
+  const auto fleet = written_and_read(scene_file);
+  if (!fleet) return fleet.error();
+  const quoin::CpuRenderer renderer(fleet->scene);
+  quoin::RenderOptions options = demo::fleet_options(*fleet);
+  for (const char* file : pictures) {
+    const auto picture = renderer.render(*fleet->camera, options);
     if (!picture) return picture.error();
-    const auto written = quoin::write_png(picture->colour, files[i]);
+    const auto written = quoin::write_png(picture->colour, file);
     if (!written) return written.error();
+    options.detail_colours = true;
   }
   return {};
 }
@@ -103,11 +40,11 @@ quoin::Status draw(int count, char** files) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr, "usage: quoin_demo_fleet OUT.png LEVELS.png\n");
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: quoin_demo_fleet FLEET.json OUT.png LEVELS.png\n");
     return 2;
   }
-  if (const auto drawn = draw(2, argv + 1); !drawn) {
+  if (const auto drawn = draw(argv[1], {argv[2], argv[3]}); !drawn) {
     std::fprintf(stderr, "quoin_demo_fleet: %s\n", quoin::to_string(drawn.error()).c_str());
     return 1;
   }

@@ -8,6 +8,7 @@
 
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
 #include "scene_warnings.h"
@@ -59,7 +60,10 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     return outcome;
   }
   outcome.files = {options.output};
-  const auto bytes = write_vox(loaded->scene, options.output, outcome.warnings);
+  outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
+  ProgressBar bar;
+  const auto bytes =
+      save_scene(*loaded, options.output, outcome.warnings, options.common.threads, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
@@ -73,8 +77,8 @@ Json outcome_json(const Outcome& outcome) {
       {"voxels", outcome.voxels},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.meshes.faces_visible},
-      {"faces_total", outcome.meshes.faces_total},
+      {"faces_visible", outcome.faces.visible},
+      {"faces_total", outcome.faces.total},
       {"quads", outcome.meshes.quads},
       {"triangles", outcome.meshes.triangles},
       {"vertices", outcome.meshes.vertices},
@@ -89,13 +93,12 @@ std::string mesh_text(const Outcome& outcome) {
   const std::string size = with_thousands(outcome.meshes.triangles) + " triangles, " +
                            with_thousands(outcome.meshes.vertices) + " vertices\n";
   if (outcome.mesher == "smooth") return "Mesh: " + size;
-  return "Faces: " + with_thousands(outcome.meshes.faces_visible) + " visible of " +
-         with_thousands(outcome.meshes.faces_total) + " total\nMesh: " + with_thousands(outcome.meshes.quads) +
-         " quads, " + size;
+  return "Mesh: " + with_thousands(outcome.meshes.quads) + " quads, " + size;
 }
 
 std::string outcome_text(const Outcome& outcome) {
   std::string text = (outcome.is_volume ? "Solid samples: " : "Voxels: ") + with_thousands(outcome.voxels) + "\n";
+  if (outcome.faces.total > 0) text += to_string(outcome.faces) + "\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
             (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
@@ -148,6 +151,10 @@ int run_checked(const ConvertOptions& options, const FormatInfo& format) {
   if (const std::string fault = fault_of_usage(options, *is_volume); !fault.empty()) {
     print_error(fault);
     return kWrongUsage;
+  }
+  if (auto writable = check_outputs({options.output}); !writable) {
+    print_error(writable.error());
+    return kFailed;
   }
   const auto outcome = convert(options, format, *is_volume);
   if (!outcome) {
@@ -241,6 +248,7 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   outcome.meshes = meshes.stats;
+  outcome.faces = {meshes.stats.faces_visible, meshes.stats.faces_total};
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();
@@ -268,7 +276,9 @@ void add_convert_command(CLI::App& app, int& status) {
       ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
       "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
+      "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
       "Example: quoin convert castle.vox castle.glb\n"
+      "Example: quoin convert fleet.json whole_fleet.json\n"
       "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
       "Example: quoin convert scan.nii.gz scan.glb --iso 300");
   command->callback([command, options, texts, &status] {

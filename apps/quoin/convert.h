@@ -7,6 +7,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "commands.h"
@@ -39,6 +40,7 @@ struct Outcome {
   std::int64_t voxels = 0;  ///< of a volume: solid samples
   std::string mesher;       ///< empty: nothing was meshed
   MeshStats meshes;
+  FaceCounts faces;           ///< of blocks
   std::optional<double> iso;  ///< of volumes
   bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
   std::uint64_t bytes = 0;

@@ -1,7 +1,7 @@
 #include <memory>
 
-#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
@@ -31,6 +31,7 @@ struct GenerateOptions {
 struct Outcome {
   std::int64_t voxels = 0;
   std::size_t types = 0;
+  FaceCounts faces;
   std::uint64_t bytes = 0;
   double seconds_generate = 0;
   double seconds_write = 0;
@@ -85,15 +86,13 @@ Result<Outcome> generate(const GenerateOptions& options) {
   outcome.voxels = grid->voxel_count();
   outcome.types = grid->types().size();
   outcome.seconds_generate = watch.lap();
-  const Scene scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
-  auto bytes = write_vox(scene, outcome.warnings);
-  if (!bytes) {
-    bytes.error().path = options.output.string();
-    return bytes.error();
-  }
+  LoadedScene made;
+  made.scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
+  outcome.faces = count_faces(made.scene, InstanceFilter::All, options.threads);
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
-  if (auto written = write_file(options.output, *bytes); !written) return written.error();
-  outcome.bytes = bytes->size();
+  const auto bytes = save_scene(made, options.output, outcome.warnings, options.threads, bar.listener("writing"));
+  if (!bytes) return bytes.error();
+  outcome.bytes = *bytes;
   outcome.seconds_write = watch.lap();
   return outcome;
 }
@@ -105,6 +104,8 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
           {"size", {size.x * kTerrainUnit, size.y * kTerrainUnit, size.z * kTerrainUnit}},
           {"voxels", outcome.voxels},
           {"types", outcome.types},
+          {"faces_visible", outcome.faces.visible},
+          {"faces_total", outcome.faces.total},
           {"bytes", outcome.bytes},
           {"files", {options.output.string()}},
           {"seconds", {{"generate", outcome.seconds_generate}, {"write", outcome.seconds_write}}},
@@ -115,16 +116,16 @@ std::string outcome_text(const GenerateOptions& options, const Outcome& outcome)
   const IVec3 size = options.terrain.size * kTerrainUnit;
   return "Terrain: seed " + std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " +
          std::to_string(size.y) + " x " + std::to_string(size.z) + "\nVoxels: " + with_thousands(outcome.voxels) +
-         " of " + std::to_string(outcome.types) + " types\nWrote " + options.output.string() + ", " +
-         bytes_for_people(outcome.bytes) + " in " +
+         " of " + std::to_string(outcome.types) + " types\n" + to_string(outcome.faces) + "\nWrote " +
+         options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
          number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
 }
 
 int run_generate(GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
-  if (!format || format->format != FileFormat::Vox) {
+  if (!format || format->is_mesh) {
     print_error(options.output.string() +
-                ": a terrain is written as .vox; `quoin convert` turns that into other formats");
+                ": a terrain is written as .vox or .json; `quoin convert` turns that into other formats");
     return kWrongUsage;
   }
   if (const std::string fault = read_options(options); !fault.empty()) {
@@ -150,7 +151,7 @@ void add_generate_command(CLI::App& app, int& status) {
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
   const auto options = std::make_shared<GenerateOptions>();
-  terrain->add_option("OUT", options->output, "File to write: .vox")->required()->check(file_name());
+  terrain->add_option("OUT", options->output, "File to write: .vox, .json")->required()->check(file_name());
   terrain->add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   terrain->add_option(
       "--chunks", options->chunks,

@@ -5,6 +5,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_faces.h>
 
 #include "commands.h"
 #include "output.h"
@@ -84,10 +85,12 @@ Json grid_json(const GridReport& report) {
   return entry;
 }
 
-Json info_json(const LoadedScene& loaded, InstanceFilter filter) {
+Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCounts& faces) {
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
                  {"types", distinct_types(loaded.scene)},
+                 {"faces_visible", faces.visible},
+                 {"faces_total", faces.total},
                  {"bounds", box(loaded.scene.bounds(filter))},
                  {"grids", Json::array()},
                  {"warnings", loaded.warnings}};
@@ -126,13 +129,14 @@ std::string grid_text(const GridReport& report) {
   return text;
 }
 
-std::string info_text(const CommonOptions& options, const LoadedScene& loaded) {
+std::string info_text(const CommonOptions& options, const LoadedScene& loaded, const FaceCounts& faces) {
   const Scene& scene = loaded.scene;
   std::string text = options.input.filename().string() + ": " + loaded.format + ", " +
                      count_of(static_cast<std::int64_t>(scene.grids().size()), "grid") + ", " +
                      count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
   text += "Voxels: " + with_thousands(scene.voxel_count()) + " of " +
           count_of(static_cast<std::int64_t>(distinct_types(scene)), "type") + "\n";
+  text += to_string(faces) + "\n";
   const DBox bounds = scene.bounds(options.instances());
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
   for (const GridReport& report : report_grids(scene)) text += grid_text(report);
@@ -148,19 +152,22 @@ int run_info(const CommonOptions& options) {
     print_error(loaded.error());
     return kFailed;
   }
-  if (options.json) return print_json(info_json(*loaded, options.instances()));
+  const FaceCounts faces = count_faces(loaded->scene, options.instances(), options.threads);
+  if (options.json) return print_json(info_json(*loaded, options.instances(), faces));
   print_warnings(loaded->warnings);
-  return print(info_text(options, *loaded));
+  return print(info_text(options, *loaded, faces));
 }
 
 }  // namespace
 
 void add_info_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand(
-      "info", "Say what is in a file: grids, sizes, voxels, types, transforms; of volumes their values");
+      "info", "Say what is in a file: grids, sizes, voxels, faces, types, transforms; of volumes their values");
   const auto options = std::make_shared<CommonOptions>();
   add_common_options(*command, *options);
-  command->footer("Reads " + readable_extensions() + ".\nExample: quoin info castle.vox");
+  command->footer("Reads " + readable_extensions() +
+                  ".\nFaces are those of the models that are placed and not hidden, each model's once.\nExample: quoin "
+                  "info castle.vox");
   command->callback([options, &status] { status = run_info(*options); });
 }
 

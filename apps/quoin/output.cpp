@@ -20,16 +20,6 @@ std::string on_one_line(std::string_view text) {
 
 }  // namespace
 
-std::string with_thousands(std::int64_t number) {
-  std::string digits = std::to_string(number);
-  const std::size_t first = number < 0 ? 1 : 0;
-  for (std::size_t at = digits.size(); at > first + 3;) {
-    at -= 3;
-    digits.insert(at, ",");
-  }
-  return digits;
-}
-
 std::string number_for_people(double value) {
   std::array<char, 400> text{};
   std::snprintf(text.data(), text.size(), "%.4f", value);

@@ -7,13 +7,11 @@
 #include <vector>
 
 #include <quoin/core/result.h>
+#include <quoin/core/thousands.h>
 
 namespace quoin::tool {
 
 using Json = nlohmann::ordered_json;
-
-/// "1,234,567".
-[[nodiscard]] std::string with_thousands(std::int64_t number);
 
 /// "1.5 MB"; decimal units, up to three digits.
 [[nodiscard]] std::string bytes_for_people(std::uint64_t bytes);

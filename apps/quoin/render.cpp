@@ -6,6 +6,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
+#include <quoin/scene/scene_faces.h>
 
 #include "interrupt.h"
 #include "output.h"
@@ -22,6 +23,7 @@ namespace {
 struct Outcome {
   Picture picture;
   Camera camera;
+  FaceCounts faces;
   std::uint64_t bytes = 0;
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   double read = 0, build = 0, trace = 0, write = 0;
@@ -114,6 +116,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   outcome.warnings = std::move(loaded->warnings);
   outcome.read = watch.lap();
   catch_interrupts();
+  outcome.faces = count_faces(scene, filter, arguments.common.threads);
   const auto camera = camera_for(*loaded, arguments);
   if (!camera) return camera.error();
   outcome.camera = *camera;
@@ -141,6 +144,8 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
                {"rays", outcome.picture.rays},
                {"pixels_hit", outcome.picture.pixels_hit},
+               {"faces_visible", outcome.faces.visible},
+               {"faces_total", outcome.faces.total},
                {"backend", arguments.backend},
                {"threads", thread_count(arguments.common.threads)},
                {"camera",
@@ -162,7 +167,7 @@ std::string outcome_text(const Outcome& outcome) {
   const double per_second = static_cast<double>(picture.rays) / std::max(outcome.trace, 1e-9);
   std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
                      std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
-                     " pixels show voxels\n";
+                     " pixels show voxels\n" + to_string(outcome.faces) + "\n";
   text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
           with_thousands(std::llround(per_second)) + " a second\n";
   if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include <glm/common.hpp>
-#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 
@@ -24,15 +23,6 @@ const char* name_of(BrushAction action) {
   return "";
 }
 
-Status write_as_vox(const Scene& scene, const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  auto bytes = write_vox(scene, warnings);
-  if (!bytes) {
-    if (bytes.error().path.empty()) bytes.error().path = path.string();
-    return bytes.error();
-  }
-  return write_file(path, *bytes);
-}
-
 Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const Progress& progress) {
   const auto half = [&progress](double offset) -> Progress {
     if (!progress) return {};
@@ -47,8 +37,8 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
-  if (format && (format->format == FileFormat::Vox || format->format == FileFormat::Glb)) return format->format;
-  return make_error(ErrorCode::Unsupported, "the viewer saves .vox and .glb; `quoin convert` writes the others",
+  if (format && (!format->is_mesh || format->format == FileFormat::Glb)) return format->format;
+  return make_error(ErrorCode::Unsupported, "the viewer saves .vox, .json and .glb; `quoin convert` writes the others",
                     path.string());
 }
 
@@ -59,13 +49,19 @@ bool can_write(const std::filesystem::path& path) {
 }
 
 Document::Document(LoadedScene loaded, std::filesystem::path path)
-    : loaded_(std::move(loaded)), path_(std::move(path)) {}
+    : loaded_(std::move(loaded)), path_(std::move(path)) {
+  faces_.update(loaded_.scene);
+}
 
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
                                                  const Progress& progress) {
   auto loaded = load_scene(path, options, progress);
   if (!loaded) return loaded.error();
   return std::make_unique<Document>(std::move(*loaded), path);
+}
+
+bool Document::can_save_in_place() const {
+  return can_write(path_) && !loaded_.names_files;
 }
 
 std::string Document::name() const {
@@ -152,14 +148,17 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
                        const Progress& progress) const {
   const auto format = format_to_write(path);
   if (!format) return format.error();
-  if (*format == FileFormat::Vox) return write_as_vox(loaded_.scene, path, warnings);
-  return write_as_glb(loaded_.scene, path, progress);
+  if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
+  const auto written = save_scene(loaded_, path, warnings, {}, progress);
+  if (!written) return written.error();
+  return {};
 }
 
 void Document::note_written(const std::filesystem::path& path, std::uint64_t state) {
   const auto format = format_to_write(path);
-  if (!format || *format != FileFormat::Vox) return;
+  if (!format || *format == FileFormat::Glb) return;
   path_ = path;
+  loaded_.names_files = false;
   saved_state_ = state;
 }
 

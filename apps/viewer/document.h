@@ -8,6 +8,7 @@
 
 #include <quoin/core/progress.h>
 #include <quoin/io/vox.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>
 
 #include "brush.h"
@@ -33,9 +34,15 @@ class Document {
   [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
   /// Empty for a scene that came from nowhere.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Whether it may be saved under its own name without a question: that can be written, and it is no scene file that
+  /// names others, whose models would then be in it.
+  [[nodiscard]] bool can_save_in_place() const;
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
+  /// The faces of what is drawn, as of now. Cost: that of what was edited since the last time; all were counted when
+  /// the document was made. Requires: no edit is under way on another thread.
+  [[nodiscard]] const FaceCounts& faces() { return faces_.update(loaded_.scene); }
 
   /// Begins a stroke with its first touch, where the user points. False, without a stroke, when the instance or its
   /// grid is gone, or the brush's type is not registered.
@@ -56,12 +63,12 @@ class Document {
   /// An opaque type of that colour and emission, new if there is none. Errors: LimitExceeded.
   [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour, float emission = 0.0F);
 
-  /// Writes .vox or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings; those
-  /// of write_vox, mesh_scene and write_mesh; Cancelled.
+  /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings;
+  /// those of save_scene, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
-  /// What was written is what the state `state` held: not dirty while it is in force. A .vox becomes the document's
-  /// own file; a mesh is a copy only, which loses voxels, and changes nothing.
+  /// What was written is what the state `state` held: not dirty while it is in force. A .vox or .json becomes the
+  /// document's own file; a mesh is a copy only, which loses voxels, and changes nothing.
   void note_written(const std::filesystem::path& path, std::uint64_t state);
 
  private:
@@ -76,13 +83,14 @@ class Document {
   std::int64_t touch(IVec3 voxel);
 
   LoadedScene loaded_;
+  SceneFaces faces_;
   std::filesystem::path path_;
   EditHistory history_;
   std::uint64_t saved_state_ = 0;
   std::optional<Stroke> stroke_;
 };
 
-/// Whether a document can be saved under that name: it ends in .vox or .glb.
+/// Whether a document can be saved under that name: it ends in .vox, .json or .glb.
 [[nodiscard]] bool can_write(const std::filesystem::path& path);
 
 }  // namespace quoin::viewer

@@ -4,8 +4,10 @@
 #include <random>
 #include <set>
 
+#include <fstream>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
@@ -95,6 +97,49 @@ TEST(Brush, ARayInAGridIsTheRayInTheWorld) {
       EXPECT_LT(glm::length(back - (world.origin + t * world.direction)), 1e-6);
     }
   }
+}
+
+TEST(Document, ASceneFileIsItsOwnOnceItHoldsItsModels) {
+  const ScratchFolder folder("scene");
+  std::vector<std::string> warnings;
+  Document document = small_document();
+  EXPECT_TRUE(can_write("hill.json"));
+  ASSERT_TRUE(document.write(folder.file("hill.vox"), warnings));
+  std::ofstream(folder.file("hills.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "hill.vox"}],
+      "instances": [{"file": "a", "rotation": {"axis": [1, 2, 3], "degrees": 40}, "scale": 0.3}]})";
+  const auto hills = Document::open(folder.file("hills.json"));
+  ASSERT_TRUE(hills);
+  EXPECT_FALSE((*hills)->can_save_in_place()) << "it would be another file";
+  EXPECT_FALSE((*hills)->write(folder.file("hills.vox"), warnings)) << "turned";
+  const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
+  ASSERT_TRUE((*hills)->begin_stroke(brush, hit_at(**hills, {63, 3, 20}, Direction::PosY)));
+  (*hills)->end_stroke();
+  ASSERT_TRUE((*hills)->write(folder.file("whole.json"), warnings));
+  (*hills)->note_written(folder.file("whole.json"), (*hills)->history().state());
+  EXPECT_FALSE((*hills)->is_dirty());
+  EXPECT_TRUE((*hills)->can_save_in_place());
+  const auto again = Document::open(folder.file("whole.json"));
+  ASSERT_TRUE(again);
+  EXPECT_TRUE((*again)->can_save_in_place());
+  EXPECT_EQ((*again)->faces(), (*hills)->faces());
+  const auto first = [](const Document& d) { return d.scene().instances()[d.scene().instances().handles()[0]]; };
+  EXPECT_EQ(first(**again).rotation, first(**hills).rotation);
+  EXPECT_EQ(first(**again).position, first(**hills).position);
+}
+
+TEST(Document, FacesFollowEdits) {
+  Document document = small_document();
+  const FaceCounts before = document.faces();
+  EXPECT_EQ(before, count_faces(document.scene()));
+  EXPECT_GT(before.visible, 0);
+  const Brush brush{BrushAction::Place, BrushShape::Sphere, 2, 3};
+  ASSERT_TRUE(document.begin_stroke(brush, hit_at(document, {63, 3, 20}, Direction::PosY)));
+  document.end_stroke();
+  EXPECT_GT(document.faces().total, before.total);
+  EXPECT_EQ(document.faces(), count_faces(document.scene()));
+  EXPECT_TRUE(document.type_of_colour({1, 2, 3, 255}));
+  ASSERT_TRUE(document.undo());
+  EXPECT_EQ(document.faces(), before);
 }
 
 TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {

@@ -5,6 +5,7 @@
 #include <quoin/core/axis_orientation.h>
 #include <quoin/core/buffer.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/direction_set.h>
 #include <quoin/core/half.h>
 #include <quoin/core/image.h>
 #include <quoin/core/oriented_box.h>
@@ -12,6 +13,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/slot_map.h>
+#include <quoin/core/thousands.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/connected.h>
@@ -57,6 +59,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_edit.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>

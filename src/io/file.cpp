@@ -56,6 +56,19 @@ std::filesystem::path behind_links(std::filesystem::path path) {
   return path;
 }
 
+/// Why there is no folder in which `path` could lie, or nothing when there is one.
+Status check_folder(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code unknown;
+  if (folder.empty() || std::filesystem::is_directory(folder, unknown)) return {};
+  const auto kind = std::filesystem::status(folder, unknown).type();
+  if (kind == std::filesystem::file_type::none || kind == std::filesystem::file_type::unknown) return {};
+  const bool is_absent = kind == std::filesystem::file_type::not_found;
+  std::string why = is_absent ? "there is no folder \"" : "\"";
+  why.append(folder.string()).append(is_absent ? "\" to write it into" : "\" is no folder to write it into");
+  return cannot_write(std::move(why), path);
+}
+
 /// A name beside `path` that no other writer of this or another process uses.
 std::filesystem::path temporary_name(const std::filesystem::path& path, unsigned attempt) {
   static std::atomic<unsigned> counter{0};
@@ -128,7 +141,9 @@ Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
   AtomicFile file;
   file.path_ = behind_links(path);
   std::optional<mode_t> mode;
-  if (Status status = check_replaceable(file.path_, mode); !status) {
+  Status status = check_folder(file.path_);
+  if (status) status = check_replaceable(file.path_, mode);
+  if (!status) {
     status.error().path = path.string();
     return status.error();
   }

@@ -5,7 +5,7 @@
 
 #include <quoin/io/scene_file.h>
 
-#include "io/volume/byte_stream.h"
+#include "io/byte_stream.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
-    FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, false, false, false},
+    FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, true, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -64,9 +64,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
                                const LoadOptions& options, const Progress& progress) {
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
-  if (format == FileFormat::Scene) {
-    return make_error(ErrorCode::Unsupported, "a scene file, whose other files only a path finds");
-  }
+  if (format == FileFormat::Scene) return read_scene_file(bytes);
   if (format && format_info(*format).is_volume) {
     return make_error(ErrorCode::Unsupported,
                       "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
@@ -119,6 +117,21 @@ Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
     if (info.writable && info.extension == extension) return info;
   }
   return make_error(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
+}
+
+Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
+                                 std::vector<std::string>& warnings, Threads threads, const Progress& progress) {
+  const auto format = format_for_writing(path);
+  if (!format) return format.error();
+  if (format->format == FileFormat::Vox) return write_vox(loaded.scene, path, warnings);
+  if (format->format != FileFormat::Scene) {
+    return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
+  }
+  auto file = with_path(scene_file_of(loaded.scene), path);
+  if (!file) return file.error();
+  file->sun = loaded.sun;
+  file->camera = loaded.camera;
+  return write_scene_file(*file, path, threads, progress);
 }
 
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {

@@ -55,6 +55,15 @@ std::string to_text(float value) {
   return error == std::errc{} ? std::string(buffer.data(), end) : std::string("0");
 }
 
+bool is_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = sequence_length(text, i);
+    if (length == 0) return false;
+    i += length;
+  }
+  return true;
+}
+
 std::string printable(std::string_view text) {
   std::string out;
   out.reserve(text.size());

@@ -16,6 +16,8 @@ namespace quoin {
 /// The shortest text from which `parse_float` gives the same number.
 [[nodiscard]] std::string to_text(float value);
 
+[[nodiscard]] bool is_utf8(std::string_view text);
+
 /// `text` as valid UTF-8 on one line: bytes that are not UTF-8 become U+FFFD, control characters become blanks.
 [[nodiscard]] std::string printable(std::string_view text);
 

@@ -36,7 +36,7 @@ void App::run_file_command(Command command) {
       return;
     case Command::Save:
       if (!state_.can_edit()) return;
-      if (state_.open.document->path().empty() || !can_write(state_.open.document->path())) return ask_where_to_save();
+      if (!state_.open.document->can_save_in_place()) return ask_where_to_save();
       return save(state_.open.document->path());
     case Command::SaveAs:
       return ask_where_to_save();
@@ -126,7 +126,7 @@ void App::adopt(OpenDocument opened) {
 void App::ask_where_to_save() {
   if (!state_.can_edit()) return;
   std::filesystem::path start = state_.open.document->path();
-  if (!can_write(start)) start.replace_extension(".vox");
+  if (!can_write(start)) start.replace_extension(state_.open.document->loaded().format == "scene" ? ".json" : ".vox");
   chooser_.show(FileChooser::Purpose::Save, start);
 }
 

@@ -152,6 +152,9 @@ float draw_status(const ViewState& state) {
     std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels a second", state.camera.speed());
     right = picture_text(state) + speed.data();
   }
+  const std::string faces = to_string(state.open.document->faces()) + "   ";
+  const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
+  if (width(hover_text(state)) + width(faces + right) + 48.0F < room.x) right.insert(0, faces);
   ImGui::SameLine(room.x - ImGui::CalcTextSize(right.c_str()).x - 12.0F);
   ImGui::TextDisabled("%s", right.c_str());
   ImGui::End();

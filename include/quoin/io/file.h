@@ -19,7 +19,7 @@ namespace quoin {
 /// Destroyed without a commit, it leaves nothing behind and the old file as it was.
 class AtomicFile {
  public:
-  /// Errors: CannotWrite.
+  /// Errors: CannotWrite, with the reason: no such folder, no permission, a folder of that name.
   [[nodiscard]] static Result<AtomicFile> create(const std::filesystem::path& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&& other) noexcept;

@@ -7,7 +7,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/io/vox.h>
@@ -57,8 +59,17 @@ struct FormatInfo {
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
                                              const Progress& progress = {});
 
-/// The same of bytes. Errors: Unsupported also for scene files, whose other files only a path finds.
+/// The same of bytes. Errors: Unsupported also for scene files that name others, which only a path finds.
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                              const Progress& progress = {});
+
+/// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss, with
+/// sun and camera) or .vox (write_vox). It appears whole or not at all; returns its size.
+///
+/// Warnings: one line each of what the format does not hold, added to `warnings`.
+/// Errors:   Unsupported for other endings; those of the format's writer; `path` is set in all.
+[[nodiscard]] Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
+                                               std::vector<std::string>& warnings, Threads threads = {},
+                                               const Progress& progress = {});
 
 }  // namespace quoin

@@ -22,6 +22,7 @@ struct LoadedScene {
   std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
   std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
   std::optional<Camera> camera;       ///< where the file has one
+  bool names_files = false;           ///< models came from other files, which saving would put into this one
 };
 
 struct LoadOptions {
@@ -31,7 +32,8 @@ struct LoadOptions {
 
 /// MagicaVoxel's format, versions 150 and 200.
 ///
-/// Source:  the published format description of MagicaVoxel and its extension (github.com/ephtracy/voxel-model).
+/// Source:  the published format description of MagicaVoxel and its extension (github.com/ephtracy/voxel-model); and
+///          Teardown's compressed models, TDCZ (github.com/vengi-voxel/vengi/pull/778).
 /// Axes:    (x, y, z) becomes (x, z, -y): Quoin's +Y is MagicaVoxel's +Z.
 /// Grids:   one a model, in the file's order, with the model's box, from the origin, as canvas. Models that are placed
 ///          nowhere stay grids without an instance; a warning counts them.
@@ -40,6 +42,8 @@ struct LoadOptions {
 /// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
 ///          last key or the end of the animation's range.
 /// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
+/// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
+///          sound.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
 /// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;

@@ -2,10 +2,11 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
+#include <string>
 #include <vector>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/direction_set.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -27,11 +28,35 @@ struct FaceRows {
   [[nodiscard]] std::int64_t count() const;
 };
 
-/// One byte a voxel of `region`, x fastest, then y, then z; bit d is set when the face towards direction d shows.
+/// The visible faces of one voxel (coordinates in the centre chunk); none of air. Cost: up to 7 voxel look-ups.
+[[nodiscard]] DirectionSet visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel);
+
+/// The visible faces of the voxels of `region`: one set a voxel, x fastest, then y, then z.
 ///
-/// Bits: +X 0, -X 1, +Y 2, -Y 3, +Z 4, -Z 5. The region is clipped to the chunk and `out` resized to its volume.
+/// The region is clipped to the chunk and `out` resized to its volume.
 /// Convenient, but makes a BlockyMesher for one use: in a loop keep one and call its `find_faces`.
 void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region,
-                   std::vector<std::uint8_t>& out);
+                   std::vector<DirectionSet>& out);
+
+/// How many faces there are, and how many of them show.
+struct FaceCounts {
+  std::int64_t visible = 0;
+  std::int64_t total = 0;  ///< 6 x voxels that are not air
+
+  bool operator==(const FaceCounts&) const = default;
+  FaceCounts& operator+=(const FaceCounts& other) {
+    visible += other.visible;
+    total += other.total;
+    return *this;
+  }
+  FaceCounts& operator-=(const FaceCounts& other) {
+    visible -= other.visible;
+    total -= other.total;
+    return *this;
+  }
+};
+
+/// "Faces: 1,234 visible of 5,676 total".
+[[nodiscard]] std::string to_string(const FaceCounts& faces);
 
 }  // namespace quoin

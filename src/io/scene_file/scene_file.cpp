@@ -92,36 +92,79 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   return load_scene(path, options, progress);
 }
 
+using Bodies = std::map<std::string, Body, std::less<>>;
+
+/// Reads the files that a scene file in `folder` names.
+Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& folder,
+                            const LoadOptions& options, LoadedScene& loaded, const Progress& progress) {
+  Bodies bodies;
+  for (const SceneFile::Source& source : sources) {
+    const double before = static_cast<double>(bodies.size());
+    Progress of_source;
+    if (progress) {
+      of_source = [&](double share) { return progress((before + share) / static_cast<double>(sources.size())); };
+    }
+    auto part = load_source(folder / source.file, options, of_source);
+    if (!part) return part.error();
+    for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
+    auto body = take_over(part->scene, loaded.scene);
+    if (!body) return body.error();
+    bodies.emplace(source.id, std::move(*body));
+  }
+  return bodies;
+}
+
+/// A scene of what the file itself holds; its instances are to follow.
+LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
+  LoadedScene loaded;
+  loaded.format = "scene";
+  loaded.sun = file.sun;
+  loaded.camera = file.camera;
+  loaded.names_files = !file.sources.empty();
+  loaded.scene.types = std::move(file.types);
+  loaded.scene.lamps = std::move(file.lamps);
+  for (SceneGrid& grid : file.grids) grids.push_back(loaded.scene.add_grid(std::move(grid)));
+  return loaded;
+}
+
+void place(const std::vector<SceneFile::Placement>& placements, const std::vector<GridHandle>& grids,
+           const Bodies& bodies, Scene& scene) {
+  for (const SceneFile::Placement& placement : placements) {
+    if (placement.grid) {
+      scene.add_instance({placement.name, grids[*placement.grid], placement.position, placement.rotation,
+                          placement.scale, placement.mirrored, placement.visible});
+      continue;
+    }
+    const Body& body = bodies.at(placement.source);
+    for (const Instance& inner : body.instances) {
+      scene.add_instance(placed(inner, placement, body.instances.size() == 1));
+    }
+  }
+}
+
 }  // namespace
 
 Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options,
                                     const Progress& progress) {
-  const auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
+  auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
   if (!file) return file.error();
-  LoadedScene loaded;
-  loaded.format = "scene";
-  loaded.sun = file->sun;
-  loaded.camera = file->camera;
-  std::map<std::string, Body, std::less<>> bodies;
-  for (const SceneFile::Source& source : file->sources) {
-    const double before = static_cast<double>(bodies.size());
-    Progress of_source;
-    if (progress) {
-      of_source = [&](double share) { return progress((before + share) / static_cast<double>(file->sources.size())); };
-    }
-    auto part = load_source(path.parent_path() / source.file, options, of_source);
-    if (!part) return with_path(std::move(part), path);
-    for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
-    auto body = with_path(take_over(part->scene, loaded.scene), path);
-    if (!body) return body.error();
-    bodies.emplace(source.id, std::move(*body));
+  std::vector<GridHandle> grids;
+  LoadedScene loaded = begin_scene(*file, grids);
+  const auto bodies = with_path(read_sources(file->sources, path.parent_path(), options, loaded, progress), path);
+  if (!bodies) return bodies.error();
+  place(file->placements, grids, *bodies, loaded.scene);
+  return loaded;
+}
+
+Result<LoadedScene> read_scene_file(std::span<const std::byte> text) {
+  auto file = parse_scene_file(text);
+  if (!file) return file.error();
+  if (!file->sources.empty()) {
+    return make_error(ErrorCode::Unsupported, "a scene file that names others, which only a path finds");
   }
-  for (const SceneFile::Placement& placement : file->placements) {
-    const Body& body = bodies.at(placement.source);
-    for (const Instance& inner : body.instances) {
-      loaded.scene.add_instance(placed(inner, placement, body.instances.size() == 1));
-    }
-  }
+  std::vector<GridHandle> grids;
+  LoadedScene loaded = begin_scene(*file, grids);
+  place(file->placements, grids, {}, loaded.scene);
   return loaded;
 }
 

@@ -1,18 +1,49 @@
 #include <cstdint>
 #include <cstdlib>
+#include <span>
 
 #include <glm/geometric.hpp>
 #include <quoin/io/scene_file.h>
 
-/// Any bytes must give an error or a scene whose numbers can be used.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const auto scene = quoin::parse_scene_file({reinterpret_cast<const std::byte*>(data), size});
-  if (!scene) return 0;
+#include "io/base64.h"
+#include "io/byte_stream.h"
+#include "io/scene_file/voxel_data.h"
+
+namespace {
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// Any bytes must give an error or a scene whose numbers can be used, and that is written again.
+void read_as_text(std::span<const std::byte> bytes) {
+  const auto scene = quoin::parse_scene_file(bytes);
+  if (!scene) return;
   for (const auto& placement : scene->placements) {
     const double length = glm::length(placement.rotation);
-    if (!(length > 0.999 && length < 1.001) || !quoin::is_finite(placement.position) || !(placement.scale > 0.0))
-      abort();
+    require(placement.grid ? *placement.grid < scene->grids.size() : length > 0.999 && length < 1.001);
+    require(quoin::is_finite(placement.position) && placement.scale > 0.0);
   }
-  if (scene->sun && !(glm::length(*scene->sun) > 0.999)) abort();
+  require(!scene->sun || glm::length(*scene->sun) > 0.999);
+  const auto again = quoin::write_scene_file(*scene, quoin::Threads{1});
+  require(again.has_value() && quoin::parse_scene_file(*again).has_value());
+}
+
+/// What is in the pieces of voxels, behind base64 and a checksum that no chance gets right.
+void read_as_voxels(std::span<const std::byte> bytes) {
+  constexpr std::size_t kTypes = 300;
+  const auto chunks = quoin::decode_voxels(quoin::to_base64(quoin::gzipped(bytes, 0)), kTypes);
+  if (!chunks) return;
+  for (const quoin::PlacedChunk& chunk : *chunks) {
+    for (const quoin::VoxelType type : chunk.voxels.types()) require(type < kTypes);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
+  read_as_text(bytes);
+  read_as_voxels(bytes);
   return 0;
 }

@@ -6,157 +6,24 @@
 #include <set>
 
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
+
+#include "io/scene_file/grids_parse.h"
+#include "io/scene_file/json_reader.h"
+#include "io/scene_file/voxel_data.h"
 
 namespace quoin {
 
 namespace {
 
-using Json = nlohmann::json;
+using namespace scene_json;
 
+// Outside of strings, where every byte may become a value of some tens of bytes.
 constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 1;
-
-/// A place in the file: a key or an index below another place, the file itself without. Text is made of it only where
-/// something is wrong.
-struct Place {
-  const Place* parent = nullptr;
-  std::string_view key;
-  std::optional<std::size_t> index;
-};
-
-std::string text_of(const Place& place) {
-  const std::string above = place.parent != nullptr ? text_of(*place.parent) : std::string();
-  if (place.index) return above + "[" + std::to_string(*place.index) + "]";
-  if (above.empty()) return std::string(place.key);
-  return above + "." + std::string(place.key);
-}
-
-// The first fault found, with its place; reading goes on after it, and nothing of it is used.
-class Faults {
- public:
-  void add(const Place& place, const std::string& what, ErrorCode code = ErrorCode::BadFormat) {
-    if (error_) return;
-    const std::string where = text_of(place);
-    error_ = Error{code, where.empty() ? what : where + ": " + what, {}, std::nullopt};
-  }
-  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
-
- private:
-  std::optional<Error> error_;
-};
-
-// A piece of the file in a message.
-std::string excerpt(std::string_view text) {
-  constexpr std::size_t kMost = 60;
-  std::string out;
-  out.append(1, '"').append(text.substr(0, kMost)).append(1, '"');
-  return out;
-}
-
-/// An object of the file, whose keys are asked for one by one.
-class Object {
- public:
-  Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults)
-      : json_(json), place_(place), faults_(faults) {
-    if (!json.is_object()) {
-      faults.add(place, "must be an object");
-      return;
-    }
-    for (const auto& [key, value] : json.items()) {
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        faults.add(place, excerpt(key) + " is not known here");
-      }
-    }
-  }
-
-  [[nodiscard]] const Json* find(std::string_view key) const {
-    if (!json_.is_object()) return nullptr;
-    const auto found = json_.find(key);
-    return found == json_.end() ? nullptr : &*found;
-  }
-  [[nodiscard]] const Json* need(std::string_view key) const {
-    const Json* found = find(key);
-    if (found == nullptr && json_.is_object()) faults_.add(place_, excerpt(key) + " is missing");
-    return found;
-  }
-  /// Requires: this object outlives it.
-  [[nodiscard]] Place place_of(std::string_view key) const { return {&place_, key, std::nullopt}; }
-
-  void read(std::string_view key, std::string& out) const {
-    const Json* json = find(key);
-    if (json == nullptr) return;
-    if (json->is_string()) {
-      out = json->get<std::string>();
-    } else {
-      faults_.add(place_of(key), "must be a string");
-    }
-  }
-  void read(std::string_view key, bool& out) const {
-    const Json* json = find(key);
-    if (json == nullptr) return;
-    if (json->is_boolean()) {
-      out = json->get<bool>();
-    } else {
-      faults_.add(place_of(key), "must be true or false");
-    }
-  }
-  void read(std::string_view key, double& out) const {
-    const Json* json = find(key);
-    if (json != nullptr) out = number(*json, place_of(key));
-  }
-  void read(std::string_view key, DVec3& out) const {
-    const Json* json = find(key);
-    if (json != nullptr) out = triple(*json, place_of(key));
-  }
-  [[nodiscard]] std::vector<double> numbers(const Json& json, const Place& place, std::size_t count) const {
-    std::vector<double> values(count, 0.0);
-    if (!json.is_array() || json.size() != count) {
-      faults_.add(place, "must be a list of " + std::to_string(count) + " numbers");
-      return values;
-    }
-    for (std::size_t i = 0; i < count; ++i) values[i] = number(json[i], {&place, {}, i});
-    return values;
-  }
-  [[nodiscard]] DVec3 triple(const Json& json, const Place& place) const {
-    const std::vector<double> v = numbers(json, place, 3);
-    return {v[0], v[1], v[2]};
-  }
-  Faults& faults() const { return faults_; }
-
- private:
-  [[nodiscard]] double number(const Json& json, const Place& place) const {
-    if (!json.is_number()) {
-      faults_.add(place, "must be a number");
-      return 0.0;
-    }
-    const auto value = json.get<double>();
-    if (!std::isfinite(value)) faults_.add(place, "is too large");
-    return value;
-  }
-
-  const Json& json_;
-  const Place& place_;
-  Faults& faults_;
-};
-
-// A vector made unit; scaled first, since the square of a very small or large number is 0 or infinite.
-std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults) {
-  double largest = 0.0;
-  for (const double x : v) largest = std::max(largest, std::abs(x));
-  if (!(largest > 0.0)) {
-    faults.add(place, "must not be all 0");
-    return v;
-  }
-  double squared = 0.0;
-  for (double& x : v) squared += (x / largest) * (x / largest);
-  for (double& x : v) x = x / largest / std::sqrt(squared);
-  return v;
-}
+constexpr int kVersion = 2;
 
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
@@ -179,18 +46,66 @@ DQuat rotation_of(const Object& instance, const Json& json) {
   return {std::cos(half), a[0] * std::sin(half), a[1] * std::sin(half), a[2] * std::sin(half)};
 }
 
+// A quaternion as it is: of a grid's instance, which may have any length.
+DQuat kept_rotation(const Object& instance, const Json& json) {
+  if (!json.is_array()) return rotation_of(instance, json);
+  const std::vector<double> q = instance.numbers(json, instance.place_of("rotation"), 4);
+  return {q[3], q[0], q[1], q[2]};
+}
+
+// Whether there is such a grid is known once all is read.
+std::size_t grid_of(const Json& json, const Object& instance) {
+  if (json.is_number_unsigned()) return json.get<std::size_t>();
+  instance.faults().add(instance.place_of("grid"), "must be a place in the list of grids, from 0");
+  return 0;
+}
+
 SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
-  const Object instance(json, place, {"file", "name", "position", "rotation", "scale", "mirrored", "visible"}, faults);
+  const Object instance(json, place, {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible"},
+                        faults);
   SceneFile::Placement placement;
-  if (instance.need("file") != nullptr) instance.read("file", placement.source);
-  instance.read("name", placement.name);
+  if (const Json* grid = instance.find("grid")) {
+    placement.grid = grid_of(*grid, instance);
+  } else if (instance.need("file") != nullptr) {
+    instance.read("file", placement.source);
+  }
+  instance.read_text("name", placement.name);
   instance.read("position", placement.position);
   instance.read("scale", placement.scale);
   instance.read("mirrored", placement.mirrored);
   instance.read("visible", placement.visible);
-  if (const Json* rotation = instance.find("rotation")) placement.rotation = rotation_of(instance, *rotation);
+  if (const Json* rotation = instance.find("rotation")) {
+    placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
+  }
   if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
   return placement;
+}
+
+Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(
+      json, place,
+      {"kind", "name", "position", "direction", "colour", "intensity", "range", "inner_angle", "outer_angle"}, faults);
+  Lamp lamp;
+  std::string kind = "point";
+  object.read("kind", kind);
+  if (kind == "spot") {
+    lamp.kind = Lamp::Kind::Spot;
+  } else if (kind != "point") {
+    faults.add(object.place_of("kind"), "must be point or spot");
+  }
+  object.read_text("name", lamp.name);
+  if (object.need("position") != nullptr) object.read("position", lamp.position);
+  object.read("direction", lamp.direction);
+  if (const Json* colour = object.find("colour")) {
+    const std::vector<double> v = object.numbers(*colour, object.place_of("colour"), 3);
+    lamp.colour = Vec3(v[0], v[1], v[2]);
+    if (!is_finite(DVec3(lamp.colour))) faults.add(object.place_of("colour"), "is too large");
+  }
+  object.read("intensity", lamp.intensity);
+  object.read("range", lamp.range);
+  object.read("inner_angle", lamp.inner_angle);
+  object.read("outer_angle", lamp.outer_angle);
+  return lamp;
 }
 
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
@@ -204,8 +119,40 @@ SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults
   return source;
 }
 
+/// Whether axes are unit, perpendicular and right-handed, to the rounding of sums of them.
+bool is_frame(const Camera& camera) {
+  constexpr double kRounding = 1e-6;
+  const auto is_near = [](DVec3 a, DVec3 b) { return glm::distance(a, b) <= kRounding; };
+  return std::abs(glm::length(camera.forward) - 1.0) <= kRounding &&
+         std::abs(glm::length(camera.up) - 1.0) <= kRounding &&
+         is_near(glm::cross(camera.forward, camera.up), camera.right);
+}
+
+/// A camera of any kind, number by number.
+Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"position", "right", "up", "forward", "fov_radians", "view_height"}, faults);
+  Camera camera;
+  for (const char* key : {"position", "right", "up"}) static_cast<void>(object.need(key));
+  object.read("position", camera.position);
+  object.read("right", camera.right);
+  object.read("up", camera.up);
+  object.read("forward", camera.forward);
+  object.read("fov_radians", camera.vertical_fov);
+  object.read("view_height", camera.view_height);
+  const bool is_flat = object.find("view_height") != nullptr;
+  if (is_flat == (object.find("fov_radians") != nullptr)) faults.add(place, "needs fov_radians or view_height");
+  if (is_flat) camera.projection = Camera::Projection::Orthographic;
+  if (!is_frame(camera)) faults.add(place, "right, up and forward must be unit and perpendicular");
+  if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
+    faults.add(object.place_of("fov_radians"), "must be more than 0 and less than pi");
+  }
+  if (!(camera.view_height > 0.0)) faults.add(object.place_of("view_height"), "must be more than 0");
+  return camera;
+}
+
 Camera camera_of(const Json& json, Faults& faults) {
   const Place place{nullptr, "camera", std::nullopt};
+  if (json.is_object() && json.contains("forward")) return kept_camera(json, place, faults);
   const Object object(json, place, {"position", "look_at", "fov"}, faults);
   DVec3 position(0.0);
   DVec3 target(0.0);
@@ -216,25 +163,6 @@ Camera camera_of(const Json& json, Faults& faults) {
   const auto camera = look_at(position, target, fov * std::numbers::pi / 180.0);
   if (!camera) faults.add(place, camera.error().message);
   return camera.value_or(Camera{});
-}
-
-// Calls `read(element, place)` for each element of a list.
-template <class Read>
-void read_list(const Object& file, std::string_view key, std::size_t most, Read read) {
-  const Json* list = file.need(key);
-  const Place place = file.place_of(key);
-  if (list == nullptr) return;
-  if (!list->is_array()) {
-    file.faults().add(place, "must be a list");
-    return;
-  }
-  if (list->size() > most) {
-    file.faults().add(place, "more than " + std::to_string(most) + " entries", ErrorCode::LimitExceeded);
-    return;
-  }
-  for (std::size_t i = 0; i < list->size() && !file.faults().error(); ++i) {
-    read((*list)[i], {&place, {}, i});
-  }
 }
 
 // Sources' ids differ, and placements name one of them.
@@ -251,27 +179,38 @@ void check_ids(const SceneFile& scene, Faults& faults) {
     }
   }
   for (std::size_t i = 0; i < scene.placements.size(); ++i) {
-    if (!ids.contains(scene.placements[i].source)) {
+    if (const auto& grid = scene.placements[i].grid) {
+      if (*grid >= scene.grids.size()) add("instances", i, "grid", "there is no grid " + std::to_string(*grid));
+    } else if (!ids.contains(scene.placements[i].source)) {
       add("instances", i, "file", "no file has the id " + excerpt(scene.placements[i].source));
     }
   }
 }
 
-void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
+void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene, Faults& faults) {
   const Place root;
-  const Object file(json, root, {"quoin_scene", "files", "instances", "sun", "camera"}, faults);
+  const Object file(json, root, {"quoin_scene", "types", "grids", "files", "instances", "lamps", "sun", "camera"},
+                    faults);
   const Json* version = file.need("quoin_scene");
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
-  if (version != nullptr && version->is_number_unsigned() && *version != kVersion) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 is",
+  if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 and 2 are",
                ErrorCode::Unsupported);
   }
-  read_list(file, "files", kMaxFiles,
-            [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
+  scene.types = read_types(file);
+  scene.grids = read_grids(file, scene.types.size(), file_bytes);
+  if (file.find("grids") == nullptr || file.find("files") != nullptr) {
+    read_list(file, "files", kMaxFiles,
+              [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
+  }
   read_list(file, "instances", kMaxInstances, [&](const Json& each, const Place& place) {
     scene.placements.push_back(placement_of(each, place, faults));
   });
+  if (file.find("lamps") != nullptr) {
+    read_list(file, "lamps", kMaxInstances,
+              [&](const Json& each, const Place& place) { scene.lamps.push_back(lamp_of(each, place, faults)); });
+  }
   if (const Json* sun = file.find("sun")) {
     const std::vector<double> v = unit(file.numbers(*sun, file.place_of("sun"), 3), file.place_of("sun"), faults);
     scene.sun = DVec3(v[0], v[1], v[2]);
@@ -280,13 +219,21 @@ void read_file_object(const Json& json, SceneFile& scene, Faults& faults) {
   if (!faults.error()) check_ids(scene, faults);
 }
 
-// Brackets outside of strings, so that nesting is known before anything is built.
-int depth_of(std::string_view text) {
+/// What a text has outside of its strings.
+struct Outside {
+  int deepest = 0;        ///< brackets within each other
+  std::size_t bytes = 0;  ///< and strings, each as one
+};
+
+// So that what it would take is known before anything is built.
+Outside outside_strings(std::string_view text) {
   int depth = 0;
   int deepest = 0;
+  std::size_t bytes = 0;
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
+    bytes += in_string ? 0 : 1;
     if (in_string) {
       if (c == '\\') ++i;
       if (c == '"') in_string = false;
@@ -298,21 +245,27 @@ int depth_of(std::string_view text) {
       --depth;
     }
   }
-  return deepest;
+  return {deepest, bytes};
 }
 
 }  // namespace
 
 Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
-  if (text.size() > kMaxBytes) return make_error(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB");
+  if (text.size() > kMaxSceneFileBytes) {
+    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 2 GiB");
+  }
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
-  if (depth_of(chars) > kMaxDepth) {
+  const Outside outside = outside_strings(chars);
+  if (outside.bytes > kMaxBytes) {
+    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB, not counting what is in strings");
+  }
+  if (outside.deepest > kMaxDepth) {
     return make_error(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
   }
   SceneFile scene;
   Faults faults;
   try {
-    read_file_object(Json::parse(chars), scene, faults);
+    read_file_object(Json::parse(chars), chars.size(), scene, faults);
   } catch (const Json::parse_error& error) {
     return make_error(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
   } catch (const Json::exception&) {

@@ -1,93 +1,268 @@
 #include <algorithm>
+#include <bit>
+#include <map>
 #include <numbers>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
-#include <quoin/io/file.h>
 #include <quoin/io/scene_file.h>
+
+#include "io/base64.h"
+#include "io/scene_file/voxel_data.h"
+#include "io/text.h"
+#include "io/whole_file.h"
 
 namespace quoin {
 namespace {
 
-// Keys in the order in which they are put: the version comes first, by which files are recognised.
+// Keys in the order in which they are put.
 using Json = nlohmann::ordered_json;
 
 Json triple(DVec3 v) {
   return {v.x, v.y, v.z};
 }
 
-Json json_of(const SceneFile::Placement& placement) {
-  const SceneFile::Placement plain;
-  Json json = {{"file", placement.source}};
-  if (!placement.name.empty()) json["name"] = placement.name;
-  if (placement.position != plain.position) json["position"] = triple(placement.position);
-  const DQuat& q = placement.rotation;
-  if (q != plain.rotation) json["rotation"] = {q.x, q.y, q.z, q.w};
-  if (placement.scale != plain.scale) json["scale"] = placement.scale;
-  if (placement.mirrored) json["mirrored"] = true;
-  if (!placement.visible) json["visible"] = false;
-  return json;
+// -0 is another number than 0.
+bool is_same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+bool is_same(DVec3 a, DVec3 b) {
+  return is_same(a.x, b.x) && is_same(a.y, b.y) && is_same(a.z, b.z);
+}
+bool is_same(const DQuat& a, const DQuat& b) {
+  return is_same(a.w, b.w) && is_same(a.x, b.x) && is_same(a.y, b.y) && is_same(a.z, b.z);
 }
 
-// A camera of the file is upright: a point that it looks at and an angle say all of it.
-Result<Json> json_of(const Camera& camera) {
-  // So far that the sum's rounding turns nothing.
-  const DVec3 reach = glm::abs(camera.position);
-  const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
-  if (camera.projection != Camera::Projection::Perspective) {
-    return make_error(ErrorCode::Unsupported, "a scene file holds perspective cameras only");
+/// Writes a scene file, and knows which version of the format it needs.
+class SceneText {
+ public:
+  using Voxels = std::vector<std::vector<std::string>>;
+
+  /// `voxels`: by grid. Errors: InvalidArgument.
+  Result<std::string> write(const SceneFile& scene, const Voxels& voxels) {
+    try {
+      for (std::size_t type = 1; type < scene.types.size(); ++type) {
+        types_.push_back(json_of(scene.types[static_cast<VoxelType>(type)]));
+      }
+      for (std::size_t i = 0; i < scene.grids.size(); ++i) grids_.push_back(json_of(scene.grids[i], voxels[i]));
+      for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(json_of(placement));
+      for (const Lamp& lamp : scene.lamps) lamps_.push_back(json_of(lamp));
+      is_second_ = is_second_ || !lamps_.empty();
+      if (scene.camera) camera_ = json_of(*scene.camera);
+      return text_of(scene);
+    } catch (const Json::type_error&) {  // of text: numbers that are not finite become null
+      return make_error(ErrorCode::InvalidArgument, "an id or path is not UTF-8");
+    }
   }
-  const auto again = look_at(camera.position, target, camera.vertical_fov);
-  if (!again) return again.error();
-  if (glm::distance(again->up, camera.up) > 1e-6) {
-    return make_error(ErrorCode::Unsupported, "a scene file holds upright cameras only");
+
+ private:
+  Json text(const std::string& bytes) {
+    if (is_utf8(bytes)) return bytes;
+    is_second_ = true;
+    return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
   }
-  return Json{{"position", triple(camera.position)},
-              {"look_at", triple(target)},
-              {"fov", camera.vertical_fov * 180.0 / std::numbers::pi}};
+
+  Json json_of(const VoxelProperties& type) {
+    const VoxelProperties plain;
+    Json json = Json::object();
+    if (!type.name.empty()) json["name"] = text(type.name);
+    json["colour"] = {type.colour.r, type.colour.g, type.colour.b, type.colour.a};
+    if (type.visibility == Visibility::Transparent) json["visibility"] = "transparent";
+    if (!type.collides) json["collides"] = false;
+    const auto put = [&](const char* key, float value, float usual) {
+      if (!is_same(value, usual)) json[key] = value;
+    };
+    put("roughness", type.roughness, plain.roughness);
+    put("metalness", type.metalness, plain.metalness);
+    put("emission", type.emission, plain.emission);
+    put("ior", type.ior, plain.ior);
+    for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
+    return json;
+  }
+
+  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels) {
+    Json json = Json::object();
+    if (!grid.name.empty()) json["name"] = text(grid.name);
+    if (!is_same(grid.pivot, DVec3(0.0))) json["pivot"] = triple(grid.pivot);
+    const IBox& canvas = grid.canvas;
+    if (canvas != IBox{}) {
+      json["canvas"] = {canvas.min.x, canvas.min.y, canvas.min.z, canvas.max.x, canvas.max.y, canvas.max.z};
+    }
+    json["voxels"] = voxels;
+    return json;
+  }
+
+  Json json_of(const SceneFile::Placement& placement) {
+    const SceneFile::Placement plain;
+    Json json = placement.grid ? Json{{"grid", *placement.grid}} : Json{{"file", placement.source}};
+    if (!placement.name.empty()) json["name"] = text(placement.name);
+    if (!is_same(placement.position, plain.position)) json["position"] = triple(placement.position);
+    const DQuat& q = placement.rotation;
+    if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+    if (!is_same(placement.scale, plain.scale)) json["scale"] = placement.scale;
+    if (placement.mirrored) json["mirrored"] = true;
+    if (!placement.visible) json["visible"] = false;
+    return json;
+  }
+
+  Json json_of(const Lamp& lamp) {
+    const Lamp plain;
+    const bool is_spot = lamp.kind == Lamp::Kind::Spot;
+    Json json = {{"kind", is_spot ? "spot" : "point"}};
+    if (!lamp.name.empty()) json["name"] = text(lamp.name);
+    json["position"] = triple(lamp.position);
+    json["colour"] = {lamp.colour.x, lamp.colour.y, lamp.colour.z};
+    json["intensity"] = lamp.intensity;
+    const auto put = [&](const char* key, double value, double usual) {
+      if (!is_same(value, usual)) json[key] = value;
+    };
+    put("range", lamp.range, plain.range);
+    if (!is_same(lamp.direction, plain.direction)) json["direction"] = triple(lamp.direction);
+    put("inner_angle", lamp.inner_angle, plain.inner_angle);
+    put("outer_angle", lamp.outer_angle, plain.outer_angle);
+    return json;
+  }
+
+  // An upright perspective camera is said by a point that it looks at and an angle in degrees, where these give it to
+  // the last bit; any other by its axes.
+  Json json_of(const Camera& camera) {
+    // So far that the sum's rounding turns nothing.
+    const DVec3 reach = glm::abs(camera.position);
+    const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
+    const double degrees = camera.vertical_fov * 180.0 / std::numbers::pi;
+    const auto again = look_at(camera.position, target, degrees * std::numbers::pi / 180.0);
+    const bool is_flat = camera.projection == Camera::Projection::Orthographic;
+    if (!is_flat && again && is_same(again->forward, camera.forward) && is_same(again->up, camera.up) &&
+        is_same(again->right, camera.right) && is_same(again->vertical_fov, camera.vertical_fov)) {
+      return {{"position", triple(camera.position)}, {"look_at", triple(target)}, {"fov", degrees}};
+    }
+    is_second_ = true;
+    Json json = {{"position", triple(camera.position)},
+                 {"right", triple(camera.right)},
+                 {"up", triple(camera.up)},
+                 {"forward", triple(camera.forward)}};
+    json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov;
+    return json;
+  }
+
+  // A line an entry: what people look for is found.
+  void put_list(std::string& text, const char* key, const std::vector<Json>& entries) const {
+    text.append(",\n  \"").append(key).append("\": [");
+    const char* before = "\n    ";
+    for (const Json& entry : entries) {
+      text.append(std::exchange(before, ",\n    ")).append(entry.dump());
+    }
+    text += entries.empty() ? "]" : "\n  ]";
+  }
+
+  [[nodiscard]] std::string text_of(const SceneFile& scene) const {
+    const bool has_models = !types_.empty() || !grids_.empty();
+    std::string text = std::string("{\n  \"quoin_scene\": ") + (has_models || is_second_ ? "2" : "1");
+    if (has_models) put_list(text, "types", types_);
+    if (has_models) put_list(text, "grids", grids_);
+    std::vector<Json> files;
+    for (const SceneFile::Source& source : scene.sources) files.push_back({{"id", source.id}, {"path", source.file}});
+    if (!has_models || !files.empty()) put_list(text, "files", files);
+    put_list(text, "instances", instances_);
+    if (!lamps_.empty()) put_list(text, "lamps", lamps_);
+    if (scene.sun) text.append(",\n  \"sun\": ").append(triple(*scene.sun).dump());
+    if (scene.camera) text.append(",\n  \"camera\": ").append(camera_.dump());
+    return text + "\n}\n";
+  }
+
+  std::vector<Json> types_;
+  std::vector<Json> grids_;
+  std::vector<Json> instances_;
+  std::vector<Json> lamps_;
+  Json camera_;
+  bool is_second_ = false;
+};
+
+Status check_types(const SceneFile& scene) {
+  for (std::size_t i = 0; i < scene.grids.size(); ++i) {
+    const std::vector<VoxelType> types = scene.grids[i].grid.types();
+    if (types.empty() || types.back() < scene.types.size()) continue;
+    return make_error(ErrorCode::InvalidArgument, "grids[" + std::to_string(i) + "] has voxels of type " +
+                                                      std::to_string(types.back()) + ", which is not registered");
+  }
+  return {};
+}
+
+std::size_t voxel_bytes_of(std::span<const Grid* const> grids) {
+  std::size_t bytes = 0;
+  for (const Grid* grid : grids) {
+    for (const IVec3 chunk : grid->chunks()) bytes += voxel_bytes(*grid->find_chunk(chunk));
+  }
+  return bytes;
+}
+
+Result<std::string> text_of(const SceneFile& scene, std::span<const Grid* const> grids, VoxelCompression compression,
+                            Threads threads, const Progress& progress) {
+  const auto voxels = encode_voxels(grids, compression, threads, progress);
+  if (!voxels) return voxels.error();
+  return SceneText().write(scene, *voxels);
+}
+
+// Whatever the reader refuses is not written. Voxels, which it takes as they are written, are left out here.
+Status check_readable(const SceneFile& scene) {
+  const auto text = SceneText().write(scene, SceneText::Voxels(scene.grids.size()));
+  if (!text) return text.error();
+  const auto read = parse_scene_file(std::as_bytes(std::span(*text)));
+  if (read) return {};
+  const bool is_limit = read.error().code == ErrorCode::LimitExceeded;
+  return make_error(is_limit ? ErrorCode::LimitExceeded : ErrorCode::InvalidArgument, read.error().message);
 }
 
 }  // namespace
 
-Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene) {
-  Json json = {{"quoin_scene", 1}};
-  json["files"] = Json::array();
-  for (const SceneFile::Source& source : scene.sources) {
-    json["files"].push_back({{"id", source.id}, {"path", source.file}});
+Result<SceneFile> scene_file_of(const Scene& scene) {
+  SceneFile file;
+  file.types = scene.types;
+  file.lamps = scene.lamps;
+  std::map<GridHandle, std::size_t> index_of;
+  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
+    index_of[handle] = file.grids.size();
+    file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas});
+  });
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const auto grid = index_of.find(instance.grid);
+    if (grid == index_of.end()) {
+      return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance.name + "\" is not there");
+    }
+    file.placements.push_back({.source = {},
+                               .grid = grid->second,
+                               .name = instance.name,
+                               .position = instance.position,
+                               .rotation = instance.rotation,
+                               .scale = instance.voxel_size,
+                               .mirrored = instance.mirrored,
+                               .visible = instance.visible});
   }
-  json["instances"] = Json::array();
-  for (const SceneFile::Placement& placement : scene.placements) json["instances"].push_back(json_of(placement));
-  if (scene.sun) json["sun"] = triple(*scene.sun);
-  if (scene.camera) {
-    auto camera = json_of(*scene.camera);
-    if (!camera) return camera.error();
-    json["camera"] = std::move(*camera);
+  return file;
+}
+
+Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads threads, const Progress& progress) {
+  if (auto sound = check_types(scene); !sound) return sound.error();
+  if (auto sound = check_readable(scene); !sound) return sound.error();
+  std::vector<const Grid*> grids;
+  for (const SceneGrid& grid : scene.grids) grids.push_back(&grid.grid);
+  auto text = text_of(scene, grids, VoxelCompression::Small, threads, progress);
+  if (text && voxel_bytes_of(grids) > max_voxel_bytes(text->size())) {
+    text = text_of(scene, grids, VoxelCompression::Stored, threads, progress);
   }
-  std::string text;
-  try {
-    text = json.dump(2) + "\n";
-  } catch (const Json::type_error&) {  // of text: numbers that are not finite become null
-    return make_error(ErrorCode::InvalidArgument, "a name, id or path is not UTF-8");
-  }
-  const auto bytes = std::as_bytes(std::span(text));
-  // Whatever the reader refuses is not written.
-  if (const auto read = parse_scene_file(bytes); !read) {
-    return make_error(
-        read.error().code == ErrorCode::LimitExceeded ? ErrorCode::LimitExceeded : ErrorCode::InvalidArgument,
-        read.error().message);
+  if (!text) return text.error();
+  const auto bytes = std::as_bytes(std::span(*text));
+  if (bytes.size() > kMaxSceneFileBytes) {
+    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 2 GiB");
   }
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
-Result<std::uint64_t> write_scene_file(const SceneFile& scene, const std::filesystem::path& path) {
-  auto bytes = write_scene_file(scene);
-  if (!bytes) {
-    Error error = bytes.error();
-    error.path = path.string();
-    return error;
-  }
-  if (Status written = write_file(path, *bytes); !written) return written.error();
-  return bytes->size();
+Result<std::uint64_t> write_scene_file(const SceneFile& scene, const std::filesystem::path& path, Threads threads,
+                                       const Progress& progress) {
+  return write_whole(path, write_scene_file(scene, threads, progress));
 }
 
 }  // namespace quoin

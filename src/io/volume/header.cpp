@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "io/volume/byte_order.h"
+#include "io/byte_order.h"
 
 namespace quoin {
 

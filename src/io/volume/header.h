@@ -9,7 +9,7 @@
 
 #include <quoin/io/volume.h>
 
-#include "io/volume/byte_stream.h"
+#include "io/byte_stream.h"
 
 namespace quoin {
 

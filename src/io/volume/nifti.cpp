@@ -12,8 +12,8 @@
 #include <string>
 #include <string_view>
 
+#include "io/byte_order.h"
 #include "io/text.h"
-#include "io/volume/byte_order.h"
 
 namespace quoin::nifti {
 

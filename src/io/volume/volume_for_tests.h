@@ -10,7 +10,8 @@
 
 #include <quoin/io/volume.h>
 
-#include "io/volume/byte_order.h"
+#include "io/byte_order.h"
+#include "io/byte_stream.h"
 
 /// What the tests and the fuzz target of volumes share.
 namespace quoin::volume_test {
@@ -78,17 +79,7 @@ inline Bytes encode(const std::vector<double>& values, ScalarType type, std::end
 }
 
 inline Bytes gzipped(std::span<const std::byte> bytes) {
-  z_stream state{};
-  if (deflateInit2(&state, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return {};
-  Bytes out(deflateBound(&state, bytes.size()) + 64);
-  state.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
-  state.avail_in = static_cast<uInt>(bytes.size());
-  state.next_out = reinterpret_cast<Bytef*>(out.data());
-  state.avail_out = static_cast<uInt>(out.size());
-  deflate(&state, Z_FINISH);
-  out.resize(state.total_out);
-  deflateEnd(&state);
-  return out;
+  return quoin::gzipped(bytes, 9);
 }
 
 /// What a NIfTI header says; the offsets of its fields are written here once more, by the specification.

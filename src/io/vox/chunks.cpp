@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "io/text.h"
 #include "io/vox/chunk_reader.h"
@@ -13,6 +14,10 @@ namespace {
 constexpr std::size_t kFileHeaderBytes = 8;
 constexpr std::size_t kChunkHeaderBytes = 12;
 constexpr std::string_view kMagic = "VOX ";
+// Some writers count the headers before them among MAIN's children, 20 bytes at most. Such a file ends with a whole
+// chunk all the same. One that was cut off does not, or has lost a chunk of at most 8 bytes of content: that of no
+// chunk that says anything.
+constexpr std::size_t kMostOverstated = kFileHeaderBytes + kChunkHeaderBytes;
 constexpr std::string_view kLfsPointer = "version https://git-lfs";
 
 struct ChunkHeader {
@@ -50,8 +55,9 @@ Status check_signature(std::span<const std::byte> bytes) {
   return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this one with \"" + printable(text_of(bytes, 4)) + "\"");
 }
 
-/// Reads a header and checks that what it claims lies before `end`.
-Result<ChunkHeader> read_header(std::span<const std::byte> bytes, std::size_t begin, std::size_t end) {
+/// Reads a header and checks that what it claims lies before `end`; its children may reach up to `spare` bytes further.
+Result<ChunkHeader> read_header(std::span<const std::byte> bytes, std::size_t begin, std::size_t end,
+                                std::size_t spare = 0) {
   ByteReader reader(bytes, begin, end);
   ChunkHeader header;
   header.offset = begin;
@@ -60,22 +66,33 @@ Result<ChunkHeader> read_header(std::span<const std::byte> bytes, std::size_t be
   header.children_bytes = reader.u32();
   if (reader.failed()) return bad_at(begin, "a chunk's header is cut off");
   const std::uint64_t claimed = header.content_bytes + header.children_bytes;
-  if (claimed > reader.remaining()) {
+  if (claimed > reader.remaining() + std::min<std::uint64_t>(spare, header.children_bytes)) {
     return bad_at(begin, "chunk " + printable(header.id) + " claims " + std::to_string(claimed) + " bytes, but " +
                              std::to_string(reader.remaining()) + " are left");
   }
   return header;
 }
 
-Status parse_size(ChunkReader& chunk, Document& out) {
-  std::array<std::uint32_t, 3> size{};
+using FileSize = std::array<std::uint32_t, 3>;
+
+std::string text_of(const FileSize& size) {
+  return std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " + std::to_string(size[2]) + " voxels";
+}
+
+/// Three edges of at most `kMaxModelEdge`.
+Result<FileSize> read_size(ChunkReader& chunk) {
+  FileSize size{};
   for (std::uint32_t& edge : size) edge = chunk.u32();
   if (chunk.failed()) return chunk.too_short();
   const bool fits = std::ranges::all_of(size, [](std::uint32_t edge) { return edge <= kMaxModelEdge; });
-  if (!fits) {
-    return chunk.error("claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
-                       std::to_string(size[2]) + " voxels");
-  }
+  if (!fits) return chunk.error("claims " + text_of(size));
+  return size;
+}
+
+Status parse_size(ChunkReader& chunk, Document& out) {
+  const Result<FileSize> read = read_size(chunk);
+  if (!read) return read.error();
+  const FileSize& size = *read;
   if (std::ranges::find(size, 0U) != size.end()) {
     out.warnings.push_back("model " + std::to_string(out.models.size()) + " has no extent on an axis; 1 is taken");
   }
@@ -96,6 +113,25 @@ Status parse_voxels(ChunkReader& chunk, Model& model) {
                        " bytes");
   }
   model.voxels = chunk.take(std::size_t{claimed} * 4);
+  return {};
+}
+
+/// Its size is its own: a SIZE before it says the same.
+Status parse_packed_voxels(ChunkReader& chunk, bool has_size, Document& out) {
+  const Result<FileSize> size = read_size(chunk);
+  if (!size) return size.error();
+  if (std::ranges::find(*size, 0U) != size->end()) return chunk.error("claims " + text_of(*size));
+  Model model;
+  for (int axis = 0; axis < 3; ++axis) model.size[axis] = static_cast<int>((*size)[static_cast<std::size_t>(axis)]);
+  model.offset = chunk.offset();
+  model.packed_begin = chunk.position();
+  model.packed_end = chunk.position() + chunk.remaining();
+  if (has_size) {
+    if (out.models.back().size != model.size) return chunk.error("has another size than the SIZE before it");
+    out.models.back() = model;
+  } else {
+    out.models.push_back(model);
+  }
   return {};
 }
 
@@ -128,6 +164,7 @@ Status parse_chunk(ChunkReader& chunk, ModelState& state, Document& out) {
     state.has_size = false;
     return parse_voxels(chunk, out.models.back());
   }
+  if (id == "TDCZ") return parse_packed_voxels(chunk, std::exchange(state.has_size, false), out);
   if (id == "RGBA") return parse_palette(chunk, out);
   if (id == "IMAP") return parse_index_map(chunk, out);
   if (id == "MATL") return parse_material(chunk, out);
@@ -190,14 +227,19 @@ Result<Document> parse_document(std::span<const std::byte> bytes) {
   if (document.version != 150 && document.version != 200) {
     document.warnings.push_back("version " + std::to_string(document.version) + " is unknown; read as 150 and 200 are");
   }
-  const Result<ChunkHeader> main = read_header(bytes, kFileHeaderBytes, bytes.size());
+  const Result<ChunkHeader> main = read_header(bytes, kFileHeaderBytes, bytes.size(), kMostOverstated);
   if (!main) return main.error();
   if (main->id != "MAIN") {
     return bad_at(kFileHeaderBytes, "the first chunk must be MAIN, not \"" + printable(main->id) + "\"");
   }
   const std::size_t begin = kFileHeaderBytes + kChunkHeaderBytes + main->content_bytes;
-  const std::size_t end = begin + main->children_bytes;
+  const std::size_t claimed_end = begin + main->children_bytes;
+  const std::size_t end = std::min(claimed_end, bytes.size());
   if (Status status = parse_chunks(bytes, begin, end, document); !status) return status.error();
+  if (claimed_end > end) {
+    document.warnings.push_back("MAIN claims " + std::to_string(claimed_end - end) +
+                                " bytes more than there are; all that are there were read");
+  }
   if (end < bytes.size()) {
     document.warnings.push_back("the last " + std::to_string(bytes.size() - end) + " bytes lie outside MAIN; skipped");
   }

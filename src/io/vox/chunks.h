@@ -18,7 +18,9 @@
 
 /// The parts of a MagicaVoxel file as they stand in it: axes, ids and colour indices are the file's.
 ///
-/// Source: MagicaVoxel-file-format-vox.txt and -vox-extension.txt, github.com/ephtracy/voxel-model.
+/// Source: MagicaVoxel-file-format-vox.txt and -vox-extension.txt, github.com/ephtracy/voxel-model. Of TDCZ, Teardown's
+///         compressed models, the description of github.com/vengi-voxel/vengi/pull/778 and the order in which
+///         github.com/TTFH/Teardown-Converter writes voxels (src/vox_writer.cpp, src/math_utils.cpp).
 namespace quoin::vox {
 
 inline constexpr std::size_t kColours = 256;
@@ -34,11 +36,13 @@ struct Dict {
   [[nodiscard]] bool is_set(std::string_view key) const { return get(key) == "1"; }
 };
 
-/// A SIZE and its XYZI.
+/// A SIZE and its XYZI, or a TDCZ.
 struct Model {
   IVec3 size{1};
   std::span<const std::byte> voxels;  ///< x, y, z, colour index: a byte each
-  std::uint64_t offset = 0;           ///< of the SIZE chunk
+  std::uint64_t offset = 0;           ///< of the SIZE chunk, or of the TDCZ
+  std::size_t packed_begin = 0;       ///< in the file: the compressed voxels of a TDCZ, which `unpack_voxels` reads
+  std::size_t packed_end = 0;         ///< 0 where there are none
 };
 
 struct TransformKey {
@@ -99,6 +103,13 @@ struct Document {
 /// Memory: views, plus a small multiple of the file's size.
 /// Errors: Unsupported for formats that share the name; BadFormat with the byte offset.
 [[nodiscard]] Result<Document> parse_document(std::span<const std::byte> bytes);
+
+/// The voxels of a TDCZ as those of an XYZI: x, y, z, colour index of each that has a colour. What is compressed is a
+/// byte a voxel of the whole box, x fastest, then y, then z. Writers may leave the stream without an end.
+///
+/// Memory: 64 MiB at most, since no edge is longer than 256.
+/// Errors: BadFormat with the byte offset, for damaged data and for more or fewer voxels than the box has.
+[[nodiscard]] Result<std::vector<std::byte>> unpack_voxels(std::span<const std::byte> file, const Model& model);
 
 /// BadFormat at `offset`.
 [[nodiscard]] Error bad_at(std::uint64_t offset, std::string message);

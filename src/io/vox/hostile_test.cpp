@@ -154,8 +154,8 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
 
 TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
   std::vector<std::byte> bytes = one_voxel().file();
-  bytes[16] = std::byte{45};
-  EXPECT_EQ(text_of(bytes), "byte 8: chunk MAIN claims 45 bytes, but 44 are left");
+  bytes[16] = std::byte{44 + 21};
+  EXPECT_EQ(text_of(bytes), "byte 8: chunk MAIN claims 65 bytes, but 44 are left");
   bytes = one_voxel().file();
   bytes[27] = std::byte{0xFF};
   EXPECT_EQ(text_of(bytes), "byte 20: chunk SIZE claims 4278190092 bytes, but 32 are left");
@@ -269,6 +269,26 @@ TEST(VoxHostile, ScatteredVoxelsCannotTakeMemoryWithoutBound) {
     EXPECT_EQ(loaded.error().code, ErrorCode::LimitExceeded);
   }
   EXPECT_LE(bytes, std::size_t{1} << 29);
+}
+
+// Real writers have counted headers among MAIN's children.
+TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
+  for (const int more : {1, 8, 12, 20}) {
+    std::vector<std::byte> bytes = one_voxel().file();
+    bytes[16] = static_cast<std::byte>(44 + more);
+    const auto loaded = read_vox(bytes);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(loaded->scene.voxel_count(), 1);
+    EXPECT_EQ(loaded->warnings, std::vector<std::string>{"MAIN claims " + std::to_string(more) +
+                                                         " bytes more than there are; all that are there were read"});
+    // The same, cut off.
+    bytes.pop_back();
+    if (more < 20) {
+      EXPECT_EQ(text_of(bytes), "byte 44: chunk XYZI claims 8 bytes, but 7 are left");
+    }
+    bytes.resize(44);
+    EXPECT_FALSE(read_vox(bytes)) << "a SIZE whose XYZI is missing";
+  }
 }
 
 TEST(VoxHostile, TheCorpusIsHarmless) {

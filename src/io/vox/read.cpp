@@ -17,20 +17,29 @@ namespace {
 constexpr std::size_t kFreeGridBytes = std::size_t{256} << 20;
 constexpr std::size_t kGridBytesPerFileByte = 64;
 
+Result<SceneGrid> grid_of(std::span<const std::byte> file, vox::Model model, vox::ModelBuilder& builder) {
+  if (model.packed_end == 0) return builder.build(model);
+  const auto voxels = vox::unpack_voxels(file, model);
+  if (!voxels) return voxels.error();
+  model.voxels = *voxels;
+  return builder.build(model);
+}
+
 Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::ModelBuilder& builder,
-                                          std::size_t file_bytes, const Progress& progress, Scene& scene) {
-  const std::size_t max_bytes = kFreeGridBytes + kGridBytesPerFileByte * file_bytes;
+                                          std::span<const std::byte> file, const Progress& progress, Scene& scene) {
+  const std::size_t max_bytes = kFreeGridBytes + kGridBytesPerFileByte * file.size();
   std::size_t grid_bytes = 0;
   std::vector<GridHandle> handles;
   handles.reserve(document.models.size());
   for (const vox::Model& model : document.models) {
-    SceneGrid grid = builder.build(model);
-    grid_bytes += grid.grid.bytes();
+    auto grid = grid_of(file, model, builder);
+    if (!grid) return grid.error();
+    grid_bytes += grid->grid.bytes();
     if (grid_bytes > max_bytes) {
       return make_error(ErrorCode::LimitExceeded, "scattered voxels take far more memory than the file has bytes", {},
                         model.offset);
     }
-    handles.push_back(scene.add_grid(std::move(grid)));
+    handles.push_back(scene.add_grid(std::move(*grid)));
     const double share = static_cast<double>(handles.size()) / static_cast<double>(document.models.size());
     if (progress && !progress(share)) return make_error(ErrorCode::Cancelled, "cancelled");
   }
@@ -95,7 +104,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
     return status.error();
   }
   vox::ModelBuilder builder(type_of);
-  const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes.size(), progress, loaded.scene);
+  const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes, progress, loaded.scene);
   if (!grids) return grids.error();
   add_instances(*placements, *grids, options, loaded.scene);
   warn("materials of no colour skipped", document->stray_materials, loaded.warnings);

@@ -173,6 +173,21 @@ void find_all_faces(const Job& job, Scratch& s) {
   find_faces_of_all_types(job, gather_border(job, s), s);
 }
 
+std::int64_t count_all_faces(const Job& job, Scratch& s) {
+  find_all_faces(job, s);
+  const std::uint64_t cells = (~std::uint64_t{0} >> (64 - (job.region.max.x - job.region.min.x))) << job.region.min.x;
+  const Layer* const layers[] = {&s.sides[0], &s.sides[1], &s.sides[2], &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
+  std::int64_t count = 0;
+  for (const Layer* layer : layers) {
+    for (int z = job.region.min.z; z < job.region.max.z; ++z) {
+      const std::uint64_t* row = layer->words + word_index(z, job.region.min.y);
+      const std::uint64_t* const end = layer->words + word_index(z, job.region.max.y);
+      for (; row != end; ++row) count += __builtin_popcountll(*row & cells);
+    }
+  }
+  return count;
+}
+
 // The layers of the other views.
 void turn_views(const Job& job, bool row_ends, Scratch& s) {
   const SlabRange range = slabs_around(job.region);

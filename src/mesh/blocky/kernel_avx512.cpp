@@ -15,6 +15,10 @@ void find_faces_avx512(const Job& job, Scratch& scratch) {
   find_all_faces(job, scratch);
 }
 
+std::int64_t count_faces_avx512(const Job& job, Scratch& scratch) {
+  return count_all_faces(job, scratch);
+}
+
 }  // namespace quoin::blocky
 
 #endif

@@ -12,4 +12,8 @@ void find_faces_plain(const Job& job, Scratch& scratch) {
   find_all_faces(job, scratch);
 }
 
+std::int64_t count_faces_plain(const Job& job, Scratch& scratch) {
+  return count_all_faces(job, scratch);
+}
+
 }  // namespace quoin::blocky

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 
+#include <quoin/core/thousands.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/visible_faces.h>
 
@@ -159,14 +160,30 @@ bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
 struct Kernel {
   void (*mesh)(const blocky::Job&, blocky::Scratch&, QuadBuffer&);
   void (*find_faces)(const blocky::Job&, blocky::Scratch&);
+  std::int64_t (*count_faces)(const blocky::Job&, blocky::Scratch&);
 };
 
 Kernel pick_kernel() {
 #ifdef QUOIN_X86_KERNELS
-  if (has_instruction_set(InstructionSet::Avx512Bytes)) return {blocky::mesh_avx512, blocky::find_faces_avx512};
-  if (has_instruction_set(InstructionSet::Avx2)) return {blocky::mesh_avx2, blocky::find_faces_avx2};
+  if (has_instruction_set(InstructionSet::Avx512Bytes)) {
+    return {blocky::mesh_avx512, blocky::find_faces_avx512, blocky::count_faces_avx512};
+  }
+  if (has_instruction_set(InstructionSet::Avx2)) {
+    return {blocky::mesh_avx2, blocky::find_faces_avx2, blocky::count_faces_avx2};
+  }
 #endif
-  return {blocky::mesh_plain, blocky::find_faces_plain};
+  return {blocky::mesh_plain, blocky::find_faces_plain, blocky::count_faces_plain};
+}
+
+// What to look at for the visible faces of a region.
+blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region) {
+  return {.chunks = &chunks,
+          .types = &types,
+          .region = region,
+          .merge = false,
+          .occlusion = false,
+          .has_transparent = blocky::holds_transparent(*chunks.centre(), types),
+          .one_type = false};
 }
 
 }  // namespace
@@ -217,14 +234,7 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
   blocky::Scratch& s = *scratch_;
-  scratch_->kernel.find_faces({.chunks = &chunks,
-                               .types = &types,
-                               .region = region,
-                               .merge = false,
-                               .occlusion = false,
-                               .has_transparent = blocky::holds_transparent(*centre, types),
-                               .one_type = false},
-                              s);
+  scratch_->kernel.find_faces(job_of_faces(chunks, types, region), s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;
@@ -238,6 +248,18 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   }
 }
 
+std::int64_t BlockyMesher::count_faces(const Neighbourhood& chunks, const VoxelRegistry& types) {
+  const Chunk* centre = chunks.centre();
+  if (centre == nullptr || is_buried(chunks, types)) return 0;
+  const IBox region = centre->bounds();
+  if (region.empty()) return 0;
+  return scratch_->kernel.count_faces(job_of_faces(chunks, types, region), *scratch_);
+}
+
+std::string to_string(const FaceCounts& faces) {
+  return "Faces: " + with_thousands(faces.visible) + " visible of " + with_thousands(faces.total) + " total";
+}
+
 std::int64_t FaceRows::count() const {
   std::int64_t total = 0;
   for (const auto& direction : rows) {
@@ -246,20 +268,31 @@ std::int64_t FaceRows::count() const {
   return total;
 }
 
+DirectionSet visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel) {
+  DirectionSet faces;
+  const VoxelType type = chunks.get(voxel);
+  if (type == kAir) return faces;
+  for (const Direction direction : kDirections) {
+    if (face_is_visible(types, type, chunks.get(voxel + normal_of(direction)))) faces.insert(direction);
+  }
+  return faces;
+}
+
 void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region,
-                   std::vector<std::uint8_t>& out) {
+                   std::vector<DirectionSet>& out) {
   const IBox inside = intersect(region, kWholeChunk);
   const IVec3 size = inside.size();
-  out.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
+  out.assign(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
+             {});
   FaceRows faces;
   BlockyMesher().find_faces(chunks, types, inside, faces);
   std::size_t next = 0;
   for (int z = inside.min.z; z < inside.max.z; ++z) {
     for (int y = inside.min.y; y < inside.max.y; ++y) {
       for (int x = inside.min.x; x < inside.max.x; ++x, ++next) {
-        for (std::size_t d = 0; d < 6; ++d) {
-          const std::uint64_t row = faces.rows[d][static_cast<std::size_t>(z * kChunkEdge + y)];
-          out[next] = static_cast<std::uint8_t>(out[next] | (row >> x & 1U) << d);
+        for (const Direction direction : kDirections) {
+          const auto& rows = faces.rows[static_cast<std::size_t>(direction)];
+          if ((rows[static_cast<std::size_t>(z * kChunkEdge + y)] >> x & 1U) != 0) out[next].insert(direction);
         }
       }
     }
@@ -268,17 +301,13 @@ void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, cons
 
 FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
                              Direction direction) {
-  const FaceFrame& frame = frame_of(direction);
-  const auto is_occluder = [&](int du, int dv) {
-    IVec3 at = voxel + normal_of(direction);
-    at[frame.u] += du;
-    at[frame.v] += dv;
-    return types.is_opaque(chunks.get(at));
-  };
-  const auto occlusion = [&](int du, int dv) {
-    return vertex_occlusion(is_occluder(du, 0), is_occluder(0, dv), is_occluder(du, dv));
-  };
-  return {occlusion(-1, -1), occlusion(1, -1), occlusion(1, 1), occlusion(-1, 1)};
+  const auto is_occluder = [&](IVec3 offset) { return types.is_opaque(chunks.get(voxel + offset)); };
+  FaceOcclusion corners{};
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const CornerNeighbours& at = kCornerNeighbours[static_cast<std::size_t>(direction)][i];
+    corners[i] = vertex_occlusion(is_occluder(at.side1), is_occluder(at.side2), is_occluder(at.corner));
+  }
+  return corners;
 }
 
 }  // namespace quoin

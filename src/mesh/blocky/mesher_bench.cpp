@@ -149,6 +149,31 @@ void visible_faces(benchmark::State& state) {
 }
 BENCHMARK(visible_faces)->Name("visible_faces/w1/cold64")->Unit(benchmark::kMicrosecond);
 
+// As `quoin info` counts them; a time is of one chunk.
+void count_faces(benchmark::State& state) {
+  const Grid grid = terrain_of_chunks();
+  const VoxelRegistry types = workloads::three_types();
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  std::vector<Neighbourhood> chunks;
+  std::int64_t meshed = 0;
+  std::int64_t counted = 0;
+  for (const IVec3 chunk : grid.chunks()) {
+    chunks.push_back(grid.neighbourhood(chunk));
+    mesher.mesh(chunks.back(), types, {}, quads);
+    meshed += face_count(quads);
+    counted += mesher.count_faces(chunks.back(), types);
+  }
+  if (counted != meshed) state.SkipWithError("faces were counted wrongly");
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(mesher.count_faces(chunks[next], types));
+    next = next + 1 == chunks.size() ? 0 : next + 1;
+  }
+  state.counters["faces"] = static_cast<double>(counted);
+}
+BENCHMARK(count_faces)->Name("count_faces/world")->Unit(benchmark::kMicrosecond);
+
 const bool kRegistered = [] {
   register_set("", instruction_set());
   for (const auto& [prefix, set] : kLesserSets) register_set(prefix, set);

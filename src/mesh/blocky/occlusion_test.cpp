@@ -1,6 +1,5 @@
 #include <quoin/mesh/occlusion.h>
 
-#include <bit>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -17,29 +16,38 @@ constexpr VoxelType kGlass = 4;
 constexpr VoxelType kOtherGlass = 5;
 constexpr IBox kCube32 = {IVec3{0}, IVec3{32}};
 
-std::uint8_t face_bits(const Grid& grid, IVec3 voxel) {
-  std::vector<std::uint8_t> faces;
+DirectionSet faces_of(const Grid& grid, IVec3 voxel) {
+  std::vector<DirectionSet> faces;
   const IVec3 local = local_of(voxel);
-  visible_faces(grid.neighbourhood(chunk_of(voxel)), oracle::mixed_types(), {local, local + 1}, faces);
+  const VoxelRegistry types = oracle::mixed_types();
+  visible_faces(grid.neighbourhood(chunk_of(voxel)), types, {local, local + 1}, faces);
+  EXPECT_EQ(visible_faces(grid.neighbourhood(chunk_of(voxel)), types, local), faces.at(0));
   return faces.at(0);
 }
 
+DirectionSet all_but(Direction direction) {
+  DirectionSet faces = DirectionSet::all();
+  faces.erase(direction);
+  return faces;
+}
+
 int face_count(const Grid& grid, IVec3 voxel) {
-  return std::popcount(face_bits(grid, voxel));
+  return faces_of(grid, voxel).size();
 }
 
 TEST(VisibleFaces, OneVoxelShowsAllSix) {
   Grid grid;
   grid.set({10, 10, 10}, kStone);
-  EXPECT_EQ(face_bits(grid, {10, 10, 10}), 0b111111);
+  EXPECT_EQ(faces_of(grid, {10, 10, 10}), DirectionSet::all());
+  EXPECT_EQ(faces_of(grid, {10, 10, 11}), DirectionSet()) << "air has none";
 }
 
 TEST(VisibleFaces, NeighboursHideTheFaceBetweenThem) {
   Grid grid;
   grid.set({10, 10, 10}, kStone);
   grid.set({11, 10, 10}, kStone);
-  EXPECT_EQ(face_bits(grid, {10, 10, 10}), 0b111110);
-  EXPECT_EQ(face_bits(grid, {11, 10, 10}), 0b111101);
+  EXPECT_EQ(faces_of(grid, {10, 10, 10}), all_but(Direction::PosX));
+  EXPECT_EQ(faces_of(grid, {11, 10, 10}), all_but(Direction::NegX));
 }
 
 TEST(VisibleFaces, StoneShowsBehindGlassAndGlassNotBehindStone) {
@@ -70,17 +78,17 @@ TEST(VisibleFaces, ANeighbourChunkHidesFacesToo) {
   Grid grid;
   grid.set({0, 10, 10}, kStone);
   grid.set({-1, 10, 10}, kStone);
-  EXPECT_EQ(face_bits(grid, {0, 10, 10}), 0b111101);
-  EXPECT_EQ(face_bits(grid, {-1, 10, 10}), 0b111110);
+  EXPECT_EQ(faces_of(grid, {0, 10, 10}), all_but(Direction::NegX));
+  EXPECT_EQ(faces_of(grid, {-1, 10, 10}), all_but(Direction::PosX));
 }
 
 TEST(VisibleFaces, FullRegionAloneShowsItsShell) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {32, 32, 32}}, kStone);
-  std::vector<std::uint8_t> faces;
+  std::vector<DirectionSet> faces;
   visible_faces(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), kCube32, faces);
   int visible = 0;
-  for (const std::uint8_t mask : faces) visible += std::popcount(mask);
+  for (const DirectionSet set : faces) visible += set.size();
   EXPECT_EQ(visible, 6'144);
   EXPECT_EQ(faces.size() * 6, 196'608U);
 }
@@ -88,15 +96,15 @@ TEST(VisibleFaces, FullRegionAloneShowsItsShell) {
 TEST(VisibleFaces, FullRegionInsideFullNeighboursShowsNothing) {
   Grid grid;
   grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, kStone);
-  std::vector<std::uint8_t> faces;
+  std::vector<DirectionSet> faces;
   visible_faces(grid.neighbourhood({0, 0, 0}), oracle::mixed_types(), kCube32, faces);
-  EXPECT_EQ(faces, std::vector<std::uint8_t>(32 * 32 * 32, 0));
+  EXPECT_EQ(faces, std::vector<DirectionSet>(32 * 32 * 32));
 }
 
 TEST(VisibleFaces, EmptyChunkShowsNothing) {
-  std::vector<std::uint8_t> faces;
+  std::vector<DirectionSet> faces;
   visible_faces(Neighbourhood{}, oracle::mixed_types(), kCube32, faces);
-  EXPECT_EQ(faces, std::vector<std::uint8_t>(32 * 32 * 32, 0));
+  EXPECT_EQ(faces, std::vector<DirectionSet>(32 * 32 * 32));
 }
 
 TEST(VertexOcclusion, IsThreeBetweenTwoSidesAndACountOtherwise) {
@@ -145,6 +153,42 @@ TEST(FaceOcclusion, AgreesWithTheOracleAcrossChunkCorners) {
                 oracle::corners_of_face(grid, types, v, d));
     }
   });
+}
+
+TEST(FaceOcclusion, ATableSaysWhichVoxelsGiveIt) {
+  const VoxelRegistry types = oracle::mixed_types();
+  const Grid grid = oracle::random_world(5, {IVec3{-4}, IVec3{4}}, 5, 0.6);
+  const auto is_opaque = [&](IVec3 at) { return types.is_opaque(grid.get(at)); };
+  grid.for_each([&](IVec3 v, VoxelType) {
+    for (const Direction d : kDirections) {
+      FaceOcclusion corners{};
+      for (std::size_t i = 0; i < 4; ++i) {
+        const CornerNeighbours& at = kCornerNeighbours[static_cast<std::size_t>(d)][i];
+        corners[i] = vertex_occlusion(is_opaque(v + at.side1), is_opaque(v + at.side2), is_opaque(v + at.corner));
+      }
+      EXPECT_EQ(corners, oracle::corners_of_face(grid, types, v, d));
+    }
+  });
+}
+
+TEST(FaceOcclusion, TheTablesVoxelsTouchTheCornerFromTheFront) {
+  for (const Direction d : kDirections) {
+    const FaceFrame& frame = frame_of(d);
+    for (std::size_t i = 0; i < 4; ++i) {
+      // Twice the corner's place, relative to the voxel's centre: whole numbers.
+      IVec3 corner = normal_of(d);
+      corner[frame.u] = i == 1 || i == 2 ? 1 : -1;
+      corner[frame.v] = i >= 2 ? 1 : -1;
+      const CornerNeighbours& at = kCornerNeighbours[static_cast<std::size_t>(d)][i];
+      for (const IVec3 offset : {at.side1, at.side2, at.corner}) {
+        EXPECT_EQ(offset[frame.axis], frame.sign);
+        EXPECT_EQ(glm::abs(2 * offset - corner), IVec3(1)) << name_of(d) << " corner " << i;
+      }
+      EXPECT_EQ(at.side1 + at.side2 - normal_of(d), at.corner);
+      EXPECT_EQ(at.side1[frame.v], 0);
+      EXPECT_EQ(at.side2[frame.u], 0);
+    }
+  }
 }
 
 TEST(Diagonal, KeepsTheBrighterOne) {

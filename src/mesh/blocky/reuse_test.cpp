@@ -158,6 +158,8 @@ TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) 
     for (BlockyMesher* each : {&mesher, &plain}) {
       each->find_faces(n, world.types, options.region, rows);
       ASSERT_EQ(rows.count(), static_cast<std::int64_t>(expected.size())) << "round " << round;
+      const auto all = static_cast<std::int64_t>(expected_faces(world.unlit, chunk, kWholeChunk).size());
+      ASSERT_EQ(each->count_faces(n, world.types), all) << "round " << round;
     }
   }
 }

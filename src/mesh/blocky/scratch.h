@@ -119,14 +119,17 @@ struct Job {
 };
 
 // The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`
-// and in the z view's `faces`, for the rows of the region.
+// and in the z view's `faces`, for the rows of the region; `count_faces` counts those of the region instead.
 void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_plain(const Job& job, Scratch& scratch);
+std::int64_t count_faces_plain(const Job& job, Scratch& scratch);
 #ifdef QUOIN_X86_KERNELS
 void mesh_avx2(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_avx2(const Job& job, Scratch& scratch);
+std::int64_t count_faces_avx2(const Job& job, Scratch& scratch);
 void mesh_avx512(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_avx512(const Job& job, Scratch& scratch);
+std::int64_t count_faces_avx512(const Job& job, Scratch& scratch);
 #endif
 
 // Makes room for `more` quads behind the first `used`; returns where they go.

@@ -1,4 +1,4 @@
-#include "io/volume/byte_stream.h"
+#include "io/byte_stream.h"
 
 #include <quoin/core/assert.h>
 
@@ -19,8 +19,9 @@ constexpr std::uint64_t kMaxDeflateRatio = 1032;
 // zlib counts in 32 bits.
 constexpr std::size_t kMaxAtOnce = std::size_t{1} << 30;
 
-// 15 bits of window, and 16 more for gzip's header and trailer.
-constexpr int kGzipWindow = 15 + 16;
+// Bits of the window of deflate, and what zlib adds to them for gzip's header and trailer.
+constexpr int kWindow = 15;
+constexpr int kGzipWindow = kWindow + 16;
 
 }  // namespace
 
@@ -29,21 +30,22 @@ bool begins_gzip(std::span<const std::byte> bytes) {
 }
 
 struct ByteStream::Inflater {
-  Inflater() {
-    if (inflateInit2(&state, kGzipWindow) != Z_OK) throw std::bad_alloc();
+  explicit Inflater(Compression compression) : has_members(compression == Compression::Gzip) {
+    if (inflateInit2(&state, has_members ? kGzipWindow : kWindow) != Z_OK) throw std::bad_alloc();
   }
   ~Inflater() { inflateEnd(&state); }
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
 
   z_stream state{};
+  bool has_members;
   bool is_done = false;
 };
 
 ByteStream::ByteStream(std::span<const std::byte> file, std::size_t begin, Compression compression)
     : file_(file), begin_(begin), position_(begin) {
   QUOIN_ASSERT(begin <= file.size(), "the stream begins in the file");
-  if (compression == Compression::Gzip) inflater_ = std::make_unique<Inflater>();
+  if (compression != Compression::None) inflater_ = std::make_unique<Inflater>(compression);
 }
 
 ByteStream::~ByteStream() = default;
@@ -87,6 +89,7 @@ Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
     return written;
   }
   if (outcome == Z_BUF_ERROR || (outcome == Z_OK && written == 0 && position_ == file_.size())) {
+    is_cut_off_ = true;
     return make_error(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
   }
   if (outcome == Z_OK) return written;
@@ -95,7 +98,7 @@ Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
 }
 
 Status ByteStream::begin_next_member() {
-  if (!begins_gzip(file_.subspan(position_))) {
+  if (!inflater_->has_members || !begins_gzip(file_.subspan(position_))) {
     inflater_->is_done = true;
     return {};
   }
@@ -120,6 +123,23 @@ Result<std::uint64_t> ByteStream::skip(std::uint64_t count) {
     if (*read_now < wanted) break;
   }
   return skipped;
+}
+
+std::vector<std::byte> gzipped(std::span<const std::byte> bytes, int level) {
+  QUOIN_ASSERT(bytes.size() < (std::size_t{1} << 31), "fewer than 2^31 bytes");
+  constexpr int kMemory = 8;  // zlib's default
+  z_stream state{};
+  if (deflateInit2(&state, level, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
+  std::vector<std::byte> out(deflateBound(&state, static_cast<uLong>(bytes.size())));
+  state.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
+  state.avail_in = static_cast<uInt>(bytes.size());
+  state.next_out = reinterpret_cast<Bytef*>(out.data());
+  state.avail_out = static_cast<uInt>(out.size());
+  const int outcome = deflate(&state, Z_FINISH);
+  out.resize(state.total_out);
+  deflateEnd(&state);
+  QUOIN_ASSERT(outcome == Z_STREAM_END, "deflateBound is a bound");
+  return out;
 }
 
 Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most) {

@@ -13,11 +13,13 @@ namespace quoin {
 /// Whether a gzip stream (RFC 1952) begins here.
 [[nodiscard]] bool begins_gzip(std::span<const std::byte> bytes);
 
-enum class Compression : std::uint8_t { None, Gzip };
+/// Gzip (RFC 1952) and Zlib (RFC 1950) are two wrappings of the same compressed data.
+enum class Compression : std::uint8_t { None, Gzip, Zlib };
 
-/// The bytes of a file from some place to its end, in order, decompressed where they are a gzip stream.
+/// The bytes of a file from some place to its end, in order, decompressed where they are a compressed stream.
 ///
-/// Members of gzip that follow each other are one stream, as the standard says; what follows the last is left alone.
+/// Members of gzip that follow each other are one stream, as the standard says; what follows the last, or the end of a
+/// zlib stream, is left alone.
 /// Memory is that of zlib's window, whatever the stream holds. Offsets in errors are those of the file.
 class ByteStream {
  public:
@@ -41,6 +43,8 @@ class ByteStream {
   /// Where in the file the next byte comes from.
   [[nodiscard]] std::size_t position() const { return position_; }
   [[nodiscard]] bool is_compressed() const { return inflater_ != nullptr; }
+  /// Whether the last read failed because compressed data have no end, rather than because they are damaged.
+  [[nodiscard]] bool is_cut_off() const { return is_cut_off_; }
 
  private:
   struct Inflater;
@@ -50,8 +54,13 @@ class ByteStream {
   std::span<const std::byte> file_;
   std::size_t begin_;
   std::size_t position_;
+  bool is_cut_off_ = false;
   std::unique_ptr<Inflater> inflater_;
 };
+
+/// The same bytes as one gzip stream (RFC 1952), `level` 0 (stored) to 9 (smallest). The same bytes give the same
+/// stream. Requires: fewer than 2^31 of them.
+[[nodiscard]] std::vector<std::byte> gzipped(std::span<const std::byte> bytes, int level);
 
 /// The first bytes of a file, decompressed where it is a gzip stream: `most` of them, or all that there are.
 [[nodiscard]] Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most);

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <quoin/io/vox.h>
+#include <quoin/render/cpu_renderer.h>
+
+namespace demo {
+
+/// A fleet of voxel ships over a generated terrain, with a camera and a sun.
+[[nodiscard]] quoin::Result<quoin::LoadedScene> make_fleet();
+
+/// How it is drawn, under its own sun.
+[[nodiscard]] quoin::RenderOptions fleet_options(const quoin::LoadedScene& fleet);
+
+}  // namespace demo

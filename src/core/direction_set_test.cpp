@@ -1,0 +1,52 @@
+#include <quoin/core/direction_set.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin {
+namespace {
+
+TEST(DirectionSet, HoldsWhatWasInserted) {
+  for (unsigned bits = 0; bits < 64; ++bits) {
+    DirectionSet set;
+    int count = 0;
+    for (const Direction direction : kDirections) {
+      if ((bits >> static_cast<unsigned>(direction) & 1U) == 0) continue;
+      set.insert(direction);
+      set.insert(direction);
+      ++count;
+    }
+    EXPECT_EQ(set, DirectionSet::from_bits(static_cast<std::uint8_t>(bits)));
+    EXPECT_EQ(set.bits(), bits);
+    EXPECT_EQ(set.size(), count);
+    EXPECT_EQ(set.empty(), count == 0);
+    std::vector<Direction> expected;
+    std::ranges::copy_if(kDirections, std::back_inserter(expected), [&](Direction d) { return set.contains(d); });
+    EXPECT_EQ(std::vector<Direction>(set.begin(), set.end()), expected);
+    for (const Direction direction : kDirections) set.erase(direction);
+    EXPECT_EQ(set, DirectionSet());
+  }
+}
+
+TEST(DirectionSet, KnowsNoSeventhDirection) {
+  EXPECT_EQ(DirectionSet::from_bits(0xFF), DirectionSet::all());
+  EXPECT_EQ(DirectionSet::all().size(), 6);
+}
+
+TEST(DirectionSet, NamesSayAxisAndSign) {
+  std::string names;
+  for (const Direction direction : DirectionSet{Direction::NegZ, Direction::PosX, Direction::NegY}) {
+    names += name_of(direction);
+  }
+  EXPECT_EQ(names, "+X-Y-Z");
+  for (const Direction direction : kDirections) {
+    const FaceFrame& frame = frame_of(direction);
+    EXPECT_EQ(name_of(direction), std::string(1, frame.sign > 0 ? '+' : '-') + "XYZ"[frame.axis]);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

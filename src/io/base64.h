@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// Bytes as text of A to Z, a to z, 0 to 9, + and /, four characters for three bytes, the last four filled up with =
+/// (RFC 4648, section 4).
+[[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
+
+/// Errors: BadFormat for what `to_base64` does not write, with the offset in `text`.
+[[nodiscard]] Result<std::vector<std::byte>> from_base64(std::string_view text);
+
+}  // namespace quoin

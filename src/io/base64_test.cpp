@@ -1,0 +1,50 @@
+#include "io/base64.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+namespace quoin {
+namespace {
+
+std::string text_of(std::string_view bytes) {
+  return to_base64(std::as_bytes(std::span(bytes)));
+}
+
+TEST(Base64, IsThatOfTheStandard) {  // RFC 4648, section 10
+  EXPECT_EQ(text_of(""), "");
+  EXPECT_EQ(text_of("f"), "Zg==");
+  EXPECT_EQ(text_of("fo"), "Zm8=");
+  EXPECT_EQ(text_of("foo"), "Zm9v");
+  EXPECT_EQ(text_of("foob"), "Zm9vYg==");
+  EXPECT_EQ(text_of("fooba"), "Zm9vYmE=");
+  EXPECT_EQ(text_of("foobar"), "Zm9vYmFy");
+}
+
+TEST(Base64, AnyBytesComeBack) {
+  std::mt19937 random(3);
+  for (std::size_t size = 0; size < 300; ++size) {
+    std::vector<std::byte> bytes(size);
+    for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
+    const auto back = from_base64(to_base64(bytes));
+    ASSERT_TRUE(back);
+    EXPECT_EQ(*back, bytes);
+  }
+}
+
+TEST(Base64, WhatIsDamagedIsRefusedWithItsPlace) {
+  const auto fault = [](std::string_view text) {
+    const auto bytes = from_base64(text);
+    return bytes ? std::string("none") : to_string(bytes.error());
+  };
+  EXPECT_EQ(fault("Zm9"), "byte 3: base64 is cut off: it comes in fours of characters");
+  EXPECT_EQ(fault("Zm9vZm-v"), "byte 6: no base64 character");
+  EXPECT_EQ(fault("Zg==Zm9v"), "byte 2: no base64 character");
+  EXPECT_EQ(fault("Z==="), "byte 1: no base64 character");
+  EXPECT_EQ(fault("Zm9="), "byte 0: base64 with bits that belong to no byte");
+  EXPECT_EQ(fault("Zm9v\xC3\xA9=="), "byte 4: no base64 character");
+}
+
+}  // namespace
+}  // namespace quoin

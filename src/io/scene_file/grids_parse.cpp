@@ -1,0 +1,165 @@
+#include "io/scene_file/grids_parse.h"
+
+#include <atomic>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <quoin/core/parallel.h>
+
+#include "io/scene_file/voxel_data.h"
+
+namespace quoin::scene_json {
+namespace {
+
+constexpr std::size_t kMaxGrids = std::size_t{1} << 22;
+
+/// A list "attributes" of pairs.
+void read_attributes(const Object& object, std::map<std::string, std::string>& attributes) {
+  read_list(object, "attributes", std::numeric_limits<std::size_t>::max(), [&](const Json& pair, const Place& place) {
+    if (!pair.is_array() || pair.size() != 2) {
+      object.faults().add(place, "must be a key and a value");
+      return;
+    }
+    std::string key = object.text(pair[0], {&place, {}, 0});
+    const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
+    if (!is_new) object.faults().add(place, "this key was given before");
+  });
+}
+
+VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
+  const Object type(
+      json, place,
+      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "attributes"}, faults);
+  VoxelProperties properties;
+  type.read_text("name", properties.name);
+  if (const Json* colour = type.need("colour")) {
+    const std::vector<int> c = type.whole_numbers(*colour, type.place_of("colour"), 4, 0, 255);
+    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
+    properties.colour = {channel(0), channel(1), channel(2), channel(3)};
+  }
+  std::string visibility = "opaque";
+  type.read("visibility", visibility);
+  if (visibility == "transparent") {
+    properties.visibility = Visibility::Transparent;
+  } else if (visibility != "opaque") {
+    faults.add(type.place_of("visibility"), "must be \"opaque\" or \"transparent\"");
+  }
+  type.read("collides", properties.collides);
+  type.read("roughness", properties.roughness);
+  type.read("metalness", properties.metalness);
+  type.read("emission", properties.emission);
+  type.read("ior", properties.ior);
+  if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
+  return properties;
+}
+
+/// Text of voxels, with its place in the file.
+struct Piece {
+  std::size_t grid = 0;
+  std::size_t index = 0;
+  const std::string* text = nullptr;
+};
+
+SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::vector<Piece>& pieces, Faults& faults) {
+  constexpr int kLeast = std::numeric_limits<int>::min();
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const Object object(json, place, {"name", "pivot", "canvas", "voxels"}, faults);
+  SceneGrid grid;
+  object.read_text("name", grid.name);
+  object.read("pivot", grid.pivot);
+  if (const Json* canvas = object.find("canvas")) {
+    const std::vector<int> c = object.whole_numbers(*canvas, object.place_of("canvas"), 6, kLeast, kMost);
+    grid.canvas = {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
+  }
+  std::size_t count = 0;
+  read_list(object, "voxels", std::numeric_limits<std::size_t>::max(), [&](const Json& piece, const Place& at) {
+    if (piece.is_string()) {
+      pieces.push_back({index, count++, &piece.get_ref<const std::string&>()});
+    } else {
+      faults.add(at, "must be a string");
+    }
+  });
+  return grid;
+}
+
+std::string about(IVec3 chunk, std::string_view what) {
+  std::string text = "chunk (";
+  for (int axis = 0; axis < 3; ++axis) text.append(std::to_string(chunk[axis])).append(axis < 2 ? ", " : ") ");
+  return text.append(what);
+}
+
+// Puts the chunks of a piece into their grid; returns what is wrong, or "".
+std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
+  for (PlacedChunk& chunk : chunks) {
+    if (chunk.voxels.non_air_count() == 0) return about(chunk.place, "holds nothing");
+    if (grid.find_chunk(chunk.place) != nullptr) return about(chunk.place, "was given before");
+    grid.put_chunk(chunk.place, std::move(chunk.voxels));
+  }
+  return "";
+}
+
+using Decoded = std::vector<Result<std::vector<PlacedChunk>>>;
+
+/// The chunks of all pieces; nothing where they take more than `max_bytes`.
+std::optional<Decoded> decode(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t max_bytes) {
+  Decoded decoded(pieces.size());
+  std::atomic<std::size_t> bytes = 0;
+  parallel_for(pieces.size(), {}, [&](std::size_t i) {
+    if (bytes > max_bytes) return;
+    decoded[i] = decode_voxels(*pieces[i].text, type_count);
+    if (!decoded[i]) return;
+    for (const PlacedChunk& chunk : *decoded[i]) bytes += voxel_bytes(chunk.voxels);
+  });
+  if (bytes > max_bytes) return std::nullopt;
+  return decoded;
+}
+
+void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t file_bytes,
+                 std::vector<SceneGrid>& grids, Faults& faults) {
+  auto all = decode(pieces, type_count, max_voxel_bytes(file_bytes));
+  if (!all) {
+    faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
+               ErrorCode::LimitExceeded);
+    return;
+  }
+  Decoded& decoded = *all;
+  for (std::size_t i = 0; i < pieces.size() && !faults.error(); ++i) {
+    const Piece& piece = pieces[i];
+    const Place list{nullptr, "grids", std::nullopt};
+    const Place grid{&list, {}, piece.grid};
+    const Place voxels{&grid, "voxels", std::nullopt};
+    const Place place{&voxels, {}, piece.index};
+    if (!decoded[i]) {
+      faults.add(place, decoded[i].error().message, decoded[i].error().code);
+    } else if (const std::string fault = put(std::move(*decoded[i]), grids[piece.grid].grid); !fault.empty()) {
+      faults.add(place, fault);
+    }
+  }
+}
+
+}  // namespace
+
+VoxelRegistry read_types(const Object& file) {
+  VoxelRegistry types;
+  if (file.find("types") == nullptr) return types;
+  read_list(file, "types", kMaxVoxelTypes, [&](const Json& each, const Place& place) {
+    const auto added = types.add(properties_of(each, place, file.faults()));
+    if (!added) file.faults().add(place, added.error().message, added.error().code);
+  });
+  return types;
+}
+
+std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes) {
+  std::vector<SceneGrid> grids;
+  if (file.find("grids") == nullptr) return grids;
+  std::vector<Piece> pieces;
+  read_list(file, "grids", kMaxGrids, [&](const Json& each, const Place& place) {
+    grids.push_back(grid_of(each, place, grids.size(), pieces, file.faults()));
+  });
+  if (!file.faults().error()) read_voxels(pieces, type_count, file_bytes, grids, file.faults());
+  return grids;
+}
+
+}  // namespace quoin::scene_json

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/scene/scene.h>
+
+#include "io/scene_file/json_reader.h"
+
+namespace quoin::scene_json {
+
+/// The list "types" of a scene file, if there is one: type 1, 2 and so on.
+[[nodiscard]] VoxelRegistry read_types(const Object& file);
+
+/// The list "grids" of a scene file of `file_bytes`, if there is one, whose voxels are of the first `type_count` types,
+/// air included.
+[[nodiscard]] std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes);
+
+}  // namespace quoin::scene_json

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+// What a scene file holds, asked for key by key; what is wrong is told with its place.
+
+namespace quoin::scene_json {
+
+using Json = nlohmann::json;
+
+/// A place in the file: a key or an index below another place, the file itself without. Text is made of it only where
+/// something is wrong.
+struct Place {
+  const Place* parent = nullptr;
+  std::string_view key;
+  std::optional<std::size_t> index;
+};
+
+/// The first fault found, with its place; reading goes on after it, and nothing of it is used.
+class Faults {
+ public:
+  void add(const Place& place, const std::string& what, ErrorCode code = ErrorCode::BadFormat);
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+ private:
+  std::optional<Error> error_;
+};
+
+/// A piece of the file in a message.
+[[nodiscard]] std::string excerpt(std::string_view text);
+
+/// An object of the file, whose keys are asked for one by one. What `read` does not find it leaves as it was.
+class Object {
+ public:
+  Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults);
+
+  [[nodiscard]] const Json* find(std::string_view key) const;
+  [[nodiscard]] const Json* need(std::string_view key) const;
+  /// Requires: this object outlives it.
+  [[nodiscard]] Place place_of(std::string_view key) const { return {&place_, key, std::nullopt}; }
+
+  void read(std::string_view key, std::string& out) const;
+  /// Text of any bytes: a string, or {"base64": "..."} where they are not UTF-8.
+  void read_text(std::string_view key, std::string& out) const;
+  void read(std::string_view key, bool& out) const;
+  void read(std::string_view key, double& out) const;
+  void read(std::string_view key, float& out) const;
+  void read(std::string_view key, DVec3& out) const;
+
+  [[nodiscard]] std::string text(const Json& json, const Place& place) const;
+  [[nodiscard]] std::vector<double> numbers(const Json& json, const Place& place, std::size_t count) const;
+  /// Whole numbers from `least` to `most`.
+  [[nodiscard]] std::vector<int> whole_numbers(const Json& json, const Place& place, std::size_t count, int least,
+                                               int most) const;
+  Faults& faults() const { return faults_; }
+
+ private:
+  [[nodiscard]] double number(const Json& json, const Place& place) const;
+
+  const Json& json_;
+  const Place& place_;
+  Faults& faults_;
+};
+
+/// A vector made unit, unless it is but for rounding.
+[[nodiscard]] std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults);
+
+/// The list of that key, with at most so many entries; null where it is none.
+[[nodiscard]] const Json* find_list(const Object& object, std::string_view key, std::size_t most);
+
+/// Calls `read(element, place)` for each element of a list.
+template <class Read>
+void read_list(const Object& object, std::string_view key, std::size_t most, Read read) {
+  const Json* list = find_list(object, key, most);
+  const Place place = object.place_of(key);
+  for (std::size_t i = 0; list != nullptr && i < list->size() && !object.faults().error(); ++i) {
+    read((*list)[i], Place{&place, {}, i});
+  }
+}
+
+}  // namespace quoin::scene_json

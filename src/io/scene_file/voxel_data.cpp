@@ -1,0 +1,316 @@
+#include "io/scene_file/voxel_data.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "core/progress_steps.h"
+#include "io/base64.h"
+#include "io/byte_order.h"
+#include "io/byte_stream.h"
+
+namespace quoin {
+namespace {
+
+constexpr std::size_t kChunksPerPiece = 32;
+constexpr std::uint32_t kMixedSlab = 0xFFFF'FFFFU;
+constexpr int kSlabs = 256;
+constexpr std::size_t kSlabVoxels = 1'024;
+constexpr std::size_t kMaxTypesOfChunk = 65'536;
+// The outermost chunks of a grid stay air.
+constexpr int kMaxPlace = (1 << (31 - kChunkShift)) - 2;
+constexpr int kMinPlace = -kMaxPlace - 1;
+
+// More than all that a piece can hold: chunks of 65,536 types, none of whose slabs is of one.
+constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
+static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
+
+// Real scenes take up to thirty times their text.
+constexpr std::size_t kFreeBytes = std::size_t{64} << 20;
+constexpr std::size_t kBytesPerFileByte = 64;
+// Of the tree above a chunk that lies alone, about.
+constexpr std::size_t kBytesAboveChunk = 1'024;
+
+constexpr int bits_of(std::size_t types) {
+  int bits = 1;
+  while ((std::size_t{1} << bits) < types) bits *= 2;
+  return bits;
+}
+
+using DenseChunk = std::vector<VoxelType>;  // x fastest, then y, then z
+
+// Where the rows of a slab begin in a dense chunk: four of y beside each other, four of z.
+std::size_t first_of_slab(int slab) {
+  return (static_cast<std::size_t>(slab / 16) * 4 * kChunkEdge + static_cast<std::size_t>(slab % 16) * 4) * kChunkEdge;
+}
+constexpr std::size_t kSlabRun = std::size_t{4} * kChunkEdge;  // voxels of a slab that lie beside each other
+
+/// Calls `visit(voxels of one z)` for the four runs of a slab.
+template <class Voxels, class Visit>
+void for_each_run(Voxels voxels, int slab, Visit visit) {
+  for (std::size_t z = 0; z < 4; ++z) {
+    visit(voxels.subspan(first_of_slab(slab) + z * kChunkEdge * kChunkEdge, kSlabRun));
+  }
+}
+
+/// Writes chunk after chunk into bytes.
+class PieceWriter {
+ public:
+  void put(IVec3 place, const Chunk& chunk) {
+    put_number(static_cast<std::uint32_t>(place.x));
+    put_number(static_cast<std::uint32_t>(place.y));
+    put_number(static_cast<std::uint32_t>(place.z));
+    if (const auto uniform = chunk.uniform()) return put_palette(std::array{*uniform});
+    read(chunk);
+    put_palette(palette_);
+    if (palette_.size() > 1) {
+      for (int slab = 0; slab < kSlabs; ++slab) put_slab(slab);
+    }
+    for (const VoxelType type : palette_) index_of_[type] = kNone;
+  }
+  [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFF'FFFFU;
+
+  template <class T>
+  void put_number(T number) {
+    for (std::size_t i = 0; i < sizeof(T); ++i) bytes_.push_back(static_cast<std::byte>(number >> (8 * i)));
+  }
+  void put_palette(std::span<const VoxelType> types) {
+    put_number(static_cast<std::uint32_t>(types.size()));
+    for (const VoxelType type : types) put_number(type);
+  }
+
+  // The chunk's types, and which there are, in the order in which they first occur.
+  void read(const Chunk& chunk) {
+    palette_.clear();
+    dense_.resize(kChunkVoxels);
+    index_of_.resize(kMaxTypesOfChunk, kNone);
+    auto row = dense_.begin();
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y, row += kChunkEdge) {
+        chunk.read_row(y, z, std::span<VoxelType, kChunkEdge>(row, kChunkEdge));
+      }
+    }
+    for (const VoxelType type : dense_) {
+      if (index_of_[type] != kNone) continue;
+      index_of_[type] = static_cast<std::uint32_t>(palette_.size());
+      palette_.push_back(type);
+    }
+  }
+
+  void put_slab(int slab) {
+    const std::span<const VoxelType> voxels(dense_);
+    const VoxelType first = voxels[first_of_slab(slab)];
+    bool is_uniform = true;
+    for_each_run(voxels, slab, [&](std::span<const VoxelType> run) {
+      is_uniform = is_uniform && std::ranges::all_of(run, [first](VoxelType type) { return type == first; });
+    });
+    put_number(is_uniform ? index_of_[first] : kMixedSlab);
+    if (is_uniform) return;
+    const int bits = bits_of(palette_.size());
+    for_each_run(voxels, slab, [&](std::span<const VoxelType> run) {
+      std::uint32_t gathered = 0;
+      int filled = 0;
+      for (const VoxelType type : run) {
+        gathered |= index_of_[type] << filled;
+        filled += bits;
+        for (; filled >= 8; filled -= 8, gathered >>= 8) bytes_.push_back(static_cast<std::byte>(gathered));
+      }
+    });
+  }
+
+  std::vector<std::byte> bytes_;
+  DenseChunk dense_;
+  std::vector<std::uint32_t> index_of_;  // by type; kNone but while a chunk is put
+  std::vector<VoxelType> palette_;
+};
+
+std::string text_of(const std::vector<std::byte>& bytes, VoxelCompression compression) {
+  constexpr int kLevel = 6;
+  return to_base64(gzipped(bytes, compression == VoxelCompression::Small ? kLevel : 0));
+}
+
+/// Reads a piece, number after number.
+class PieceReader {
+ public:
+  PieceReader(std::span<const std::byte> bytes, std::size_t type_count) : bytes_(bytes), type_count_(type_count) {}
+
+  [[nodiscard]] bool is_at_end() const { return at_ == bytes_.size(); }
+
+  Result<PlacedChunk> read_chunk() {
+    constexpr std::size_t kHeaderBytes = 16;
+    if (!has(kHeaderBytes)) return cut_off();
+    PlacedChunk chunk;
+    const std::size_t begin = at_;
+    for (int axis = 0; axis < 3; ++axis) chunk.place[axis] = take<std::int32_t>();
+    const auto count = take<std::uint32_t>();
+    for (int axis = 0; axis < 3; ++axis) {
+      const int at = chunk.place[axis];
+      if (at < kMinPlace || at > kMaxPlace) return fault("a chunk beyond where voxels end", begin);
+    }
+    if (count == 0 || count > kMaxTypesOfChunk) {
+      return fault("a chunk of " + std::to_string(count) + " types", at_ - sizeof(count));
+    }
+    if (auto read = read_palette(count); !read) return read.error();
+    if (count == 1) {
+      chunk.voxels = Chunk(palette_[0]);
+      return chunk;
+    }
+    dense_.resize(kChunkVoxels);
+    for (int slab = 0; slab < kSlabs; ++slab) {
+      if (auto read = read_slab(slab); !read) return read.error();
+    }
+    chunk.voxels = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
+    return chunk;
+  }
+
+ private:
+  [[nodiscard]] bool has(std::size_t count) const { return bytes_.size() - at_ >= count; }
+  template <class T>
+  T take() {
+    const T number = load<T>(bytes_.data() + at_, std::endian::little);
+    at_ += sizeof(T);
+    return number;
+  }
+  static Error fault(const std::string& what, std::size_t at) {
+    return make_error(ErrorCode::BadFormat, "byte " + std::to_string(at) + " of the voxel data: " + what);
+  }
+  [[nodiscard]] Error cut_off() const { return fault("cut off", bytes_.size()); }
+
+  Status read_palette(std::uint32_t count) {
+    if (!has(count * sizeof(VoxelType))) return cut_off();
+    palette_.resize(count);
+    for (VoxelType& type : palette_) {
+      type = take<VoxelType>();
+      if (type >= type_count_) {
+        return fault("type " + std::to_string(type) + ", and the file has " + std::to_string(type_count_ - 1),
+                     at_ - sizeof(type));
+      }
+    }
+    return {};
+  }
+
+  Status read_slab(int slab) {
+    if (!has(sizeof(std::uint32_t))) return cut_off();
+    const auto index = take<std::uint32_t>();
+    const std::span<VoxelType> voxels(dense_);
+    if (index != kMixedSlab) {
+      if (index >= palette_.size()) return wrong_index(index, at_ - sizeof(index));
+      for_each_run(voxels, slab, [&](std::span<VoxelType> run) { std::ranges::fill(run, palette_[index]); });
+      return {};
+    }
+    const int bits = bits_of(palette_.size());
+    const std::size_t bytes = kSlabVoxels / 8 * static_cast<std::size_t>(bits);
+    if (!has(bytes)) return cut_off();
+    Status status;
+    std::uint32_t gathered = 0;
+    int filled = 0;
+    for_each_run(voxels, slab, [&](std::span<VoxelType> run) {
+      for (VoxelType& type : run) {
+        for (; filled < bits; filled += 8) gathered |= std::to_integer<std::uint32_t>(bytes_[at_++]) << filled;
+        const std::uint32_t found = gathered & ((1U << bits) - 1);
+        gathered >>= bits;
+        filled -= bits;
+        if (found >= palette_.size() && status) status = wrong_index(found, at_ - 1);
+        type = palette_[found < palette_.size() ? found : 0];
+      }
+    });
+    return status;
+  }
+  [[nodiscard]] Error wrong_index(std::uint32_t index, std::size_t at) const {
+    return fault("index " + std::to_string(index) + " of a palette of " + std::to_string(palette_.size()), at);
+  }
+
+  std::span<const std::byte> bytes_;
+  std::size_t type_count_;
+  std::size_t at_ = 0;
+  std::vector<VoxelType> palette_;
+  DenseChunk dense_;
+};
+
+/// An error whose place is no place of the file.
+Error placed(const Error& error, const std::string& unit, const std::string& of) {
+  return make_error(error.code, unit + " " + std::to_string(error.byte_offset.value_or(0)) + of + ": " + error.message);
+}
+
+Result<std::vector<std::byte>> expanded(std::string_view piece) {
+  const auto compressed = from_base64(piece);
+  if (!compressed) return placed(compressed.error(), "character", "");
+  if (!begins_gzip(*compressed)) return make_error(ErrorCode::BadFormat, "no gzip stream");
+  ByteStream stream(*compressed, 0, Compression::Gzip);
+  constexpr std::size_t kStep = std::size_t{1} << 16;
+  std::vector<std::byte> bytes;
+  while (bytes.size() <= kMaxPieceBytes) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + std::max(kStep, before));
+    const auto count = stream.read(std::span(bytes).subspan(before));
+    if (!count) return placed(count.error(), "byte", " of the compressed data");
+    bytes.resize(before + *count);
+    if (*count == 0) break;
+  }
+  if (bytes.size() > kMaxPieceBytes) return make_error(ErrorCode::LimitExceeded, "expands to more than 32 MiB");
+  if (stream.remaining() > 0) return make_error(ErrorCode::BadFormat, "something follows the compressed data");
+  return bytes;
+}
+
+}  // namespace
+
+std::size_t max_voxel_bytes(std::size_t file_bytes) {
+  return kFreeBytes + kBytesPerFileByte * file_bytes;
+}
+
+std::size_t voxel_bytes(const Chunk& chunk) {
+  return kBytesAboveChunk + chunk.bytes();
+}
+
+Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
+                                                            VoxelCompression compression, Threads threads,
+                                                            const Progress& progress) {
+  struct Piece {
+    std::size_t grid;
+    std::vector<IVec3> chunks;
+  };
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    const std::vector<IVec3> chunks = grids[i]->chunks();
+    for (std::size_t at = 0; at < chunks.size(); at += kChunksPerPiece) {
+      const auto first = chunks.begin() + static_cast<std::ptrdiff_t>(at);
+      const std::size_t count = std::min(kChunksPerPiece, chunks.size() - at);
+      pieces.push_back({i, {first, first + static_cast<std::ptrdiff_t>(count)}});
+    }
+  }
+  std::vector<std::string> texts(pieces.size());
+  ProgressSteps steps(progress, pieces.size());
+  parallel_for(pieces.size(), threads, [&](std::size_t i) {
+    if (steps.cancelled()) return;
+    PieceWriter writer;
+    const Grid& grid = *grids[pieces[i].grid];
+    for (const IVec3 chunk : pieces[i].chunks) writer.put(chunk, *grid.find_chunk(chunk));
+    texts[i] = text_of(writer.bytes(), compression);
+    steps.step();
+  });
+  if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  std::vector<std::vector<std::string>> of_grids(grids.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) of_grids[pieces[i].grid].push_back(std::move(texts[i]));
+  return of_grids;
+}
+
+Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count) {
+  const auto bytes = expanded(piece);
+  if (!bytes) return bytes.error();
+  std::vector<PlacedChunk> chunks;
+  PieceReader reader(*bytes, type_count);
+  while (!reader.is_at_end()) {
+    auto chunk = reader.read_chunk();
+    if (!chunk) return chunk.error();
+    chunks.push_back(std::move(*chunk));
+  }
+  return chunks;
+}
+
+}  // namespace quoin

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/grid/grid.h>
+
+// The voxels of a grid as a scene file holds them: pieces of some chunks each, which are gzip streams in base64.
+//
+//   chunk    int32 x, y, z          its coordinates: voxels / 64
+//            uint32 n               types of its palette, 1 to 65,536
+//            uint16 types[n]
+//            if n > 1, 256 slabs of 64 x 4 x 4 voxels, by z / 4, then y / 4:
+//              uint32 index         of the palette, for all of the slab; or 0xFFFFFFFF, and then
+//              uint8 [128 * bits]   1,024 indices of `bits` bits, x fastest, then y, then z, from the lowest bit up;
+//                                   `bits` is the first of 1, 2, 4, 8 and 16 with 2^bits >= n
+//
+// Little-endian; chunk after chunk to the end of the piece.
+
+namespace quoin {
+
+inline constexpr std::size_t kMaxSceneFileBytes = std::size_t{2} << 30;
+
+/// What chunks may take in memory, all together, of a file of so many bytes; and what a chunk counts as, the tree above
+/// it included. What is written keeps to it: where compressed voxels would take more, they are stored as they are.
+[[nodiscard]] std::size_t max_voxel_bytes(std::size_t file_bytes);
+[[nodiscard]] std::size_t voxel_bytes(const Chunk& chunk);
+
+enum class VoxelCompression : std::uint8_t { Stored, Small };
+
+/// The pieces of each grid, in the order of their chunks. The same voxels give the same text, at any thread count.
+/// Errors: Cancelled when `progress` says so.
+[[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
+                                                                          VoxelCompression compression, Threads threads,
+                                                                          const Progress& progress);
+
+struct PlacedChunk {
+  IVec3 place{0};
+  Chunk voxels;
+};
+
+/// The chunks of a piece.
+///
+/// Errors: BadFormat, whose message says at which character of the text, or at which byte of what is in it; also for
+///         types that are not below `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, as
+///         none that was written does.
+[[nodiscard]] Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count);
+
+}  // namespace quoin

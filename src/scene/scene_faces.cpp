@@ -1,0 +1,185 @@
+#include <quoin/scene/scene_faces.h>
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <quoin/mesh/blocky.h>
+
+#include "grid/coordinate_hash.h"
+
+namespace quoin {
+namespace {
+
+struct GridFaces {
+  ChangeCursor read;
+  std::unordered_map<IVec3, std::int64_t, CoordinateHash> visible_of;  // chunks with a visible face
+  std::int64_t visible = 0;
+  std::size_t placements = 0;  // drawn instances
+  FaceCounts counted;          // what of it is in the scene's counts
+
+  void put(IVec3 chunk, std::int64_t count) {
+    const auto known = visible_of.find(chunk);
+    visible += count - (known == visible_of.end() ? 0 : known->second);
+    if (count > 0) {
+      visible_of[chunk] = count;
+    } else if (known != visible_of.end()) {
+      visible_of.erase(known);
+    }
+  }
+};
+
+/// A chunk whose faces are to be counted anew.
+struct ChunkCount {
+  const Grid* grid = nullptr;
+  GridFaces* faces = nullptr;
+  IVec3 chunk{0};
+  std::int64_t visible = 0;
+};
+
+bool has_any_of(const Grid& grid, const TypeChanges& changes) {
+  const std::vector<VoxelType> types = grid.types();
+  return changes.all || std::ranges::any_of(changes.items, [&](const TypeChange& change) {
+           return change.visibility && std::ranges::binary_search(types, change.type);
+         });
+}
+
+void count_chunks(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads) {
+  // A mesher, which each task has of its own, is made in the time of some chunks.
+  constexpr std::size_t kChunksPerTask = 32;
+  const std::size_t tasks =
+      std::min<std::size_t>(chunks.size() / kChunksPerTask + 1, std::size_t{4} * thread_count(threads));
+  if (chunks.empty()) return;
+  parallel_for(tasks, threads, [&](std::size_t task) {
+    BlockyMesher mesher;
+    for (std::size_t i = task; i < chunks.size(); i += tasks) {
+      chunks[i].visible = mesher.count_faces(chunks[i].grid->neighbourhood(chunks[i].chunk), types);
+    }
+  });
+}
+
+}  // namespace
+
+struct SceneFaces::Impl {
+  InstanceFilter filter = InstanceFilter::Visible;
+  ChangeCursor scene_read;
+  ChangeCursor types_read;
+  std::map<GridHandle, GridFaces> grids;       // also those that no drawn instance places any more
+  std::map<InstanceHandle, GridHandle> drawn;  // what each drawn instance places
+  FaceCounts counts;
+
+  std::vector<GridHandle> touched_by(const Scene& scene, const SceneChanges& changes);
+  void forget_those_with(const TypeChanges& types, const Scene& scene, std::vector<GridHandle>& touched);
+  void look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched);
+  void follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks);
+  void count_in(const Scene& scene, GridHandle handle);
+};
+
+// The grids of which something may count otherwise than before.
+std::vector<GridHandle> SceneFaces::Impl::touched_by(const Scene& scene, const SceneChanges& changes) {
+  std::vector<GridHandle> touched = changes.grids;
+  std::vector<InstanceHandle> instances = changes.instances;
+  if (changes.all) {
+    grids.clear();
+    drawn.clear();
+    counts = {};
+    instances = scene.instances().handles();
+  }
+  for (const InstanceHandle handle : instances) look_at(scene, handle, touched);
+  return touched;
+}
+
+// Grids with voxels of types that are opaque or transparent, and were not before, are counted from the beginning.
+void SceneFaces::Impl::forget_those_with(const TypeChanges& types, const Scene& scene,
+                                         std::vector<GridHandle>& touched) {
+  for (auto& [handle, faces] : grids) {
+    const SceneGrid* entry = scene.grids().find(handle);
+    if (entry == nullptr || !has_any_of(entry->grid, types)) continue;
+    faces.read = {};
+    touched.push_back(handle);
+  }
+}
+
+// Notes which grid an instance places now, if it is drawn, and adds that and the one it placed before to `touched`.
+void SceneFaces::Impl::look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched) {
+  if (const auto before = drawn.find(handle); before != drawn.end()) {
+    --grids[before->second].placements;
+    touched.push_back(before->second);
+    drawn.erase(before);
+  }
+  const Instance* instance = scene.instances().find(handle);
+  if (instance == nullptr || !is_drawn(scene, *instance, filter)) return;
+  drawn[handle] = instance->grid;
+  ++grids[instance->grid].placements;
+  touched.push_back(instance->grid);
+}
+
+// Adds the chunks of a grid that are to be counted again.
+void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks) {
+  const SceneGrid* entry = scene.grids().find(handle);
+  const auto found = grids.find(handle);
+  if (entry == nullptr || found == grids.end() || found->second.placements == 0) return;
+  GridFaces& faces = found->second;
+  const GridChanges changes = entry->grid.changes_since(faces.read);
+  if (changes.all) {
+    faces.visible_of.clear();
+    faces.visible = 0;
+  }
+  for (const IVec3 chunk : chunks_to_mesh(entry->grid, changes)) chunks.push_back({&entry->grid, &faces, chunk, 0});
+}
+
+// Puts what a grid has now in the place of what was counted of it before.
+void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
+  const auto found = grids.find(handle);
+  if (found == grids.end()) return;
+  GridFaces& faces = found->second;
+  counts -= std::exchange(faces.counted, {});
+  const SceneGrid* entry = scene.grids().find(handle);
+  if (entry == nullptr) {
+    grids.erase(found);
+    return;
+  }
+  if (faces.placements == 0) return;
+  faces.counted = {faces.visible, 6 * entry->grid.voxel_count()};
+  counts += faces.counted;
+}
+
+SceneFaces::SceneFaces(InstanceFilter filter) : impl_(std::make_unique<Impl>()) {
+  impl_->filter = filter;
+}
+SceneFaces::SceneFaces(SceneFaces&&) noexcept = default;
+SceneFaces& SceneFaces::operator=(SceneFaces&&) noexcept = default;
+SceneFaces::~SceneFaces() = default;
+
+const FaceCounts& SceneFaces::counts() const {
+  return impl_->counts;
+}
+
+const FaceCounts& SceneFaces::update(const Scene& scene, Threads threads) {
+  ChangeCursor scene_read = impl_->scene_read;
+  ChangeCursor types_read = impl_->types_read;
+  const SceneChanges changes = scene.changes_since(scene_read);
+  const TypeChanges types = scene.types.changes_since(types_read);
+  if (changes.empty() && types.empty()) return impl_->counts;
+  impl_->scene_read = impl_->types_read = {};  // stays so when memory runs out
+  std::vector<GridHandle> touched = impl_->touched_by(scene, changes);
+  if (has_other_visibility(types)) impl_->forget_those_with(types, scene, touched);
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  std::vector<ChunkCount> chunks;
+  for (const GridHandle handle : touched) impl_->follow(scene, handle, chunks);
+  count_chunks(chunks, scene.types, threads);
+  for (const ChunkCount& counted : chunks) counted.faces->put(counted.chunk, counted.visible);
+  for (const GridHandle handle : touched) impl_->count_in(scene, handle);
+  impl_->scene_read = scene_read;
+  impl_->types_read = types_read;
+  return impl_->counts;
+}
+
+FaceCounts count_faces(const Scene& scene, InstanceFilter filter, Threads threads) {
+  return SceneFaces(filter).update(scene, threads);
+}
+
+}  // namespace quoin

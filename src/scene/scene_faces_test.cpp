@@ -1,0 +1,135 @@
+#include <quoin/scene/scene_faces.h>
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <quoin/scene/scene_meshes.h>
+
+#include "mesh/mesh_oracle.h"
+
+namespace quoin {
+namespace {
+
+/// One voxel, one face at a time.
+FaceCounts slow_counts(const Scene& scene, InstanceFilter filter) {
+  FaceCounts counts;
+  for (const GridHandle handle : scene.grids().handles()) {
+    bool is_counted = false;
+    scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+      is_counted = is_counted || (instance.grid == handle && is_drawn(scene, instance, filter));
+    });
+    if (!is_counted) continue;
+    const Grid& grid = scene.grids()[handle].grid;
+    counts +=
+        {static_cast<std::int64_t>(oracle::visible_faces(grid, scene.types, false).size()), 6 * grid.voxel_count()};
+  }
+  return counts;
+}
+
+GridHandle add_random_grid(Scene& scene, std::mt19937& random) {
+  SceneGrid grid;
+  grid.grid = oracle::random_world(random(), {IVec3{-9}, IVec3{9}}, 5, 0.2);
+  return scene.add_grid(std::move(grid));
+}
+
+/// Any change that a scene can be told of.
+void change(Scene& scene, std::mt19937& random) {
+  const auto grids = scene.grids().handles();
+  const auto instances = scene.instances().handles();
+  const auto any_grid = [&] { return grids[random() % grids.size()]; };
+  const auto voxel = [&] { return IVec3(random() % 18, random() % 18, random() % 18) - 9; };
+  switch (random() % 9) {
+    case 0:
+      if (random() % 3 == 0) add_random_grid(scene, random);
+      break;
+    case 1:
+      scene.add_instance({.name = "", .grid = any_grid(), .visible = random() % 2 == 0});
+      break;
+    case 2:
+      if (!instances.empty()) scene.remove_instance(instances[random() % instances.size()]);
+      break;
+    case 3:
+      if (grids.size() > 2) scene.remove_grid(any_grid());
+      break;
+    case 4:
+      if (!instances.empty()) {
+        Instance& instance = scene.edit(instances[random() % instances.size()]);
+        instance.visible = !instance.visible;
+        instance.position.x += 1.0;
+      }
+      break;
+    case 5:
+      if (random() % 4 == 0) scene.edit(any_grid()).grid.clear();
+      break;
+    case 6: {
+      const auto type = static_cast<VoxelType>(1 + random() % 5);
+      VoxelProperties properties = scene.types[type];
+      properties.visibility = random() % 2 == 0 ? Visibility::Opaque : Visibility::Transparent;
+      scene.types.replace(type, properties);
+      break;
+    }
+    default:
+      for (int i = 0; i < 3; ++i) scene.edit(any_grid()).grid.set(voxel(), static_cast<VoxelType>(random() % 6));
+  }
+}
+
+TEST(SceneFaces, FollowEveryChangeOfAScene) {
+  constexpr unsigned kSeed = 31;
+  std::mt19937 random(kSeed);
+  Scene scene;
+  scene.types = oracle::mixed_types();
+  for (int i = 0; i < 3; ++i) add_random_grid(scene, random);
+  SceneFaces visible;
+  SceneFaces all(InstanceFilter::All);
+  for (int round = 0; round < 400; ++round) {
+    change(scene, random);
+    if (random() % 3 == 0) continue;  // several changes at once
+    ASSERT_EQ(visible.update(scene), slow_counts(scene, InstanceFilter::Visible)) << "seed " << kSeed << " " << round;
+    ASSERT_EQ(all.update(scene), slow_counts(scene, InstanceFilter::All)) << "seed " << kSeed << " " << round;
+    ASSERT_EQ(all.counts(), count_faces(scene, InstanceFilter::All));
+  }
+}
+
+TEST(SceneFaces, AreThoseThatAMesherFinds) {
+  std::mt19937 random(5);
+  Scene scene;
+  scene.types = oracle::mixed_types();
+  for (int i = 0; i < 4; ++i) {
+    const GridHandle grid = add_random_grid(scene, random);
+    for (int placed = 0; placed < i; ++placed) {
+      scene.add_instance({.name = "", .grid = grid, .visible = placed % 2 == 0 && i != 1});
+    }
+  }
+  for (const InstanceFilter filter : {InstanceFilter::Visible, InstanceFilter::All}) {
+    const auto meshes = mesh_scene(scene, {.instances = filter});
+    ASSERT_TRUE(meshes);
+    const FaceCounts counts = count_faces(scene, filter);
+    EXPECT_EQ(counts, (FaceCounts{meshes->stats.faces_visible, meshes->stats.faces_total}));
+    EXPECT_GT(counts.visible, 0);
+  }
+}
+
+TEST(SceneFaces, OfAnotherSceneAreCountedAnew) {
+  std::mt19937 random(6);
+  SceneFaces faces;
+  EXPECT_EQ(faces.update(Scene()), FaceCounts());
+  for (int i = 0; i < 3; ++i) {
+    Scene scene;
+    scene.types = oracle::mixed_types();
+    const GridHandle grid = add_random_grid(scene, random);
+    scene.add_instance({.name = "", .grid = grid});
+    EXPECT_EQ(faces.update(scene), slow_counts(scene, InstanceFilter::Visible));
+    scene.edit(grid).grid.set({40, 40, 40}, 1);
+    EXPECT_EQ(faces.update(scene.snapshot()), slow_counts(scene, InstanceFilter::Visible));
+  }
+}
+
+TEST(SceneFaces, ReadWithThousands) {
+  EXPECT_EQ(to_string(FaceCounts{1'234, 5'000'676}), "Faces: 1,234 visible of 5,000,676 total");
+}
+
+}  // namespace
+}  // namespace quoin
