@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -46,18 +47,12 @@ bool has_any_of(const Grid& grid, const TypeChanges& changes) {
          });
 }
 
-void count_chunks(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads) {
-  // A mesher, which each task has of its own, is made in the time of some chunks.
-  constexpr std::size_t kChunksPerTask = 32;
-  const std::size_t tasks =
-      std::min<std::size_t>(chunks.size() / kChunksPerTask + 1, std::size_t{4} * thread_count(threads));
-  if (chunks.empty()) return;
-  parallel_for(tasks, threads, [&](std::size_t task) {
-    BlockyMesher mesher;
-    for (std::size_t i = task; i < chunks.size(); i += tasks) {
-      chunks[i].visible = mesher.count_faces(chunks[i].grid->neighbourhood(chunks[i].chunk), types);
-    }
-  });
+/// Counts the chunks at `first`, `first + step` and so on.
+void count_chunks(std::vector<ChunkCount>& chunks, std::size_t first, std::size_t step, const VoxelRegistry& types,
+                  BlockyMesher& mesher) {
+  for (std::size_t i = first; i < chunks.size(); i += step) {
+    chunks[i].visible = mesher.count_faces(chunks[i].grid->neighbourhood(chunks[i].chunk), types);
+  }
 }
 
 }  // namespace
@@ -69,11 +64,13 @@ struct SceneFaces::Impl {
   std::map<GridHandle, GridFaces> grids;       // also those that no drawn instance places any more
   std::map<InstanceHandle, GridHandle> drawn;  // what each drawn instance places
   FaceCounts counts;
+  std::optional<BlockyMesher> mesher;  // for the few chunks around an edit
 
   std::vector<GridHandle> touched_by(const Scene& scene, const SceneChanges& changes);
   void forget_those_with(const TypeChanges& types, const Scene& scene, std::vector<GridHandle>& touched);
   void look_at(const Scene& scene, InstanceHandle handle, std::vector<GridHandle>& touched);
   void follow(const Scene& scene, GridHandle handle, std::vector<ChunkCount>& chunks);
+  void count(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads);
   void count_in(const Scene& scene, GridHandle handle);
 };
 
@@ -130,6 +127,22 @@ void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector
   for (const IVec3 chunk : chunks_to_mesh(entry->grid, changes)) chunks.push_back({&entry->grid, &faces, chunk, 0});
 }
 
+void SceneFaces::Impl::count(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads) {
+  // Making a mesher, which each task has of its own, takes as long as some chunks.
+  constexpr std::size_t kChunksPerTask = 32;
+  const std::size_t tasks =
+      std::min<std::size_t>(chunks.size() / kChunksPerTask, std::size_t{4} * thread_count(threads));
+  if (tasks > 1) {
+    parallel_for(tasks, threads, [&](std::size_t task) {
+      BlockyMesher own;
+      count_chunks(chunks, task, tasks, types, own);
+    });
+  } else if (!chunks.empty()) {
+    if (!mesher) mesher.emplace();
+    count_chunks(chunks, 0, 1, types, *mesher);
+  }
+}
+
 // Puts what a grid has now in the place of what was counted of it before.
 void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
   const auto found = grids.find(handle);
@@ -170,7 +183,7 @@ const FaceCounts& SceneFaces::update(const Scene& scene, Threads threads) {
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   std::vector<ChunkCount> chunks;
   for (const GridHandle handle : touched) impl_->follow(scene, handle, chunks);
-  count_chunks(chunks, scene.types, threads);
+  impl_->count(chunks, scene.types, threads);
   for (const ChunkCount& counted : chunks) counted.faces->put(counted.chunk, counted.visible);
   for (const GridHandle handle : touched) impl_->count_in(scene, handle);
   impl_->scene_read = scene_read;

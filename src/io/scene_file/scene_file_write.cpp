@@ -162,6 +162,7 @@ class SceneText {
     if (has_models) put_list(text, "types", types_);
     if (has_models) put_list(text, "grids", grids_);
     std::vector<Json> files;
+    files.reserve(scene.sources.size());
     for (const SceneFile::Source& source : scene.sources) files.push_back({{"id", source.id}, {"path", source.file}});
     if (!has_models || !files.empty()) put_list(text, "files", files);
     put_list(text, "instances", instances_);
@@ -247,6 +248,7 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   if (auto sound = check_types(scene); !sound) return sound.error();
   if (auto sound = check_readable(scene); !sound) return sound.error();
   std::vector<const Grid*> grids;
+  grids.reserve(scene.grids.size());
   for (const SceneGrid& grid : scene.grids) grids.push_back(&grid.grid);
   auto text = text_of(scene, grids, VoxelCompression::Small, threads, progress);
   if (text && voxel_bytes_of(grids) > max_voxel_bytes(text->size())) {
