@@ -51,7 +51,7 @@ struct SceneFile {
 /// Errors: BadFormat, with the byte offset where it is no JSON, else with the place in it
 ///         ("instances[3].rotation: ..."); unknown keys are refused; Unsupported for a later version; LimitExceeded
 ///         beyond 64 MiB outside of strings or 2 GiB in all, 32 levels of nesting, 65,536 files, 4,194,304 grids,
-///         instances or lamps, and for voxels that would take more than 256 MiB and 64 times the file's size of memory,
+///         instances or lamps, and for voxels that would take more than 64 MiB and 64 times the file's size of memory,
 ///         which what `write_scene_file` writes does not. What is wrong within voxels is told with its place in them
 ///         ("grids[0].voxels[2]: byte 37 of the voxel data: ...").
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
