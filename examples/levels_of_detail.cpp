@@ -1,6 +1,6 @@
 // Levels of detail: a road of houses that ends far away. Near ones are drawn voxel by voxel, those further off in
-// coarser cells, the last from impostors; green, yellow to orange, and blue tell which. OUT.png, or levels_of_detail.png,
-// beside the picture as players see it.
+// coarser cells, the last from impostors; green, yellow to orange, and blue tell which. OUT.png, or
+// levels_of_detail.png, below the picture as players see it.
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
-// What ambient occlusion does to corners: a staircase between walls in which every value from 0 to 3 occurs, in the classic
-// block look (own colours times occlusion, no light at all), and occlusion alone in grey: OUT.png, or
+// What ambient occlusion does to corners: a staircase between walls in which every value from 0 to 3 occurs, in the
+// classic block look (own colours times occlusion, no light at all), and occlusion alone in grey: OUT.png, or
 // occlusion_staircase.png, and the same with _grey.
 
 #include <array>

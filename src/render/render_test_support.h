@@ -93,8 +93,8 @@ inline Pixel encoded(Vec3 light) {
   return {encode(light.x), encode(light.y), encode(light.z)};
 }
 
-/// A plate whose face towards `face` has a blocker where only the reference's sixth occlusion ray from the face's middle
-/// meets it, and a camera that sees that middle in one pixel.
+/// A plate whose face towards `face` has a blocker where only the reference's sixth occlusion ray from the face's
+/// middle meets it, and a camera that sees that middle in one pixel.
 inline Camera sixth_ray_blocked(Scene& scene, Direction face) {
   const VoxelType type = add_type(scene, {188, 188, 188, 255});
   const FaceFrame& frame = frame_of(face);

@@ -73,8 +73,8 @@ struct SelectedInstance {
 /// The coarsest level at which grids are traced.
 inline constexpr int kMaxGridLevel = 4;
 
-/// Chooses what is drawn, and how, in one view (a window, a split screen's half, a mirror): remembers the last choice of
-/// each instance there (hysteresis), and each grid's content.
+/// Chooses what is drawn, and how, in one view (a window, a split screen's half, a mirror): remembers the last choice
+/// of each instance there (hysteresis), and each grid's content.
 /// Lifetime: the scene is only read within calls.
 class DetailSelector {
  public:

@@ -78,8 +78,8 @@ struct SceneChanges {
 class Scene {
  public:
   VoxelRegistry types;
-  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::lamps says whether they shine.
-  /// Renderers take over what changed here with their next `update`.
+  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::lamps says whether they
+  /// shine. Renderers take over what changed here with their next `update`.
   std::vector<Lamp> lamps;
 
   Scene();

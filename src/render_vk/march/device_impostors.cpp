@@ -148,7 +148,8 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   const bool is_known = entry.last_use == picture_;
   entry.last_use = picture_;
   if (is_known || entry.whole.impostor == impostor) return {};
-  // What was begun is ended first, or an edit a frame would keep it from ever being whole; but who waits wants the last.
+  // What was begun is ended first, or an edit a frame would keep it from ever being whole; but who waits wants the
+  // last.
   const bool waits = faces_left == std::numeric_limits<std::size_t>::max();
   if (entry.next.impostor == nullptr || (waits && entry.next.impostor != impostor)) {
     if (Status done = begin(impostor, entry.next); !done) return done;

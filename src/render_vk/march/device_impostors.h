@@ -20,8 +20,8 @@ struct Placement;
 
 /// Impostors in device memory, sent when a picture first shows them and kept from picture to picture.
 ///
-/// Where pictures do not wait, one sends no more than `kFacesAPicture`, a fraction of a millisecond: until a new impostor
-/// is there as a whole, the one before it is drawn, and what has none is traced.
+/// Where pictures do not wait, one sends no more than `kFacesAPicture`, a fraction of a millisecond: until a new
+/// impostor is there as a whole, the one before it is drawn, and what has none is traced.
 class DeviceImpostors {
  public:
   static constexpr std::size_t kFacesAPicture = std::size_t{1} << 16;
