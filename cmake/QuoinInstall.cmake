@@ -16,6 +16,13 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/quoin-config.cmake" "${CMAKE_CURRENT_
 # For builds without CMake. The static library needs what it is made of; the shared one brings it along.
 file(RELATIVE_PATH quoin_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
 string(REGEX REPLACE "/$" "" quoin_pc_prefix "${quoin_pc_prefix}")
+foreach(folder LIBDIR INCLUDEDIR)  # absolute in some distributions
+  string(TOLOWER "quoin_pc_${folder}" variable)
+  set(${variable} "\${prefix}/${CMAKE_INSTALL_${folder}}")
+  if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
+    set(${variable} "${CMAKE_INSTALL_${folder}}")
+  endif()
+endforeach()
 set(quoin_pc_libs "")
 if(quoin_library_type STREQUAL "STATIC_LIBRARY")
   set(quoin_pc_libs " -ltbb -lpng -lz -ldl -pthread")

@@ -25,11 +25,13 @@ struct Sum {
   DVec3 first{0.0};     // power times place
   double second = 0.0;  // and times its square
   double weight = 0.0;
+  IVec3 origin{0};
   EmissiveCell cell;
   bool is_used = false;
 
+  // Places are counted from the first voxel, so that squares stay small wherever the grid's origin is.
   void add(IVec3 voxel, Direction face, Vec3 light) {
-    const DVec3 middle = DVec3(voxel) + 0.5 + 0.5 * DVec3(normal_of(face));
+    const DVec3 middle = DVec3(voxel - origin) + 0.5 + 0.5 * DVec3(normal_of(face));
     const double power = static_cast<double>(light.x) + static_cast<double>(light.y) + static_cast<double>(light.z);
     first += power * middle;
     second += power * glm::dot(middle, middle);
@@ -39,12 +41,14 @@ struct Sum {
   void add_voxel(IVec3 voxel) {
     const IBox own{voxel, voxel + 1};
     cell.box = is_used ? unite(cell.box, own) : own;
+    if (!is_used) origin = voxel;
     is_used = true;
   }
   [[nodiscard]] EmissiveCell finished() const {
     EmissiveCell done = cell;
-    done.centre = first / weight;
-    done.spread_squared = std::max(second / weight - glm::dot(done.centre, done.centre), 0.0);
+    const DVec3 mean = first / weight;
+    done.centre = DVec3(origin) + mean;
+    done.spread_squared = std::max(second / weight - glm::dot(mean, mean), 0.0);
     return done;
   }
 };

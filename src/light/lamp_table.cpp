@@ -33,14 +33,20 @@ double most_power(const PlacedLamp& lamp) {
   return std::sqrt(sum);
 }
 
+// Never so bright that sums and squares are no numbers.
+constexpr double kMostPower = 1e30;
+Vec3 capped(DVec3 power) {
+  return Vec3(glm::clamp(power, DVec3(0.0), DVec3(kMostPower)));
+}
+
 PlacedLamp placed_cell(const EmissiveCell& cell, const LampPlace& place, double brightness) {
   const double size = place.voxel_size;
   PlacedLamp lamp;
   lamp.position = place.position + place.axes * ((cell.centre - place.pivot) * size);
   lamp.axes = place.axes;
   // A face of radiance L lights what faces it by L / pi, as the sun's 1 is an irradiance of pi.
-  const auto scale = static_cast<float>(brightness * size * size / std::numbers::pi);
-  for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = cell.power[face] * scale;
+  const double scale = brightness * size * size / std::numbers::pi;
+  for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = capped(DVec3(cell.power[face]) * scale);
   lamp.spread_squared = cell.spread_squared * size * size;
   lamp.low = (DVec3(cell.box.min) - cell.centre) * size;
   lamp.high = (DVec3(cell.box.max) - cell.centre) * size;
@@ -52,14 +58,16 @@ bool shines(const Lamp& lamp) {
   const bool is_finite_lamp =
       is_finite(lamp.position) && std::isfinite(lamp.intensity) && is_finite(DVec3(lamp.colour));
   if (!is_finite_lamp || !(lamp.intensity > 0.0) || !(lamp.range > 0.0)) return false;
-  return lamp.kind == Lamp::Kind::Point || (is_finite(lamp.direction) && lamp.direction != DVec3(0.0));
+  if (lamp.kind == Lamp::Kind::Point) return true;
+  return is_finite(lamp.direction) && lamp.direction != DVec3(0.0) && std::isfinite(lamp.inner_angle) &&
+         std::isfinite(lamp.outer_angle);
 }
 
 PlacedLamp placed_lamp(const Lamp& from, double brightness) {
   PlacedLamp lamp;
   lamp.position = from.position;
   lamp.is_point = true;
-  lamp.power[0] = glm::max(from.colour, Vec3(0.0F)) * static_cast<float>(std::min(from.intensity * brightness, 1e30));
+  lamp.power[0] = capped(DVec3(from.colour) * std::min(from.intensity * brightness, kMostPower));
   lamp.reach = std::min(std::sqrt(most_power(lamp) / kLeastLight), from.range);
   if (from.kind == Lamp::Kind::Point) return lamp;
   const DVec3 size = glm::abs(from.direction);
@@ -105,9 +113,10 @@ class ListMaker {
   ListMaker(const std::vector<PlacedLamp>& lamps, const std::vector<double>& power, int max_lamps)
       : lamps_(&lamps), power_(&power), max_lamps_(static_cast<std::size_t>(max_lamps)) {}
 
-  void add(const LampPlace& place, std::int32_t index) {
+  // Of some chunks of a placed grid.
+  void add(const LampPlace& place, std::int32_t index, std::span<const IVec3> chunks) {
     const trace::TreeNodes opaque(*place.opaque);
-    for (const IVec3 chunk : place.voxels->chunks()) {
+    for (const IVec3 chunk : chunks) {
       const IVec3 corner = chunk * kChunkEdge;
       find_near(sphere_of(place, corner, kChunkEdge));
       if (near_.empty()) continue;
@@ -165,12 +174,39 @@ void put_bricks(std::vector<ListMaker>& made, LampTable& table) {
     const auto first = static_cast<std::uint32_t>(table.lists.size());
     table.lists.insert(table.lists.end(), each.lists.begin(), each.lists.end());
     for (LampTable::Brick brick : each.bricks) {
+      table.longest = std::max(table.longest, static_cast<int>(brick.count));
       brick.first += first;
       std::size_t slot = LampTable::slot_of(brick.brick, brick.placed) & mask;
       while (table.bricks[slot].count != 0) slot = (slot + 1) & mask;
       table.bricks[slot] = brick;
     }
   }
+}
+
+// On several threads, some chunks at a time; in the order of places and chunks.
+void make_lists(std::span<const LampPlace> places, int max_lamps, Threads threads, LampTable& table) {
+  constexpr std::size_t kChunksATask = 16;
+  struct Task {
+    std::size_t place = 0;
+    std::span<const IVec3> chunks;
+  };
+  std::vector<std::vector<IVec3>> chunks;
+  chunks.reserve(places.size());
+  for (const LampPlace& place : places) chunks.push_back(place.voxels->chunks());
+  std::vector<Task> tasks;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t first = 0; first < chunks[i].size(); first += kChunksATask) {
+      tasks.push_back({i, std::span(chunks[i]).subspan(first, std::min(kChunksATask, chunks[i].size() - first))});
+    }
+  }
+  std::vector<double> power;
+  power.reserve(table.lamps.size());
+  for (const PlacedLamp& lamp : table.lamps) power.push_back(most_power(lamp));
+  std::vector<ListMaker> made(tasks.size(), ListMaker(table.lamps, power, max_lamps));
+  parallel_for(tasks.size(), threads, [&](std::size_t i) {
+    made[i].add(places[tasks[i].place], static_cast<std::int32_t>(tasks[i].place), tasks[i].chunks);
+  });
+  put_bricks(made, table);
 }
 
 }  // namespace
@@ -185,7 +221,7 @@ LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal) {
   if (!(cosine > 0.0)) return ray;
   const double share = distance / lamp.reach;
   const double fading = 1.0 - share * share * share * share;
-  double factor = cosine * fading * fading / (squared + lamp.spread_squared);
+  double factor = cosine * fading / (squared + lamp.spread_squared);
   ray.distance = distance;
   if (lamp.is_point) {
     if (lamp.cos_inner > -2.0) {
@@ -223,35 +259,35 @@ void LampCache::update() {
   max_lamps_ = 0;
 }
 
-std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, std::span<const LampPlace> places,
-                                                  const LightOptions& light, Threads threads) {
+std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const LightOptions& light, Threads threads,
+                                                  FunctionRef<std::vector<LampPlace>()> places_of) {
   if (light.lamps == 0 || light.lamp_brightness == 0.0 || light.shading != Shading::Lit) return nullptr;
   const std::lock_guard lock(mutex_);
   if (light.lamps == max_lamps_ && light.lamp_brightness == brightness_) return table_;
   max_lamps_ = 0;
-  std::erase_if(cells_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
-  std::map<GridHandle, bool> is_new;
+  const std::vector<LampPlace> places = places_of();
   auto made = std::make_shared<LampTable>();
-  for (const Lamp& lamp : scene.lamps) {
-    if (shines(lamp)) made->lamps.push_back(placed_lamp(lamp, light.lamp_brightness));
-  }
-  for (const LampPlace& place : places) {
-    EmissiveCells& cells = cells_[place.grid];
-    if (is_new.try_emplace(place.grid, true).second) cells.update(*place.voxels, scene.types);
-    cells.for_each(
-        [&](const EmissiveCell& cell) { made->lamps.push_back(placed_cell(cell, place, light.lamp_brightness)); });
-  }
-  std::vector<double> power;
-  for (const PlacedLamp& lamp : made->lamps) power.push_back(most_power(lamp));
-  std::vector<ListMaker> lists(places.size(), ListMaker(made->lamps, power, light.lamps));
-  if (!made->lamps.empty()) {
-    parallel_for(places.size(), threads, [&](std::size_t i) { lists[i].add(places[i], static_cast<std::int32_t>(i)); });
-  }
-  put_bricks(lists, *made);
+  made->lamps = lamps_of(scene, places, light.lamp_brightness);
+  if (!made->lamps.empty()) make_lists(places, light.lamps, threads, *made);
   table_ = made->lists.empty() ? nullptr : std::move(made);
   max_lamps_ = light.lamps;
   brightness_ = light.lamp_brightness;
   return table_;
+}
+
+std::vector<PlacedLamp> LampCache::lamps_of(const Scene& scene, std::span<const LampPlace> places, double brightness) {
+  std::erase_if(cells_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
+  std::vector<PlacedLamp> lamps;
+  for (const Lamp& lamp : scene.lamps) {
+    if (shines(lamp)) lamps.push_back(placed_lamp(lamp, brightness));
+  }
+  std::map<GridHandle, bool> is_known;
+  for (const LampPlace& place : places) {
+    EmissiveCells& cells = cells_[place.grid];
+    if (is_known.try_emplace(place.grid, true).second) cells.update(*place.voxels, scene.types);
+    cells.for_each([&](const EmissiveCell& cell) { lamps.push_back(placed_cell(cell, place, brightness)); });
+  }
+  return lamps;
 }
 
 }  // namespace quoin

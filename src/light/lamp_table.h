@@ -10,6 +10,7 @@
 
 #include <glm/mat3x3.hpp>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
@@ -66,6 +67,7 @@ struct LampTable {
   std::vector<PlacedLamp> lamps;
   std::vector<Brick> bricks;  ///< a power of two
   std::vector<std::uint32_t> lists;
+  int longest = 0;  ///< list
 
   [[nodiscard]] static std::uint32_t slot_of(IVec3 brick, std::int32_t placed) {
     const auto bits = [](int coordinate) { return static_cast<std::uint32_t>(coordinate); };
@@ -93,12 +95,17 @@ class LampCache {
   /// The scene was edited, or its instances are others.
   void update();
 
-  /// `places`: in the order of SceneTracer::placed. Null where nothing shines, or the options want no lamps.
-  /// Cost: emissive cells of the chunks that changed; for each brick the lamps near it.
-  [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, std::span<const LampPlace> places,
-                                                       const LightOptions& light, Threads threads);
+  /// Null where nothing shines, or the options want no lamps. `places` is asked for the placed grids, in the order of
+  /// SceneTracer::placed, when the table has to be made.
+  /// Cost: when it is made, the emissive cells of the chunks that changed; for each chunk all lamps, for each brick
+  /// those near its chunk. The scene is read then only.
+  [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, const LightOptions& light, Threads threads,
+                                                       FunctionRef<std::vector<LampPlace>()> places);
 
  private:
+  [[nodiscard]] std::vector<PlacedLamp> lamps_of(const Scene& scene, std::span<const LampPlace> places,
+                                                 double brightness);
+
   std::mutex mutex_;
   std::map<GridHandle, EmissiveCells> cells_;
   std::shared_ptr<const LampTable> table_;

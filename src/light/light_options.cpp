@@ -23,8 +23,8 @@ Status check(const LightOptions& options) {
   for (const auto& [name, value] : {std::pair{"sun brightness", options.sun_brightness},
                                     {"sky brightness", options.sky_brightness},
                                     {"lamp brightness", options.lamp_brightness}}) {
-    if (!std::isfinite(value) || value < 0.0) {
-      return make_error(ErrorCode::InvalidArgument, std::string(name) + ": must be finite and not negative");
+    if (!(value >= 0.0 && value <= 1e9)) {
+      return make_error(ErrorCode::InvalidArgument, std::string(name) + ": must be 0 to 1e9");
     }
   }
   if (options.lamps < 0 || options.lamps > 1024) return refuse("lamps: must be 0 to 1024");

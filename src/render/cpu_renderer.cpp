@@ -73,13 +73,15 @@ struct CpuRenderer::Impl {
   LampCache lamps;
 
   [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const RenderOptions& render) {
-    if (render.light.lamps == 0) return nullptr;
+    return lamps.table(*scene, render.light, render.threads, [this] { return lamp_places(); });
+  }
+  [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
     for (const PlacedGrid& each : tracer.placed()) {
       places.push_back({scene->instances()[each.instance].grid, each.voxels, each.pivot, each.world_axes, each.position,
                         each.voxel_size, each.opaque, each.transparent});
     }
-    return lamps.table(*scene, places, render.light, render.threads);
+    return places;
   }
 };
 
@@ -124,7 +126,8 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  const PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->instances, camera, options);
+  PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->instances, camera, options);
+  keep_whole(detail.far.instances, detail.selected);
   Subject subject;
   if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, options.threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position);

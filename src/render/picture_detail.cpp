@@ -1,6 +1,7 @@
 #include "render/picture_detail.h"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 
 namespace quoin {
@@ -17,7 +18,8 @@ std::vector<SelectedInstance> select(const Scene& scene, InstanceFilter filter, 
   return selected;
 }
 
-// Those with impostors stay whole where they are traced: shadows onto what an impostor shows are those of its voxels.
+}  // namespace
+
 void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected) {
   auto next = far.begin();
   for (SelectedInstance& choice : selected) {
@@ -28,15 +30,12 @@ void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> se
   }
 }
 
-}  // namespace
-
 PictureDetail DetailChooser::choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                     const RenderOptions& options) {
   PictureDetail detail;
   if (!options.detail) return detail;
   detail.selected = select(scene, filter, camera, options);
   detail.far = take_far(scene, detail.selected, options);
-  keep_whole(detail.far.instances, detail.selected);
   return detail;
 }
 
@@ -44,6 +43,9 @@ FarImpostors DetailChooser::take_far(const Scene& scene, const std::vector<Selec
                                      const RenderOptions& options) {
   const auto is_far = [](const SelectedInstance& choice) { return choice.detail == Detail::Far; };
   if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
+  // Pictures that wait do so one after another: none ends a round in which another's impostors must not be dropped.
+  std::unique_lock lock(waiting_, std::defer_lock);
+  if (options.impostor_seconds == std::numeric_limits<double>::infinity()) lock.lock();
   return take_impostors(impostors_, scene, selected, options.impostor_seconds, {options.impostor_edge});
 }
 

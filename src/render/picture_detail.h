@@ -1,5 +1,7 @@
 #pragma once
 
+#include <mutex>
+#include <span>
 #include <vector>
 
 #include <quoin/render/cpu_renderer.h>
@@ -14,9 +16,13 @@ namespace quoin {
 
 /// How the instances of one picture are drawn.
 struct PictureDetail {
-  std::vector<SelectedInstance> selected;  ///< traced so often halved; those with impostors not at all
+  std::vector<SelectedInstance> selected;  ///< traced so often halved; see keep_whole
   FarImpostors far;
 };
+
+/// Has those that are drawn from impostors stay whole where they are traced: shadows onto what an impostor shows are
+/// those of its voxels. Both in the order of the instances.
+void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected);
 
 /// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
 class DetailChooser {
@@ -36,6 +42,7 @@ class DetailChooser {
                                       const RenderOptions& options);
 
   ImpostorCache impostors_;
+  std::mutex waiting_;  // for impostors, however long that takes
 };
 
 }  // namespace quoin

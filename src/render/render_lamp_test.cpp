@@ -36,7 +36,7 @@ Scene floor_by_night() {
 }
 
 double fading(double distance, double reach) {
-  return std::pow(1.0 - std::pow(distance / reach, 4.0), 2.0);
+  return 1.0 - std::pow(distance / reach, 4.0);
 }
 
 void expect_grey(const Picture& picture, int x, int y, double light) {
@@ -234,7 +234,7 @@ TEST(RenderLamps, BadOnesLightNothing) {
   Scene scene = floor_by_night();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 8; ++i) {
     Lamp lamp;
     lamp.position = {0, 4, 0};
     lamp.kind = Lamp::Kind::Spot;
@@ -244,6 +244,8 @@ TEST(RenderLamps, BadOnesLightNothing) {
     if (i == 3) lamp.range = nan;
     if (i == 4) lamp.direction = DVec3(0.0);
     if (i == 5) lamp.colour.x = std::numeric_limits<float>::quiet_NaN();
+    if (i == 6) lamp.inner_angle = nan;
+    if (i == 7) lamp.outer_angle = nan;
     scene.lamps.push_back(lamp);
   }
   const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));

@@ -55,8 +55,8 @@ struct LightOptions {
 };
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of
-///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances, exposure or
-///         brightness, fewer than 0 or more than 1,024 lamps.
+///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,
+///         brightness of less than 0 or more than 1e9, fewer than 0 or more than 1,024 lamps.
 [[nodiscard]] Status check(const LightOptions& options);
 
 }  // namespace quoin

@@ -10,9 +10,9 @@ namespace quoin {
 
 /// A light without a body, at a point of the world. Voxels that emit light are lamps by themselves.
 ///
-/// Falls off with the square of the distance, times (1 - (distance / range)^4)^2 where it has a range, as
-/// KHR_lights_punctual of glTF recommends. A lamp whose numbers are not finite (but the range), or whose intensity is
-/// not positive, lights nothing.
+/// Falls off with the square of the distance, times 1 - (distance / range)^4, as KHR_lights_punctual of glTF
+/// recommends; where it would add less than 1/4096 before its range is over, it ends there in the same way. A lamp
+/// whose numbers are not finite (but the range), or whose intensity is not positive, lights nothing.
 struct Lamp {
   enum class Kind : std::uint8_t {
     Point,  ///< shines into all directions alike

@@ -156,7 +156,7 @@ std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const I
   constexpr double kMaxShare = 1.0 / 16.0;  // of the content's volume
   if (changes.all || changes.items.size() > kMaxBoxes) return std::nullopt;
   const auto volume = [](const IBox& box) {
-    const DVec3 size(box.max - box.min);
+    const DVec3 size = DVec3(box.max) - DVec3(box.min);
     return size.x * size.y * size.z;
   };
   std::vector<IBox> boxes;

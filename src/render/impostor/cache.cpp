@@ -38,6 +38,7 @@ struct Entry {
   std::optional<Job> waiting;
   std::optional<Origin> building;
   std::uint64_t last_use = 0;
+  std::size_t refused_bytes = 0;  // of the last one, for which there was no room
 
   // Of the newest that there is, is being built or waits.
   [[nodiscard]] const Origin* newest() const {
@@ -105,7 +106,7 @@ void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
 
 // Puts the grid's present state into the queue, in place of an older one that waits there.
 void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const Grid& grid, int edge) {
-  const bool is_new = !entry.waiting.has_value();
+  start_workers();
   Job job{grid.snapshot(), {grid.cursor(), types_changed, edge}, {}, types};
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
   if (base != nullptr && base->types == types_changed && base->edge == edge) {
@@ -114,11 +115,10 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const Grid& grid,
   } else {
     job.changes.all = true;
   }
+  const bool is_new = !entry.waiting.has_value();
+  if (is_new) queue.push_back(handle);
   entry.waiting = std::move(job);
-  if (!is_new) return;
-  queue.push_back(handle);
-  start_workers();
-  wake.notify_one();
+  if (is_new) wake.notify_one();
 }
 
 void ImpostorCache::Impl::start_workers() {
@@ -134,8 +134,14 @@ void ImpostorCache::Impl::work() {
     Entries::iterator next = entries.end();
     wake.wait(lock, [&] { return is_stopped || has_unused || (next = next_to_build()) != entries.end(); });
     if (is_stopped) return;
-    if (next != entries.end()) build(next, lock);
-    free_unused(lock);
+    try {
+      if (next != entries.end()) build(next, lock);
+      free_unused(lock);
+    } catch (const std::bad_alloc&) {
+      // For the lists above: the impostor is gone, and is asked for again.
+      if (!lock.owns_lock()) lock.lock();
+      ++stats.out_of_memory;
+    }
   }
 }
 
@@ -194,8 +200,10 @@ void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shar
   ++stats.built;
   built_bytes += bytes;
   release(entry->second);
+  entry->second.refused_bytes = 0;
   if (!make_room(bytes, entry->second.last_use)) {
     ++stats.dropped;
+    entry->second.refused_bytes = bytes;
     if (entry->second.waiting) entry->second.waiting->changes = {true, {}};
     drop(entry);
     return;
@@ -214,10 +222,10 @@ void ImpostorCache::Impl::release(Entry& entry) {
   has_unused = true;
 }
 
-// What is being built or waits stays, without an impostor.
+// What is being built, waits or was refused stays, without an impostor.
 void ImpostorCache::Impl::drop(Entries::iterator entry) {
   release(entry->second);
-  if (!entry->second.building && !entry->second.waiting) entries.erase(entry);
+  if (!entry->second.building && !entry->second.waiting && entry->second.refused_bytes == 0) entries.erase(entry);
 }
 
 // Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
@@ -236,9 +244,10 @@ bool ImpostorCache::Impl::make_room(std::size_t bytes, std::uint64_t used_before
   return true;
 }
 
-// Going by the mean size of those that were built.
+// Going by its own size, where it was refused, or the mean of those that were built.
 bool ImpostorCache::Impl::has_room(const Entry& entry) {
-  const std::size_t likely = stats.built == 0 ? 1 : built_bytes / stats.built;
+  const std::size_t mean = stats.built == 0 ? 1 : built_bytes / stats.built;
+  const std::size_t likely = std::max(entry.refused_bytes, mean);
   return entry.impostor != nullptr || make_room(likely, entry.last_use);
 }
 
@@ -250,6 +259,7 @@ void ImpostorCache::Impl::forget_missing(const Scene& scene) {
       entry->second.waiting.reset();
       std::erase(queue, entry->first);
     }
+    entry->second.refused_bytes = 0;
     drop(entry);
   }
   ++round;

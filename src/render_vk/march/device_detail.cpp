@@ -54,12 +54,14 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
   Placement placement = device.placement();
   const ImpostorScreen screen(camera, options.width, options.height);
   const auto put = [&]() -> Status {
-    if (Status done = put_halved(device, scene, detail.selected, options.threads, placement); !done) return done;
-    const FarImpostors& far = detail.far;
     const bool waits = options.impostor_seconds == std::numeric_limits<double>::infinity();
-    Status done = impostors_.draw(scene, far, screen, options.width, options.height, waits, placement);
-    if (!done) return done;
-    return memory_->flush();
+    const auto sent = impostors_.send(scene, detail.far, waits);
+    if (!sent) return sent.error();
+    std::vector<SelectedInstance> selected = detail.selected;
+    keep_whole(*sent, selected);
+    if (Status done = put_halved(device, scene, selected, options.threads, placement); !done) return done;
+    Status done = impostors_.draw(scene, *sent, screen, options.width, options.height, placement);
+    return done ? memory_->flush() : done;
   };
   // What was half put in place is not kept, whether the device's memory ran out or ours.
   try {

@@ -152,6 +152,11 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   // last.
   const bool waits = faces_left == std::numeric_limits<std::size_t>::max();
   if (entry.next.impostor == nullptr || (waits && entry.next.impostor != impostor)) {
+    // Nobody will see the old one again.
+    if (waits) {
+      memory_->release(entry.whole.place);
+      entry.whole = {};
+    }
     if (Status done = begin(impostor, entry.next); !done) return done;
   }
   std::size_t left = faces_left;
@@ -163,24 +168,38 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   return {};
 }
 
-Status DeviceImpostors::draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
-                             int height, bool waits, Placement& placement) {
+Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits) {
   ++picture_;
   std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAPicture;
+  // Those that are not there at all come first, or one that is edited all the time would keep them waiting.
+  for (const bool is_first : {true, false}) {
+    for (const auto& [grid, impostor] : far.kept) {
+      Entry& entry = entries_[grid];
+      if ((entry.whole.impostor == nullptr) != is_first) continue;
+      if (Status done = put(impostor, entry, faces_left); !done) return done.error();
+    }
+  }
+  std::vector<FarInstance> sent;
+  for (const FarInstance& instance : far.instances) {
+    const Sent& whole = entries_.find(scene.instances()[instance.instance].grid)->second.whole;
+    if (whole.impostor != nullptr) sent.push_back({instance.instance, whole.impostor.get()});
+  }
+  return sent;
+}
+
+Status DeviceImpostors::draw(const Scene& scene, std::span<const FarInstance> sent, const ImpostorScreen& screen,
+                             int width, int height, Placement& placement) const {
   std::uint64_t number = 0;
   auto next = placement.placed.begin();
-  for (const FarInstance& instance : far.instances) {
+  for (const FarInstance& instance : sent) {
     next = find_placed(next, placement.placed.end(), instance.instance);
     if (next == placement.placed.end()) break;
     if (next->placed.instance != instance.instance) continue;
-    const GridHandle grid = scene.instances()[instance.instance].grid;
-    Entry& entry = entries_[grid];
-    if (Status done = put(far.kept.find(grid)->second, entry, faces_left); !done) return done;
-    if (entry.whole.impostor == nullptr) continue;  // it is traced
     next->is_far = true;
     const auto index = static_cast<std::int32_t>(next - placement.placed.begin());
-    const auto drawn = screen.drawn(next->placed, index, *entry.whole.impostor);
+    const auto drawn = screen.drawn(next->placed, index, *instance.impostor);
     if (!drawn) continue;
+    const Entry& entry = entries_.find(scene.instances()[instance.instance].grid)->second;
     ShaderFar shown = shader_far(entry.whole, *drawn);
     set_aim(*drawn, width, height, shown);
     shown.origin = IVec4(next->origin, index);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/render/impostor.h>
@@ -28,14 +29,17 @@ class DeviceImpostors {
 
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
-  /// Has the far instances of a picture, which is `width` by `height` pixels, drawn from their impostors: rays of the
-  /// camera pass them by, and Placement::far says what shows of them. Memory as DeviceDetail::place.
-  /// `waits`: all that is shown is sent first.
+  /// Begins a picture: sends impostors, and returns the far instances whose impostor is there; the others are to be
+  /// traced. `waits`: all are sent. Errors: LimitExceeded when a memory is full. It then is to be cleared.
+  [[nodiscard]] Result<std::vector<FarInstance>> send(const Scene& scene, const FarImpostors& far, bool waits);
+
+  /// Has those of a picture, which is `width` by `height` pixels, drawn from their impostors: rays of the camera pass
+  /// them by, and Placement::far says what shows of them. Memory as DeviceDetail::place.
   ///
-  /// Errors: LimitExceeded when a memory is full, or when those instances' faces are more than 2^32. It then is to be
-  ///         cleared.
-  [[nodiscard]] Status draw(const Scene& scene, const FarImpostors& far, const ImpostorScreen& screen, int width,
-                            int height, bool waits, Placement& placement);
+  /// Requires: `send` returned them. Errors: LimitExceeded when their faces are more than 2^32. It then is to be
+  ///           cleared.
+  [[nodiscard]] Status draw(const Scene& scene, std::span<const FarInstance> sent, const ImpostorScreen& screen,
+                            int width, int height, Placement& placement) const;
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
   void drop_unused(std::uint64_t max_bytes);
 

@@ -166,6 +166,17 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   return put_grids();
 }
 
+Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> now) {
+  if (now == table) return {};
+  table = nullptr;
+  if (now == nullptr) return {};
+  Status done = put_table(memory, bricks, std::as_bytes(std::span(now->bricks)));
+  if (done) done = put_table(memory, lists, std::as_bytes(std::span(now->lists)));
+  if (done) done = memory.flush();
+  if (done) table = std::move(now);
+  return done;
+}
+
 std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   std::vector<LampPlace> places;
   for (const DevicePlaced& each : placement_.placed) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -45,6 +46,16 @@ struct Placement {
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
+
+/// A table of lamps, its bricks and lists in device memory.
+struct DeviceLamps {
+  std::shared_ptr<const LampTable> table;  ///< null: nothing shines
+  Place bricks;
+  Place lists;
+
+  /// After an error it holds nothing.
+  [[nodiscard]] Status put(DeviceMemory& memory, std::shared_ptr<const LampTable> now);
+};
 
 /// A scene's voxels in device memory, and its instances.
 class DeviceScene {

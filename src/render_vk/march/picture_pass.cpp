@@ -15,17 +15,18 @@ constexpr std::int64_t kMaxRays = std::int64_t{1} << 22;
 constexpr std::int64_t kMaxRaysAtOnce = std::int64_t{1} << 24;
 const char* const kDoing = "drawing";
 
-std::int64_t rays_of_pixel(const RenderOptions& options) {
+// `lamps`: that light a point at most.
+std::int64_t rays_of_pixel(const RenderOptions& options, int lamps) {
   const LightOptions& light = options.light;
-  return 2 + light.lamps + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
+  return 2 + lamps + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
 }
 
 // The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass
 // take 1.5 kB a pixel.
-std::int32_t tile_edge(const RenderOptions& options, bool has_glass, bool is_processor) {
+std::int32_t tile_edge(const RenderOptions& options, int lamps, bool has_glass, bool is_processor) {
   std::int32_t edge = is_processor ? 256 : 1024;
   if (has_glass) edge = is_processor ? 128 : 256;
-  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options) > kMaxRays) edge /= 2;
+  while (edge > 16 && std::int64_t{edge} * edge * rays_of_pixel(options, lamps) > kMaxRays) edge /= 2;
   return edge;
 }
 
@@ -83,13 +84,12 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
 }
 
 Status PicturePass::put_lamps(const Camera& camera, const FrameData& data) {
-  if (lamps_ == nullptr) return {};
+  if (lamps_.table == nullptr) return {};
   frame_.flags |= kLamps;
-  frame_.lamp_mask = static_cast<std::uint32_t>(lamps_->bricks.size() - 1);
-  Status done = upload(shader_lamps(*lamps_, camera.position, data.view_origin), frame_.lamps);
-  if (done) done = upload(lamps_->bricks, frame_.lamp_bricks);
-  if (done) done = upload(lamps_->lists, frame_.lamp_lists);
-  return done;
+  frame_.lamp_mask = static_cast<std::uint32_t>(lamps_.table->bricks.size() - 1);
+  frame_.lamp_bricks = lamps_.bricks.address;
+  frame_.lamp_lists = lamps_.lists.address;
+  return upload(shader_lamps(*lamps_.table, camera.position, data.view_origin), frame_.lamps);
 }
 
 Status PicturePass::put_far(const RenderOptions& options) {
@@ -109,7 +109,7 @@ Status PicturePass::put_far(const RenderOptions& options) {
 
 Status PicturePass::make_tile_buffers(const RenderOptions& options) {
   const bool has_glass = placement_->has_transparent;
-  tile_edge_ = tile_edge(options, has_glass, device_->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU);
+  tile_edge_ = tile_edge(options, most_lamps(), has_glass, device_->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
                       static_cast<std::size_t>(std::min(tile_edge_, options.height));
   const VkDeviceSize bytes = (target_ == nullptr ? pixels * 8 : 0) + sizeof(ShaderCounters) + 16;
@@ -312,7 +312,7 @@ Status PicturePass::resolve(std::span<const Tile> tiles) {
 
 Status PicturePass::add_samples(PictureImpl& picture, const RenderOptions& options, const Progress& progress) {
   const std::vector<Tile> tiles = tiles_of(options);
-  const std::int64_t rays_of_tile = rays_of_pixel(options) * tile_edge_ * tile_edge_;
+  const std::int64_t rays_of_tile = rays_of_pixel(options, most_lamps()) * tile_edge_ * tile_edge_;
   const auto at_once = static_cast<std::size_t>(std::max<std::int64_t>(kMaxRaysAtOnce / rays_of_tile, 1));
   const double all = static_cast<double>(tiles.size()) * options.samples;
   double count = 0.0;

@@ -20,9 +20,9 @@ namespace quoin::vulkan {
 /// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
 class PicturePass {
  public:
-  /// `placement` is of `scene`, and so are `lamps`; null: none shines.
+  /// `placement` is of `scene`, and so are `lamps`.
   PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
-              const Placement& placement, std::shared_ptr<const LampTable> lamps)
+              const Placement& placement, DeviceLamps lamps)
       : device_(&device),
         memory_(&memory),
         pipelines_(&pipelines),
@@ -51,6 +51,7 @@ class PicturePass {
   Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame(const Camera& camera, const RenderOptions& options);
   Status put_far(const RenderOptions& options);
+  [[nodiscard]] int most_lamps() const { return lamps_.table == nullptr ? 0 : lamps_.table->longest; }
   Status put_lamps(const Camera& camera, const FrameData& data);
   void find_hits(VkCommandBuffer commands, const ShaderPush& push) const;
   Status begin(const Camera& camera, const RenderOptions& options);
@@ -71,7 +72,7 @@ class PicturePass {
   const Pipelines* pipelines_;
   const DeviceScene* scene_;
   const Placement* placement_;
-  std::shared_ptr<const LampTable> lamps_;
+  DeviceLamps lamps_;
   const PictureImpl* target_ = nullptr;  // null: what is drawn is read
   std::vector<Place> places_;
   ShaderFrame frame_;

@@ -52,12 +52,16 @@ struct VulkanRenderer::Impl {
   const Scene* voxels = nullptr;
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
-  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const RenderOptions& render) {
-    if (render.light.lamps == 0 || voxels == nullptr) return nullptr;
-    return lamps.table(*voxels, scene.lamp_places(*voxels), render.light, render.threads);
+  /// What lamps light, sent to the device when it is another than before.
+  [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const RenderOptions& render) {
+    if (render.light.lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
+    auto table = lamps.table(*voxels, render.light, render.threads, [this] { return scene.lamp_places(*voxels); });
+    if (Status done = sent_lamps.put(memory, std::move(table)); !done) return done.error();
+    return sent_lamps;
   }
 
   LampCache lamps;
+  vulkan::DeviceLamps sent_lamps;
   std::uint64_t uploaded = 0;
 };
 

@@ -87,8 +87,10 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
   if (const Status status = check(camera, options); !status) return status.error();
   const auto subject = Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
+  auto lamps = impl_->lamp_table(options);
+  if (!lamps) return lamps.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           impl_->lamp_table(options));
+                           std::move(*lamps));
   return pass.render(camera, options, progress);
 }
 
@@ -113,8 +115,10 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   }
   const auto subject = Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
+  auto lamps = impl_->lamp_table(options);
+  if (!lamps) return lamps.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           impl_->lamp_table(options));
+                           std::move(*lamps));
   return pass.draw(target, camera, options, progress);
 }
 

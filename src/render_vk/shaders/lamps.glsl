@@ -55,7 +55,7 @@ vec3 lamp_light(Lamp lamp, vec3 to_lamp, vec3 normal, out vec3 direction, out fl
   if (!(cosine > 0.0)) return vec3(0.0);
   float share = far / lamp.position.w;
   float fading = 1.0 - share * share * share * share;
-  float factor = cosine * fading * fading / (squared + lamp.axes[0].w);
+  float factor = cosine * fading / (squared + lamp.axes[0].w);
   reach = far;
   if (lamp.low.w > 0.0) {
     if (lamp.low.w > 1.0) {
