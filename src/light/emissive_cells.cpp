@@ -7,17 +7,15 @@
 
 #include <quoin/core/direction.h>
 
-#include "core/srgb.h"
+#include "light/surfaces.h"
 
 namespace quoin {
 namespace {
 
 Vec3 emitted_by(const VoxelProperties& properties) {
   if (!(properties.emission > 0.0F)) return Vec3(0.0F);
-  const Rgba8 c = properties.colour;
   const float most = std::numeric_limits<float>::max() / 1e6F;  // so that sums of many are finite
-  return Vec3(linear_from_srgb(c.r), linear_from_srgb(c.g), linear_from_srgb(c.b)) *
-         std::min(properties.emission, most);
+  return linear_colour(properties.colour) * std::min(properties.emission, most);
 }
 
 // What is gathered of a cell.

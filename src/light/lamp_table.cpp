@@ -254,6 +254,19 @@ std::span<const std::uint32_t> LampTable::at(IVec3 brick, std::int32_t placed) c
   return {};
 }
 
+LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
+                     const OccupancyTree* transparent) {
+  const GridHandle grid = scene.instances()[placed.instance].grid;
+  return {grid,
+          &scene.grids()[grid].grid,
+          placed.pivot,
+          placed.world_axes,
+          placed.position,
+          placed.voxel_size,
+          &opaque,
+          transparent};
+}
+
 void LampCache::update() {
   const std::lock_guard lock(mutex_);
   max_lamps_ = 0;

@@ -15,6 +15,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
 #include <quoin/trace/occupancy_tree.h>
 
 #include "light/emissive_cells.h"
@@ -88,6 +89,10 @@ struct LampPlace {
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< may be null
 };
+
+/// A placed grid's, which is traced as it is. Requires: `placed` is of `scene`; its pointers are not looked at.
+[[nodiscard]] LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
+                                   const OccupancyTree* transparent);
 
 /// Makes the table of a scene when it is first asked for after an `update`. Threads: any number may call `table`.
 class LampCache {

@@ -7,12 +7,17 @@
 #include "core/srgb.h"
 
 namespace quoin {
+
+Vec3 linear_colour(Rgba8 colour) {
+  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
+}
+
 namespace {
 
 Surface surface_of(const VoxelProperties& properties) {
   Surface surface;
   const Rgba8 c = properties.colour;
-  surface.colour = {linear_from_srgb(c.r), linear_from_srgb(c.g), linear_from_srgb(c.b)};
+  surface.colour = linear_colour(c);
   // What overflows is as bright as can be; negative and NaN emit nothing.
   const float emission =
       properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;

@@ -17,6 +17,9 @@ struct Surface {
   float log_clarity = 0.0F;
 };
 
+/// Without its alpha.
+[[nodiscard]] Vec3 linear_colour(Rgba8 colour);
+
 /// Surfaces by type; an id that is not registered gives a magenta that shows.
 class Surfaces {
  public:

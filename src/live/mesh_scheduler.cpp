@@ -6,15 +6,12 @@
 #include <new>
 #include <utility>
 
+#include "core/worker_count.h"
 #include "grid/chunk_order.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
 namespace {
-
-unsigned worker_count(Threads threads) {
-  return threads.count != 0 ? threads.count : std::max(2U, thread_count(threads)) - 1;
-}
 
 // A smooth chunk takes a worker milliseconds, and its job the copies of up to 125 chunks.
 std::size_t jobs_ahead(SurfaceStyle style, unsigned workers) {

@@ -78,8 +78,7 @@ struct CpuRenderer::Impl {
   [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
     for (const PlacedGrid& each : tracer.placed()) {
-      places.push_back({scene->instances()[each.instance].grid, each.voxels, each.pivot, each.world_axes, each.position,
-                        each.voxel_size, each.opaque, each.transparent});
+      places.push_back(lamp_place(*scene, each, *each.opaque, each.transparent));
     }
     return places;
   }

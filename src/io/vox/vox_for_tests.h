@@ -207,4 +207,11 @@ inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOption
   return difference(loaded->scene, again->scene);
 }
 
+/// Of all grids of a scene.
+inline std::size_t grid_bytes(const Scene& scene) {
+  std::size_t bytes = 0;
+  for (const GridHandle grid : scene.grids().handles()) bytes += scene.grids()[grid].grid.bytes();
+  return bytes;
+}
+
 }  // namespace quoin::vox_test

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/worker_count.h"
+
 namespace quoin {
 namespace {
 
@@ -123,8 +125,7 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const Grid& grid,
 
 void ImpostorCache::Impl::start_workers() {
   if (!workers.empty()) return;
-  const unsigned machine = thread_count({});
-  const unsigned count = options.threads.count != 0 ? options.threads.count : std::max(machine, 2U) - 1;
+  const unsigned count = worker_count(options.threads);
   for (unsigned i = 0; i < count; ++i) workers.emplace_back([this] { work(); });
 }
 

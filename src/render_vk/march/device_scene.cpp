@@ -180,11 +180,8 @@ Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> n
 std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   std::vector<LampPlace> places;
   for (const DevicePlaced& each : placement_.placed) {
-    const PlacedGrid& placed = each.placed;
-    const GridHandle grid = scene.instances()[placed.instance].grid;
-    const TreeCache& trees = grids_.find(grid)->second.trees;
-    places.push_back({grid, &scene.grids()[grid].grid, placed.pivot, placed.world_axes, placed.position,
-                      placed.voxel_size, &trees.opaque(), trees.transparent()});
+    const TreeCache& trees = grids_.find(scene.instances()[each.placed.instance].grid)->second.trees;
+    places.push_back(lamp_place(scene, each.placed, trees.opaque(), trees.transparent()));
   }
   return places;
 }

@@ -7,6 +7,7 @@
 #include "glass.glsl"
 #include "count.glsl"
 #include "sky.glsl"
+#include "srgb.glsl"
 #include "lamps.glsl"
 
 layout(constant_id = 0) const bool kHasGlass = true;
@@ -202,11 +203,6 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
     openness = 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
-}
-
-// The light that shows as an sRGB value.
-vec3 linear_from_srgb(vec3 value) {
-  return mix(pow((value + 0.055) / 1.055, vec3(2.4)), value / 12.92, lessThanEqual(value, vec3(0.04045)));
 }
 
 vec3 unlit_colour(Point point, uint slot, vec3 colour) {

@@ -2,6 +2,7 @@
 // side. Vectors are read as a whole: see docs/decisions/040.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+#include "srgb.glsl"
 
 const uint kLit = 1;
 const uint kHasOcclusion = 2;
@@ -85,8 +86,7 @@ uint surface_at(uint type) {
 // What a fragment is to show of a colour, or of a value that is to be seen as it is.
 vec3 shown(vec3 colour) {
   if (has(kShowOcclusion) || has(kShowNormals)) {
-    vec3 value = clamp(colour, 0.0, 1.0);
-    colour = mix(pow((value + 0.055) / 1.055, vec3(2.4)), value / 12.92, lessThanEqual(value, vec3(0.04045)));
+    colour = linear_from_srgb(clamp(colour, 0.0, 1.0));
   } else {
     colour *= Frame(push.frame).exposure;
   }
