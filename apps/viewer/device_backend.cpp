@@ -56,6 +56,9 @@ struct DeviceBackend::Impl {
   Status prepare();
   Result<bool> draw();
   Status prepare_meshes(SurfaceStyle style);
+  Result<bool> take_surfaces();
+  [[nodiscard]] MeshPictureOptions mesh_picture(bool waits);
+  Result<bool> update_renderer();
   Result<bool> draw_meshes();
   Result<bool> draw_rays();
   Status draw_stage();
@@ -118,36 +121,62 @@ Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
   return {};
 }
 
-Result<bool> DeviceBackend::Impl::draw_meshes() {
-  const bool is_smooth = request->mode == DrawMode::Smooth;
-  if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) {
-    return ready.error();
+// Has the renderer know the scene; returns whether it was another.
+Result<bool> DeviceBackend::Impl::update_renderer() {
+  if (!std::exchange(is_scene_new, false)) return false;
+  if (Status taken = renderer->update(*scene, options.cpu.instances, options.cpu.threads); !taken) {
+    return taken.error();
   }
+  return true;
+}
+
+// Takes over what was edited and what workers made of it; returns whether there is another picture.
+Result<bool> DeviceBackend::Impl::take_surfaces() {
+  const auto updated = update_renderer();
+  if (!updated) return updated.error();
   const bool is_scene_changed = std::exchange(meshes->is_scene_new, false);
-  bool is_new = std::exchange(is_request_new, false) || is_scene_changed;
   if (is_scene_changed) {
-    if (Status taken = meshes->renderer.update(*scene, options.cpu.instances); !taken) {
-      return taken.error();
-    }
+    if (Status taken = meshes->renderer.update(*scene, options.cpu.instances); !taken) return taken.error();
   }
   if (is_scene_changed || meshes->live.pending() > 0) meshes->live.update(*scene, request->camera.position);
   const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
-  if (!surfaces.empty()) {
-    is_new = true;
-    if (Status put = meshes->renderer.put(surfaces); !put) return put.error();
-  }
-  const bool was_settled = std::exchange(is_settled, meshes->live.pending() == 0);
-  if (!is_new && was_settled == is_settled) return false;
+  if (surfaces.empty()) return *updated || is_scene_changed;
+  if (Status put = meshes->renderer.put(surfaces); !put) return put.error();
+  return true;
+}
+
+MeshPictureOptions DeviceBackend::Impl::mesh_picture(bool waits) {
   MeshPictureOptions wanted;
   wanted.width = request->width;
   wanted.height = request->height;
   wanted.samples = std::min(request->samples, kMeshSamples);
   wanted.light = request->light;
   wanted.wireframe = request->wireframe;
+  wanted.detail_colours = request->detail_colours;
+  wanted.threads = options.cpu.threads;
+  if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  wanted.selector = &selectors[1];
+  if (!waits) wanted.impostor_seconds = 0.0;
+  return wanted;
+}
+
+Result<bool> DeviceBackend::Impl::draw_meshes() {
+  const bool is_smooth = request->mode == DrawMode::Smooth;
+  if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) {
+    return ready.error();
+  }
+  const auto has_changed = take_surfaces();
+  if (!has_changed) return has_changed.error();
+  const bool is_new = std::exchange(is_request_new, false) || *has_changed;
+  // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
+  const bool is_last = !is_new && meshes->live.pending() == 0;
+  if (is_new) is_settled = false;
+  if (is_settled || (!is_new && !is_last)) return false;
   divisor = 1;
-  if (Status drawn = meshes->renderer.draw(*picture, request->camera, wanted); !drawn) {
+  if (Status drawn = meshes->renderer.draw(*picture, request->camera, mesh_picture(is_last)); !drawn) {
     return drawn.error();
   }
+  is_settled = is_last || (meshes->live.pending() == 0 && !request->detail_by_pixels);
   return true;
 }
 
@@ -204,12 +233,9 @@ Status DeviceBackend::Impl::draw_stage() {
 }
 
 Result<bool> DeviceBackend::Impl::draw_rays() {
-  if (std::exchange(is_scene_new, false)) {
-    is_request_new = true;
-    if (Status taken = renderer->update(*scene, options.cpu.instances, options.cpu.threads); !taken) {
-      return taken.error();
-    }
-  }
+  const auto updated = update_renderer();
+  if (!updated) return updated.error();
+  if (*updated) is_request_new = true;
   if (is_request_new) is_settled = false;
   if (is_settled) return false;
   if (Status drawn = draw_stage(); !drawn) return drawn.error();
@@ -283,8 +309,10 @@ std::optional<ViewFrame> DeviceBackend::take() {
 bool DeviceBackend::wants_frames() const {
   const Impl& me = *impl_;
   if (!me.can_draw_now()) return false;
-  const bool is_stale =
-      me.request->mode == DrawMode::Rays ? me.is_scene_new || !me.is_settled : !me.meshes || me.meshes->is_scene_new;
+  const bool is_rays = me.request->mode == DrawMode::Rays;
+  const bool is_stale = me.is_scene_new || (is_rays ? !me.is_settled
+                                                    : !me.meshes || me.meshes->is_scene_new ||
+                                                          (!me.is_settled && me.meshes->live.pending() == 0));
   return me.is_request_new || is_stale;
 }
 

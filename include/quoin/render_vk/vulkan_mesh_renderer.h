@@ -1,15 +1,19 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 
+#include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -24,22 +28,35 @@ struct MeshPictureOptions {
   int width = 1280;
   int height = 720;
   int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
-  /// `shadows` and `occlusion_rays` mean nothing here: any occlusion but Off is that of the meshes' vertices.
+  /// `occlusion_rays` means nothing here: any occlusion but Off is that of the meshes' vertices.
   LightOptions light;
+  /// As RenderOptions has them. Mid: meshes of halved grids, made on `threads` when a picture first shows them, blocky
+  /// or smooth as those of the full grid that were put, else blocky; Far: the faces of an impostor.
+  std::optional<DetailPolicy> detail;
+  DetailSelector* selector = nullptr;
+  double impostor_seconds = std::numeric_limits<double>::infinity();
+  int impostor_edge = 128;
+  bool detail_colours = false;
+  Threads threads;
   Wireframe wireframe = Wireframe::Off;
 };
 
 /// Draws chunks' meshes by rasterisation, on the device of a VulkanRenderer: a quad of a blocky mesh takes 8 bytes
 /// there, and its corners are made when it is drawn.
 ///
-/// Equal: a blocky mesh lit without shadows is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at
-///        silhouettes and where glass is seen: glass counts as one voxel thick, drawn from back to front. There is no
-///        inside: only faces that look towards the camera are drawn.
-/// Glass: quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn in
-///        the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque, whatever
-///        their types; and so is glass where values are shown instead of colours.
-/// Far:   what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
-///        1/1024 of a voxel is cut off.
+/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes, edges
+///         of shadows and where glass is seen: glass counts as one voxel thick, drawn from back to front. There is no
+///         inside: only faces that look towards the camera are drawn.
+/// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
+///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
+///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
+/// Detail: of far instances the impostor is drawn, and of their meshes what is transparent; of a smooth one these are
+///         its voxels' faces. Until its impostor is there an instance is drawn halved.
+/// Glass:  quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn
+///         in the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque,
+///         whatever their types; and so is glass where values are shown instead of colours.
+/// Far:    what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
+///         1/1024 of a voxel is cut off.
 /// Lifetime: the renderer it was made for must outlive it.
 /// Threads:  that renderer's.
 /// Errors:   as there.
@@ -59,15 +76,20 @@ class VulkanMeshRenderer {
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
   void clear();
 
-  /// Draws all there is. Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as
-  /// CpuRenderer::render and those whose axes lie in one plane, and for a picture of another renderer; Unsupported for
-  /// wireframes where the device has no lines. After an error in drawing the picture has no samples.
+  /// Draws all there is.
+  ///
+  /// Requires: with shadows, lamps or levels of detail the VulkanRenderer was updated with the same scene and filter; with
+  ///           levels of detail the scene was not edited since, by either's update.
+  /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those whose
+  /// axes lie in one plane, for a picture of another renderer, and when that renderer was last updated with another
+  /// scene or filter but what is to be drawn needs it; Unsupported for wireframes where the device has no lines. After
+  /// an error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
 
   struct Stats {
-    std::size_t chunks = 0;            ///< with a surface
+    std::size_t chunks = 0;            ///< with a surface, those of halved grids too
     std::int64_t triangles = 0;        ///< in memory, each once
-    std::int64_t drawn_triangles = 0;  ///< of the last picture, after leaving out chunks beside it
+    std::int64_t drawn_triangles = 0;  ///< of the last picture, after leaving out chunks beside it; impostors' too
     std::size_t bytes = 0;             ///< of surfaces, in device memory
   };
   [[nodiscard]] Stats stats() const;

@@ -200,18 +200,23 @@ bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b)
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ShaderGrid)) == 0);
 }
 
-Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
+std::vector<Vec4> surface_table(const VoxelRegistry& types) {
   // A product with an infinite logarithm is not sure to be a number on every device.
   constexpr float kLeast = -1e30F;
   const Surfaces surfaces(types);
   std::vector<Vec4> table;
-  last_surface_ = static_cast<std::uint32_t>(types.size());
-  for (std::uint32_t type = 0; type <= last_surface_; ++type) {
-    const Surface& surface = surfaces[static_cast<VoxelType>(type)];
+  for (std::size_t type = 0; type <= types.size(); ++type) {
+    const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
     table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
     table.emplace_back(surface.emitted, 0.0F);
     table.emplace_back(glm::max(surface.log_transmittance, Vec3(kLeast)), 0.0F);
   }
+  return table;
+}
+
+Status DeviceScene::put_surfaces(const VoxelRegistry& types) {
+  std::vector<Vec4> table = surface_table(types);
+  last_surface_ = static_cast<std::uint32_t>(types.size());
   if (table == surface_table_) return {};
   surface_table_ = std::move(table);
   return put_table(*memory_, surfaces_place_, bytes_of(surface_table_));

@@ -25,6 +25,7 @@ struct DevicePlaced {
   DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates
   DVec3 high{0.0};
   bool is_far = false;  ///< drawn from its impostor: the camera's rays pass it by
+  DVec3 far_centre{0.0};  ///< of that, in the grid
 };
 
 /// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.
@@ -46,6 +47,9 @@ struct Placement {
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
+
+/// What types look like, as shaders/data.glsl has it: three vectors each, and those of types beyond the last.
+[[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
 
 /// A table of lamps, its bricks and lists in device memory.
 struct DeviceLamps {

@@ -280,6 +280,14 @@ std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3
   return lamps;
 }
 
+std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera, FrameData& data) {
+  data.frame.flags |= kLamps;
+  data.frame.lamp_mask = static_cast<std::uint32_t>(lamps.table->bricks.size() - 1);
+  data.frame.lamp_bricks = lamps.bricks.address;
+  data.frame.lamp_lists = lamps.lists.address;
+  return shader_lamps(*lamps.table, camera.position, data.view_origin);
+}
+
 std::vector<float> srgb_thresholds() {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   std::vector<float> thresholds(256, 0.0F);

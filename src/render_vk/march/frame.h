@@ -25,6 +25,10 @@ struct FrameData {
 /// All that is in the world is made relative to the camera here, in double precision. Cost: O(instances).
 [[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
 
+/// Has a frame lit by lamps, which the shaders are to find where the result is put.
+/// Requires: `lamps` has a table, in device memory; `data` is of `camera`.
+[[nodiscard]] std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera, FrameData& data);
+
 /// A table's lamps, from where view space has its origin in the world.
 [[nodiscard]] std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin);
 

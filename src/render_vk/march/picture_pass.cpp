@@ -65,6 +65,8 @@ Status PicturePass::upload(const std::vector<T>& values, std::uint64_t& address)
 Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
   FrameData data = make_frame(*placement_, camera, options);
   occlusion_rays_ = options.light.occlusion_rays;
+  std::vector<ShaderLamp> lamps;
+  if (lamps_.table != nullptr) lamps = put_lamps(lamps_, camera, data);
   frame_ = data.frame;
   frame_.grids = placement_->grids;
   frame_.last_surface = scene_->last_surface();
@@ -74,22 +76,13 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   if (done) done = upload(data.leaves, frame_.leaves);
   if (done) done = upload(data.directions, frame_.directions);
   if (done) done = upload(data.turns, frame_.turns);
-  if (done) done = put_lamps(camera, data);
+  if (done) done = upload(lamps, frame_.lamps);
   if (done) done = upload(thresholds(), frame_.thresholds);
   if (done) done = make_tile_buffers(options);
   if (done) done = put_far(options);
   if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
   if (done) done = memory_->flush();
   return done;
-}
-
-Status PicturePass::put_lamps(const Camera& camera, const FrameData& data) {
-  if (lamps_.table == nullptr) return {};
-  frame_.flags |= kLamps;
-  frame_.lamp_mask = static_cast<std::uint32_t>(lamps_.table->bricks.size() - 1);
-  frame_.lamp_bricks = lamps_.bricks.address;
-  frame_.lamp_lists = lamps_.lists.address;
-  return upload(shader_lamps(*lamps_.table, camera.position, data.view_origin), frame_.lamps);
 }
 
 Status PicturePass::put_far(const RenderOptions& options) {

@@ -52,7 +52,6 @@ class PicturePass {
   Status put_frame(const Camera& camera, const RenderOptions& options);
   Status put_far(const RenderOptions& options);
   [[nodiscard]] int most_lamps() const { return lamps_.table == nullptr ? 0 : lamps_.table->longest; }
-  Status put_lamps(const Camera& camera, const FrameData& data);
   void find_hits(VkCommandBuffer commands, const ShaderPush& push) const;
   Status begin(const Camera& camera, const RenderOptions& options);
   Status make_tile_buffers(const RenderOptions& options);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <quoin/render_vk/vulkan_renderer.h>
@@ -65,4 +66,22 @@ struct VulkanRenderer::Impl {
   std::uint64_t uploaded = 0;
 };
 
+namespace vulkan {
+
+/// What a picture is taken of: the instances as the scene has them, or in their detail.
+class Subject {
+ public:
+  /// As VulkanRenderer::render, of what is right.
+  [[nodiscard]] static Result<Subject> of(RendererImpl& impl, const Camera& camera, const RenderOptions& options);
+
+  [[nodiscard]] const Placement& placement() const { return detailed_ ? *detailed_ : *plain_; }
+
+ private:
+  explicit Subject(const Placement& plain) : plain_(&plain) {}
+
+  const Placement* plain_;
+  std::optional<Placement> detailed_;
+};
+
+}  // namespace vulkan
 }  // namespace quoin

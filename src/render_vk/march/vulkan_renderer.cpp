@@ -1,7 +1,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
-#include <optional>
 #include <utility>
 
 #include "render/picture_request.h"
@@ -9,32 +8,16 @@
 #include "render_vk/march/renderer_impl.h"
 
 namespace quoin {
-namespace {
 
-// What a picture is taken of: the instances as the scene has them, or in their detail.
-class Subject {
- public:
-  [[nodiscard]] static Result<Subject> of(vulkan::RendererImpl& impl, const Camera& camera,
-                                          const RenderOptions& options) {
-    Subject subject(impl.scene.placement());
-    if (!options.detail || impl.voxels == nullptr) return subject;
-    const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
-    auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
-    if (!placed) return placed.error();
-    subject.detailed_ = std::move(*placed);
-    return subject;
-  }
-
-  [[nodiscard]] const vulkan::Placement& placement() const { return detailed_ ? *detailed_ : *plain_; }
-
- private:
-  explicit Subject(const vulkan::Placement& plain) : plain_(&plain) {}
-
-  const vulkan::Placement* plain_;
-  std::optional<vulkan::Placement> detailed_;
-};
-
-}  // namespace
+Result<vulkan::Subject> vulkan::Subject::of(RendererImpl& impl, const Camera& camera, const RenderOptions& options) {
+  Subject subject(impl.scene.placement());
+  if (!options.detail || impl.voxels == nullptr) return subject;
+  const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
+  auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
+  if (!placed) return placed.error();
+  subject.detailed_ = std::move(*placed);
+  return subject;
+}
 
 Result<std::unique_ptr<VulkanRenderer::Impl>> VulkanRenderer::Impl::create(
     Result<std::unique_ptr<vulkan::Device>> device, std::uint64_t block_bytes) {
@@ -85,7 +68,7 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 
 Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
   if (const Status status = check(camera, options); !status) return status.error();
-  const auto subject = Subject::of(*impl_, camera, options);
+  const auto subject = vulkan::Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
   auto lamps = impl_->lamp_table(options);
   if (!lamps) return lamps.error();
@@ -113,7 +96,7 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
-  const auto subject = Subject::of(*impl_, camera, options);
+  const auto subject = vulkan::Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
   auto lamps = impl_->lamp_table(options);
   if (!lamps) return lamps.error();

@@ -72,20 +72,36 @@ inline std::vector<SurfaceUpdate> smooth_surfaces(GridHandle handle, const Densi
   return updates;
 }
 
+/// As live meshes make them.
+inline std::vector<SurfaceUpdate> live_surfaces(const Scene& scene, SurfaceStyle style) {
+  LiveMeshOptions options;
+  options.style = style;
+  LiveMeshes live(options);
+  live.finish(scene, {0, 0, 0});
+  return live.take();
+}
+
 inline MeshPictureOptions mesh_options(const RenderOptions& options) {
   MeshPictureOptions mesh;
   mesh.width = options.width;
   mesh.height = options.height;
   mesh.samples = 1;
   mesh.light = options.light;
+  mesh.detail = options.detail;
+  mesh.selector = options.selector;
+  mesh.impostor_seconds = options.impostor_seconds;
+  mesh.detail_colours = options.detail_colours;
   return mesh;
 }
 
 /// The light that meshes have.
-inline RenderOptions without_shadows(RenderOptions options) {
-  options.light.shadows = false;
+inline RenderOptions with_mesh_light(RenderOptions options) {
   options.light.occlusion = OcclusionMode::Vertex;
   return options;
+}
+inline RenderOptions without_shadows(RenderOptions options) {
+  options.light.shadows = false;
+  return with_mesh_light(options);
 }
 
 class VulkanMeshTest : public VulkanTest {
@@ -103,6 +119,8 @@ class VulkanMeshTest : public VulkanTest {
   }
 
   void put(const Scene& scene, const std::vector<SurfaceUpdate>& surfaces) {
+    const Status traced = renderer_->update(scene);
+    EXPECT_TRUE(traced) << to_string(traced.error());
     const Status updated = meshes_->update(scene);
     EXPECT_TRUE(updated) << to_string(updated.error());
     const Status done = meshes_->put(surfaces);

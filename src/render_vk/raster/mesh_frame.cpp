@@ -39,7 +39,7 @@ struct View {
   double furthest = 0.0;
   double smallest_voxel = std::numeric_limits<double>::infinity();
 
-  View(const Camera& camera, const MeshPictureOptions& options)
+  View(const Camera& camera, const RenderOptions& options)
       : rays(camera, options.width, options.height),
         frustum(camera, options.width, options.height),
         pixel_from_world(glm::inverse(glm::dmat3(rays.right(), rays.down(), rays.forward()))),
@@ -67,12 +67,13 @@ struct Space {
   DVec3 eye{0.0};        // the camera from there; orthographic: the direction towards it
   DVec3 base_in_view{0.0};
 
-  Space(const MeshInstance& of, const MeshStore::StoredGrid& grid, const Camera& camera)
+  /// `low` to `high`: places of its chunks.
+  Space(const MeshInstance& of, IVec3 low, IVec3 high, const Camera& camera)
       : instance(&of), view_axes(of.world_axes * of.voxel_size) {
     const glm::dmat3 grid_axes = glm::transpose(of.world_axes);
     // The difference of two far positions is taken first: it is small, and mostly exact.
     camera_in_grid = of.pivot - grid_axes * (of.position - camera.position) / of.voxel_size;
-    const DVec3 chunk = glm::clamp(glm::floor(camera_in_grid / kEdge), DVec3(grid.low), DVec3(grid.high));
+    const DVec3 chunk = glm::clamp(glm::floor(camera_in_grid / kEdge), DVec3(low), DVec3(high));
     base = chunk * kEdge;
     base_in_view = view_axes * (base - camera_in_grid);
     eye = camera_in_grid - base;
@@ -98,6 +99,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
   const double radius = kChunkRadius * space.instance->voxel_size;
   const std::size_t before = data.draws.size();
   for (const auto& [chunk, mesh] : grid.chunks) {
+    if (space.instance->is_far && mesh.glass.empty()) continue;
     const DVec3 offset = DVec3(chunk) * kEdge - space.base;
     const DVec3 middle = space.view_axes * (offset + kEdge / 2) + space.base_in_view;
     if (!view.frustum.meets(middle, radius)) continue;
@@ -106,9 +108,33 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
     view.include(depth, radius * 1.01, space.instance->voxel_size);
     const bool is_perspective = view.rays.is_perspective();
     data.draws.push_back({&mesh, number, Vec3(offset), is_perspective ? glm::length(middle) : depth,
-                          visible_faces(offset, space.eye, is_perspective), space.instance->mirrored});
+                          visible_faces(offset, space.eye, is_perspective), space.instance->mirrored,
+                          space.instance->is_far});
   }
   return data.draws.size() > before;
+}
+
+// Lists the faces of its impostor. Their box is not known here, but that of what is seen from all sides is: a ball.
+void add_far(const Space& space, View& view, MeshFrameData& data) {
+  const MeshImpostor& impostor = space.instance->impostor;
+  const DVec3 offset = impostor.centre - space.base;
+  const DVec3 middle = space.view_axes * offset + space.base_in_view;
+  const double depth = glm::dot(middle, view.rays.forward());
+  if (!std::isfinite(depth)) return;
+  view.include(depth, impostor.radius * 1.01 * space.instance->voxel_size, space.instance->voxel_size);
+  const auto instance = static_cast<std::uint32_t>(data.instances.size());
+  const double distance = view.rays.is_perspective() ? glm::length(middle) : depth;
+  data.far.push_back({impostor.level, impostor.faces, instance, Vec3(offset), false, distance});
+  if (impostor.unseen.count > 0) {
+    data.far.push_back({impostor.unseen, impostor.faces, instance, Vec3(offset), true, distance});
+  }
+}
+
+// Its faces say in which voxel of the grid they lie.
+void set_impostor(const Space& space, ShaderMeshInstance& out) {
+  out.home = IVec4(-space.instance->origin, space.instance->placed);
+  out.far_half = space.instance->impostor.half;
+  out.unseen_half = space.instance->impostor.unseen_half;
 }
 
 // A vector in view, or with w = 1 a point, in clip space.
@@ -128,20 +154,6 @@ Vec4 clip_point(const View& view, DVec3 in_view) {
   return to_vec4({p.x, p.y, (view.furthest - p.z) / (view.furthest - view.nearest)}, 1.0);
 }
 
-// The light of a face, which is linear in how open it is: without openness, and what that adds.
-std::array<float, 2> light_of(float diffuse, const LightOptions& options) {
-  const auto sky = static_cast<float>(options.sky_brightness);
-  if (options.shading == Shading::Unlit) return {1.0F, 0.0F};
-  if (options.shading == Shading::UnlitWithOcclusion) {
-    const bool is_off = options.occlusion == OcclusionMode::Off;
-    return is_off ? std::array{1.0F, 0.0F} : std::array{kLeastOfAll, 1.0F - kLeastOfAll};
-  }
-  if (options.occlusion == OcclusionMode::Off) return {sky * kAmbientWithoutOcclusion + diffuse, 0.0F};
-  if (options.occlusion_affects == OcclusionAffects::Ambient) return {diffuse, sky * kAmbient};
-  const float all = sky * kAmbient + diffuse;
-  return {all * kLeastOfAll, all * (1.0F - kLeastOfAll)};
-}
-
 ShaderMeshInstance shader_instance(const Space& space, const View& view, const LightOptions& light, int subpixels) {
   ShaderMeshInstance out;
   const MeshInstance& instance = *space.instance;
@@ -154,9 +166,11 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
   out.clip[3] = clip_point(view, space.base_in_view);
   for (const Direction face : kDirections) {
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
-    out.light[static_cast<std::size_t>(face)] =
-        light_of(static_cast<float>(std::max(cosine, 0.0) * light.sun_brightness), light);
+    const int i = static_cast<int>(face);
+    out.diffuse[static_cast<std::size_t>(i / 4)][i % 4] =
+        static_cast<float>(std::max(cosine, 0.0) * light.sun_brightness);
   }
+  out.home = IVec4(IVec3(space.base) - instance.origin, instance.placed);
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());
@@ -206,32 +220,11 @@ void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData&
   for (const Entry& entry : entries) data.order.push_back(entry.quad);
 }
 
-std::uint32_t flags_of(const MeshPictureOptions& options) {
-  const Shading shading = options.light.shading;
-  std::uint32_t flags = 0;
-  if (shading == Shading::Occlusion) flags |= kMeshShowOcclusion;
-  if (shading == Shading::Normals) flags |= kMeshShowNormals;
-  if (shading == Shading::Lit) flags |= kMeshLit;
-  if (options.light.occlusion != OcclusionMode::Off) flags |= kMeshHasOcclusion;
-  if (options.light.occlusion_affects == OcclusionAffects::All) flags |= kMeshAffectsAll;
-  return flags;
-}
-
-void set_frame(const View& view, const MeshPictureOptions& options, MeshFrameData& data) {
-  data.push.numbers = flags_of(options) << kMeshFlagsShift;
+void set_frame(const View& view, const LightOptions& light, MeshFrameData& data) {
   data.sky.clip = {to_vec4(view.rays.right()), to_vec4(view.rays.down()), to_vec4(view.rays.corner()),
                    to_vec4(view.rays.forward())};
   data.sky.room = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
-  ShaderMeshFrame& frame = data.frame;
-  const auto sky = static_cast<float>(options.light.sky_brightness);
-  frame.sky_zenith = {sky * sky::kZenith, 0.0F};
-  frame.sky_horizon = {sky * sky::kHorizon, 0.0F};
-  frame.sky_ground = {sky * sky::kGround, 0.0F};
-  frame.ground_begins = sky::kGroundBegins;
-  frame.ground_is_full = sky::kGroundIsFull;
-  frame.sun = to_vec4(to_sun(options.light) * options.light.sun_brightness);
-  frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
-  frame.exposure = options.light.shading == Shading::Lit ? exposure_of(options.light) : 1.0F;
+  data.frame.sun = to_vec4(to_sun(light) * light.sun_brightness);
 }
 
 // Axes in one plane see nothing of space; products of near to perpendicular unit vectors are near to 1.
@@ -244,6 +237,7 @@ bool is_flat(const Camera& camera) {
 QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
   const StoredMesh& mesh = *draw.mesh;
   QuadRuns runs;
+  const bool has_opaque = !draw.is_far;
   const auto add = [&](std::uint32_t first, std::uint32_t end) {
     if (first == end) return;
     if (!runs.empty() && runs.back().second == first) {
@@ -252,10 +246,10 @@ QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
       runs.emplace_back(first, end);
     }
   };
-  for (std::size_t face = 0; face < 6 && mesh.is_by_direction; ++face) {
+  for (std::size_t face = 0; face < 6 && has_opaque && mesh.is_by_direction; ++face) {
     if ((draw.faces >> face & 1) != 0) add(mesh.opaque[face], mesh.opaque[face + 1]);
   }
-  if (!mesh.is_by_direction) add(0, mesh.opaque.back());
+  if (has_opaque && !mesh.is_by_direction) add(0, mesh.opaque.back());
   if (with_glass) add(mesh.opaque.back(), mesh.opaque.back() + static_cast<std::uint32_t>(mesh.glass.size()));
   return runs;
 }
@@ -263,6 +257,7 @@ QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
 std::int64_t MeshFrameData::triangles() const {
   const bool is_ordered = glass_quads > 0 && glass_quads <= kMaxOrdered;
   std::int64_t count = is_ordered ? 2 * static_cast<std::int64_t>(order.size()) : 0;
+  for (const FarDraw& draw : far) count += 2 * std::int64_t{draw.level.count};
   for (const MeshDraw& draw : draws) {
     count += draw.mesh->indices / 3;
     for (const auto& [first, end] : visible_quads(draw, !is_ordered)) count += 2 * std::int64_t{end - first};
@@ -271,26 +266,35 @@ std::int64_t MeshFrameData::triangles() const {
 }
 
 Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances, const Camera& camera,
-                                      const MeshPictureOptions& options, int subpixels) {
+                                      const RenderOptions& options, int subpixels) {
   if (is_flat(camera)) return make_error(ErrorCode::InvalidArgument, "camera: directions must not lie in one plane");
   MeshFrameData data;
   View view(camera, options);
   std::vector<Space> spaces;
-  for (const MeshInstance& instance : instances) {
-    const MeshStore::StoredGrid* grid = store.find(instance.grid);
-    if (grid == nullptr) continue;
-    const Space space(instance, *grid, camera);
-    if (!add_draws(space, *grid, view, data)) continue;
+  const auto keep = [&](const Space& space) {
     spaces.push_back(space);
     data.instances.emplace_back();
+  };
+  for (const MeshInstance& instance : instances) {
+    if (const MeshStore::StoredGrid* grid = store.find(instance.mesh); grid != nullptr) {
+      const Space space(instance, grid->low, grid->high, camera);
+      if (add_draws(space, *grid, view, data)) keep(space);
+    }
+    if (instance.impostor.level.count == 0) continue;
+    const IVec3 chunk(glm::floor(instance.impostor.centre / kEdge));
+    const Space space(instance, chunk, chunk, camera);
+    add_far(space, view, data);
+    keep(space);
   }
   view.finish();
   for (std::size_t i = 0; i < spaces.size(); ++i) {
     data.instances[i] = shader_instance(spaces[i], view, options.light, subpixels);
   }
-  std::stable_sort(data.draws.begin(), data.draws.end(),
-                   [](const MeshDraw& a, const MeshDraw& b) { return a.distance < b.distance; });
-  set_frame(view, options, data);
+  for (const FarDraw& draw : data.far) set_impostor(spaces[draw.instance], data.instances[draw.instance]);
+  const auto is_nearer = [](const auto& a, const auto& b) { return a.distance < b.distance; };
+  std::stable_sort(data.draws.begin(), data.draws.end(), is_nearer);
+  std::stable_sort(data.far.begin(), data.far.end(), is_nearer);
+  set_frame(view, options.light, data);
   // Where values are shown instead of colours, what is transparent is drawn like anything else.
   if (!shows_values(options.light.shading)) order_glass(spaces, view, data);
   return data;

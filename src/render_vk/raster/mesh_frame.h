@@ -10,19 +10,36 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/scene/camera.h>
 
+#include "render_vk/march/frame.h"
 #include "render_vk/raster/mesh_shader_data.h"
 #include "render_vk/raster/mesh_store.h"
 
 namespace quoin::vulkan {
 
+/// An impostor in device memory, as one instance shows it.
+struct MeshImpostor {
+  ShaderFarLevel level;
+  ShaderFarLevel unseen;
+  std::uint64_t faces = 0;
+  float half = 0.5F;  ///< from the middle of a face to its edges, voxels
+  float unseen_half = 0.5F;
+  DVec3 centre{0.0};    ///< of the content, in the grid
+  double radius = 0.0;  ///< of it, voxels: no face lies further away
+};
+
 /// An instance whose meshes are drawn.
 struct MeshInstance {
-  GridHandle grid;
+  InstanceHandle handle;
+  MeshKey mesh;
   glm::dmat3 world_axes{1.0};  ///< as PlacedGrid's
   DVec3 position{0.0};
-  DVec3 pivot{0.0};
+  DVec3 pivot{0.0};  ///< in the coordinates of the mesh's grid, which may be a halved one
   double voxel_size = 1.0;
   bool mirrored = false;
+  std::int32_t placed = -1;  ///< among what the frame's rays meet; -1: it is not there
+  IVec3 origin{0};           ///< of its tree's coordinates
+  bool is_far = false;       ///< of its own meshes only what is transparent is drawn
+  MeshImpostor impostor;     ///< of a far one, if it shows
 };
 
 /// A chunk of an instance that is in the picture.
@@ -33,6 +50,17 @@ struct MeshDraw {
   double distance = 0.0;       ///< of its middle, in world units; orthographic: along the view
   std::uint8_t faces = 0;      ///< the directions, as bits, of which the camera can see any
   bool mirrored = false;
+  bool is_far = false;  ///< only what is transparent
+};
+
+/// Faces of an impostor that are in the picture.
+struct FarDraw {
+  ShaderFarLevel level;
+  std::uint64_t faces = 0;
+  std::uint32_t instance = 0;
+  Vec3 offset{0.0F};  ///< of the content's centre
+  bool is_unseen = false;
+  double distance = 0.0;
 };
 
 /// Runs of a blocky chunk's quads, each from one number to before the next.
@@ -42,18 +70,21 @@ using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 /// What drawing one picture takes, but for where things lie in memory.
 struct MeshFrameData {
+  FrameData picture;  ///< what rays meet, and light
   ShaderMeshFrame frame;
   ShaderMeshPush push;  ///< what all draws have in common
   ShaderMeshPush sky;
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
+  std::vector<FarDraw> far;     ///< likewise
   /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`: then
   /// chunks are drawn in their order, and the quads of each as they come.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
+  std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
 
-  [[nodiscard]] bool has(std::uint32_t flag) const { return (push.numbers >> kMeshFlagsShift & flag) != 0; }
+  [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }
   /// Of the surfaces that are drawn.
   [[nodiscard]] std::int64_t triangles() const;
 };
@@ -66,11 +97,10 @@ constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 /// Depth: reversed, 1 at the near plane. It lies at the nearest chunk in the picture, but not nearer than 1/1024 of the
 ///        smallest voxel; perspective has no far plane, orthographic pictures' lies behind the last chunk.
 /// `subpixels`: in how many places per pixel and axis a device tells corners apart.
-/// Requires: `check` accepts the camera and the options.
+/// `picture` is left to the caller. Requires: `check` accepts the camera and the options.
 /// Errors:   InvalidArgument for a camera whose axes lie in one plane.
 /// Cost:     O(chunks of the instances), and sorting those in the picture and the transparent quads.
 [[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,
-                                                    const Camera& camera, const MeshPictureOptions& options,
-                                                    int subpixels);
+                                                    const Camera& camera, const RenderOptions& options, int subpixels);
 
 }  // namespace quoin::vulkan

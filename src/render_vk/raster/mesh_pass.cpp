@@ -4,6 +4,8 @@
 #include <array>
 #include <cstring>
 
+#include <quoin/render/impostor.h>
+
 namespace quoin::vulkan {
 namespace {
 
@@ -11,6 +13,7 @@ const char* const kDoing = "drawing meshes";
 // Quads that 16-bit indices reach; more of them take several draws.
 constexpr std::uint32_t kQuadsAtOnce = 16'384;
 constexpr VkDeviceSize kAlignment = 32;
+constexpr std::uint32_t kAllViews = (1U << kImpostorViews) - 1U;
 
 VkDeviceSize aligned(VkDeviceSize size) {
   return (size + kAlignment - 1) / kAlignment * kAlignment;
@@ -36,6 +39,7 @@ struct MeshPass::Step {
   std::uint32_t mode = kDrawSurfaces;
   VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
   std::array<VkPipeline, 2> smooth{};  // mirrored: 1
+  VkPipeline far = VK_NULL_HANDLE;     // impostors
 
   [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
 };
@@ -108,23 +112,47 @@ Status MeshPass::grow(VkDeviceSize bytes) {
   return {};
 }
 
-// Puts what the shaders read of a picture where it will be copied from, and has the images ready.
-Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
-  constexpr VkDeviceSize kInstances = sizeof(ShaderMeshFrame);
-  const VkDeviceSize draws = kInstances + aligned(bytes_of(data.instances));
-  const VkDeviceSize order = draws + aligned(bytes_of(data.glass));
-  frame_bytes_ = order + aligned(bytes_of(data.order));
+// Puts what the shaders read of a picture where it will be copied from.
+Status MeshPass::put_frame(MeshFrameData& data) {
+  // Instances follow the frame of meshes.
+  struct Part {
+    const void* from;
+    std::size_t bytes;
+    std::uint64_t* address;
+  };
+  ShaderFrame& picture = data.picture.frame;
+  const std::array<Part, 9> parts{{{&data.frame, sizeof data.frame, &data.push.frame},
+                                      {data.instances.data(), bytes_of(data.instances), nullptr},
+                                      {&picture, sizeof picture, &data.frame.frame},
+                                      {data.glass.data(), bytes_of(data.glass), &data.frame.draws},
+                                      {data.order.data(), bytes_of(data.order), &data.frame.order},
+                                      {data.picture.placed.data(), bytes_of(data.picture.placed), &picture.placed},
+                                      {data.picture.tree.data(), bytes_of(data.picture.tree), &picture.tree},
+                                      {data.picture.leaves.data(), bytes_of(data.picture.leaves), &picture.leaves},
+                                      {data.lamps.data(), bytes_of(data.lamps), &picture.lamps}}};
+  static_assert(sizeof(ShaderMeshFrame) % 16 == 0);
+  std::array<std::uint64_t, parts.size()> offsets{};
+  frame_bytes_ = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    offsets[i] = frame_bytes_;
+    frame_bytes_ += i == 0 ? parts[i].bytes : aligned(parts[i].bytes);
+  }
   if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
   // Room was left for the address to be a multiple, whatever the buffer's is.
   frame_address_ = aligned(frame_.address());
-  data.frame.draws = frame_address_ + draws;
-  data.frame.order = frame_address_ + order;
-  data.push.frame = data.sky.frame = frame_address_;
-  std::byte* to = staging_.mapped();
-  std::memcpy(to, &data.frame, sizeof data.frame);
-  if (!data.instances.empty()) std::memcpy(to + kInstances, data.instances.data(), bytes_of(data.instances));
-  if (!data.glass.empty()) std::memcpy(to + draws, data.glass.data(), bytes_of(data.glass));
-  if (!data.order.empty()) std::memcpy(to + order, data.order.data(), bytes_of(data.order));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].address != nullptr) *parts[i].address = frame_address_ + offsets[i];
+  }
+  data.sky.frame = data.push.frame;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (parts[i].bytes > 0) std::memcpy(staging_.mapped() + offsets[i], parts[i].from, parts[i].bytes);
+  }
+  return {};
+}
+
+// Has that, and images, ready.
+Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples) {
+  if (Status done = put_frame(data); !done) return done;
   if (target_.is_of(size, samples)) return {};
   target_ = {};
   const auto pass = pipelines_->render_pass(samples);
@@ -137,7 +165,7 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
 
 std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe) const {
   if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
-  const bool shows_values = data.has(kMeshShowOcclusion | kMeshShowNormals);
+  const bool shows_values = data.has(kShowOcclusion | kShowNormals);
   // What is solid first, so that less of the sky is to be drawn.
   std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
   if (data.glass_quads > 0) {
@@ -148,11 +176,13 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
   return steps;
 }
 
-Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples) {
+Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light) {
   for (Step& step : steps) {
+    // Edges are as bright as what they lie on, but for shadows.
+    const bool is_lit = step.over != Step::Over::Sky && step.mode != kDrawEdgesOver && step.mode != kDrawEdgesOnly;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found =
-          pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, samples});
+      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder,
+                                               is_lit ? light : MeshLight::Plain, samples});
       if (!found) return found.error();
       out = *found;
       return {};
@@ -165,15 +195,16 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples)
     }
     if (done) done = find(MeshWay::What::Smooth, false, step.smooth[0]);
     if (done) done = find(MeshWay::What::Smooth, true, step.smooth[1]);
+    if (done) done = find(MeshWay::What::Far, false, step.far);
     if (!done) return done;
   }
   return {};
 }
 
-Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
+Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe, MeshLight light,
                       const Buffer& colours) {
   std::vector<Step> steps = steps_for(data, wireframe);
-  Status done = find_pipelines(steps, samples);
+  Status done = find_pipelines(steps, samples, light);
   if (done) done = prepare(data, size, samples);
   if (!done) return done;
   return device_->run(kDoing, [&](VkCommandBuffer commands) { record(commands, data, steps, colours); });
@@ -234,6 +265,7 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     const MeshDraw& draw = data.draws[step.is_glass() ? data.draws.size() - 1 - i : i];
     const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
     if (step.is_glass() && draw.mesh->glass.empty()) continue;
+    if (draw.is_far && step.over == Step::Over::Opaque) continue;
     const VkPipeline wanted = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
     if (wanted != bound) {
       api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
@@ -250,6 +282,27 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     push(commands, values);
     draw_mesh(commands, draw, step);
   }
+  if (!step.is_glass() && !data.far.empty()) draw_far(commands, data, step);
+}
+
+void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
+  device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.far);
+  bind_corners(commands);
+  for (const FarDraw& draw : data.far) {
+    const ShaderMeshInstance& instance = data.instances[draw.instance];
+    ShaderMeshPush values = data.push;
+    values.clip = instance.clip;
+    values.eye = instance.eye;
+    values.room = instance.room;
+    values.offset = {draw.offset.x, draw.offset.y, draw.offset.z};
+    values.instance = draw.instance;
+    values.data = draw.level.faces;
+    values.far_faces = draw.faces;
+    values.numbers |= step.mode | (draw.level.views & kAllViews) << kMeshViewsShift;
+    if (draw.is_unseen) values.numbers |= kMeshIsUnseen;
+    push(commands, values);
+    draw_quads(commands, 0, draw.level.count);
+  }
 }
 
 void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const {
@@ -263,7 +316,7 @@ void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const S
   const std::uint32_t opaque = mesh.opaque.back();
   const auto all = opaque + static_cast<std::uint32_t>(mesh.glass.size());
   if (step.is_glass()) return draw_quads(commands, opaque, all);
-  if (step.mode == kDrawEdgesOnly) return draw_quads(commands, 0, all);
+  if (step.mode == kDrawEdgesOnly) return draw_quads(commands, draw.is_far ? opaque : 0, all);
   for (const auto& [first, end] : visible_quads(draw, step.over == Step::Over::All)) draw_quads(commands, first, end);
 }
 

@@ -24,9 +24,9 @@ class MeshPass {
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 
-  /// Writes the pixels of `data` into `colours`. `data.push` says where surfaces are.
+  /// Writes the pixels of `data` into `colours`. `data.picture` says where types, trees and tables of lamps are.
   [[nodiscard]] Status draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
-                            const Buffer& colours);
+                            MeshLight light, const Buffer& colours);
 
  private:
   struct Step;
@@ -35,12 +35,14 @@ class MeshPass {
   Status open();
   Status put_corners();
   Status prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples);
+  Status put_frame(MeshFrameData& data);
   Status grow(VkDeviceSize bytes);
   [[nodiscard]] std::vector<Step> steps_for(const MeshFrameData& data, Wireframe wireframe) const;
-  Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples);
+  Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light);
   void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
               const Buffer& colours) const;
   void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
+  void draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
   void draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const;
   void draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const;
   void bind_corners(VkCommandBuffer commands) const;

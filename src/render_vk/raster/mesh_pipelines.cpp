@@ -20,6 +20,9 @@ constexpr std::uint32_t kBlockyVertex[] = {
 constexpr std::uint32_t kBlockyFragment[] = {
 #include "blocky.frag.inc"
 };
+constexpr std::uint32_t kFarVertex[] = {
+#include "far.vert.inc"
+};
 constexpr std::uint32_t kSmoothVertex[] = {
 #include "smooth.vert.inc"
 };
@@ -27,9 +30,19 @@ constexpr std::uint32_t kSmoothFragment[] = {
 #include "smooth.frag.inc"
 };
 
-// In the order of MeshWay::What, first the vertices' shader.
-constexpr std::array<std::span<const std::uint32_t>, 6> kCode = {kSkyVertex,      kSkyFragment,  kBlockyVertex,
-                                                                 kBlockyFragment, kSmoothVertex, kSmoothFragment};
+constexpr std::array<std::span<const std::uint32_t>, 7> kCode = {
+    kSkyVertex, kSkyFragment, kBlockyVertex, kBlockyFragment, kSmoothVertex, kSmoothFragment, kFarVertex};
+
+// Of vertices and of fragments, in `kCode`.
+std::array<std::size_t, 2> shaders_of(MeshWay::What what) {
+  switch (what) {
+    case MeshWay::What::Sky: return {0, 1};
+    case MeshWay::What::Blocky: return {2, 3};
+    case MeshWay::What::Smooth: return {4, 5};
+    case MeshWay::What::Far: return {6, 3};
+  }
+  return {};
+}
 
 const char* const kDoing = "compiling shaders";
 
@@ -114,24 +127,24 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 2> values;
-  std::array<VkSpecializationMapEntry, 2> entries;
+  std::array<VkBool32, 4> values;
+  std::array<VkSpecializationMapEntry, 4> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
-  Stages(const MeshWay& way, const VkShaderModule* shaders)
-      : values{way.ordered ? VK_TRUE : VK_FALSE, is_glass(way) ? VK_TRUE : VK_FALSE},
-        entries{VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
-                VkSpecializationMapEntry{1, sizeof(VkBool32), sizeof(VkBool32)}},
-        constants{2, entries.data(), sizeof values, values.data()} {
+  Stages(const MeshWay& way, const std::array<VkShaderModule, 2>& shaders)
+      : values{way.ordered, is_glass(way), way.light != MeshLight::Plain, way.light == MeshLight::TracedThroughGlass},
+        constants{4, entries.data(), sizeof values, values.data()} {
+    for (std::uint32_t i = 0; i < entries.size(); ++i) {
+      entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
+    }
     for (std::size_t i = 0; i < all.size(); ++i) {
       all[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
       all[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
       all[i].module = shaders[i];
       all[i].pName = "main";
+      all[i].pSpecializationInfo = &constants;
     }
-    if (way.what != MeshWay::What::Blocky) return;
-    for (VkPipelineShaderStageCreateInfo& stage : all) stage.pSpecializationInfo = &constants;
   }
   Stages(const Stages&) = delete;
   Stages& operator=(const Stages&) = delete;
@@ -211,7 +224,8 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 }
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
-  const Stages stages(way, &shaders_[2 * static_cast<std::size_t>(way.what)]);
+  const auto [vertices, fragments] = shaders_of(way.what);
+  const Stages stages(way, {shaders_[vertices], shaders_[fragments]});
   GraphicsPipelineInfo info;
   info.pass = pass;
   info.layout = layout_;

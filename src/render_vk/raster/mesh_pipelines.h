@@ -13,14 +13,22 @@ namespace quoin::vulkan {
 constexpr VkFormat kMeshColour = VK_FORMAT_R8G8B8A8_SRGB;  // so that blending and resolving are linear
 constexpr VkFormat kMeshDepth = VK_FORMAT_D32_SFLOAT;
 
+/// What light a fragment gets.
+enum class MeshLight : std::uint8_t {
+  Plain,              ///< all that its face is turned to
+  Traced,             ///< what rays say: shadows, lamps
+  TracedThroughGlass  ///< there is some in the scene
+};
+
 /// One of the few ways in which meshes are drawn.
 struct MeshWay {
-  enum class What : std::uint8_t { Sky, Blocky, Smooth };
+  enum class What : std::uint8_t { Sky, Blocky, Smooth, Far };
   What what = What::Sky;
   /// As ShaderMeshPush: surfaces, edges over them, edges alone, or a channel of glass.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
+  MeshLight light = MeshLight::Plain;
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;
@@ -41,7 +49,7 @@ class MeshPipelines {
   [[nodiscard]] Result<VkPipeline> pipeline(const MeshWay& way);
 
  private:
-  static constexpr std::size_t kShaders = 6;
+  static constexpr std::size_t kShaders = 7;
 
   explicit MeshPipelines(Device& device) : device_(&device) {}
   VkResult make_pass(std::uint32_t samples, VkRenderPass& pass) const;

@@ -13,9 +13,12 @@ struct ShaderMeshInstance {
   std::array<Vec4, 4> clip{};
   std::array<Vec4, 3> axes{};
   Vec4 eye{0.0F};
-  std::array<std::array<float, 2>, 6> light{};
+  std::array<Vec4, 2> diffuse{};
+  IVec4 home{0, 0, 0, -1};
   float room = 0.0F;
-  std::array<float, 3> pad{};
+  float far_half = 0.0F;
+  float unseen_half = 0.0F;
+  float pad = 0.0F;
 };
 
 struct ShaderGlassDraw {
@@ -32,17 +35,11 @@ struct ShaderGlassQuad {
 };
 
 struct ShaderMeshFrame {
-  Vec4 sky_zenith{0.0F};
-  Vec4 sky_horizon{0.0F};
-  Vec4 sky_ground{0.0F};
-  Vec4 sun{0.0F};
-  Vec4 light{0.0F};
+  std::uint64_t frame = 0;  ///< a ShaderFrame
   std::uint64_t draws = 0;
   std::uint64_t order = 0;
-  float exposure = 1.0F;
-  float ground_begins = 0.0F;
-  float ground_is_full = 0.0F;
-  float pad = 0.0F;
+  std::uint64_t pad = 0;
+  Vec4 sun{0.0F};
 };
 
 // ShaderMeshPush::numbers: what is drawn,
@@ -50,15 +47,9 @@ constexpr std::uint32_t kDrawSurfaces = 0;
 constexpr std::uint32_t kDrawEdgesOver = 1;
 constexpr std::uint32_t kDrawEdgesOnly = 2;
 constexpr std::uint32_t kDrawGlass = 3;  ///< and the channel
-// flags,
-constexpr int kMeshFlagsShift = 4;
-constexpr std::uint32_t kMeshLit = 1;
-constexpr std::uint32_t kMeshHasOcclusion = 2;
-constexpr std::uint32_t kMeshAffectsAll = 4;
-constexpr std::uint32_t kMeshShowOcclusion = 8;
-constexpr std::uint32_t kMeshShowNormals = 16;
-// and the last surface.
-constexpr int kMeshLastSurfaceShift = 12;
+// and of an impostor which views count, and whether its faces are those that none saw.
+constexpr int kMeshViewsShift = 4;
+constexpr std::uint32_t kMeshIsUnseen = std::uint32_t{1} << 30;
 
 struct ShaderMeshPush {
   std::array<Vec4, 4> clip{};
@@ -67,12 +58,12 @@ struct ShaderMeshPush {
   std::uint32_t instance = 0;
   std::uint64_t frame = 0;
   std::uint64_t data = 0;
-  std::uint64_t surfaces = 0;
+  std::uint64_t far_faces = 0;
   float room = 0.0F;
   std::uint32_t numbers = 0;
 };
 
 static_assert(sizeof(ShaderMeshInstance) == 192 && sizeof(ShaderGlassDraw) == 32 && sizeof(ShaderGlassQuad) == 8);
-static_assert(sizeof(ShaderMeshFrame) == 5 * 16 + 2 * 8 + 4 * 4 && sizeof(ShaderMeshPush) == 128);
+static_assert(sizeof(ShaderMeshFrame) == 3 * 16 && sizeof(ShaderMeshPush) == 128);
 
 }  // namespace quoin::vulkan

@@ -77,7 +77,7 @@ MeshStore::~MeshStore() {
 }
 
 void MeshStore::clear() {
-  for (auto& [handle, grid] : grids_) {
+  for (auto& [key, grid] : grids_) {
     for (auto& [at, mesh] : grid.chunks) memory_->release(mesh.place);
   }
   grids_.clear();
@@ -85,7 +85,7 @@ void MeshStore::clear() {
   triangles_ = 0;
 }
 
-Status MeshStore::put(std::span<const SurfaceUpdate> surfaces) {
+Status MeshStore::put(std::span<const SurfaceUpdate> surfaces, int level) {
   for (const SurfaceUpdate& update : surfaces) {
     if (update.surface == nullptr) continue;
     if (Status right = check(*update.surface); !right) return right;
@@ -94,7 +94,7 @@ Status MeshStore::put(std::span<const SurfaceUpdate> surfaces) {
   std::size_t bytes = 0;
   Status done;
   for (const SurfaceUpdate& update : surfaces) {
-    Change& change = changes.emplace_back(Change{update.grid, update.chunk, {}});
+    Change& change = changes.emplace_back(Change{{update.grid, level}, update.chunk, {}});
     if (update.surface != nullptr) done = upload(*update.surface, change.mesh);
     if (!done) break;
     bytes += change.mesh.place.size;
@@ -152,7 +152,7 @@ Status MeshStore::finish(std::vector<Change>& changes) {
 
 void MeshStore::replace(Change& change) {
   if (change.mesh.place.size == 0) {
-    const auto grid = grids_.find(change.grid);
+    const auto grid = grids_.find(change.key);
     if (grid == grids_.end()) return;
     const auto old = grid->second.chunks.find(change.chunk);
     if (old == grid->second.chunks.end()) return;
@@ -162,7 +162,7 @@ void MeshStore::replace(Change& change) {
     if (grid->second.chunks.empty()) grids_.erase(grid);
     return;
   }
-  StoredGrid& grid = grids_[change.grid];
+  StoredGrid& grid = grids_[change.key];
   const auto [at, is_new] = grid.chunks.try_emplace(change.chunk);
   if (is_new) {
     grid.bounds_known = false;
@@ -182,8 +182,21 @@ void MeshStore::give_back(StoredMesh& mesh) {
   memory_->release(mesh.place);
 }
 
-const MeshStore::StoredGrid* MeshStore::find(GridHandle handle) {
-  const auto found = grids_.find(handle);
+void MeshStore::drop(MeshKey key) {
+  const auto found = grids_.find(key);
+  if (found == grids_.end()) return;
+  for (auto& [at, mesh] : found->second.chunks) give_back(mesh);
+  grids_.erase(found);
+}
+
+std::size_t MeshStore::StoredGrid::bytes() const {
+  std::size_t sum = 0;
+  for (const auto& [at, mesh] : chunks) sum += mesh.place.size;
+  return sum;
+}
+
+const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
+  const auto found = grids_.find(key);
   if (found == grids_.end()) return nullptr;
   StoredGrid& grid = found->second;
   if (!grid.bounds_known) {

@@ -29,6 +29,15 @@ struct StoredMesh {
   }
 };
 
+/// Whose chunks: those of a grid, or of the grid halved that often.
+struct MeshKey {
+  GridHandle grid;
+  int level = 0;
+  bool operator<(const MeshKey& other) const {
+    return grid != other.grid ? grid < other.grid : level < other.level;
+  }
+};
+
 /// Surfaces of chunks in device memory: 8 bytes a quad, or 28 a vertex and 4 an index.
 class MeshStore {
  public:
@@ -42,6 +51,8 @@ class MeshStore {
     IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
     IVec3 high{0};
     bool bounds_known = false;
+
+    [[nodiscard]] std::size_t bytes() const;
   };
 
   explicit MeshStore(DeviceMemory& memory) : memory_(&memory) {}
@@ -49,12 +60,13 @@ class MeshStore {
   MeshStore(const MeshStore&) = delete;
   MeshStore& operator=(const MeshStore&) = delete;
 
-  /// As VulkanMeshRenderer::put.
-  [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
+  /// As VulkanMeshRenderer::put. `level`: how often the grids are halved that they are of.
+  [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces, int level = 0);
+  void drop(MeshKey key);
   void clear();
 
   /// Null when nothing of the grid is there. Its bounds are known then.
-  [[nodiscard]] const StoredGrid* find(GridHandle grid);
+  [[nodiscard]] const StoredGrid* find(MeshKey key);
 
   [[nodiscard]] std::size_t chunks() const { return chunks_; }
   [[nodiscard]] std::int64_t triangles() const { return triangles_; }
@@ -62,7 +74,7 @@ class MeshStore {
 
  private:
   struct Change {
-    GridHandle grid;
+    MeshKey key;
     IVec3 chunk{0};
     StoredMesh mesh;  // of no size: nothing is there any more
   };
@@ -73,7 +85,7 @@ class MeshStore {
   void give_back(StoredMesh& mesh);
 
   DeviceMemory* memory_;
-  std::map<GridHandle, StoredGrid> grids_;
+  std::map<MeshKey, StoredGrid> grids_;
   std::size_t chunks_ = 0;
   std::int64_t triangles_ = 0;
   std::size_t bytes_ = 0;

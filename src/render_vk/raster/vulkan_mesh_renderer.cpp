@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <optional>
 #include <utility>
 
-#include "light/surfaces.h"
+#include <glm/geometric.hpp>
+
 #include "render/picture_request.h"
 #include "render_vk/march/device_picture.h"
 #include "render_vk/march/renderer_impl.h"
+#include "render_vk/raster/level_meshes.h"
 #include "render_vk/raster/mesh_pass.h"
 #include "scene/instance_axes.h"
 
@@ -16,61 +18,89 @@ namespace quoin {
 
 using vulkan::Vec4;
 
-struct VulkanMeshRenderer::Impl {
-  Impl(vulkan::RendererImpl& of_renderer, std::unique_ptr<vulkan::MeshPass> with_pass)
-      : device(of_renderer.device.get()),
-        memory(&of_renderer.memory),
-        pass(std::move(with_pass)),
-        store(of_renderer.memory) {}
-  ~Impl() { memory->release(surfaces); }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  void place(const Scene& scene, InstanceFilter filter);
-  Status put_surfaces(const VoxelRegistry& types);
-  Status upload_surfaces(const std::vector<Vec4>& table);
-
-  vulkan::Device* device;
-  vulkan::DeviceMemory* memory;
-  std::unique_ptr<vulkan::MeshPass> pass;
-  vulkan::MeshStore store;
-  std::vector<vulkan::MeshInstance> instances;
-  vulkan::Place surfaces;
-  std::vector<Vec4> surface_table;  // what lies there
-  std::int64_t drawn_triangles = 0;
-};
-
 namespace {
 
-// What a type looks like, and as glass of one voxel, as shaders/mesh.glsl reads it.
-std::vector<Vec4> table_of(const VoxelRegistry& types) {
-  // Brighter than anything, but its products with what is interpolated stay numbers.
-  constexpr float kBrightest = 1e15F;
-  const Surfaces surfaces(types);
-  std::vector<Vec4> table;
-  for (std::size_t type = 0; type <= types.size(); ++type) {
-    const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
-    table.emplace_back(surface.colour, 1.0F - std::exp(surface.log_clarity));
-    table.emplace_back(glm::min(surface.emitted, Vec3(kBrightest)), 0.0F);
-    table.emplace_back(glm::exp(surface.log_transmittance), 0.0F);
-  }
-  return table;
-}
+// Beyond this, meshes of halved grids go that pictures have not shown for longest.
+constexpr std::size_t kMaxLevelBytes = std::size_t{256} << 20;
 
-Status check(const Camera& camera, const MeshPictureOptions& options) {
-  constexpr std::array kSamples = {1, 2, 4, 8};
+RenderOptions request_of(const MeshPictureOptions& options) {
   RenderOptions request;
   request.width = options.width;
   request.height = options.height;
   request.light = options.light;
-  if (Status right = check(camera, request); !right) return right;
+  request.detail = options.detail;
+  request.selector = options.selector;
+  request.impostor_seconds = options.impostor_seconds;
+  request.impostor_edge = options.impostor_edge;
+  request.detail_colours = options.detail_colours;
+  request.threads = options.threads;
+  return request;
+}
+
+Status check(const Camera& camera, const MeshPictureOptions& options) {
+  constexpr std::array kSamples = {1, 2, 4, 8};
+  if (Status right = check(camera, request_of(options)); !right) return right;
   if (std::find(kSamples.begin(), kSamples.end(), options.samples) == kSamples.end()) {
     return make_error(ErrorCode::InvalidArgument, "samples: of meshes must be 1, 2, 4 or 8");
   }
   return {};
 }
 
+bool traces_light(const LightOptions& light) {
+  if (light.shading != Shading::Lit) return false;
+  return (light.shadows && light.sun_brightness > 0.0) || light.lamps > 0;
+}
+
+vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::DevicePlaced& placed) {
+  vulkan::MeshImpostor impostor;
+  impostor.level = far.level;
+  impostor.unseen = far.unseen;
+  impostor.faces = far.faces;
+  impostor.half = far.size.x;
+  impostor.unseen_half = far.size.y;
+  impostor.centre = placed.far_centre;
+  // Faces of coarse levels reach past the content.
+  impostor.radius = 0.5 * glm::length(placed.high - placed.low) + 2.0 * far.size.x;
+  return impostor;
+}
+
 }  // namespace
+
+struct VulkanMeshRenderer::Impl {
+  Impl(vulkan::RendererImpl& of_renderer, std::unique_ptr<vulkan::MeshPass> with_pass)
+      : renderer(&of_renderer),
+        device(of_renderer.device.get()),
+        memory(&of_renderer.memory),
+        pass(std::move(with_pass)),
+        store(of_renderer.memory),
+        levels(store) {}
+  ~Impl() { memory->release(surfaces); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void place(const Scene& of_scene, InstanceFilter filter);
+  Status put_surfaces(const VoxelRegistry& types);
+  [[nodiscard]] Status check_request(const vulkan::PictureImpl& target, const Camera& camera,
+                                     const MeshPictureOptions& options) const;
+  [[nodiscard]] Result<std::vector<vulkan::MeshInstance>> detailed(const vulkan::Placement& placement, Threads threads);
+  Status put_picture(const vulkan::Placement& placement, const Camera& camera, const RenderOptions& request,
+                     vulkan::MeshFrameData& data);
+  [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const RenderOptions& request,
+                                                         vulkan::MeshLight& light);
+
+  vulkan::RendererImpl* renderer;
+  vulkan::Device* device;
+  vulkan::DeviceMemory* memory;
+  std::unique_ptr<vulkan::MeshPass> pass;
+  vulkan::MeshStore store;
+  vulkan::LevelMeshes levels;
+  const Scene* scene = nullptr;
+  InstanceFilter shown = InstanceFilter::Visible;
+  std::vector<vulkan::MeshInstance> instances;  // in the order of their handles
+  vulkan::Place surfaces;
+  std::vector<Vec4> surface_table;  // what lies there
+  std::int64_t drawn_triangles = 0;
+};
 
 VulkanMeshRenderer::VulkanMeshRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 VulkanMeshRenderer::VulkanMeshRenderer(VulkanMeshRenderer&&) noexcept = default;
@@ -86,24 +116,35 @@ Result<VulkanMeshRenderer> VulkanMeshRenderer::create(VulkanRenderer& renderer) 
 
 Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
   impl_->place(scene, filter);
+  impl_->levels.look_at(scene);
   return impl_->put_surfaces(scene.types);
 }
 
-void VulkanMeshRenderer::Impl::place(const Scene& scene, InstanceFilter filter) {
+void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filter) {
+  if (scene != &of_scene) levels.clear();
+  scene = &of_scene;
+  shown = filter;
   instances.clear();
-  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
-    const SceneGrid* grid = scene.grids().find(instance.grid);
+  scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
+    const SceneGrid* grid = scene->grids().find(instance.grid);
     if (grid == nullptr || !passes(filter, instance) || !has_place(instance) || !is_finite(grid->pivot)) return;
-    instances.push_back(
-        {instance.grid, world_axes(instance), instance.position, grid->pivot, instance.voxel_size, instance.mirrored});
+    vulkan::MeshInstance& placed = instances.emplace_back();
+    placed.handle = handle;
+    placed.mesh = {instance.grid, 0};
+    placed.world_axes = world_axes(instance);
+    placed.position = instance.position;
+    placed.pivot = grid->pivot;
+    placed.voxel_size = instance.voxel_size;
+    placed.mirrored = instance.mirrored;
   });
 }
 
 Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
-  std::vector<Vec4> table = table_of(types);
+  std::vector<Vec4> table = vulkan::surface_table(types);
   if (table == surface_table) return {};
   surface_table.clear();
-  Status done = upload_surfaces(table);
+  Status done = vulkan::put_table(*memory, surfaces, std::as_bytes(std::span(table)));
+  if (done) done = memory->flush();
   if (done) {
     surface_table = std::move(table);
   } else {
@@ -112,56 +153,122 @@ Status VulkanMeshRenderer::Impl::put_surfaces(const VoxelRegistry& types) {
   return done;
 }
 
-Status VulkanMeshRenderer::Impl::upload_surfaces(const std::vector<Vec4>& table) {
-  const auto bytes = std::as_bytes(std::span(table));
-  if (bytes.size() > surfaces.size) {
-    memory->release(surfaces);
-    const auto larger = memory->allocate(bytes.size(), "uploading the types");
-    if (!larger) return larger.error();
-    surfaces = *larger;
-  }
-  if (Status done = memory->write(surfaces, bytes); !done) return done;
-  return memory->flush();
-}
-
 Status VulkanMeshRenderer::put(std::span<const SurfaceUpdate> surfaces) {
   return impl_->store.put(surfaces);
 }
 
 void VulkanMeshRenderer::clear() {
+  impl_->levels.clear();
   impl_->store.clear();
+}
+
+Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target, const Camera& camera,
+                                               const MeshPictureOptions& options) const {
+  const std::string who = "vulkan: " + device->description().name;
+  if (Status right = check(camera, options); !right) return right;
+  const auto refuse = [](std::string message) { return make_error(ErrorCode::InvalidArgument, std::move(message)); };
+  const auto largest = static_cast<std::int64_t>(pass->largest_edge());
+  if (options.width > largest || options.height > largest) {
+    const std::string edge = std::to_string(largest);
+    return refuse(who + " draws meshes of at most " + edge + " x " + edge + " pixels");
+  }
+  if (options.wireframe != Wireframe::Off && !device->physical().draws_lines) {
+    return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
+  }
+  if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
+  const bool needs_voxels = options.detail.has_value() || traces_light(options.light);
+  if (needs_voxels && scene != nullptr && (renderer->voxels != scene || renderer->instances != shown)) {
+    return refuse("vulkan: shadows, lamps and levels of detail need VulkanRenderer::update with the scene of the meshes");
+  }
+  return {};
+}
+
+// The instances as a picture shows them; the meshes of halved grids are in the store then.
+Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(const vulkan::Placement& placement,
+                                                                             Threads threads) {
+  std::vector<vulkan::MeshInstance> shown_as = instances;
+  levels.begin();
+  auto next = placement.placed.begin();
+  for (vulkan::MeshInstance& instance : shown_as) {
+    next = vulkan::find_placed(next, placement.placed.end(), instance.handle);
+    if (next == placement.placed.end()) break;
+    const PlacedGrid& placed = next->placed;
+    if (placed.instance != instance.handle) continue;
+    instance.placed = static_cast<std::int32_t>(next - placement.placed.begin());
+    instance.origin = next->origin;
+    instance.is_far = next->is_far;
+    if (placed.level == 0) continue;
+    instance.mesh.level = placed.level;
+    instance.pivot = placed.pivot;
+    instance.voxel_size = placed.voxel_size;
+    Status done = levels.put(instance.mesh, *placed.voxels, scene->types, threads);
+    if (!done) return done.error();
+  }
+  levels.drop_unused(kMaxLevelBytes);
+  for (const vulkan::ShaderFar& far : placement.far) {
+    const vulkan::DevicePlaced& placed = placement.placed[static_cast<std::size_t>(far.origin.w)];
+    const auto found = std::lower_bound(
+        shown_as.begin(), shown_as.end(), placed.placed.instance,
+        [](const vulkan::MeshInstance& instance, InstanceHandle handle) { return instance.handle < handle; });
+    if (found != shown_as.end() && found->handle == placed.placed.instance) found->impostor = impostor_of(far, placed);
+  }
+  return shown_as;
+}
+
+// What rays meet, and light.
+Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement, const Camera& camera,
+                                             const RenderOptions& request, vulkan::MeshFrameData& data) {
+  data.picture = vulkan::make_frame(placement, camera, request);
+  vulkan::ShaderFrame& frame = data.picture.frame;
+  frame.grids = placement.grids;
+  frame.surfaces = surfaces.address;
+  frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
+  if (!traces_light(request.light)) return {};
+  const auto lamps = renderer->lamp_table(request);
+  if (!lamps) return lamps.error();
+  if (lamps->table != nullptr) {
+    data.lamps = vulkan::put_lamps(*lamps, camera, data.picture);
+  }
+  return {};
+}
+
+Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera& camera, const RenderOptions& request,
+                                                                   vulkan::MeshLight& light) {
+  const bool traces = traces_light(request.light) && scene != nullptr;
+  const vulkan::Placement nothing;
+  std::optional<vulkan::Subject> subject;
+  if (scene != nullptr && (traces || request.detail)) {
+    auto made = vulkan::Subject::of(*renderer, camera, request);
+    if (!made) return made.error();
+    subject.emplace(std::move(*made));
+  }
+  const vulkan::Placement& placement = subject ? subject->placement() : nothing;
+  // Nothing was updated yet, or that failed: then there are no types either.
+  if (surface_table.empty()) instances.clear();
+  const auto shown_as = detailed(placement, request.threads);
+  if (!shown_as) return shown_as.error();
+  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels());
+  if (!data) return data.error();
+  if (Status done = put_picture(placement, camera, request, *data); !done) return done.error();
+  if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;
+  return data;
 }
 
 Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options) {
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
-  vulkan::Device& device = *impl_->device;
-  const std::string who = "vulkan: " + device.description().name;
-  if (Status right = check(camera, options); !right) return right;
-  const auto largest = static_cast<std::int64_t>(impl_->pass->largest_edge());
-  if (options.width > largest || options.height > largest) {
-    const std::string edge = std::to_string(largest);
-    return make_error(ErrorCode::InvalidArgument, who + " draws meshes of at most " + edge + " x " + edge + " pixels");
-  }
-  if (options.wireframe != Wireframe::Off && !device.physical().draws_lines) {
-    return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
-  }
-  if (target.device != &device) {
-    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer than the meshes");
-  }
-  // Nothing was updated yet, or that failed: then there are no types either.
-  if (impl_->surface_table.empty()) impl_->instances.clear();
-  auto data = vulkan::make_mesh_frame(impl_->store, impl_->instances, camera, options, impl_->pass->subpixels());
+  if (Status right = impl_->check_request(target, camera, options); !right) return right;
+  auto light = vulkan::MeshLight::Plain;
+  auto data = impl_->make_frame(camera, request_of(options), light);
   if (!data) return data.error();
-  data->push.surfaces = impl_->surfaces.address;
-  const std::size_t types = std::max<std::size_t>(impl_->surface_table.size() / 3, 1);
-  data->push.numbers |= static_cast<std::uint32_t>(types - 1) << vulkan::kMeshLastSurfaceShift;
   if (Status sized = target.resize(options.width, options.height); !sized) return sized;
   target.samples = 0;
   target.rays = 0;
   target.sums = {};
   const std::uint32_t samples = impl_->pass->samples_for(options.samples);
   const VkExtent2D size{static_cast<std::uint32_t>(options.width), static_cast<std::uint32_t>(options.height)};
-  if (Status done = impl_->pass->draw(*data, size, samples, options.wireframe, target.colours); !done) return done;
+  if (Status done = impl_->pass->draw(*data, size, samples, options.wireframe, light, target.colours); !done) {
+    return done;
+  }
   target.samples = static_cast<int>(samples);
   impl_->drawn_triangles = data->triangles();
   return {};

@@ -1,7 +1,7 @@
 #version 460
 // Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which face
 // that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
-#include "data.glsl"
+#include "compute.glsl"
 #include "far.glsl"
 
 layout(constant_id = 0) const bool kFindsFaces = false;

@@ -1,9 +1,11 @@
 #version 460
 // The bodies of glass before what each pixel shows.
-#include "data.glsl"
+#include "compute.glsl"
 #include "walk.glsl"
-#include "pairs.glsl"
 #include "instances.glsl"
+#include "pairs.glsl"
+#include "camera.glsl"
+#define KEEPS_BODIES
 #include "glass.glsl"
 #include "count.glsl"
 

@@ -1,5 +1,5 @@
 // Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list of kBodies for each
-// pixel of the tile, nearest first.
+// pixel of the tile, nearest first; without KEEPS_BODIES there is no room for any.
 
 // ln of the share of light below which a body counts as closed.
 const float kClosed = -11.0;
@@ -40,6 +40,7 @@ struct BodyList {
   float dropped_t;  // where the first begins for which there was no room
 };
 
+#ifdef KEEPS_BODIES
 // Puts a body in its place; when the list is full the furthest gives way, and is returned.
 bool insert_body(inout BodyList list, Body body, out Body dropped) {
   Bodies bodies = Bodies(list.address);
@@ -65,12 +66,15 @@ bool insert_body(inout BodyList list, Body body, out Body dropped) {
   bodies.at[list.first + i] = body;
   return is_full;
 }
+#endif
 
 // What one more body does to the light of those that found no room.
 void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) {
   if (body.lengths.x < from_t) return;
-  Body dropped;
+  Body dropped = body;
+#ifdef KEEPS_BODIES
   if (!insert_body(list, body, dropped)) return;
+#endif
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
   passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, dropped.what.z != 0);
 }

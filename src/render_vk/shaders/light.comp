@@ -1,29 +1,23 @@
 #version 460
 // The light of what each pixel of a tile shows: light/lighting.h on the processor's side.
-#include "data.glsl"
+#include "compute.glsl"
 #include "walk.glsl"
-#include "pairs.glsl"
 #include "instances.glsl"
+#include "pairs.glsl"
+#include "camera.glsl"
+
+layout(constant_id = 0) const bool kHasGlass = true;
+#define KEEPS_BODIES
 #include "glass.glsl"
 #include "count.glsl"
 #include "sky.glsl"
 #include "srgb.glsl"
 #include "lamps.glsl"
-
-layout(constant_id = 0) const bool kHasGlass = true;
+#include "rays.glsl"
+#include "faces.glsl"
+#include "lit.glsl"
 
 const uint kTurns = 1024;
-
-// By face: its axis, and the axes of its edges.
-const int kFaceU[6] = {1, 2, 2, 0, 0, 1};
-const int kFaceV[6] = {2, 1, 0, 2, 1, 0};
-
-int axis_of(uint face) {
-  return int(face >> 1);
-}
-float sign_of(uint face) {
-  return (face & 1) == 0 ? 1.0 : -1.0;
-}
 
 vec3 sky_colour(float up) {
   Frame f = frame();
@@ -56,49 +50,6 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
   direction[kFaceU[face]] = radius * (ring.x * turn.x - ring.y * turn.y);
   direction[kFaceV[face]] = radius * (ring.y * turn.x + ring.x * turn.y);
   return direction;
-}
-
-// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel of any instance.
-bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
-  ViewRay in_view = view_from_grid(own, ray);
-  start_visit(in_view);
-  Placed placed = own;
-  bool is_first = true;
-  for (int i = home; i >= 0; i = next_instance(max_t)) {
-    if (i == home && !is_first) continue;
-    if (!is_first) {
-      placed = placed_at(i);
-      ray = grid_from_view(placed, in_view);
-    }
-    is_first = false;
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) && find_voxel(max_t)) return true;
-    if (frame().placed_count == 1) return false;
-  }
-  return false;
-}
-
-// What of each channel of the sun's light passes what is transparent on the way.
-vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
-  ViewRay in_view = view_from_grid(own, ray);
-  float length = own.ref_inside.w;
-  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, 0, kInfinity);
-  vec3 passed = vec3(1.0);
-  start_visit(in_view);
-  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
-    Placed placed = placed_at(i);
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
-    GridRay in_grid = ray;
-    if (i != home) in_grid = grid_from_view(placed, in_view);
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
-    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, 0.0, list, passed);
-  }
-  uint i = 0;
-  Body body;
-  while (next_body(list, i, body)) {
-    passed *= passed_by(surface_of(body.what.x), body.lengths.z, body.what.z != 0);
-  }
-  return passed;
 }
 
 // 3 when both sides are occluders, else how many of the three are.
@@ -159,19 +110,21 @@ vec3 on_face(vec3 inside, uint face) {
   return at;
 }
 
-uint rays_taken;
+// Where rays start from a surface point: a little before its face.
+GridRay ray_from(Point point, Placed placed) {
+  GridRay ray = GridRay(point.voxel.xyz & ~63, vec3(point.voxel.xyz & 63) + point.inside.xyz, vec3(0.0), 0.0);
+  ray.origin[axis_of(point.what.y)] += frame().lift / placed.ref_view.w * sign_of(point.what.y);
+  return ray;
+}
 
 // Sunlight and openness of a surface point.
 void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out float openness) {
   uint face = point.what.y;
-  int axis = axis_of(face);
   float cells = placed.ref_view.w;
   float cosine = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
   sunlight = vec3(cosine);
   openness = 0.0;
-  ivec3 base = point.voxel.xyz & ~63;
-  vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
-  origin[axis] += frame().lift / cells * sign_of(face);
+  GridRay ray = ray_from(point, placed);
   int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
   bool is_far = (point.what.z & kIsFar) != 0;
   int count = has(kOcclusionRays) && !is_far ? frame().occlusion_count : 0;
@@ -180,9 +133,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   int open = 0;
   for (int i = first; i < count; ++i) {
     bool is_sun = i < 0;
-    vec3 direction = placed.to_sun.xyz;
-    if (!is_sun) direction = occlusion_direction(face, i, hash);
-    GridRay ray = GridRay(base, origin, direction, 0.0);
+    ray.direction = is_sun ? placed.to_sun.xyz : occlusion_direction(face, i, hash);
     float max_t = (is_sun ? frame().shadow_distance : frame().occlusion_distance) / cells;
     bool blocked = is_blocked(point.voxel.w, placed, ray, max_t);
     ++rays_taken;
@@ -219,39 +170,7 @@ vec3 unlit_colour(Point point, uint slot, vec3 colour) {
     trace_light(point, placed_at(point.voxel.w), slot, sunlight, openness);
   }
   if (has(kShowOcclusion)) return linear_from_srgb(vec3(openness));
-  float least = frame().light.z;
-  return colour * (least + (1.0 - least) * openness);
-}
-
-// What lamps add to a surface point.
-vec3 trace_lamps(Point point, Placed placed, uint slot) {
-  int level = placed.origin.w;
-  uvec2 list = lamps_at(((point.voxel.xyz + placed.origin.xyz) << level) >> 4, point.voxel.w);
-  uint face = point.what.y;
-  int axis = axis_of(face);
-  ivec3 base = point.voxel.xyz & ~63;
-  vec3 origin = vec3(point.voxel.xyz & 63) + point.inside.xyz;
-  origin[axis] += frame().lift / placed.ref_view.w * sign_of(face);
-  float voxel_size = placed.ref_inside.w;
-  vec3 normal = placed.view_axes[axis].xyz * (sign_of(face) / voxel_size);
-  vec3 from = view_from_grid(placed, GridRay(base, origin, vec3(0.0), 0.0)).origin;
-  vec3 sum = vec3(0.0);
-  for (uint i = 0; i < list.y; ++i) {
-    Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[list.x + i]];
-    vec3 direction;
-    float reach;
-    vec3 light = lamp_light(lamp, lamp.position.xyz - from, normal, direction, reach);
-    if (light == vec3(0.0)) continue;
-    if (has(kShadows) && reach > 0.0) {
-      GridRay ray = GridRay(base, origin, turned(placed.grid_axes, direction) * voxel_size, 0.0);
-      float max_t = reach / voxel_size;
-      ++rays_taken;
-      if (is_blocked(point.voxel.w, placed, ray, max_t)) continue;
-      if (kHasGlass) light *= sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
-    }
-    sum += light;
-  }
-  return sum;
+  return colour * left_by_occlusion(openness);
 }
 
 vec3 light_of(Point point, uint slot) {
@@ -268,15 +187,11 @@ vec3 light_of(Point point, uint slot) {
     float openness;
     Placed placed = placed_at(point.voxel.w);
     trace_light(point, placed, slot, sunlight, openness);
-    if (has(kLamps)) sunlight += trace_lamps(point, placed, slot);
-    vec4 share = frame().light;
-    vec3 light = share.x * openness + sunlight;
-    if (!has(kOcclusionRays) && !has(kOcclusionVertex)) {
-      light = share.y + sunlight;
-    } else if (has(kAffectsAll)) {
-      light = (share.x + sunlight) * (share.z + (1.0 - share.z) * openness);
+    if (has(kLamps)) {
+      vec3 normal = placed.view_axes[axis_of(point.what.y)].xyz * (sign_of(point.what.y) / placed.ref_inside.w);
+      sunlight += light_of_lamps(slot, point.voxel, placed, ray_from(point, placed), normal);
     }
-    colour += surface.colour * light;
+    colour += surface.colour * light_at(sunlight, openness);
   }
   return colour * frame().exposure;
 }

@@ -1,9 +1,10 @@
 #version 460
 // The nearest opaque voxel of each pixel of a tile.
-#include "data.glsl"
+#include "compute.glsl"
 #include "walk.glsl"
-#include "pairs.glsl"
 #include "instances.glsl"
+#include "pairs.glsl"
+#include "camera.glsl"
 #include "count.glsl"
 #include "far.glsl"
 

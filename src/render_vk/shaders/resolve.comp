@@ -1,6 +1,6 @@
 #version 460
 // The samples' mean as sRGB bytes, rounded exactly: the byte is the number of thresholds that the light reaches.
-#include "data.glsl"
+#include "compute.glsl"
 
 uint encoded(float light) {
   Floats thresholds = Floats(frame().thresholds);

@@ -7,7 +7,7 @@ layout(location = 1) flat out vec4 horizon;
 layout(location = 2) flat out vec4 ground;  // w: where it is full
 
 void main() {
-  Frame f = Frame(push.frame);
+  Frame f = frame();
   gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.0, 1.0);
   zenith = f.sky_zenith;
   horizon = f.sky_horizon;

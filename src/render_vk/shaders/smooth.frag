@@ -1,37 +1,51 @@
 #version 460
 #include "mesh.glsl"
 
+layout(constant_id = 2) const bool kTraces = false;
+layout(constant_id = 3) const bool kHasGlass = false;
+#include "mesh_light.glsl"
+
 layout(location = 0) centroid in vec3 normal;
 layout(location = 1) centroid in vec4 albedo;
 layout(location = 2) centroid in vec3 emitted;
+layout(location = 3) centroid in vec3 place;
+layout(location = 4) flat in ivec3 base;
 layout(location = 0) out vec4 pixel;
 
-// The reference model of light without shadows, before exposure: light/lighting.h. `diffuse`: max(n.l, 0).
-vec3 lit_colour(vec3 colour, float diffuse, float openness) {
-  if (!has(kLit)) return colour;
-  vec4 share = Frame(push.frame).light;
-  float light = share.x * openness + diffuse;
-  if (!has(kHasOcclusion)) {
-    light = share.y + diffuse;
-  } else if (has(kAffectsAll)) {
-    light = (share.x + diffuse) * (share.z + (1.0 - share.z) * openness);
-  }
-  return colour * light + emitted;
+// The surface lies up to most of a voxel below the corners of the voxels that it is of; what would be shadows of these
+// on it begins past them. Voxels.
+const float kLift = 1.0;
+
+vec3 light_of(vec3 in_grid, vec3 n) {
+  MeshFrame f = mesh_frame();
+  vec4 sun = f.sun;
+  ivec4 home = f.instances[push.instance].home;
+  float diffuse = max(dot(n, sun.xyz), 0.0);
+  vec3 from = place + kLift * in_grid;
+  ivec4 voxel = ivec4(base + ivec3(floor(place)), home.w);
+  return traced_light(voxel, base & ~63, vec3(base & 63) + from, n, diffuse);
 }
 
 void main() {
-  vec4 surface = albedo;
   // Between opposite normals there may be none.
   float size = length(normal);
-  vec3 n = size > 0.0 ? normal / size : vec3(0.0);
+  vec3 in_grid = size > 0.0 ? normal / size : vec3(0.0);
+  vec4 axes[3] = mesh_frame().instances[push.instance].axes;
+  vec3 n = axes[0].xyz * in_grid.x + axes[1].xyz * in_grid.y + axes[2].xyz * in_grid.z;
   vec3 colour;
   if (has(kShowOcclusion)) {
-    colour = vec3(surface.w);
+    colour = vec3(albedo.w);
   } else if (has(kShowNormals)) {
     colour = 0.5 + 0.5 * n;
   } else {
-    vec4 sun = Frame(push.frame).sun;
-    colour = lit_colour(surface.xyz, max(dot(n, sun.xyz), 0.0), surface.w);
+    vec3 surface = albedo.xyz;
+    vec3 glow = emitted;
+    if (has(kDetailColours)) {
+      ivec4 home = mesh_frame().instances[push.instance].home;
+      if (home.w >= 0) surface = placed_at(home.w).detail_colour.xyz;
+      glow = vec3(0.0);
+    }
+    colour = colour_in_light(surface, glow, light_of(in_grid, n), albedo.w);
   }
   pixel = vec4(shown(colour), 1.0);
 }

@@ -2,9 +2,11 @@
 // A vertex of a smooth mesh: seven words.
 #include "mesh.glsl"
 
-layout(location = 0) centroid out vec3 normal;  // in the world
+layout(location = 0) centroid out vec3 normal;  // in the grid
 layout(location = 1) centroid out vec4 albedo;  // w: openness
 layout(location = 2) centroid out vec3 emitted;
+layout(location = 3) centroid out vec3 place;  // in voxels, from `base`
+layout(location = 4) flat out ivec3 base;      // in the tree's coordinates
 
 invariant gl_Position;
 
@@ -17,16 +19,16 @@ vec3 unit_vector(uint word) {
 }
 
 void main() {
-  Words words = Words(push.data);
+  Numbers words = Numbers(push.data);
   uint first = 7 * uint(gl_VertexIndex);
-  vec3 local = vec3(uintBitsToFloat(words.at[first]), uintBitsToFloat(words.at[first + 1]),
-                    uintBitsToFloat(words.at[first + 2]));
-  precise vec3 point = (local + 0.5) + push.offset;
-  gl_Position = push.clip[0] * point.x + push.clip[1] * point.y + push.clip[2] * point.z + push.clip[3];
-  vec3 n = unit_vector(words.at[first + 3]);
-  vec4 axes[3] = Frame(push.frame).instances[push.instance].axes;
-  normal = axes[0].xyz * n.x + axes[1].xyz * n.y + axes[2].xyz * n.z;
+  place = vec3(uintBitsToFloat(words.at[first]), uintBitsToFloat(words.at[first + 1]),
+               uintBitsToFloat(words.at[first + 2])) + 0.5;
+  precise vec3 point = place + push.offset;
+  gl_Position = clip_from(push.clip, point);
+  normal = unit_vector(words.at[first + 3]);
   albedo = vec4(unpackUnorm2x16(words.at[first + 4]), unpackUnorm2x16(words.at[first + 5]));
-  vec4 glow = Vectors(push.surfaces).at[surface_at(words.at[first + 6]) + 1];
-  emitted = glow.xyz;
+  vec4 glow = Vectors(frame().surfaces).at[3 * min(words.at[first + 6], frame().last_surface) + 1];
+  emitted = min(glow.xyz, vec3(1e15));
+  ivec4 home = mesh_frame().instances[push.instance].home;
+  base = home.xyz + ivec3(push.offset);
 }

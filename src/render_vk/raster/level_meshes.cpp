@@ -1,0 +1,81 @@
+#include "render_vk/raster/level_meshes.h"
+
+#include <algorithm>
+
+namespace quoin::vulkan {
+
+void LevelMeshes::clear() {
+  for (const auto& [key, level] : levels_) store_->drop(key);
+  levels_.clear();
+}
+
+void LevelMeshes::look_at(const Scene& scene) {
+  const TypeChanges types = scene.types.changes_since(followed_types_);
+  const bool is_seen_otherwise = has_other_visibility(types);
+  for (auto level = levels_.begin(); level != levels_.end();) {
+    const auto each = level++;
+    if (scene.grids().find(each->first.grid) == nullptr) {
+      drop(each);
+    } else if (is_seen_otherwise || (!types.empty() && each->second.surfaces->style() == SurfaceStyle::Smooth)) {
+      each->second.surfaces->forget();
+    }
+  }
+}
+
+void LevelMeshes::drop(std::map<MeshKey, Level>::iterator level) {
+  store_->drop(level->first);
+  levels_.erase(level);
+}
+
+// As the chunks of the full grid are, if there are any.
+SurfaceStyle LevelMeshes::style_of(GridHandle grid) {
+  const MeshStore::StoredGrid* full = store_->find({grid, 0});
+  return full == nullptr ? SurfaceStyle::Blocky : full->chunks.begin()->second.style;
+}
+
+Status LevelMeshes::put(MeshKey key, const Grid& voxels, const VoxelRegistry& types, Threads threads) {
+  const SurfaceStyle style = style_of(key.grid);
+  auto known = levels_.find(key);
+  if (known != levels_.end() && known->second.surfaces->style() != style) {
+    drop(known);
+    known = levels_.end();
+  }
+  if (known == levels_.end()) {
+    known = levels_.emplace(key, Level{std::make_unique<GridSurfaces>(key.grid, style), 0}).first;
+  }
+  if (known->second.last_use == picture_) return {};
+  known->second.last_use = picture_;
+  try {
+    Status done = put_updates(key, known->second, voxels, types, threads);
+    if (!done) drop(known);
+    return done;
+  } catch (...) {
+    drop(known);
+    throw;
+  }
+}
+
+Status LevelMeshes::put_updates(MeshKey key, Level& level, const Grid& voxels, const VoxelRegistry& types,
+                                Threads threads) {
+  const std::vector<SurfaceUpdate> updates = level.surfaces->update(voxels, types, threads);
+  return updates.empty() ? Status{} : store_->put(updates, key.level);
+}
+
+void LevelMeshes::drop_unused(std::size_t max_bytes) {
+  std::size_t held = 0;
+  const auto bytes_of = [&](MeshKey key) {
+    const MeshStore::StoredGrid* stored = store_->find(key);
+    return stored == nullptr ? 0 : stored->bytes();
+  };
+  for (const auto& [key, level] : levels_) held += bytes_of(key);
+  while (held > max_bytes) {
+    const auto oldest = std::min_element(levels_.begin(), levels_.end(), [](const auto& a, const auto& b) {
+      return a.second.last_use < b.second.last_use;
+    });
+    if (oldest == levels_.end() || oldest->second.last_use == picture_) return;
+    held -= bytes_of(oldest->first);
+    drop(oldest);
+  }
+}
+
+}  // namespace quoin::vulkan

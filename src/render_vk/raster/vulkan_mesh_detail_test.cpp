@@ -1,0 +1,205 @@
+// Levels of detail and impostors of what is rasterised.
+
+#include <array>
+#include <random>
+#include <set>
+
+#include "render_vk/march/vulkan_detail_support.h"
+#include "render_vk/raster/mesh_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::add_blobs;
+using vulkan_test::add_crowd;
+using vulkan_test::blocky_surfaces;
+using vulkan_test::in_detail;
+using vulkan_test::mesh_options;
+using vulkan_test::with_mesh_light;
+
+class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
+ protected:
+  // Glass is told apart by tests of its own.
+  void make_opaque() {
+    for (std::size_t type = 1; type < scene_.types.size(); ++type) {
+      VoxelProperties properties = scene_.types[static_cast<VoxelType>(type)];
+      properties.visibility = Visibility::Opaque;
+      scene_.types.replace(static_cast<VoxelType>(type), properties);
+    }
+  }
+  void compare_all(const Camera& camera, const RenderOptions& options, const std::string& name) {
+    compare(scene_, camera, with_mesh_light(options), name);
+  }
+  std::int64_t triangles_of(const Camera& camera, const RenderOptions& options) {
+    (void)drawn(camera, mesh_options(options));
+    return meshes_->stats().drawn_triangles;
+  }
+
+  Scene scene_;
+};
+
+RenderOptions always(Detail detail, double cell_pixels) {
+  RenderOptions options = sized(256, 192);
+  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail->near_radii = 0.0;
+  options.detail->mid_radii = detail == Detail::Mid ? 1e9 : 0.0;
+  options.detail->cell_pixels = cell_pixels;
+  return options;
+}
+
+TEST_F(VulkanMeshDetail, HalvedGridsAreThoseOfTheProcessor) {
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 4, 260.0);
+  make_opaque();
+  const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
+  std::int64_t last = 0;
+  for (const double pixels : {0.4, 2.0, 6.0}) {
+    RenderOptions options = always(Detail::Mid, pixels);
+    compare_all(camera, options, "mesh_mid_" + std::to_string(static_cast<int>(10 * pixels)));
+    options.light.shadows = false;
+    compare_all(camera, options, "mesh_mid_plain_" + std::to_string(static_cast<int>(10 * pixels)));
+    const std::int64_t triangles = triangles_of(camera, with_mesh_light(options));
+    EXPECT_NE(triangles, last);
+    last = triangles;
+  }
+}
+
+TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 6, 260.0);
+  make_opaque();
+  const Camera camera = towards({-900, 1420, -1500}, {700, 0, 700}, 0.6);
+  const RenderOptions options = in_detail(320, 240, 128);
+  compare_all(camera, options, "mesh_far");
+  const std::int64_t with = triangles_of(camera, with_mesh_light(options));
+  compare_all(towards({-9000, 14200, -15000}, {700, 0, 700}, 0.06), options, "mesh_far_telephoto");
+  Camera above = render_test::from_above(700, 4000, 700, 2000);
+  compare_all(above, options, "mesh_far_above");
+  RenderOptions whole = options;
+  whole.detail.reset();
+  EXPECT_GT(with, 0);
+  EXPECT_NE(with, triangles_of(camera, with_mesh_light(whole)));
+}
+
+TEST_F(VulkanMeshDetail, AllThreeInOnePicture) {
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 8, 260.0);
+  make_opaque();
+  RenderOptions options = in_detail(480, 270, 60);
+  const Camera camera = towards({-120, 260, -220}, {900, -100, 900}, 1.0);
+  std::vector<SelectedInstance> selected;
+  DetailSelector().select(scene_, camera, options.width, options.height, *options.detail, selected);
+  std::array<int, 3> count{};
+  for (const SelectedInstance& each : selected) ++count.at(static_cast<std::size_t>(each.detail));
+  for (const int each : count) EXPECT_GT(each, 0);
+  compare_all(camera, options, "mesh_all_details");
+  options.detail_colours = true;
+  compare_all(camera, options, "mesh_detail_colours");
+}
+
+TEST_F(VulkanMeshDetail, GlassOfFarInstancesIsDrawn) {
+  const VoxelType glass = add_type(scene_, {90, 120, 220, 120}, Visibility::Transparent);
+  const VoxelType stone = add_type(scene_, {200, 180, 150});
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {40, 4, 40}}, stone);
+  grid.fill_box({{0, 4, 0}, {40, 30, 1}}, glass);
+  render_test::place(scene_, std::move(grid));
+  put(scene_, blocky_surfaces(scene_));
+  const Camera camera = towards({20, 40, 300}, {20, 10, 0}, 0.3);
+  RenderOptions options = with_mesh_light(always(Detail::Far, 1.0));
+  const Image far = drawn(camera, mesh_options(options));
+  options.detail.reset();
+  const Image whole = drawn(camera, mesh_options(options));
+  int different = 0;
+  for (std::size_t i = 0; i < far.rgb.size(); ++i) different += std::abs(far.rgb[i] - whole.rgb[i]) > 3;
+  EXPECT_LE(different * 100, static_cast<int>(far.rgb.size()));
+}
+
+TEST_F(VulkanMeshDetail, EditsShowInEveryDetail) {
+  add_crowd(scene_, {add_blobs(scene_, 31)}, 3, 260.0);
+  make_opaque();
+  const Camera camera = towards({-300, 420, -500}, {260, 0, 260}, 0.7);
+  const GridHandle handle = scene_.instances()[scene_.instances().handles().front()].grid;
+  std::mt19937 random(5);
+  for (int i = 0; i < 4; ++i) {
+    const IVec3 at = 16 * IVec3(static_cast<int>(random() % 8) - 4, static_cast<int>(random() % 8) - 4,
+                                static_cast<int>(random() % 8) - 4);
+    scene_.edit(handle).grid.fill_box({at, at + 32}, i % 2 == 0 ? VoxelType{2} : kAir);
+    put(scene_, blocky_surfaces(scene_));
+    for (const Detail detail : {Detail::Mid, Detail::Far}) {
+      const RenderOptions options = with_mesh_light(always(detail, 2.0));
+      expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene_, camera, options), "mesh_edited");
+    }
+  }
+}
+
+// Without waiting, what has no impostor yet is drawn halved, and nothing is left out.
+TEST_F(VulkanMeshDetail, WhatHasNoImpostorYetIsDrawnHalved) {
+  add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 3, 260.0);
+  make_opaque();
+  put(scene_, blocky_surfaces(scene_));
+  const Camera camera = towards({-300, 420, -500}, {260, 0, 260}, 0.7);
+  RenderOptions options = with_mesh_light(always(Detail::Far, 2.0));
+  options.impostor_seconds = 0.0;
+  const Image first = drawn(camera, mesh_options(options));
+  options.impostor_seconds = std::numeric_limits<double>::infinity();
+  expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene_, camera, options), "mesh_waited");
+  int different = 0;
+  const Image last = drawn(camera, mesh_options(options));
+  for (std::size_t i = 0; i < first.rgb.size(); ++i) different += std::abs(first.rgb[i] - last.rgb[i]) > 60;
+  EXPECT_LE(different * 20, static_cast<int>(first.rgb.size()));
+}
+
+// Meshes that were put as smooth ones are halved as smooth ones.
+TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
+  const VoxelType stone = add_type(scene_, {200, 190, 170});
+  SceneGrid ball;
+  ball.grid.fill_sphere({0.0, 0.0, 0.0}, 40.0, stone);
+  scene_.add_instance({"", scene_.add_grid(std::move(ball))});
+  put(scene_, vulkan_test::live_surfaces(scene_, SurfaceStyle::Smooth));
+  const Camera camera = towards({0, 60, 200}, {0, 0, 0}, 0.6);
+  RenderOptions options = with_mesh_light(always(Detail::Mid, 1.0));
+  options.light.shading = Shading::Normals;
+  const Image halved = drawn(camera, mesh_options(options));
+  const std::int64_t triangles = meshes_->stats().drawn_triangles;
+  options.detail.reset();
+  const Image whole = drawn(camera, mesh_options(options));
+  EXPECT_LT(triangles * 2, meshes_->stats().drawn_triangles);
+  int different = 0;
+  for (std::size_t i = 0; i < halved.rgb.size(); ++i) different += std::abs(halved.rgb[i] - whole.rgb[i]) > 40;
+  EXPECT_LE(different * 50, static_cast<int>(halved.rgb.size()));
+}
+
+// A view's memory keeps what is about a threshold from trembling.
+TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
+  add_crowd(scene_, {add_blobs(scene_, 31)}, 1, 260.0);
+  make_opaque();
+  put(scene_, blocky_surfaces(scene_));
+  RenderOptions options = with_mesh_light(sized(128, 96));
+  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail->near_radii = 5.0;
+  options.detail->mid_radii = 1e9;
+  DetailSelector selector;
+  options.selector = &selector;
+  options.detail_colours = true;
+  std::set<std::int64_t> triangles;
+  for (int i = 0; i < 6; ++i) {
+    std::vector<SelectedInstance> selected;
+    DetailSelector without;
+    // The distance at which it changes without memory, found by bisection.
+    double near = 10.0;
+    double far = 10'000.0;
+    for (int step = 0; step < 50; ++step) {
+      const double middle = 0.5 * (near + far);
+      without.select(scene_, towards({middle, 0, 0}, {0, 0, 0}), 128, 96, *options.detail, selected);
+      (selected.empty() || selected.front().detail != Detail::Near ? far : near) = middle;
+      without = DetailSelector();
+    }
+    const double at = near * (i % 2 == 0 ? 0.995 : 1.005);
+    triangles.insert(triangles_of(towards({at, 0, 0}, {0, 0, 0}), options));
+  }
+  EXPECT_EQ(triangles.size(), 1U);
+}
+
+}  // namespace
+}  // namespace quoin

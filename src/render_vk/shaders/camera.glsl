@@ -1,0 +1,125 @@
+// The camera's rays, one an invocation; in view, and in the grids of instances.
+
+// Where the invocation's ray crosses the picture, in pixels.
+vec2 picture_point() {
+  return vec2(push.corner + tile_pixel()) + push.point;
+}
+
+vec3 picture_vector(vec2 point) {
+  Frame f = frame();
+  return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+}
+
+// A camera's ray. It starts where view space has its origin, at frame().view_depth times length_a_depth.
+ViewRay camera_ray(vec2 point) {
+  Frame f = frame();
+  vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;
+  if (!has(kPerspective)) return ViewRay(start, f.forward.xyz);
+  vec3 d = picture_vector(point) + f.forward.xyz;
+  return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
+}
+
+// The ray's length by which its forward component grows by 1.
+float length_a_depth(vec2 point) {
+  if (!has(kPerspective)) return 1.0;
+  vec3 d = picture_vector(point) + frame().forward.xyz;
+  return sqrt(dot(d, d));
+}
+
+// A coordinate of the picture, in all three.
+Pair pixel_pair(int axis) {
+  Pair sum = exact_sum(vec3(float(push.corner[axis] + tile_pixel()[axis])), vec3(push.point[axis]));
+  return renewed(sum.high, sum.low + push.point_low[axis]);
+}
+
+// origin + x right + y down at the invocation's point of the picture.
+Pair across(Pair origin, Pair right, Pair down) {
+  return sum_of(sum_of(origin, product_of(right, pixel_pair(0))), product_of(down, pixel_pair(1)));
+}
+
+// A camera's ray in an instance's grid, as exact as in double. It starts near the grid, so that distance costs nothing.
+struct ExactRay {
+  Pair start;  // from start_base
+  Pair direction;
+};
+
+// Of the invocation's ray, in view; a unit vector.
+Pair exact_direction() {
+  Frame f = frame();
+  Pair forward = Pair(f.forward.xyz, f.forward_low.xyz);
+  if (!has(kPerspective)) return forward;
+  Pair in_picture = across(Pair(f.corner.xyz, f.corner_low.xyz), Pair(f.right.xyz, f.right_low.xyz),
+                           Pair(f.down.xyz, f.down_low.xyz));
+  return unit_of(sum_of(in_picture, forward));
+}
+
+// `d`: `exact_direction`.
+ExactRay exact_ray_in(Placed placed, Pair d) {
+  ExactRay ray;
+  ray.start = across(Pair(placed.start.xyz, placed.start_low.xyz), Pair(placed.start_x.xyz, placed.start_x_low.xyz),
+                     Pair(placed.start_y.xyz, placed.start_y_low.xyz));
+  Pair x = product_of(Pair(placed.grid_axes[0].xyz, placed.grid_axes_low[0].xyz), component(d, 0));
+  Pair y = product_of(Pair(placed.grid_axes[1].xyz, placed.grid_axes_low[1].xyz), component(d, 1));
+  Pair z = product_of(Pair(placed.grid_axes[2].xyz, placed.grid_axes_low[2].xyz), component(d, 2));
+  ray.direction = sum_of(sum_of(x, y), z);
+  return ray;
+}
+
+bool is_before(Pair a, Pair b, int axis) {
+  return a.high[axis] != b.high[axis] ? a.high[axis] < b.high[axis] : a.low[axis] < b.low[axis];
+}
+
+// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does before
+// it rounds. `axis`: of the plane through which it enters; -1 where it is left as it is. False when it misses.
+bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float moved_t, out int axis) {
+  vec3 low = vec3(tree.low.xyz - placed.start_base.xyz);
+  vec3 high = vec3(tree.high.xyz - placed.start_base.xyz);
+  moved_t = 0.0;
+  axis = -1;
+  vec3 p = ray.start.high;
+  if (all(lessThanEqual(low - 64.0, p)) && all(lessThanEqual(p, high + 64.0))) return true;
+  Pair planes = Pair(mix(high, low, greaterThan(ray.direction.high, vec3(0.0))), vec3(0.0));
+  Pair t = quotient_of(sum_of(planes, Pair(-ray.start.high, -ray.start.low)), ray.direction);
+  for (int i = 0; i < 3; ++i) {
+    bool is_low = p[i] < low[i];
+    if (!is_low && p[i] < high[i]) continue;
+    float d = ray.direction.high[i];
+    if (is_low ? !(d > 0.0) : !(d < 0.0)) return false;
+    if (axis < 0 || !is_before(component(t, i), component(t, axis), 0)) axis = i;
+  }
+  if (axis < 0) return true;
+  moved_t = t.high[axis];
+  ray.start = sum_of(ray.start, product_of(component(t, axis), ray.direction));
+  ray.start.high[axis] = planes.high[axis];
+  ray.start.low[axis] = 0.0;
+  // The others are inside by now, or never will be.
+  return all(greaterThanEqual(ray.start.high, low - 1e-3)) && all(lessThanEqual(ray.start.high, high + 1e-3));
+}
+
+// From the multiple of 64 voxels next to its start, and then rounded.
+GridRay rounded(Placed placed, ExactRay ray, float t) {
+  vec3 whole = clamp(floor(ray.start.high), vec3(-1e9), vec3(1e9));
+  ivec3 shift = ivec3(whole) & ~63;
+  Pair start = sum_of(ray.start, Pair(-vec3(shift), vec3(0.0)));
+  return GridRay(placed.start_base.xyz + shift, start.high, ray.direction.high, t);
+}
+
+// How far along such a ray, from the instance's start, the plane of a voxel's face is.
+Pair distance_to_face(ExactRay ray, Pair from_voxel, uint face) {
+  int axis = int(face >> 1);
+  float plane = (face & 1) == 0 ? 1.0 : 0.0;
+  Pair from_plane = sum_of(Pair(vec3(plane), vec3(0.0)), component(Pair(-from_voxel.high, -from_voxel.low), axis));
+  return quotient_of(from_plane, component(ray.direction, axis));
+}
+
+// A ray's start, from the voxel's lower corner.
+Pair start_from(ExactRay ray, Placed placed, ivec3 voxel) {
+  return sum_of(ray.start, Pair(-vec3(voxel - placed.start_base.xyz), vec3(0.0)));
+}
+
+// Where such a ray meets the face through which it enters a voxel, from the voxel's lower corner.
+vec3 exact_place(Placed placed, Pair d, ivec3 voxel, uint face) {
+  ExactRay ray = exact_ray_in(placed, d);
+  Pair start = start_from(ray, placed, voxel);
+  return sum_of(start, product_of(distance_to_face(ray, start, face), ray.direction)).high;
+}

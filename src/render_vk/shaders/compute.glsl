@@ -1,0 +1,44 @@
+// What the shaders share that compute a tile of a picture, an invocation a pixel.
+#include "data.glsl"
+
+layout(push_constant) uniform Push {
+  uvec2 frame_address;
+  ivec2 corner;     // of the tile, in pixels
+  ivec2 size;       // of the tile
+  vec2 point;       // of the sample, within pixels
+  vec2 point_low;   // what is left of that
+  vec2 turn;        // of the sample: cosine and sine of what turns nine fixed directions of occlusion
+  uint seed;        // of the sample
+  uint first;       // 1: of the pixel's samples
+  uint round;       // of the sample
+  uint base;        // of the tile's first pixel in sums and colours, and from one row there to the next
+  uint pitch;
+  uint far_first;   // the tile's part of the list of impostors, and how many workgroups draw it
+  uint far_count;
+  uint far_groups;
+} push;
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+Frame frame() {
+  return Frame(push.frame_address);
+}
+
+bool has(uint flag) {
+  return (frame().flags & flag) != 0;
+}
+
+// The invocation's place in the tile, and in the buffers of a tile.
+ivec2 tile_pixel() {
+  return ivec2(gl_GlobalInvocationID.xy);
+}
+bool is_in_tile() {
+  return all(lessThan(tile_pixel(), push.size));
+}
+uint slot_of_pixel() {
+  return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
+}
+// Its place where the picture comes together.
+uint place_of_pixel() {
+  return push.base + gl_GlobalInvocationID.y * push.pitch + gl_GlobalInvocationID.x;
+}

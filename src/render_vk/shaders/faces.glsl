@@ -1,0 +1,12 @@
+// Faces of voxels, as core/direction.h numbers them.
+
+// The axes of a face's edges.
+const int kFaceU[6] = {1, 2, 2, 0, 0, 1};
+const int kFaceV[6] = {2, 1, 0, 2, 1, 0};
+
+int axis_of(uint face) {
+  return int(face >> 1);
+}
+float sign_of(uint face) {
+  return (face & 1) == 0 ? 1.0 : -1.0;
+}

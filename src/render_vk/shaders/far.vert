@@ -1,0 +1,49 @@
+#version 460
+// A corner of a face of an impostor, which stands for a face of one voxel.
+#include "quad.glsl"
+#include "far.glsl"
+
+// Which corner the triangles of such a face begin with: light/corner_light.h.
+uint first_corner(uint corners) {
+  return (corners & 3) + (corners >> 4 & 3) > (corners >> 2 & 3) + (corners >> 6 & 3) ? 1 : 0;
+}
+
+void main() {
+  uint index = uint(gl_VertexIndex);
+  FarFaces faces = FarFaces(push.data);
+  uvec4 which = faces.at[index >> 2].what;
+  if ((which.y & push.numbers >> 4 & 0x3FFFFFF) == 0) {
+    hide_corner();
+    return;
+  }
+  uint face = which.z;
+  ivec4 voxel = VoxelFaces(push.far_faces).at[which.x];
+  uint corners = uint(voxel.w) >> 16 & 0xFF;
+  uint corner = ((index & 3) + first_corner(corners)) & 3;
+  bool is_east = corner == 1 || corner == 2;
+  bool is_north = corner >= 2;
+  bool is_unseen = (push.numbers >> 30 & 1) != 0;
+  MeshFrame f = mesh_frame();
+  float half_size = is_unseen ? f.instances[push.instance].unseen_half : f.instances[push.instance].far_half;
+  int u = kFaceU[face];
+  int v = kFaceV[face];
+  vec4 centre = faces.at[index >> 2].centre;
+  precise vec3 point = push.offset + centre.xyz;
+  point[u] += is_east ? half_size : -half_size;
+  point[v] += is_north ? half_size : -half_size;
+  Seen seen = Seen(push.clip, push.eye, push.room);
+  if (!put_corner(seen, face, point, is_east, is_north)) {
+    hide_corner();
+    return;
+  }
+  // Of the voxel that is stood for, whatever the size of what is drawn.
+  vec3 local = vec3(0.0);
+  if ((face & 1) == 0) local[axis_of(face)] = 1.0;
+  if (is_east) local[u] = 1.0;
+  if (is_north) local[v] = 1.0;
+  place = vec4(local, openness_of(corners, corner));
+  ivec4 home = f.instances[push.instance].home;
+  base = ivec4(voxel.xyz + home.xyz, voxel.w & 0xFFFF);
+  edges = vec4(0.0, 0.0, 1.0, 1.0);
+  what = uvec2(face, push.instance);
+}

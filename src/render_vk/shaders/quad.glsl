@@ -1,0 +1,50 @@
+// What blocky.vert and far.vert share: corners of faces, and what fragments are told of these.
+#include "mesh.glsl"
+#include "faces.glsl"
+
+layout(location = 0) centroid out vec4 place;  // in voxels, from `base`; w: how open it is
+layout(location = 1) flat out ivec4 base;      // in the tree's coordinates; w: the type
+layout(location = 2) flat out vec4 edges;      // of the face: where it begins and ends, along each of its edges
+layout(location = 3) flat out uvec2 what;      // the face's direction, the instance
+
+invariant gl_Position;
+
+void hide_corner() {
+  gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+  place = vec4(0.0);
+  base = ivec4(0);
+  edges = vec4(0.0);
+  what = uvec2(0);
+}
+
+// Where an instance is seen from, and how.
+struct Seen {
+  vec4 clip[4];
+  vec4 eye;
+  float room;
+};
+
+// Puts a face's corner, at `point`, in the picture; false where one cannot see the face.
+bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north) {
+  int axis = axis_of(face);
+  int u = kFaceU[face];
+  int v = kFaceV[face];
+  vec3 to_eye = seen.eye.w != 0.0 ? seen.eye.xyz - point : seen.eye.xyz;
+  if (sign_of(face) * to_eye[axis] <= 0.0 && drawn() != kEdgesOnly) return false;
+  // Faces are widened, in their planes, by less than a device can tell places apart: where the edge of one meets the
+  // corners of others, rounding would leave gaps.
+  vec4 at = clip_from(seen.clip, point);
+  vec3 direction = to_eye / length(to_eye);
+  float wide = seen.room * max(at.w, 0.0) / max(abs(direction[axis]), 0.0625);
+  float wide_u = wide * sqrt(max(1.0 - direction[v] * direction[v], 0.0));
+  float wide_v = wide * sqrt(max(1.0 - direction[u] * direction[u], 0.0));
+  point[u] += is_east ? wide_u : -wide_u;
+  point[v] += is_north ? wide_v : -wide_v;
+  gl_Position = clip_from(seen.clip, point);
+  return true;
+}
+
+// `corners`: of all four, two bits each.
+float openness_of(uint corners, uint corner) {
+  return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
+}

@@ -1,0 +1,76 @@
+// What light reaches a point: rays among all instances. Those that include this say whether there is glass
+// (`kHasGlass`).
+
+uint rays_taken;
+
+// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel of any instance.
+bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
+  ViewRay in_view = view_from_grid(own, ray);
+  start_visit(in_view);
+  Placed placed = own;
+  bool is_first = true;
+  for (int i = home; i >= 0; i = next_instance(max_t)) {
+    if (i == home && !is_first) continue;
+    if (!is_first) {
+      placed = placed_at(i);
+      ray = grid_from_view(placed, in_view);
+    }
+    is_first = false;
+    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
+    if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) && find_voxel(max_t)) return true;
+    if (frame().placed_count == 1) return false;
+  }
+  return false;
+}
+
+// What of each channel of the sun's light passes what is transparent on the way.
+vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
+  ViewRay in_view = view_from_grid(own, ray);
+  float length = own.ref_inside.w;
+#ifdef KEEPS_BODIES
+  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, 0, kInfinity);
+#else
+  BodyList list = BodyList(uvec2(0), 0, 0, kInfinity);
+#endif
+  vec3 passed = vec3(1.0);
+  start_visit(in_view);
+  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
+    Placed placed = placed_at(i);
+    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
+    GridRay in_grid = ray;
+    if (i != home) in_grid = grid_from_view(placed, in_view);
+    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
+    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, 0.0, list, passed);
+  }
+  uint i = 0;
+  Body body;
+  while (next_body(list, i, body)) {
+    passed *= passed_by(surface_of(body.what.x), body.lengths.z, body.what.z != 0);
+  }
+  return passed;
+}
+
+// What lamps add at a point: `voxel` of an instance's tree, w: which instance. `from`: where rays start, as in a
+// GridRay; `normal`: in view, unit.
+vec3 light_of_lamps(uint slot, ivec4 voxel, Placed placed, GridRay from, vec3 normal) {
+  uvec2 list = lamps_at(((voxel.xyz + placed.origin.xyz) << placed.origin.w) >> 4, voxel.w);
+  float voxel_size = placed.ref_inside.w;
+  vec3 in_view = view_from_grid(placed, from).origin;
+  vec3 sum = vec3(0.0);
+  for (uint i = 0; i < list.y; ++i) {
+    Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[list.x + i]];
+    vec3 direction;
+    float reach;
+    vec3 light = lamp_light(lamp, lamp.position.xyz - in_view, normal, direction, reach);
+    if (light == vec3(0.0)) continue;
+    if (has(kShadows) && reach > 0.0) {
+      GridRay ray = GridRay(from.base, from.origin, turned(placed.grid_axes, direction) * voxel_size, 0.0);
+      float max_t = reach / voxel_size;
+      ++rays_taken;
+      if (is_blocked(voxel.w, placed, ray, max_t)) continue;
+      if (kHasGlass) light *= sunlight_passed(slot, voxel.w, placed, ray, max_t);
+    }
+    sum += light;
+  }
+  return sum;
+}
