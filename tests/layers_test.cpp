@@ -46,6 +46,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"live/grid_surfaces.h", {"render_vk"}},
     {"mesh/smooth/material.h", {"live"}},
     {"render/camera_rays.h", {"render_vk"}},
+    {"render/impostor/faces.h", {"render_vk"}},
     {"render/impostor/far.h", {"render_vk"}},
     {"render/impostor/screen.h", {"render_vk"}},
     {"render/picture_detail.h", {"render_vk"}},

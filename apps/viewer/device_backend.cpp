@@ -59,6 +59,8 @@ struct DeviceBackend::Impl {
   Result<bool> take_surfaces();
   [[nodiscard]] MeshPictureOptions mesh_picture(bool waits);
   Result<bool> update_renderer();
+  /// Without a graphics card meshes have no light that takes rays: a picture with shadows would take seconds.
+  [[nodiscard]] bool is_processor() const { return renderer->device().kind == "cpu"; }
   Result<bool> draw_meshes();
   Result<bool> draw_rays();
   Status draw_stage();
@@ -157,6 +159,10 @@ MeshPictureOptions DeviceBackend::Impl::mesh_picture(bool waits) {
   if (request->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   wanted.selector = &selectors[1];
   if (!waits) wanted.impostor_seconds = 0.0;
+  if (is_processor()) {
+    wanted.light.shadows = false;
+    wanted.light.lamps = 0;
+  }
   return wanted;
 }
 
@@ -176,6 +182,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   if (Status drawn = meshes->renderer.draw(*picture, request->camera, mesh_picture(is_last)); !drawn) {
     return drawn.error();
   }
+  // Otherwise the next picture is a better one.
   is_settled = is_last || (meshes->live.pending() == 0 && !request->detail_by_pixels);
   return true;
 }
@@ -274,6 +281,10 @@ void DeviceBackend::forget_device() {
 std::string DeviceBackend::name() const {
   if (!impl_->uses_device() || !impl_->renderer) return impl_->cpu.name();
   return impl_->renderer->device().name;
+}
+
+bool DeviceBackend::traces_light(DrawMode mode) const {
+  return mode == DrawMode::Rays || (impl_->renderer && !impl_->is_processor());
 }
 
 bool DeviceBackend::can_draw(DrawMode mode) const {

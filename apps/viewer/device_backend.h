@@ -35,6 +35,7 @@ class DeviceBackend final : public ViewBackend {
 
   [[nodiscard]] std::string name() const override;
   [[nodiscard]] bool can_draw(DrawMode mode) const override;
+  [[nodiscard]] bool traces_light(DrawMode mode) const override;
   void show(const ViewRequest& request) override;
   [[nodiscard]] std::optional<ViewFrame> take() override;
   [[nodiscard]] bool wants_frames() const override;

@@ -204,6 +204,24 @@ TEST_F(DeviceBackendTest, TheDeviceDrawsLevelsOfDetail) {
   }
 }
 
+TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
+  const Document document = small_document();
+  const auto backend = backend_of(document, true);
+  ViewRequest request = request_for(document, DrawMode::Blocks);
+  request.samples = 1;
+  request.detail_by_pixels = true;
+  request.light.occlusion = OcclusionMode::Vertex;
+  request.light.shadows = backend->traces_light(DrawMode::Blocks);
+  for (const double times : {1.0, 6.0}) {
+    request.camera.position *= times;
+    backend->show(request);
+    const auto pictures = settle(*backend);
+    ASSERT_FALSE(pictures.empty());
+    EXPECT_LT(differing(pictures.back(), by_processor(document, request), 6), 0.05) << times;
+    EXPECT_FALSE(backend->wants_frames());
+  }
+}
+
 TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   const Document document = small_document();
   DeviceBackendOptions options;

@@ -74,6 +74,9 @@ class ViewBackend {
   /// Whether there is a way to draw that; asked again after a fault.
   [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return mode == DrawMode::Rays; }
 
+  /// Whether what is drawn so has shadows and the light of lamps.
+  [[nodiscard]] virtual bool traces_light(DrawMode mode) const { return mode == DrawMode::Rays; }
+
   /// From now on this is wanted. The same request again changes nothing.
   virtual void show(const ViewRequest& request) = 0;
 

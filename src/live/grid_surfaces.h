@@ -11,8 +11,8 @@
 
 namespace quoin {
 
-/// The surfaces of one grid's chunks, made when they are asked for rather than by workers: as LiveMeshes makes them, and
-/// after an edit those that it could have changed.
+/// The surfaces of one grid's chunks, made when they are asked for rather than by workers: as LiveMeshes makes them,
+/// and after an edit those that it could have changed.
 class GridSurfaces {
  public:
   GridSurfaces(GridHandle handle, SurfaceStyle style);

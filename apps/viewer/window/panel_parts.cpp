@@ -187,14 +187,13 @@ void draw_picture_part(ViewState& state) {
     const bool can = !state.open.backend || state.open.backend->can_draw(wanted);
     can ? void(settings.mode = wanted) : state.tell("there is no device to draw meshes");
   }
-  if (settings.mode == DrawMode::Rays) {
-    ImGui::Checkbox("coarser far away", &settings.detail_by_pixels);
-    ImGui::BeginDisabled(!settings.detail_by_pixels);
-    ImGui::SameLine();
-    ImGui::Checkbox("in colours", &settings.detail_colours);
-    ImGui::EndDisabled();
-    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
-  } else {
+  ImGui::Checkbox("coarser far away", &settings.detail_by_pixels);
+  ImGui::BeginDisabled(!settings.detail_by_pixels);
+  ImGui::SameLine();
+  ImGui::Checkbox("in colours", &settings.detail_colours);
+  ImGui::EndDisabled();
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
+  if (settings.mode != DrawMode::Rays) {
     int edges = static_cast<int>(settings.wireframe);
     if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);
@@ -262,13 +261,13 @@ void draw_light_part(ViewState& state) {
   }
   draw_occlusion(light, state.settings.mode == DrawMode::Rays);
   ImGui::BeginDisabled(light.shading != Shading::Lit);
-  const bool has_shadows = state.settings.mode == DrawMode::Rays;
+  const bool has_shadows = state.open.backend && state.open.backend->traces_light(state.settings.mode);
   ImGui::BeginDisabled(!has_shadows);
   bool shows_shadows = light.shadows && has_shadows;
   if (ImGui::Checkbox("shadows", &shows_shadows)) light.shadows = shows_shadows;
   ImGui::EndDisabled();
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
-    ImGui::SetTooltip("meshes carry no shadows; marched rays do (F5)");
+    ImGui::SetTooltip("meshes have shadows where there is a graphics card; marched rays do everywhere (F5)");
   }
   ImGui::SameLine();
   bool is_all = light.occlusion_affects == OcclusionAffects::All;

@@ -50,8 +50,9 @@ struct MeshPictureOptions {
 /// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
-/// Detail: of far instances the impostor is drawn, and of their meshes what is transparent; of a smooth one these are
-///         its voxels' faces. Until its impostor is there an instance is drawn halved.
+/// Detail: of far instances the impostor is drawn, where it has fewer faces than the meshes have quads, and of these
+///         what is transparent; of a smooth one that is its voxels' faces. Until its impostor is there an instance is
+///         drawn halved.
 /// Glass:  quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn
 ///         in the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque,
 ///         whatever their types; and so is glass where values are shown instead of colours.
@@ -78,12 +79,11 @@ class VulkanMeshRenderer {
 
   /// Draws all there is.
   ///
-  /// Requires: with shadows, lamps or levels of detail the VulkanRenderer was updated with the same scene and filter; with
-  ///           levels of detail the scene was not edited since, by either's update.
-  /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those whose
-  /// axes lie in one plane, for a picture of another renderer, and when that renderer was last updated with another
-  /// scene or filter but what is to be drawn needs it; Unsupported for wireframes where the device has no lines. After
-  /// an error in drawing the picture has no samples.
+  /// Requires: with levels of detail the scene was not edited since the last update of this and of the VulkanRenderer.
+  /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
+  /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps or levels of detail when
+  /// the VulkanRenderer was not last updated with the same scene and filter; Unsupported for wireframes where the
+  /// device has no lines. After an error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
 
   struct Stats {

@@ -196,11 +196,12 @@ Status DeviceImpostors::draw(const Scene& scene, std::span<const FarInstance> se
     if (next == placement.placed.end()) break;
     if (next->placed.instance != instance.instance) continue;
     next->is_far = true;
-    next->far_centre = instance.impostor->faces().centre;
     const auto index = static_cast<std::int32_t>(next - placement.placed.begin());
     const auto drawn = screen.drawn(next->placed, index, *instance.impostor);
     if (!drawn) continue;
     const Entry& entry = entries_.find(scene.instances()[instance.instance].grid)->second;
+    next->impostor = drawn->faces;
+    next->impostor_level = drawn->level;
     ShaderFar shown = shader_far(entry.whole, *drawn);
     set_aim(*drawn, width, height, shown);
     shown.origin = IVec4(next->origin, index);

@@ -10,6 +10,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "light/lamp_table.h"
+#include "render/impostor/faces.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/march/device_grid.h"
 #include "scene/tracer/instance_tree.h"
@@ -24,8 +25,9 @@ struct DevicePlaced {
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
   DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates
   DVec3 high{0.0};
-  bool is_far = false;  ///< drawn from its impostor: the camera's rays pass it by
-  DVec3 far_centre{0.0};  ///< of that, in the grid
+  bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
+  const ImpostorFaces* impostor = nullptr;  ///< of that, until the next picture
+  std::size_t impostor_level = 0;           ///< of its faces
 };
 
 /// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.

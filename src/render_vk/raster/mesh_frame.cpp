@@ -81,10 +81,10 @@ struct Space {
   }
 };
 
-// The directions of which a chunk, whose minimum corner lies at `offset`, may show a face.
-std::uint8_t visible_faces(DVec3 offset, DVec3 eye, bool is_perspective) {
-  const DVec3 low = is_perspective ? offset : DVec3(0.0);
-  const DVec3 high = is_perspective ? offset + kEdge : DVec3(0.0);
+// The directions of which what lies in a box may show a face.
+std::uint8_t visible_faces(DBox box, DVec3 eye, bool is_perspective) {
+  const DVec3 low = is_perspective ? box.min : DVec3(0.0);
+  const DVec3 high = is_perspective ? box.max : DVec3(0.0);
   int faces = 0;
   for (int axis = 0; axis < 3; ++axis) {
     if (eye[axis] > low[axis]) faces |= 1 << (2 * axis);
@@ -108,13 +108,22 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
     view.include(depth, radius * 1.01, space.instance->voxel_size);
     const bool is_perspective = view.rays.is_perspective();
     data.draws.push_back({&mesh, number, Vec3(offset), is_perspective ? glm::length(middle) : depth,
-                          visible_faces(offset, space.eye, is_perspective), space.instance->mirrored,
+                          visible_faces({offset, offset + kEdge}, space.eye, is_perspective), space.instance->mirrored,
                           space.instance->is_far});
   }
   return data.draws.size() > before;
 }
 
-// Lists the faces of its impostor. Their box is not known here, but that of what is seen from all sides is: a ball.
+void append_run(std::uint32_t first, std::uint32_t end, QuadRuns& runs) {
+  if (first == end) return;
+  if (!runs.empty() && runs.back().second == first) {
+    runs.back().second = end;
+  } else {
+    runs.emplace_back(first, end);
+  }
+}
+
+// Lists the faces of its impostor, which lie in a ball.
 void add_far(const Space& space, View& view, MeshFrameData& data) {
   const MeshImpostor& impostor = space.instance->impostor;
   const DVec3 offset = impostor.centre - space.base;
@@ -123,10 +132,21 @@ void add_far(const Space& space, View& view, MeshFrameData& data) {
   if (!std::isfinite(depth)) return;
   view.include(depth, impostor.radius * 1.01 * space.instance->voxel_size, space.instance->voxel_size);
   const auto instance = static_cast<std::uint32_t>(data.instances.size());
-  const double distance = view.rays.is_perspective() ? glm::length(middle) : depth;
-  data.far.push_back({impostor.level, impostor.faces, instance, Vec3(offset), false, distance});
-  if (impostor.unseen.count > 0) {
-    data.far.push_back({impostor.unseen, impostor.faces, instance, Vec3(offset), true, distance});
+  const bool is_perspective = view.rays.is_perspective();
+  const DBox box{offset - impostor.radius, offset + impostor.radius};
+  const std::uint8_t seen = visible_faces(box, space.eye, is_perspective);
+  for (const MeshImpostor::Part* part : {&impostor.level, &impostor.unseen}) {
+    FarDraw draw{part->faces,
+                 {},
+                 impostor.faces,
+                 instance,
+                 Vec3(offset),
+                 part == &impostor.unseen,
+                 is_perspective ? glm::length(middle) : depth};
+    for (std::size_t face = 0; face < 6 && part->faces.count > 0; ++face) {
+      if ((seen >> face & 1) != 0) append_run(part->begin[face], part->begin[face + 1], draw.runs);
+    }
+    if (!draw.runs.empty()) data.far.push_back(std::move(draw));
   }
 }
 
@@ -237,15 +257,8 @@ bool is_flat(const Camera& camera) {
 QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
   const StoredMesh& mesh = *draw.mesh;
   QuadRuns runs;
+  const auto add = [&](std::uint32_t first, std::uint32_t end) { append_run(first, end, runs); };
   const bool has_opaque = !draw.is_far;
-  const auto add = [&](std::uint32_t first, std::uint32_t end) {
-    if (first == end) return;
-    if (!runs.empty() && runs.back().second == first) {
-      runs.back().second = end;
-    } else {
-      runs.emplace_back(first, end);
-    }
-  };
   for (std::size_t face = 0; face < 6 && has_opaque && mesh.is_by_direction; ++face) {
     if ((draw.faces >> face & 1) != 0) add(mesh.opaque[face], mesh.opaque[face + 1]);
   }
@@ -257,7 +270,9 @@ QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
 std::int64_t MeshFrameData::triangles() const {
   const bool is_ordered = glass_quads > 0 && glass_quads <= kMaxOrdered;
   std::int64_t count = is_ordered ? 2 * static_cast<std::int64_t>(order.size()) : 0;
-  for (const FarDraw& draw : far) count += 2 * std::int64_t{draw.level.count};
+  for (const FarDraw& draw : far) {
+    for (const auto& [first, end] : draw.runs) count += 2 * std::int64_t{end - first};
+  }
   for (const MeshDraw& draw : draws) {
     count += draw.mesh->indices / 3;
     for (const auto& [first, end] : visible_quads(draw, !is_ordered)) count += 2 * std::int64_t{end - first};
@@ -280,7 +295,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
       const Space space(instance, grid->low, grid->high, camera);
       if (add_draws(space, *grid, view, data)) keep(space);
     }
-    if (instance.impostor.level.count == 0) continue;
+    if (instance.impostor.level.faces.count == 0) continue;
     const IVec3 chunk(glm::floor(instance.impostor.centre / kEdge));
     const Space space(instance, chunk, chunk, camera);
     add_far(space, view, data);

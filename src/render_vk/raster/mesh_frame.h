@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -18,8 +19,13 @@ namespace quoin::vulkan {
 
 /// An impostor in device memory, as one instance shows it.
 struct MeshImpostor {
-  ShaderFarLevel level;
-  ShaderFarLevel unseen;
+  /// Of its faces some.
+  struct Part {
+    ShaderFarLevel faces;                  ///< of no address: none
+    std::array<std::uint32_t, 7> begin{};  ///< of each direction; the end of the last
+  };
+  Part level;
+  Part unseen;
   std::uint64_t faces = 0;
   float half = 0.5F;  ///< from the middle of a face to its edges, voxels
   float unseen_half = 0.5F;
@@ -53,9 +59,13 @@ struct MeshDraw {
   bool is_far = false;  ///< only what is transparent
 };
 
+/// Runs of a chunk's quads, or of an impostor's faces, each from one number to before the next.
+using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
 /// Faces of an impostor that are in the picture.
 struct FarDraw {
   ShaderFarLevel level;
+  QuadRuns runs;  ///< of its faces, those whose direction the camera may see
   std::uint64_t faces = 0;
   std::uint32_t instance = 0;
   Vec3 offset{0.0F};  ///< of the content's centre
@@ -63,9 +73,8 @@ struct FarDraw {
   double distance = 0.0;
 };
 
-/// Runs of a blocky chunk's quads, each from one number to before the next.
-using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
-/// Those that face the camera, as far as can be told by directions; the transparent ones all, if at all.
+/// Those of a blocky chunk that face the camera, as far as can be told by directions; the transparent ones all, if
+/// at all.
 [[nodiscard]] QuadRuns visible_quads(const MeshDraw& draw, bool with_glass);
 
 /// What drawing one picture takes, but for where things lie in memory.

@@ -122,14 +122,14 @@ Status MeshPass::put_frame(MeshFrameData& data) {
   };
   ShaderFrame& picture = data.picture.frame;
   const std::array<Part, 9> parts{{{&data.frame, sizeof data.frame, &data.push.frame},
-                                      {data.instances.data(), bytes_of(data.instances), nullptr},
-                                      {&picture, sizeof picture, &data.frame.frame},
-                                      {data.glass.data(), bytes_of(data.glass), &data.frame.draws},
-                                      {data.order.data(), bytes_of(data.order), &data.frame.order},
-                                      {data.picture.placed.data(), bytes_of(data.picture.placed), &picture.placed},
-                                      {data.picture.tree.data(), bytes_of(data.picture.tree), &picture.tree},
-                                      {data.picture.leaves.data(), bytes_of(data.picture.leaves), &picture.leaves},
-                                      {data.lamps.data(), bytes_of(data.lamps), &picture.lamps}}};
+                                   {data.instances.data(), bytes_of(data.instances), nullptr},
+                                   {&picture, sizeof picture, &data.frame.frame},
+                                   {data.glass.data(), bytes_of(data.glass), &data.frame.draws},
+                                   {data.order.data(), bytes_of(data.order), &data.frame.order},
+                                   {data.picture.placed.data(), bytes_of(data.picture.placed), &picture.placed},
+                                   {data.picture.tree.data(), bytes_of(data.picture.tree), &picture.tree},
+                                   {data.picture.leaves.data(), bytes_of(data.picture.leaves), &picture.leaves},
+                                   {data.lamps.data(), bytes_of(data.lamps), &picture.lamps}}};
   static_assert(sizeof(ShaderMeshFrame) % 16 == 0);
   std::array<std::uint64_t, parts.size()> offsets{};
   frame_bytes_ = 0;
@@ -163,11 +163,13 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
   return {};
 }
 
-std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe) const {
+std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe, MeshLight light) const {
   if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
   const bool shows_values = data.has(kShowOcclusion | kShowNormals);
   // What is solid first, so that less of the sky is to be drawn.
-  std::vector<Step> steps{{shows_values ? Step::Over::All : Step::Over::Opaque}, {Step::Over::Sky}};
+  const auto solid = shows_values ? Step::Over::All : Step::Over::Opaque;
+  std::vector<Step> steps{{solid}, {Step::Over::Sky}};
+  if (light != MeshLight::Plain) steps.insert(steps.begin(), {solid, kDrawDepth});
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMaxOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
@@ -179,7 +181,7 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
 Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light) {
   for (Step& step : steps) {
     // Edges are as bright as what they lie on, but for shadows.
-    const bool is_lit = step.over != Step::Over::Sky && step.mode != kDrawEdgesOver && step.mode != kDrawEdgesOnly;
+    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || step.is_glass());
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
       const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder,
                                                is_lit ? light : MeshLight::Plain, samples});
@@ -203,7 +205,7 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
 
 Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe, MeshLight light,
                       const Buffer& colours) {
-  std::vector<Step> steps = steps_for(data, wireframe);
+  std::vector<Step> steps = steps_for(data, wireframe, light);
   Status done = find_pipelines(steps, samples, light);
   if (done) done = prepare(data, size, samples);
   if (!done) return done;
@@ -301,7 +303,7 @@ void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, con
     values.numbers |= step.mode | (draw.level.views & kAllViews) << kMeshViewsShift;
     if (draw.is_unseen) values.numbers |= kMeshIsUnseen;
     push(commands, values);
-    draw_quads(commands, 0, draw.level.count);
+    for (const auto& [first, end] : draw.runs) draw_quads(commands, first, end);
   }
 }
 

@@ -37,7 +37,7 @@ class MeshPass {
   Status prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t samples);
   Status put_frame(MeshFrameData& data);
   Status grow(VkDeviceSize bytes);
-  [[nodiscard]] std::vector<Step> steps_for(const MeshFrameData& data, Wireframe wireframe) const;
+  [[nodiscard]] std::vector<Step> steps_for(const MeshFrameData& data, Wireframe wireframe, MeshLight light) const;
   Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light);
   void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
               const Buffer& colours) const;

@@ -36,10 +36,14 @@ constexpr std::array<std::span<const std::uint32_t>, 7> kCode = {
 // Of vertices and of fragments, in `kCode`.
 std::array<std::size_t, 2> shaders_of(MeshWay::What what) {
   switch (what) {
-    case MeshWay::What::Sky: return {0, 1};
-    case MeshWay::What::Blocky: return {2, 3};
-    case MeshWay::What::Smooth: return {4, 5};
-    case MeshWay::What::Far: return {6, 3};
+    case MeshWay::What::Sky:
+      return {0, 1};
+    case MeshWay::What::Blocky:
+      return {2, 3};
+    case MeshWay::What::Smooth:
+      return {4, 5};
+    case MeshWay::What::Far:
+      return {6, 3};
   }
   return {};
 }
@@ -75,7 +79,7 @@ std::array<VkSubpassDependency, 2> around_pass() {
 }
 
 bool is_glass(const MeshWay& way) {
-  return way.mode >= kDrawGlass;
+  return way.mode >= kDrawGlass && way.mode < kDrawGlass + 3;
 }
 bool is_edges(const MeshWay& way) {
   return way.mode == kDrawEdgesOver || way.mode == kDrawEdgesOnly;
@@ -101,9 +105,13 @@ VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
       info_of<VkPipelineDepthStencilStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO);
   const bool is_sky = way.what == MeshWay::What::Sky;
   state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
-  state.depthWriteEnable = way.mode == kDrawSurfaces && !is_sky ? VK_TRUE : VK_FALSE;
+  // Where light is traced, depths are there before: each pixel is lit once.
+  const bool has_depth = way.mode == kDrawSurfaces && way.light != MeshLight::Plain;
+  const bool writes = (way.mode == kDrawSurfaces && !is_sky && !has_depth) || way.mode == kDrawDepth;
+  state.depthWriteEnable = writes ? VK_TRUE : VK_FALSE;
   // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
   state.depthCompareOp = VK_COMPARE_OP_GREATER;
+  if (has_depth) state.depthCompareOp = VK_COMPARE_OP_EQUAL;
   if (is_sky || way.mode == kDrawEdgesOver) state.depthCompareOp = VK_COMPARE_OP_GREATER_OR_EQUAL;
   return state;
 }
@@ -113,6 +121,7 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   VkPipelineColorBlendAttachmentState state{};
   state.colorWriteMask =
       VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
+  if (way.mode == kDrawDepth) state.colorWriteMask = 0;
   if (!is_glass(way)) return state;
   state.colorWriteMask = VkColorComponentFlags{VK_COLOR_COMPONENT_R_BIT} << (way.mode - kDrawGlass);
   state.blendEnable = VK_TRUE;

@@ -47,6 +47,7 @@ constexpr std::uint32_t kDrawSurfaces = 0;
 constexpr std::uint32_t kDrawEdgesOver = 1;
 constexpr std::uint32_t kDrawEdgesOnly = 2;
 constexpr std::uint32_t kDrawGlass = 3;  ///< and the channel
+constexpr std::uint32_t kDrawDepth = 6;  ///< where surfaces are, before they are lit
 // and of an impostor which views count, and whether its faces are those that none saw.
 constexpr int kMeshViewsShift = 4;
 constexpr std::uint32_t kMeshIsUnseen = std::uint32_t{1} << 30;

@@ -164,11 +164,8 @@ void MeshStore::replace(Change& change) {
   }
   StoredGrid& grid = grids_[change.key];
   const auto [at, is_new] = grid.chunks.try_emplace(change.chunk);
-  if (is_new) {
-    grid.bounds_known = false;
-  } else {
-    give_back(at->second);
-  }
+  grid.bounds_known = false;
+  if (!is_new) give_back(at->second);
   at->second = std::move(change.mesh);
   ++chunks_;
   triangles_ += at->second.triangles();
@@ -201,9 +198,11 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   StoredGrid& grid = found->second;
   if (!grid.bounds_known) {
     grid.low = grid.high = grid.chunks.begin()->first;
+    grid.opaque_quads = 0;
     for (const auto& [at, mesh] : grid.chunks) {
       grid.low = glm::min(grid.low, at);
       grid.high = glm::max(grid.high, at);
+      grid.opaque_quads += mesh.opaque.back() + mesh.indices / 6;
     }
     grid.bounds_known = true;
   }

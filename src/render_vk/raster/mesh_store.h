@@ -33,9 +33,7 @@ struct StoredMesh {
 struct MeshKey {
   GridHandle grid;
   int level = 0;
-  bool operator<(const MeshKey& other) const {
-    return grid != other.grid ? grid < other.grid : level < other.level;
-  }
+  bool operator<(const MeshKey& other) const { return grid != other.grid ? grid < other.grid : level < other.level; }
 };
 
 /// Surfaces of chunks in device memory: 8 bytes a quad, or 28 a vertex and 4 an index.
@@ -51,6 +49,7 @@ class MeshStore {
     IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
     IVec3 high{0};
     bool bounds_known = false;
+    std::int64_t opaque_quads = 0;  ///< of all, once `bounds_known`
 
     [[nodiscard]] std::size_t bytes() const;
   };

@@ -53,12 +53,12 @@ bool traces_light(const LightOptions& light) {
 
 vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::DevicePlaced& placed) {
   vulkan::MeshImpostor impostor;
-  impostor.level = far.level;
-  impostor.unseen = far.unseen;
+  impostor.level = {far.level, placed.impostor->levels.at(placed.impostor_level).begin};
+  impostor.unseen = {far.unseen, placed.impostor->unseen.begin};
   impostor.faces = far.faces;
   impostor.half = far.size.x;
   impostor.unseen_half = far.size.y;
-  impostor.centre = placed.far_centre;
+  impostor.centre = placed.impostor->centre;
   // Faces of coarse levels reach past the content.
   impostor.radius = 0.5 * glm::length(placed.high - placed.low) + 2.0 * far.size.x;
   return impostor;
@@ -178,7 +178,8 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
   const bool needs_voxels = options.detail.has_value() || traces_light(options.light);
   if (needs_voxels && scene != nullptr && (renderer->voxels != scene || renderer->instances != shown)) {
-    return refuse("vulkan: shadows, lamps and levels of detail need VulkanRenderer::update with the scene of the meshes");
+    return refuse(
+        "vulkan: shadows, lamps and levels of detail need VulkanRenderer::update with the scene of the meshes");
   }
   return {};
 }
@@ -210,7 +211,11 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     const auto found = std::lower_bound(
         shown_as.begin(), shown_as.end(), placed.placed.instance,
         [](const vulkan::MeshInstance& instance, InstanceHandle handle) { return instance.handle < handle; });
-    if (found != shown_as.end() && found->handle == placed.placed.instance) found->impostor = impostor_of(far, placed);
+    if (found == shown_as.end() || found->handle != placed.placed.instance) continue;
+    // Merged quads of what is simple are fewer than the faces that snapshots saw of it.
+    const vulkan::MeshStore::StoredGrid* mesh = store.find(found->mesh);
+    found->is_far = mesh == nullptr || mesh->opaque_quads > std::int64_t{far.level.count} + far.unseen.count;
+    if (found->is_far) found->impostor = impostor_of(far, placed);
   }
   return shown_as;
 }

@@ -47,9 +47,7 @@ void main() {
     hide_corner();
     return;
   }
-  place = vec4(local, openness_of(bits.x >> 30 | (bits.y & 63) << 2, corner));
   ivec4 home = mesh_frame().instances[placed].home;
-  base = ivec4(home.xyz + ivec3(offset), int(bits.y >> 10 & 0xFFFF));
-  edges = vec4(low[u], low[v], high[u], high[v]);
-  what = uvec2(face, placed);
+  put_face(face, bits.y >> 10 & 0xFFFF, placed, local, low, high, home.xyz + ivec3(offset),
+           openness_of(bits.x >> 30 | (bits.y & 63) << 2, corner));
 }

@@ -37,13 +37,14 @@ void main() {
     return;
   }
   // Of the voxel that is stood for, whatever the size of what is drawn.
-  vec3 local = vec3(0.0);
-  if ((face & 1) == 0) local[axis_of(face)] = 1.0;
+  vec3 low = vec3(0.0);
+  if ((face & 1) == 0) low[axis_of(face)] = 1.0;
+  vec3 high = low;
+  high[u] = high[v] = 1.0;
+  vec3 local = low;
   if (is_east) local[u] = 1.0;
   if (is_north) local[v] = 1.0;
-  place = vec4(local, openness_of(corners, corner));
   ivec4 home = f.instances[push.instance].home;
-  base = ivec4(voxel.xyz + home.xyz, voxel.w & 0xFFFF);
-  edges = vec4(0.0, 0.0, 1.0, 1.0);
-  what = uvec2(face, push.instance);
+  put_face(face, uint(voxel.w) & 0xFFFF, push.instance, local, low, high, voxel.xyz + home.xyz,
+           openness_of(corners, corner));
 }

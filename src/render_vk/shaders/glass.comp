@@ -6,6 +6,7 @@
 #include "pairs.glsl"
 #include "camera.glsl"
 #define KEEPS_BODIES
+#include "lit.glsl"
 #include "glass.glsl"
 #include "count.glsl"
 

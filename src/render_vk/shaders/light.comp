@@ -8,6 +8,7 @@
 
 layout(constant_id = 0) const bool kHasGlass = true;
 #define KEEPS_BODIES
+#include "lit.glsl"
 #include "glass.glsl"
 #include "count.glsl"
 #include "sky.glsl"
@@ -15,7 +16,6 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "lamps.glsl"
 #include "rays.glsl"
 #include "faces.glsl"
-#include "lit.glsl"
 
 const uint kTurns = 1024;
 

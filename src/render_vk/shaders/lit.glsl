@@ -1,4 +1,28 @@
-// The reference model of light: light/lighting.h on the processor's side.
+// What types look like, and the reference model of light: light/surfaces.h and light/lighting.h on the processor's
+// side.
+
+struct Surface {
+  vec3 colour;
+  float log_clarity;
+  vec3 emitted;
+  vec3 log_transmittance;
+};
+
+Surface surface_of(uint type) {
+  uint i = 3 * min(type, frame().last_surface);
+  Vectors surfaces = Vectors(frame().surfaces);
+  vec4 colour = surfaces.at[i];
+  return Surface(colour.xyz, colour.w, surfaces.at[i + 1].xyz, surfaces.at[i + 2].xyz);
+}
+
+vec3 passed_by(Surface surface, float voxels, bool starts_inside) {
+  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+  return length > 0.0 ? exp(surface.log_transmittance * length) : vec3(1.0);
+}
+float own_share(Surface surface, float voxels, bool starts_inside) {
+  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+  return length > 0.0 ? 1.0 - exp(surface.log_clarity * length) : 0.0;
+}
 
 bool has_occlusion() {
   return has(kOcclusionRays) || has(kOcclusionVertex);

@@ -5,7 +5,6 @@
 #include "glass.glsl"
 #include "lamps.glsl"
 #include "rays.glsl"
-#include "lit.glsl"
 
 // The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
 // `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.

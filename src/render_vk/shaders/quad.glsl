@@ -1,11 +1,16 @@
-// What blocky.vert and far.vert share: corners of faces, and what fragments are told of these.
+// What blocky.vert and far.vert share: corners of faces, and what fragments are told of these. Where light is not
+// traced, that is their colour, which is linear in how open they are.
 #include "mesh.glsl"
-#include "faces.glsl"
+
+layout(constant_id = 1) const bool kIsGlass = false;
+layout(constant_id = 2) const bool kTraces = false;
+#include "face_colour.glsl"
 
 layout(location = 0) centroid out vec4 place;  // in voxels, from `base`; w: how open it is
 layout(location = 1) flat out ivec4 base;      // in the tree's coordinates; w: the type
 layout(location = 2) flat out vec4 edges;      // of the face: where it begins and ends, along each of its edges
 layout(location = 3) flat out uvec2 what;      // the face's direction, the instance
+layout(location = 4) centroid out vec4 colour;
 
 invariant gl_Position;
 
@@ -15,6 +20,7 @@ void hide_corner() {
   base = ivec4(0);
   edges = vec4(0.0);
   what = uvec2(0);
+  colour = vec4(0.0);
 }
 
 // Where an instance is seen from, and how.
@@ -47,4 +53,16 @@ bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north) {
 // `corners`: of all four, two bits each.
 float openness_of(uint corners, uint corner) {
   return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
+}
+
+// Tells fragments what there is. `local`: the corner, `low` and `high`: of the whole face, from `from`.
+void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 high, ivec3 from, float openness) {
+  int u = kFaceU[face];
+  int v = kFaceV[face];
+  place = vec4(local, openness);
+  base = ivec4(from, int(type));
+  edges = vec4(low[u], low[v], high[u], high[v]);
+  what = uvec2(face, instance);
+  colour = vec4(0.0);
+  if (!kTraces) colour = colour_of_face(face, type, instance, vec3(diffuse_of(face, instance)), openness);
 }

@@ -3,6 +3,7 @@
 
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
+#include "lit.glsl"
 #include "mesh_light.glsl"
 
 layout(location = 0) centroid in vec3 normal;

@@ -1,0 +1,34 @@
+// What a point of a face shows: of a blocky mesh, or of an impostor. Those that include this say whether it is of glass
+// (`kIsGlass`).
+#include "faces.glsl"
+#include "lit.glsl"
+
+// The sun's light on a face of an instance, if nothing is in between.
+float diffuse_of(uint face, uint instance) {
+  vec4 diffuse = mesh_frame().instances[instance].diffuse[face >> 2];
+  return diffuse[face & 3];
+}
+
+// A colour, or a value that is to be seen as it is; w: what is hidden of what lies behind, of the channel drawn.
+vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float openness) {
+  if (has(kShowOcclusion)) return vec4(vec3(openness), 1.0);
+  if (has(kShowNormals)) {
+    vec4 axis = mesh_frame().instances[instance].axes[axis_of(face)];
+    return vec4(0.5 + 0.5 * sign_of(face) * axis.xyz, 1.0);
+  }
+  Surface surface = surface_of(type);
+  if (has(kDetailColours)) {
+    ivec4 home = mesh_frame().instances[instance].home;
+    if (home.w >= 0) {
+      vec4 colour = PlacedGrids(frame().placed).at[home.w].detail_colour;
+      surface.colour = colour.xyz;
+    }
+    surface.emitted = vec3(0.0);
+  }
+  // Brighter than anything, but its products with what is interpolated stay numbers.
+  vec3 lit = colour_in_light(surface.colour, min(surface.emitted, vec3(1e15)), sunlight, openness);
+  lit = min(lit, vec3(1e15));
+  if (!kIsGlass) return vec4(lit, 1.0);
+  // Of one voxel.
+  return vec4(own_share(surface, 1.0, false) * lit, 1.0 - passed_by(surface, 1.0, false)[drawn() - kGlass]);
+}
