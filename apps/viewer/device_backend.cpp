@@ -134,7 +134,9 @@ Result<bool> DeviceBackend::Impl::update_renderer() {
 
 // Takes over what was edited and what workers made of it; returns whether there is another picture.
 Result<bool> DeviceBackend::Impl::take_surfaces() {
-  const auto updated = update_renderer();
+  Result<bool> updated = false;
+  // Only light by rays and levels of detail need the voxels on the device.
+  if (request->detail_by_pixels || !is_processor()) updated = update_renderer();
   if (!updated) return updated.error();
   const bool is_scene_changed = std::exchange(meshes->is_scene_new, false);
   if (is_scene_changed) {
@@ -321,9 +323,9 @@ bool DeviceBackend::wants_frames() const {
   const Impl& me = *impl_;
   if (!me.can_draw_now()) return false;
   const bool is_rays = me.request->mode == DrawMode::Rays;
-  const bool is_stale = me.is_scene_new || (is_rays ? !me.is_settled
-                                                    : !me.meshes || me.meshes->is_scene_new ||
-                                                          (!me.is_settled && me.meshes->live.pending() == 0));
+  const bool is_stale =
+      is_rays ? me.is_scene_new || !me.is_settled
+              : !me.meshes || me.meshes->is_scene_new || (!me.is_settled && me.meshes->live.pending() == 0);
   return me.is_request_new || is_stale;
 }
 

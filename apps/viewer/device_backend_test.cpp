@@ -211,6 +211,9 @@ TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
   request.samples = 1;
   request.detail_by_pixels = true;
   request.light.occlusion = OcclusionMode::Vertex;
+  request.light.shadows = false;
+  backend->show(request);
+  ASSERT_FALSE(settle(*backend).empty());
   request.light.shadows = backend->traces_light(DrawMode::Blocks);
   for (const double times : {1.0, 6.0}) {
     request.camera.position *= times;

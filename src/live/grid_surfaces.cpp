@@ -31,7 +31,12 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const Grid& grid, const VoxelReg
     }
     parallel_for(jobs.size(), threads, [&](std::size_t i) {
       thread_local LiveWorkspace workspace;
-      make_live_surface(options_, *jobs[i], workspace);
+      try {
+        make_live_surface(options_, *jobs[i], workspace);
+      } catch (...) {
+        workspace = {};  // what memory ran out in may be half made
+        throw;
+      }
     });
     for (const auto& job : jobs) grid_.collect(*job);
   }

@@ -50,8 +50,8 @@ struct MeshPictureOptions {
 /// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
-/// Detail: of far instances the impostor is drawn, where it has fewer faces than the meshes have quads, and of these
-///         what is transparent; of a smooth one that is its voxels' faces. Until its impostor is there an instance is
+/// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
+///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its impostor is there an instance is
 ///         drawn halved.
 /// Glass:  quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn
 ///         in the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque,
@@ -79,7 +79,8 @@ class VulkanMeshRenderer {
 
   /// Draws all there is.
   ///
-  /// Requires: with levels of detail the scene was not edited since the last update of this and of the VulkanRenderer.
+  /// Requires: with levels of detail or lamps the scene was not edited since the last update of this and of the
+  ///           VulkanRenderer.
   /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
   /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps or levels of detail when
   /// the VulkanRenderer was not last updated with the same scene and filter; Unsupported for wireframes where the

@@ -20,7 +20,7 @@ namespace quoin::vulkan {
 
 /// An instance and what frames need to know of it.
 struct DevicePlaced {
-  PlacedGrid placed;      ///< its pointers mean nothing
+  PlacedGrid placed;      ///< of its pointers only `voxels` of a halved grid means anything, until the next picture
   std::int32_t grid = 0;  ///< index into the device's grids
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
   DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates

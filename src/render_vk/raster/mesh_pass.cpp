@@ -40,6 +40,7 @@ struct MeshPass::Step {
   VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
   std::array<VkPipeline, 2> smooth{};  // mirrored: 1
   VkPipeline far = VK_NULL_HANDLE;     // impostors
+  bool is_backwards = false;           // so that of equally near surfaces the one stays that is drawn first otherwise
 
   [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
 };
@@ -169,7 +170,10 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
   // What is solid first, so that less of the sky is to be drawn.
   const auto solid = shows_values ? Step::Over::All : Step::Over::Opaque;
   std::vector<Step> steps{{solid}, {Step::Over::Sky}};
-  if (light != MeshLight::Plain) steps.insert(steps.begin(), {solid, kDrawDepth});
+  if (light != MeshLight::Plain) {
+    steps.front().is_backwards = true;
+    steps.insert(steps.begin(), {solid, kDrawDepth});
+  }
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMaxOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
@@ -263,8 +267,14 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     push(commands, values);
     return draw_quads(commands, 0, static_cast<std::uint32_t>(data.order.size()));
   }
+  if (step.is_backwards) {
+    draw_far(commands, data, step);
+    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
+    bind_corners(commands);
+  }
+  const bool is_backwards = step.is_glass() || step.is_backwards;
   for (std::size_t i = 0; i < data.draws.size(); ++i) {
-    const MeshDraw& draw = data.draws[step.is_glass() ? data.draws.size() - 1 - i : i];
+    const MeshDraw& draw = data.draws[is_backwards ? data.draws.size() - 1 - i : i];
     const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
     if (step.is_glass() && draw.mesh->glass.empty()) continue;
     if (draw.is_far && step.over == Step::Over::Opaque) continue;
@@ -284,13 +294,15 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     push(commands, values);
     draw_mesh(commands, draw, step);
   }
-  if (!step.is_glass() && !data.far.empty()) draw_far(commands, data, step);
+  if (!is_backwards) draw_far(commands, data, step);
 }
 
 void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
+  if (data.far.empty()) return;
   device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.far);
   bind_corners(commands);
-  for (const FarDraw& draw : data.far) {
+  for (std::size_t i = 0; i < data.far.size(); ++i) {
+    const FarDraw& draw = data.far[step.is_backwards ? data.far.size() - 1 - i : i];
     const ShaderMeshInstance& instance = data.instances[draw.instance];
     ShaderMeshPush values = data.push;
     values.clip = instance.clip;

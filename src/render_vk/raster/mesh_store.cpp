@@ -91,21 +91,33 @@ Status MeshStore::put(std::span<const SurfaceUpdate> surfaces, int level) {
     if (Status right = check(*update.surface); !right) return right;
   }
   std::vector<Change> changes;
+  const auto give_up = [&] {
+    memory_->discard();
+    for (Change& change : changes) memory_->release(change.mesh.place);
+  };
+  try {
+    Status done = put_all(surfaces, level, changes);
+    if (!done) give_up();
+    return done;
+  } catch (...) {
+    give_up();
+    throw;
+  }
+}
+
+Status MeshStore::put_all(std::span<const SurfaceUpdate> surfaces, int level, std::vector<Change>& changes) {
   std::size_t bytes = 0;
   Status done;
   for (const SurfaceUpdate& update : surfaces) {
     Change& change = changes.emplace_back(Change{{update.grid, level}, update.chunk, {}});
     if (update.surface != nullptr) done = upload(*update.surface, change.mesh);
-    if (!done) break;
+    if (!done) return done;
     bytes += change.mesh.place.size;
     if (bytes < kBatchBytes) continue;
     if (done = finish(changes); !done) return done;
     bytes = 0;
   }
-  if (done) return finish(changes);
-  memory_->discard();
-  for (Change& change : changes) memory_->release(change.mesh.place);
-  return done;
+  return finish(changes);
 }
 
 Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {

@@ -78,6 +78,7 @@ class MeshStore {
     StoredMesh mesh;  // of no size: nothing is there any more
   };
 
+  Status put_all(std::span<const SurfaceUpdate> surfaces, int level, std::vector<Change>& changes);
   Status upload(const ChunkSurface& surface, StoredMesh& mesh);
   Status finish(std::vector<Change>& changes);
   void replace(Change& change);

@@ -59,8 +59,8 @@ vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::Dev
   impostor.half = far.size.x;
   impostor.unseen_half = far.size.y;
   impostor.centre = placed.impostor->centre;
-  // Faces of coarse levels reach past the content.
-  impostor.radius = 0.5 * glm::length(placed.high - placed.low) + 2.0 * far.size.x;
+  // Those in the corners of the largest box that there can be, with room for the faces' own size.
+  impostor.radius = 1.7321 * placed.impostor->levels.at(placed.impostor_level).size + 2.0 * far.size.x;
   return impostor;
 }
 
@@ -212,9 +212,11 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
         shown_as.begin(), shown_as.end(), placed.placed.instance,
         [](const vulkan::MeshInstance& instance, InstanceHandle handle) { return instance.handle < handle; });
     if (found == shown_as.end() || found->handle != placed.placed.instance) continue;
-    // Merged quads of what is simple are fewer than the faces that snapshots saw of it.
+    // Merged quads of what is simple are fewer than the faces that snapshots saw of it. Where not all chunks have a
+    // mesh, some may still be on their way.
     const vulkan::MeshStore::StoredGrid* mesh = store.find(found->mesh);
-    found->is_far = mesh == nullptr || mesh->opaque_quads > std::int64_t{far.level.count} + far.unseen.count;
+    found->is_far = mesh == nullptr || mesh->chunks.size() < scene->grids()[found->mesh.grid].grid.chunk_count() ||
+                    mesh->opaque_quads > std::int64_t{far.level.count} + far.unseen.count;
     if (found->is_far) found->impostor = impostor_of(far, placed);
   }
   return shown_as;
@@ -228,7 +230,7 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
-  if (!traces_light(request.light)) return {};
+  if (scene == nullptr || !traces_light(request.light)) return {};
   const auto lamps = renderer->lamp_table(request);
   if (!lamps) return lamps.error();
   if (lamps->table != nullptr) {

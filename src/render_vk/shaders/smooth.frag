@@ -23,7 +23,7 @@ vec3 light_of(vec3 in_grid, vec3 n) {
   ivec4 home = f.instances[push.instance].home;
   float diffuse = max(dot(n, sun.xyz), 0.0);
   vec3 from = place + kLift * in_grid;
-  ivec4 voxel = ivec4(base + ivec3(floor(place)), home.w);
+  ivec4 voxel = ivec4(base + ivec3(floor(place - 0.5 * in_grid)), home.w);
   return traced_light(voxel, base & ~63, vec3(base & 63) + from, n, diffuse);
 }
 
