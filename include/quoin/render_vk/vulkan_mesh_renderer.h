@@ -51,8 +51,8 @@ struct MeshPictureOptions {
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
 /// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
-///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its impostor is there an instance is
-///         drawn halved.
+///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its
+///         impostor is there an instance is drawn halved.
 /// Glass:  quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn
 ///         in the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque,
 ///         whatever their types; and so is glass where values are shown instead of colours.
