@@ -175,6 +175,7 @@ TEST_F(VulkanImages, HaveMeshesToo) {
   ASSERT_TRUE(meshes) << to_string(meshes.error());
   LiveMeshOptions options;
   LiveMeshes live(options);
+  ASSERT_TRUE(renderer_->update(scene));
   ASSERT_TRUE(meshes->update(scene));
   live.update(scene, {});
   while (live.pending() > 0) {
