@@ -215,7 +215,7 @@ TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
   backend->show(request);
   ASSERT_FALSE(settle(*backend).empty());
   request.light.shadows = backend->traces_light(DrawMode::Blocks);
-  for (const double times : {1.0, 6.0}) {
+  for (const double times : {1.1, 6.0}) {
     request.camera.position *= times;
     backend->show(request);
     const auto pictures = settle(*backend);
