@@ -1,7 +1,6 @@
 #include "live/grid_surfaces.h"
 
 #include <memory>
-#include <new>
 #include <utility>
 
 namespace quoin {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "render_vk/device/drop_oldest.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin::vulkan {
@@ -121,16 +122,9 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
 }
 
 void DeviceDetail::drop_unused(std::uint64_t max_bytes) {
-  std::uint64_t held = halved_bytes();
-  while (held > max_bytes) {
-    const auto oldest = std::min_element(levels_.begin(), levels_.end(), [](const auto& a, const auto& b) {
-      return a.second.last_use < b.second.last_use;
-    });
-    if (oldest == levels_.end() || oldest->second.last_use == picture_) return;
-    held -= oldest->second.voxels.bytes();
-    oldest->second.voxels.release(*memory_);
-    levels_.erase(oldest);
-  }
+  drop_oldest(
+      levels_, picture_, max_bytes, [](const auto& entry) { return entry.second.voxels.bytes(); },
+      [&](auto& entry) { entry.second.voxels.release(*memory_); });
 }
 
 std::uint64_t DeviceDetail::halved_bytes() const {

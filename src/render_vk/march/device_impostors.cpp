@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "render_vk/device/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
 
 namespace quoin::vulkan {
@@ -228,16 +229,10 @@ ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& dra
 }
 
 void DeviceImpostors::drop_unused(std::uint64_t max_bytes) {
-  std::uint64_t held = bytes();
-  while (held > max_bytes) {
-    const auto oldest = std::min_element(entries_.begin(), entries_.end(), [](const auto& a, const auto& b) {
-      return a.second.last_use < b.second.last_use;
-    });
-    if (oldest == entries_.end() || oldest->second.last_use == picture_) return;
-    held -= oldest->second.whole.place.size + oldest->second.next.place.size;
-    release(oldest->second);
-    entries_.erase(oldest);
-  }
+  drop_oldest(
+      entries_, picture_, max_bytes,
+      [](const auto& entry) { return entry.second.whole.place.size + entry.second.next.place.size; },
+      [&](auto& entry) { release(entry.second); });
 }
 
 std::uint64_t DeviceImpostors::bytes() const {

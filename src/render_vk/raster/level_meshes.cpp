@@ -1,6 +1,6 @@
 #include "render_vk/raster/level_meshes.h"
 
-#include <algorithm>
+#include "render_vk/device/drop_oldest.h"
 
 namespace quoin::vulkan {
 
@@ -61,21 +61,12 @@ Status LevelMeshes::put_updates(MeshKey key, Level& level, const Grid& voxels, c
   return updates.empty() ? Status{} : store_->put(updates, key.level);
 }
 
-void LevelMeshes::drop_unused(std::size_t max_bytes) {
-  std::size_t held = 0;
-  const auto bytes_of = [&](MeshKey key) {
-    const MeshStore::StoredGrid* stored = store_->find(key);
-    return stored == nullptr ? 0 : stored->bytes();
+void LevelMeshes::drop_unused(std::uint64_t max_bytes) {
+  const auto bytes_of = [&](const auto& entry) {
+    const MeshStore::StoredGrid* stored = store_->find(entry.first);
+    return stored == nullptr ? 0 : stored->bytes;
   };
-  for (const auto& [key, level] : levels_) held += bytes_of(key);
-  while (held > max_bytes) {
-    const auto oldest = std::min_element(levels_.begin(), levels_.end(), [](const auto& a, const auto& b) {
-      return a.second.last_use < b.second.last_use;
-    });
-    if (oldest == levels_.end() || oldest->second.last_use == picture_) return;
-    held -= bytes_of(oldest->first);
-    drop(oldest);
-  }
+  drop_oldest(levels_, picture_, max_bytes, bytes_of, [&](const auto& entry) { store_->drop(entry.first); });
 }
 
 }  // namespace quoin::vulkan

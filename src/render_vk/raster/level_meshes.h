@@ -29,7 +29,7 @@ class LevelMeshes {
   /// Errors: of MeshStore::put, and bad_alloc; then nothing of this level is there.
   [[nodiscard]] Status put(MeshKey key, const Grid& voxels, const VoxelRegistry& types, Threads threads);
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
-  void drop_unused(std::size_t max_bytes);
+  void drop_unused(std::uint64_t max_bytes);
 
  private:
   struct Level {

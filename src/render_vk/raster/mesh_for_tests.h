@@ -165,6 +165,16 @@ class VulkanMeshTest : public VulkanTest {
   std::unique_ptr<VulkanMeshRenderer> meshes_;
 };
 
+/// Of the bytes of two pictures of one size, those that differ by more than `tolerance`.
+inline int bytes_that_differ(const Image& a, const Image& b, int tolerance) {
+  EXPECT_EQ(a.rgb.size(), b.rgb.size());
+  int different = 0;
+  for (std::size_t i = 0; i < a.rgb.size() && i < b.rgb.size(); ++i) {
+    different += std::abs(a.rgb[i] - b.rgb[i]) > tolerance;
+  }
+  return different;
+}
+
 inline Vec3 byte_at(const Image& image, int x, int y) {
   const auto at =
       3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x));

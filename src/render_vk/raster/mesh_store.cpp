@@ -198,12 +198,6 @@ void MeshStore::drop(MeshKey key) {
   grids_.erase(found);
 }
 
-std::size_t MeshStore::StoredGrid::bytes() const {
-  std::size_t sum = 0;
-  for (const auto& [at, mesh] : chunks) sum += mesh.place.size;
-  return sum;
-}
-
 const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   const auto found = grids_.find(key);
   if (found == grids_.end()) return nullptr;
@@ -211,10 +205,12 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   if (!grid.bounds_known) {
     grid.low = grid.high = grid.chunks.begin()->first;
     grid.opaque_quads = 0;
+    grid.bytes = 0;
     for (const auto& [at, mesh] : grid.chunks) {
       grid.low = glm::min(grid.low, at);
       grid.high = glm::max(grid.high, at);
       grid.opaque_quads += mesh.opaque.back() + mesh.indices / 6;
+      grid.bytes += mesh.place.size;
     }
     grid.bounds_known = true;
   }

@@ -48,10 +48,9 @@ class MeshStore {
     std::map<IVec3, StoredMesh, ByPlace> chunks;
     IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
     IVec3 high{0};
-    bool bounds_known = false;
     std::int64_t opaque_quads = 0;  ///< of all, once `bounds_known`
-
-    [[nodiscard]] std::size_t bytes() const;
+    std::uint64_t bytes = 0;        ///< likewise
+    bool bounds_known = false;
   };
 
   explicit MeshStore(DeviceMemory& memory) : memory_(&memory) {}

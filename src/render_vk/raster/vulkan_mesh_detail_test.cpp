@@ -16,6 +16,7 @@ using render_test::towards;
 using vulkan_test::add_blobs;
 using vulkan_test::add_crowd;
 using vulkan_test::blocky_surfaces;
+using vulkan_test::bytes_that_differ;
 using vulkan_test::in_detail;
 using vulkan_test::mesh_options;
 using vulkan_test::with_mesh_light;
@@ -121,8 +122,7 @@ TEST_F(VulkanMeshDetail, GlassOfFarInstancesIsDrawn) {
   const Image far = drawn(camera, mesh_options(options));
   options.detail.reset();
   const Image whole = drawn(camera, mesh_options(options));
-  int different = 0;
-  for (std::size_t i = 0; i < far.rgb.size(); ++i) different += std::abs(far.rgb[i] - whole.rgb[i]) > 3;
+  const int different = bytes_that_differ(far, whole, 3);
   EXPECT_LE(different * 100, static_cast<int>(far.rgb.size()));
 }
 
@@ -155,9 +155,8 @@ TEST_F(VulkanMeshDetail, WhatHasNoImpostorYetIsDrawnHalved) {
   const Image first = drawn(camera, mesh_options(options));
   options.impostor_seconds = std::numeric_limits<double>::infinity();
   expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene_, camera, options), "mesh_waited");
-  int different = 0;
   const Image last = drawn(camera, mesh_options(options));
-  for (std::size_t i = 0; i < first.rgb.size(); ++i) different += std::abs(first.rgb[i] - last.rgb[i]) > 60;
+  const int different = bytes_that_differ(first, last, 60);
   EXPECT_LE(different * 20, static_cast<int>(first.rgb.size()));
 }
 
@@ -176,8 +175,7 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   options.detail.reset();
   const Image whole = drawn(camera, mesh_options(options));
   EXPECT_LT(triangles * 2, meshes_->stats().drawn_triangles);
-  int different = 0;
-  for (std::size_t i = 0; i < halved.rgb.size(); ++i) different += std::abs(halved.rgb[i] - whole.rgb[i]) > 40;
+  const int different = bytes_that_differ(halved, whole, 40);
   EXPECT_LE(different * 50, static_cast<int>(halved.rgb.size()));
 }
 

@@ -18,6 +18,7 @@ using render_test::sized;
 using render_test::towards;
 using vulkan_test::blocky_surfaces;
 using vulkan_test::byte_at;
+using vulkan_test::bytes_that_differ;
 using vulkan_test::mesh_options;
 using vulkan_test::without_shadows;
 
@@ -178,8 +179,7 @@ TEST_F(VulkanMeshLight, MergedQuadsLookLikeSingleFaces) {
   put(scene, blocky_surfaces(scene, true));
   EXPECT_LT(meshes_->stats().triangles, faces);
   const Image merged = drawn(camera, options);
-  int different = 0;
-  for (std::size_t i = 0; i < single.rgb.size(); ++i) different += std::abs(single.rgb[i] - merged.rgb[i]) > 2;
+  const int different = bytes_that_differ(single, merged, 2);
   EXPECT_LE(different, 20) << "of " << single.rgb.size();
 }
 

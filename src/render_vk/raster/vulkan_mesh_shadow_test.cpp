@@ -15,18 +15,12 @@ using render_test::sized;
 using render_test::towards;
 using vulkan_test::blocky_surfaces;
 using vulkan_test::byte_at;
+using vulkan_test::bytes_that_differ;
 using vulkan_test::mesh_options;
 using vulkan_test::with_mesh_light;
 using vulkan_test::without_shadows;
 
-class VulkanMeshShadow : public vulkan_test::VulkanMeshTest {
- protected:
-  int differences_of(const Image& a, const Image& b, int tolerance) {
-    int different = 0;
-    for (std::size_t i = 0; i < a.rgb.size(); ++i) different += std::abs(a.rgb[i] - b.rgb[i]) > tolerance;
-    return different;
-  }
-};
+class VulkanMeshShadow : public vulkan_test::VulkanMeshTest {};
 
 // A floor with a tower on it, and beside these a turned beam that is another instance.
 Scene yard(DVec3 at = DVec3(0.0)) {
@@ -104,7 +98,7 @@ TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
   const Camera camera = towards({31.3, 17.7, 22.1}, {9, 2, 19}, 0.5);
   const Image with = drawn(camera, mesh_options(options));
   options.light.shadows = false;
-  EXPECT_EQ(differences_of(with, drawn(camera, mesh_options(options)), 1), 0);
+  EXPECT_EQ(bytes_that_differ(with, drawn(camera, mesh_options(options)), 1), 0);
 }
 
 TEST_F(VulkanMeshShadow, GlassTintsTheSun) {
@@ -141,7 +135,7 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
   compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "lamps");
   const Image lit = drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options));
   options.light.lamps = 0;
-  EXPECT_GT(differences_of(lit, drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options)), 20), 5000);
+  EXPECT_GT(bytes_that_differ(lit, drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options)), 20), 5000);
 }
 
 // A slab over a plain, and a cliff behind a gentle slope: shadows where blocks have them, and no others.

@@ -10,7 +10,7 @@
 // `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
   vec3 sunlight = vec3(diffuse);
-  if (!kTraces || voxel.w < 0 || !has(kLit)) return sunlight;
+  if (!kTraces || voxel.w < 0) return sunlight;
   Placed placed = placed_at(voxel.w);
   GridRay ray = GridRay(base, from, placed.to_sun.xyz, 0.0);
   float max_t = frame().shadow_distance / placed.ref_view.w;
