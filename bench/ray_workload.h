@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
 
 #include "bench/workloads.h"
@@ -78,18 +79,18 @@ inline std::vector<RayQuery> camera_rays() {
   return rays;
 }
 
-inline void add_secondary_rays(RayWorkload& workload, std::size_t index) {
-  const RayQuery& query = workload.primary[index];
-  const auto hit = first_hit(workload.tree, query.ray);
-  if (!hit) return;
-  const DVec3 n(normal_of(hit->face));
-  const int axis = frame_of(hit->face).axis;
+/// A shadow ray and six occlusion rays of a pixel of `camera_rays` from where it hit a surface.
+inline void add_rays_from(const Ray& ray, double t, const DVec3& n, std::size_t index, std::vector<RayQuery>& shadow,
+                          std::vector<RayQuery>& occlusion) {
+  // The normal's greatest axis, and the two after it made upright to it.
+  int axis = std::abs(n.y) > std::abs(n.x) ? 1 : 0;
+  if (std::abs(n.z) > std::abs(n[axis])) axis = 2;
   DVec3 tangent{0};
-  DVec3 bitangent{0};
   tangent[(axis + 1) % 3] = 1;
-  bitangent[(axis + 2) % 3] = 1;
-  const DVec3 origin = query.ray.origin + query.ray.direction * hit->t + n * 0.001;
-  workload.shadow.push_back({{origin, glm::normalize(DVec3{0.371, 0.743, 0.223})}});
+  tangent = glm::normalize(tangent - n * glm::dot(n, tangent));
+  const DVec3 bitangent = glm::cross(n, tangent) * (n[axis] > 0 ? 1.0 : -1.0);
+  const DVec3 origin = ray.origin + ray.direction * t + n * 0.001;
+  shadow.push_back({{origin, glm::normalize(DVec3{0.371, 0.743, 0.223})}});
   const std::size_t tile = index / 16;
   const std::size_t column = tile % (kRayColumns / 4) * 4 + index % 4;
   const std::size_t row = tile / (kRayColumns / 4) * 4 + index % 16 / 4;
@@ -100,7 +101,7 @@ inline void add_secondary_rays(RayWorkload& workload, std::size_t index) {
     const double phi = 2 * std::numbers::pi * (s + xi) / 6;
     const double r = std::sqrt(sin2);
     const DVec3 d = n * std::sqrt(1 - sin2) + tangent * (r * std::cos(phi)) + bitangent * (r * std::sin(phi));
-    workload.occlusion.push_back({{origin, d}, 6.0});
+    occlusion.push_back({{origin, d}, 6.0});
   }
 }
 
@@ -113,7 +114,11 @@ inline const RayWorkload& ray_workload() {
     w.grid = terrain_grid(256, 256);
     w.tree = OccupancyTree::build(w.grid, w.types);
     w.primary = detail::camera_rays();
-    for (std::size_t i = 0; i < w.primary.size(); ++i) detail::add_secondary_rays(w, i);
+    for (std::size_t i = 0; i < w.primary.size(); ++i) {
+      const Ray& ray = w.primary[i].ray;
+      const auto hit = first_hit(w.tree, ray);
+      if (hit) detail::add_rays_from(ray, hit->t, DVec3(normal_of(hit->face)), i, w.shadow, w.occlusion);
+    }
     return w;
   }();
   return shared;
@@ -194,6 +199,15 @@ inline const RandomRayWorkload& random_ray_workload() {
     return w;
   }();
   return shared;
+}
+
+/// Packets of 16 in the order of the rays.
+inline std::vector<RayPacket> ray_packets(const std::vector<RayQuery>& rays) {
+  std::vector<RayPacket> packets((rays.size() + 15) / 16);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    packets[i / 16].set(static_cast<int>(i % 16), rays[i].ray, rays[i].max_t);
+  }
+  return packets;
 }
 
 }  // namespace quoin::workloads

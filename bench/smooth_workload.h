@@ -9,6 +9,8 @@
 
 #include <quoin/grid/density_chunk.h>
 
+#include "bench/workloads.h"
+
 namespace quoin::workloads {
 
 enum class Smooth { S4, S1 };
@@ -30,8 +32,7 @@ inline std::vector<float> smooth_field(Smooth which, int column_x = 0, int colum
       for (int x = 0; x < 64; ++x) {
         const double wx = x - 1 + 62 * column_x;
         const double wz = z - 1 + 62 * column_z;
-        const double h = 31.0 + 12.0 * std::sin(0.11 * wx + 0.3) * std::cos(0.07 * wz) +
-                         6.0 * std::sin(0.31 * wx) * std::sin(0.23 * wz);
+        const double h = smooth_height(wx, wz);
         const double sphere = std::hypot(x - 31, y - 31, z - 31) - 28.0;
         field.push_back(static_cast<float>(which == Smooth::S4 ? sphere : y - 1 - h));
       }

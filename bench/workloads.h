@@ -11,10 +11,12 @@
 
 namespace quoin::workloads {
 
-/// Height of the terrain at a column.
+/// Height of the terrain at a column, without steps and with them.
+inline double smooth_height(double x, double z) {
+  return 31.0 + 12.0 * std::sin(0.11 * x + 0.3) * std::cos(0.07 * z) + 6.0 * std::sin(0.31 * x) * std::sin(0.23 * z);
+}
 inline double height(double x, double z) {
-  return std::floor(31.0 + 12.0 * std::sin(0.11 * x + 0.3) * std::cos(0.07 * z) +
-                    6.0 * std::sin(0.31 * x) * std::sin(0.23 * z));
+  return std::floor(smooth_height(x, z));
 }
 
 inline VoxelType terrain_type(double y, double h) {

@@ -44,7 +44,12 @@ quoin::Status draw(const quoin::Scene& scene, const std::string& path) {
 
 int main(int argc, char** argv) {
   const auto scene = make_staircase();
-  const quoin::Status status = scene ? draw(*scene, argc > 1 ? argv[1] : "staircase.png") : scene.error();
-  if (!status) std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
-  return status ? 0 : 1;
+  const std::string path = argc > 1 ? argv[1] : "staircase.png";
+  const quoin::Status status = scene ? draw(*scene, path) : scene.error();
+  if (!status) {
+    std::fprintf(stderr, "picture: %s\n", quoin::to_string(status.error()).c_str());
+    return 1;
+  }
+  std::printf("drew %s\n", path.c_str());
+  return 0;
 }

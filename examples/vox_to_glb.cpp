@@ -42,6 +42,10 @@ quoin::Status convert(const std::string& in, const std::string& out) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 2 || argc > 3) {
+    std::fprintf(stderr, "usage: vox_to_glb [IN.vox OUT.glb]\n");
+    return 2;
+  }
   const bool has_input = argc == 3;
   const std::string in = has_input ? argv[1] : "stairs.vox";
   const std::string out = has_input ? argv[2] : "stairs.glb";

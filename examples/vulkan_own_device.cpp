@@ -225,7 +225,12 @@ int main(int argc, char** argv) {
   make_device(program);
   make_image(program);
   make_buffer(program);
-  const quoin::Status status = run(program, argc > 1 ? argv[1] : "own_device.png");
-  if (!status) std::fprintf(stderr, "own_device: %s\n", quoin::to_string(status.error()).c_str());
-  return status ? 0 : 1;
+  const char* const path = argc > 1 ? argv[1] : "own_device.png";
+  const quoin::Status status = run(program, path);
+  if (!status) {
+    std::fprintf(stderr, "own_device: %s\n", quoin::to_string(status.error()).c_str());
+    return 1;
+  }
+  std::printf("drew %s\n", path);
+  return 0;
 }

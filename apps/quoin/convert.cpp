@@ -42,6 +42,7 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
   if (!meshes) return meshes.error();
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
+  warn_of_lamps(scene, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 
@@ -77,8 +78,8 @@ Json outcome_json(const Outcome& outcome) {
       {"voxels", outcome.voxels},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.faces.visible},
-      {"faces_total", outcome.faces.total},
+      {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
+      {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
       {"quads", outcome.meshes.quads},
       {"triangles", outcome.meshes.triangles},
       {"vertices", outcome.meshes.vertices},
@@ -248,7 +249,7 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   outcome.meshes = meshes.stats;
-  outcome.faces = {meshes.stats.faces_visible, meshes.stats.faces_total};
+  if (outcome.mesher != "smooth") outcome.faces = {meshes.stats.faces_visible, meshes.stats.faces_total};
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();

@@ -65,8 +65,10 @@ Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outco
                                           options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
   outcome.mesher = "smooth";
+  outcome.faces = count_faces(scene, filter, options.common.threads);
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
+  warn_of_lamps(scene, outcome.warnings);
   warn_of_looks(scene, filter, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }

@@ -92,6 +92,9 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"faces_visible", faces.visible},
                  {"faces_total", faces.total},
                  {"bounds", box(loaded.scene.bounds(filter))},
+                 {"lamps", loaded.scene.lamps.size()},
+                 {"sun", loaded.sun ? triple(*loaded.sun) : Json()},
+                 {"camera", loaded.camera ? triple(loaded.camera->position) : Json()},
                  {"grids", Json::array()},
                  {"warnings", loaded.warnings}};
   for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report));
@@ -103,7 +106,7 @@ std::string three(const DVec3& v, const char* between) {
 }
 
 std::string quoted(const std::string& name) {
-  return name.empty() ? "(no name)" : "\"" + name + "\"";
+  return name.empty() ? "(no name)" : "\"" + on_one_line(name) + "\"";
 }
 
 std::string count_of(std::int64_t count, const std::string& singular) {
@@ -139,6 +142,9 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded, c
   text += to_string(faces) + "\n";
   const DBox bounds = scene.bounds(options.instances());
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
+  if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
+  if (loaded.sun) text += "Sun: towards " + three(*loaded.sun, ", ") + "\n";
+  if (loaded.camera) text += "Camera: at " + three(loaded.camera->position, ", ") + "\n";
   for (const GridReport& report : report_grids(scene)) text += grid_text(report);
   return text;
 }

@@ -8,8 +8,6 @@
 
 namespace quoin::tool {
 
-namespace {
-
 std::string on_one_line(std::string_view text) {
   std::string line(text);
   for (char& c : line) {
@@ -17,8 +15,6 @@ std::string on_one_line(std::string_view text) {
   }
   return line;
 }
-
-}  // namespace
 
 std::string number_for_people(double value) {
   std::array<char, 400> text{};

@@ -13,6 +13,9 @@ namespace quoin::tool {
 
 using Json = nlohmann::ordered_json;
 
+/// Text for a terminal: control characters become question marks.
+[[nodiscard]] std::string on_one_line(std::string_view text);
+
 /// "1.5 MB"; decimal units, up to three digits.
 [[nodiscard]] std::string bytes_for_people(std::uint64_t bytes);
 

@@ -69,7 +69,8 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
 }
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
-  add_text_option(command, "--sun", "X,Y,Z|off", "Direction towards the sun (default 0.371,0.743,0.223), or night");
+  add_text_option(command, "--sun", "X,Y,Z|off",
+                  "Direction towards the sun (default 0.371,0.743,0.223), or off: night with --sky-brightness 0.05");
   add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
   command
       .add_option("--lamps", arguments.render.light.lamps,
@@ -186,7 +187,7 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   for (const char* option : {"--ao-rays", "--ao-distance"}) {
     if (command.count(option) > 0 && arguments.occlusion != "rays") return std::string(option) + " needs --ao rays";
   }
-  for (const char* option : {"--lamps", "--lamp-brightness", "--sky-brightness"}) {
+  for (const char* option : {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness"}) {
     if (command.count(option) > 0 && (preset == "unlit" || preset == "ao")) {
       return std::string(option) + ": the preset " + preset + " has no light";
     }
@@ -194,6 +195,9 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   const bool has_shadows = preset == "full" || preset == "no-ao";
   if (command.count("--shadow-distance") > 0 && !has_shadows) {
     return "--shadow-distance: the preset " + preset + " has no shadows";
+  }
+  if (command.count("--lamp-brightness") > 0 && arguments.render.light.lamps == 0) {
+    return "--lamp-brightness: --lamps 0 has no lamps shine";
   }
   return "";
 }

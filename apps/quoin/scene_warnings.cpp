@@ -4,6 +4,11 @@
 
 namespace quoin::tool {
 
+void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
+  if (scene.lamps.empty()) return;
+  warnings.push_back("lamps left out, which meshes do not hold: " + std::to_string(scene.lamps.size()));
+}
+
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
   std::size_t left_out = 0;
   for (const InstanceHandle handle : scene.instances().handles()) {

@@ -334,8 +334,8 @@ std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   if (!me.uses_device() || !me.meshes || me.request->mode == DrawMode::Rays) return {};
   const VulkanMeshRenderer::Stats drawn = me.meshes->renderer.stats();
   const LiveMeshes::Stats live = me.meshes->live.stats();
-  return {{"triangles", text("%.0f", static_cast<double>(drawn.triangles))},
-          {"of these drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
+  return {{"triangles, each once", text("%.0f", static_cast<double>(drawn.triangles))},
+          {"triangles drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
           {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},
           {"still to mesh", text("%.0f", static_cast<double>(me.meshes->live.pending()))},
           {"meshes", text("%.1f MB", static_cast<double>(drawn.bytes) / 1e6)},

@@ -28,6 +28,10 @@ void set_direction(RayPacket& rays, std::size_t lane, DVec3 direction) {
   rays.direction_z[lane] = direction.z;
 }
 
+DVec3 normal_at(const SurfacePoint& point) {
+  return point.in_field ? DVec3(point.normal) : DVec3(normal_of(point.face));
+}
+
 }  // namespace
 
 // The points' indices: those of one grid together, in it those of one face, so that most groups of sixteen have all
@@ -71,15 +75,19 @@ struct Lighting::Group {
       surfaces |= 1U << size;
       if (point.openness < 0.0F) unknown |= 1U << size;
     }
-    const FaceFrame& frame = frame_of(point.face);
     DVec3 origin = point.position;
-    origin[frame.axis] += lift * frame.sign;
+    if (point.in_field) {
+      origin += lift * DVec3(point.normal);
+    } else {
+      const FaceFrame& frame = frame_of(point.face);
+      origin[frame.axis] += lift * frame.sign;
+    }
     origins.origin_x[size] = origin.x;
     origins.origin_y[size] = origin.y;
     origins.origin_z[size] = origin.z;
-    set_direction(origins, size, DVec3(normal_of(point.face)));
+    set_direction(origins, size, normal_at(point));
     placed = point.placed;
-    is_one_face &= size == 0 || point.face == points[0]->face;
+    is_one_face &= !point.in_field && (size == 0 || point.face == points[0]->face);
     points[size++] = &point;
   }
 };
@@ -156,13 +164,18 @@ std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) 
   return rays;
 }
 
+float Lighting::diffuse(const Frame& frame, const SurfacePoint& point) const {
+  if (!point.in_field) return frame.diffuse[index_of(point.face)];
+  return static_cast<float>(std::max(glm::dot(DVec3(point.normal), frame.to_sun), 0.0) * options_.sun_brightness);
+}
+
 std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunlight) const {
   const Frame& frame = frames_[static_cast<std::size_t>(group.placed)];
   RayPacket rays = group.origins;
   for (std::size_t i = 0; i < group.size; ++i) {
-    const float diffuse = frame.diffuse[index_of(group.points[i]->face)];
-    sunlight[i] = Vec3(diffuse);
-    if (diffuse > 0.0F && (group.surfaces >> i & 1U) != 0) rays.active |= 1U << i;
+    const float unshadowed = diffuse(frame, *group.points[i]);
+    sunlight[i] = Vec3(unshadowed);
+    if (unshadowed > 0.0F && (group.surfaces >> i & 1U) != 0) rays.active |= 1U << i;
   }
   if (!options_.shadows || rays.active == 0) return 0;
   rays.direction_x.fill(frame.to_sun.x);
@@ -231,8 +244,7 @@ std::int64_t Lighting::add_lamp(const Group& group, const PlacedLamp& lamp, std:
     const SurfacePoint& point = *group.points[i];
     const DVec3 origin{group.origins.origin_x[i], group.origins.origin_y[i], group.origins.origin_z[i]};
     const DVec3 point_from_pivot = placed.world_axes * ((origin - placed.pivot) * placed.voxel_size);
-    const LampRay ray =
-        lamp_ray(lamp, lamp_from_pivot - point_from_pivot, placed.world_axes * DVec3(normal_of(point.face)));
+    const LampRay ray = lamp_ray(lamp, lamp_from_pivot - point_from_pivot, placed.world_axes * normal_at(point));
     if (ray.light == Vec3(0.0F)) continue;
     light[i] = ray.light;
     lit |= 1U << i;
@@ -257,12 +269,18 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (!needs_openness()) return 0;
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = std::max(group.points[i]->openness, 0.0F);
   if (group.unknown == 0) return 0;
-  if (options_.occlusion == OcclusionMode::Rays) return trace_openness(group, openness);
+  // A field has no faces with corners.
+  std::uint32_t traced = options_.occlusion == OcclusionMode::Rays ? group.unknown : 0;
+  for (std::size_t i = 0; i < group.size; ++i) {
+    if ((group.unknown >> i & 1U) != 0 && group.points[i]->in_field) traced |= 1U << i;
+  }
+  const std::int64_t rays = traced == 0 ? 0 : trace_openness(group, traced, openness);
+  if (traced == group.unknown) return rays;
   GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
   FaceOcclusion corners{};
   const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
-    if ((group.unknown >> i & 1U) == 0) continue;
+    if (((group.unknown & ~traced) >> i & 1U) == 0) continue;
     const SurfacePoint& point = *group.points[i];
     // Neighbours often lie on the same face.
     const bool is_new = last == nullptr || point.voxel != last->voxel || point.face != last->face;
@@ -270,13 +288,13 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
     if (is_new) corners = corner_occlusion(reader, *types_, point.voxel, point.face);
     openness[i] = 1.0F - occlusion_at(corners, point.voxel, point.face, point.position) / 3.0F;
   }
-  return 0;
+  return rays;
 }
 
-std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openness) const {
+std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const {
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
-  rays.active = group.unknown;
+  rays.active = lanes;
   rays.max_t.fill(options_.occlusion_distance / voxels_per_cell(group.placed));
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
@@ -285,7 +303,7 @@ std::int64_t Lighting::trace_openness(const Group& group, std::span<float> openn
     for (std::size_t i = 0; i < group.size; ++i) open[i] += static_cast<int>((blocked >> i & 1U) == 0);
   }
   for (std::size_t i = 0; i < group.size; ++i) {
-    if ((group.unknown >> i & 1U) != 0) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
+    if ((lanes >> i & 1U) != 0) openness[i] = static_cast<float>(open[i]) / static_cast<float>(count);
   }
   return std::int64_t{count} * std::popcount(rays.active);
 }
@@ -301,19 +319,25 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
     const SurfacePoint& point = *group.points[i];
     const std::size_t face = index_of(point.face);
     const bool is_fixed = group.directions != nullptr;
-    set_direction(rays, i, is_fixed ? (*group.directions)[face][number] : directions_.spread(face, ray, point.pixel));
+    // Those of a field's surface are those of an upper face, turned with it.
+    const std::size_t of = point.in_field ? index_of(Direction::PosY) : face;
+    DVec3 direction = is_fixed ? (*group.directions)[of][number] : directions_.spread(of, ray, point.pixel);
+    if (point.in_field) direction = turned_from_up(direction, DVec3(point.normal));
+    set_direction(rays, i, direction);
   }
 }
 
 const Surface& Lighting::surface_at(const SurfacePoint& point) const {
+  // As in smooth meshes, a field without materials is white.
+  static const Surface white{Vec3(1.0F)};
+  if (point.in_field && point.type == kAir) return white;
   if (detail_surfaces_.empty()) return (*surfaces_)[point.type];
   return detail_surfaces_[static_cast<std::size_t>(point.placed)];
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
-  const FaceFrame& frame = frame_of(point.face);
   const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
-  const Vec3 normal = Vec3(placed.world_axes[frame.axis]) * static_cast<float>(frame.sign);
+  const Vec3 normal(placed.world_axes * normal_at(point));
   Vec3 colour;
   for (int axis = 0; axis < 3; ++axis) colour[axis] = linear_from_srgb(0.5F + 0.5F * normal[axis]);
   return colour;

@@ -22,13 +22,15 @@ enum class PointKind : std::uint8_t {
   Glow,     ///< only what it emits
 };
 
-/// A point of a voxel's face that is to be lit.
+/// A point of a voxel's face, or of a field's surface, that is to be lit.
 struct SurfacePoint {
-  DVec3 position{0.0};  ///< in its grid, on the face
+  DVec3 position{0.0};  ///< in its grid, on the face or surface
   IVec3 voxel{0};
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   VoxelType type = kAir;
-  Direction face = Direction::PosX;
+  Direction face = Direction::PosX;  ///< of a field the one to which the normal is nearest
+  bool in_field = false;
+  Vec3 normal{0.0F};  ///< of a field, in its grid, of unit length or 0
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
   float openness = -1.0F;   ///< 0 to 1 where it is known, whatever the options' way to find it; less than 0: it is not
@@ -78,11 +80,13 @@ class Lighting {
   std::int64_t add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
                         std::span<Vec3> lamplight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
-  std::int64_t trace_openness(const Group& group, std::span<float> openness) const;
+  std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
+  // Of the sun, without shadows.
+  [[nodiscard]] float diffuse(const Frame& frame, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 normal_colour(const SurfacePoint& point) const;
   [[nodiscard]] bool needs_openness() const;
 

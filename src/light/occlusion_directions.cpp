@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <glm/geometric.hpp>
+
 #include <quoin/core/direction.h>
 
 namespace quoin {
@@ -72,6 +74,15 @@ OcclusionDirections::Fixed OcclusionDirections::turned(Angle turn) const {
     }
   }
   return all;
+}
+
+DVec3 turned_from_up(const DVec3& direction, const DVec3& normal) {
+  // Straight down any axis will do.
+  if (normal.y < -1.0 + 1e-9) return {-direction.x, -direction.y, direction.z};
+  // Rodrigues' formula, with the sine and cosine of the angle in the axis and in normal.y.
+  const DVec3 axis{normal.z, 0.0, -normal.x};
+  const DVec3 once = glm::cross(axis, direction);
+  return direction + once + glm::cross(axis, once) / (1.0 + normal.y);
 }
 
 DVec3 OcclusionDirections::spread(std::size_t face, int ray, std::uint32_t hash) const {

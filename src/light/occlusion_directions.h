@@ -56,6 +56,9 @@ class OcclusionDirections {
   std::vector<Angle> turns_;
 };
 
+/// A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: turned about the axis upright to both.
+[[nodiscard]] DVec3 turned_from_up(const DVec3& direction, const DVec3& normal);
+
 /// A well-mixed number of two, by integers only.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t a, std::uint32_t b) {
   return mix_bits(a * 0x9E37'79B9U + b * 0x85EB'CA6BU + 0x27D4'EB2FU);

@@ -95,8 +95,14 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   point.face = hits.grids.face[i];
   point.placed = hits.placed[i];
-  point.position = on_face(context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
-                           point.voxel, point.face);
+  point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  point.in_field = (hits.in_field >> lane & 1U) != 0;
+  if (point.in_field) {
+    point.normal = hits.normal(i);
+    point.type = hits.material[i];
+  } else {
+    point.position = on_face(point.position, point.voxel, point.face);
+  }
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
   if ((far_faces_.found >> lane & 1U) == 0) return;
   point.type = far_faces_.face[i]->type;
@@ -138,6 +144,7 @@ void Tile::light_points() {
   std::optional<GridReader> reader;
   std::int32_t known = -1;
   for (SurfacePoint& point : points_) {
+    if (point.in_field) continue;
     if (point.placed != known) {
       known = point.placed;
       reader.emplace(*placed[static_cast<std::size_t>(known)].voxels);

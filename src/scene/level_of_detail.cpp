@@ -168,7 +168,8 @@ void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid
   Content& content = contents[handle.index];
   content.sphere = content_sphere(grid.grid);
   content.generation = handle.generation;
-  content.is_there = content.sphere.radius > 0.0;
+  // Fields have no levels: what holds one is drawn whole.
+  content.is_there = content.sphere.radius > 0.0 && grid.field.chunk_count() == 0;
   content.from_pivot = content.sphere.centre - grid.pivot;
 }
 

@@ -95,9 +95,14 @@ struct Scene::Book {
       if (!handle.has_value()) continue;
       journal.begin_change();
       note(*handle, keys);
-      notices.follow(grids[*handle].grid.notice_, index);
+      follow(grids[*handle], index);
     }
     noticed.clear();
+  }
+  // Edits of either come under the grid's number.
+  void follow(const SceneGrid& grid, std::uint32_t index) {
+    notices.follow(grid.grid.notice_, index);
+    notices.follow(grid.field.notice_, index);
   }
 };
 
@@ -113,12 +118,11 @@ Scene Scene::snapshot() const {
   copy.types = types;
   copy.lamps = lamps;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
-    return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas};
+    return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()};
   });
   copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
   copy.book_ = std::make_unique<Book>(*book_);
-  copy.grids_.for_each(
-      [&](GridHandle handle, const SceneGrid& grid) { copy.book_->notices.follow(grid.grid.notice_, handle.index); });
+  copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) { copy.book_->follow(grid, handle.index); });
   return copy;
 }
 
@@ -130,7 +134,7 @@ GridHandle Scene::add_grid(SceneGrid grid) {
   book_->journal.begin_change();
   book_->grid_serials[handle.index] = 0;  // records of another grid in this slot stay as they are
   book_->note(handle, grids_.size() + instances_.size());
-  book_->notices.follow(grids_[handle].grid.notice_, handle.index);
+  book_->follow(grids_[handle], handle.index);
   return handle;
 }
 
@@ -214,7 +218,7 @@ DBox Scene::bounds(InstanceFilter filter) const {
     const Instance& instance = instances_[handle];
     const SceneGrid* grid = grids_.find(instance.grid);
     if (grid == nullptr || !passes(filter, instance) || !has_place(instance)) continue;
-    const IBox tight = grid->grid.bounds();
+    const IBox tight = grid->bounds();
     if (tight.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {
       const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,

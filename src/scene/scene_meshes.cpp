@@ -66,13 +66,13 @@ std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   return grids;
 }
 
-/// A placement per drawn instance, in their order; `grids[i]` is part `i`.
+/// A placement per drawn instance, in their order; `grids[i]` is part `i`. Of one grid's instances where it is given.
 std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<GridHandle>& grids,
-                                         InstanceFilter filter) {
+                                         InstanceFilter filter, std::optional<GridHandle> only = {}) {
   std::vector<MeshPlacement> placements;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, filter)) continue;
+    if (!is_drawn(scene, instance, filter) || (only && instance.grid != *only)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
     const DQuat rotation = unit_rotation(instance.rotation);
     const Similarity place{instance.position, rotation, instance.voxel_size, instance.mirrored};
@@ -153,6 +153,25 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
   return mesh;
 }
 
+/// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
+/// instances, in their order.
+Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
+                  const Surface& wanted, SceneMeshes& meshes, Threads threads) {
+  for (const GridHandle handle : grids) {
+    const SceneGrid& grid = scene.grids()[handle];
+    if (grid.field.chunk_count() == 0) continue;
+    auto mesh = surface_of(grid.field, scene.types, wanted, meshes.stats, threads, {});
+    if (!mesh) return mesh.error();
+    if (mesh->indices.empty()) continue;
+    for (MeshPlacement& placement : placements_of(scene, {handle}, filter, handle)) {
+      placement.part = meshes.parts.size();
+      meshes.placements.push_back(std::move(placement));
+    }
+    meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
+  }
+  return {};
+}
+
 }  // namespace
 
 glm::dmat4 MeshPlacement::matrix() const {
@@ -202,6 +221,11 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     }
   }
   meshes.placements = placements_of(scene, grids, options.instances);
+  SmoothMeshOptions smooth;
+  if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;
+  if (auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, meshes, threads); !done) {
+    return done.error();
+  }
   return meshes;
 }
 
@@ -227,6 +251,8 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
     // The field's sample is the voxel's centre.
     if (!is_empty) meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot - 0.5));
   }
+  const Surface wanted{options.mesh, options.simplify_error};
+  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads); !done) return done.error();
   return meshes;
 }
 

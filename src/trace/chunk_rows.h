@@ -12,17 +12,29 @@
 
 namespace quoin::trace {
 
+/// What 4x4 rows of a chunk, 64 voxels each, hold.
+enum class Slab : std::uint8_t { Empty, Full, Mixed };
+using SlabRows = std::array<std::uint64_t, 16>;  ///< [z][y]
+
+/// Of which kind rows are.
+[[nodiscard]] inline Slab slab_of(const SlabRows& rows) {
+  std::uint64_t any = 0;
+  std::uint64_t all = ~std::uint64_t{0};
+  for (const std::uint64_t row : rows) {
+    any |= row;
+    all &= row;
+  }
+  return any == 0 ? Slab::Empty : all == ~std::uint64_t{0} ? Slab::Full : Slab::Mixed;
+}
+
 /// Rows of a chunk as bits, by asking the palette which types count.
 class ChunkRows {
  public:
   ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which);
 
-  /// Whether no voxel counts, or all do.
+  /// Whether no voxel counts.
   [[nodiscard]] bool none() const { return in_.empty(); }
-  [[nodiscard]] bool all() const { return out_.empty(); }
 
-  enum class Slab : std::uint8_t { Empty, Full, Mixed };
-  using SlabRows = std::array<std::uint64_t, 16>;
   /// The 4x4 rows from (y, z) on, which are multiples of 4; they are set only where they are mixed.
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
@@ -69,9 +81,40 @@ class RowsBox {
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};
-  /// Fills them in. False when all four are empty or all four are full, as `is_full` says; `bricks` is then not set.
-  bool read(const ChunkRows& rows, int y, int z, RowsBox& box);
+  /// Fills them in from what has rows, a ChunkRows or CellRows. False when all four are empty or all four are full, as
+  /// `is_full` says; `bricks` is then not set.
+  template <class Rows>
+  bool read(const Rows& rows, int y, int z, RowsBox& box);
   bool is_full = false;
 };
+
+// 16 rows of 16 nibbles, [z][y][x / 4], become 16 words of 4^3 bits: nibble j of word i becomes nibble i of word j.
+void transpose_nibbles(SlabRows& rows);
+
+template <class Rows>
+bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
+  int empty = 0;
+  int full = 0;
+  SlabRows words;
+  for (int slab = 0; slab < 16; ++slab) {
+    const int slab_y = y + 4 * (slab & 3);
+    const int slab_z = z + 4 * (slab >> 2);
+    const Slab kind = rows.read(slab_y, slab_z, words);
+    if (kind == Slab::Empty) {
+      words.fill(0);
+      ++empty;
+    } else if (kind == Slab::Full) {
+      words.fill(~std::uint64_t{0});
+      box.add_slab(slab_y, slab_z);
+      ++full;
+    } else {
+      for (int i = 0; i < 16; ++i) box.add(slab_y + (i & 3), slab_z + (i >> 2), words[static_cast<std::size_t>(i)]);
+      transpose_nibbles(words);
+    }
+    for (std::size_t i = 0; i < 16; ++i) bricks[i / 4][i % 4 + static_cast<std::size_t>(slab) * 4] = words[i];
+  }
+  is_full = full == 16;
+  return empty != 16 && full != 16;
+}
 
 }  // namespace quoin::trace

@@ -6,7 +6,9 @@
 #include <tsl/robin_map.h>
 
 #include "grid/chunk_boxes.h"
+#include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
+#include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
 
@@ -42,6 +44,21 @@ std::size_t word_of(IVec3 unit) {
 }
 unsigned bit_of(IVec3 unit) {
   return static_cast<unsigned>((unit.x & 3) + 4 * (unit.y & 3) + 16 * (unit.z & 3));
+}
+
+// A chunk and those below it, some of whose cells end in it.
+constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
+                                         {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
+
+// Where cells between the samples of some chunks lie.
+std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
+  std::vector<IVec3> cells;
+  cells.reserve(chunks.size() * kBelow.size());
+  for (const IVec3 chunk : chunks) {
+    for (const IVec3 offset : kBelow) cells.push_back(chunk + offset);
+  }
+  sort_and_unite(cells);
+  return cells;
 }
 
 trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chunks, const Node* bricks,
@@ -178,7 +195,8 @@ struct OccupancyTree::Impl {
   }
 
   // Returns which bricks changed; `box` becomes that of the chunk's occupied voxels, in chunk coordinates.
-  std::uint64_t fill(ChunkNode& node, const trace::ChunkRows& rows, IBox& box) {
+  template <class Rows>
+  std::uint64_t fill(ChunkNode& node, const Rows& rows, IBox& box) {
     std::uint64_t changed = 0;
     trace::RowsBox rows_box;
     trace::BrickRow four;
@@ -195,21 +213,24 @@ struct OccupancyTree::Impl {
     return changed;
   }
 
+  std::uint64_t drop(IVec3 chunk) {
+    chunk_boxes.put(chunk, {});
+    remove(chunk);
+    return kAll;
+  }
+
   // Returns which bricks changed.
-  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
-    const auto drop = [&] {
-      chunk_boxes.put(chunk, {});
-      remove(chunk);
-      return kAll;
-    };
-    if (voxels == nullptr) return drop();
-    const trace::ChunkRows rows(*voxels, types, which);
-    if (rows.none()) return drop();
+  template <class Rows>
+  std::uint64_t put(const Rows& rows, IVec3 chunk) {
+    if (rows.none()) return drop(chunk);
     IBox box;
     const std::uint64_t changed = fill(find_or_create(chunk), rows, box);
-    if (box.empty()) return drop();
+    if (box.empty()) return drop(chunk);
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
+  }
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
+    return voxels == nullptr ? drop(chunk) : put(trace::ChunkRows(*voxels, types, which), chunk);
   }
 
   // Puts 4 bits in place of those at `bit`.
@@ -334,11 +355,22 @@ OccupancyTree::~OccupancyTree() = default;
 OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types, Occupancy which) {
   OccupancyTree tree(which);
   for (const IVec3 chunk : grid.chunks()) tree.impl_->put(grid.find_chunk(chunk), types, chunk);
-  tree.impl_->chunk_nodes.shrink_to_fit();
-  tree.impl_->bricks.shrink_to_fit();
-  tree.impl_->finish({});
-  tree.view_ = tree.impl_->kernel_view();
+  tree.finish_build();
   return tree;
+}
+
+OccupancyTree OccupancyTree::build(const DensityGrid& field) {
+  OccupancyTree tree;
+  for (const IVec3 chunk : cells_of(field.chunks())) tree.impl_->put(trace::CellRows(field, chunk), chunk);
+  tree.finish_build();
+  return tree;
+}
+
+void OccupancyTree::finish_build() {
+  impl_->chunk_nodes.shrink_to_fit();
+  impl_->bricks.shrink_to_fit();
+  impl_->finish({});
+  view_ = impl_->kernel_view();
 }
 
 void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
@@ -350,6 +382,27 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const G
   changed.reserve(changes.items.size());
   for (const ChunkChange& each : changes.items) {
     changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk)});
+  }
+  impl_->finish(changed);
+  view_ = impl_->kernel_view();
+}
+
+void OccupancyTree::update(const DensityGrid& field, const DensityChanges& changes) {
+  if (changes.all) {
+    *this = build(field);
+    return;
+  }
+  std::vector<IVec3> reached;
+  for (const DensityChange& each : changes.items) {
+    for (const IVec3 offset : kBelow) {
+      if (each.affects(offset, 1)) reached.push_back(each.chunk + offset);
+    }
+  }
+  sort_and_unite(reached);
+  std::vector<Impl::Changed> changed;
+  changed.reserve(reached.size());
+  for (const IVec3 chunk : reached) {
+    changed.push_back({chunk, impl_->put(trace::CellRows(field, chunk), chunk)});
   }
   impl_->finish(changed);
   view_ = impl_->kernel_view();

@@ -221,13 +221,9 @@ bool is_usable(const Ray& ray, double max_t) {
   return length > 0.0 && max_t >= 0.0;
 }
 
-// The face that looks most against a direction; x before y before z.
+// The face that looks most against a direction.
 Direction facing(const DVec3& direction) {
-  int axis = 0;
-  for (int other = 1; other < 3; ++other) {
-    if (std::abs(direction[other]) > std::abs(direction[axis])) axis = other;
-  }
-  return static_cast<Direction>(2 * axis + (direction[axis] > 0.0 ? 1 : 0));
+  return nearest_direction(-direction);
 }
 
 Direction face_of(const Walk& walk, const Ray& ray) {

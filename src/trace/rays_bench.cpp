@@ -75,19 +75,10 @@ void trace(benchmark::State& state, const Case& c, InstructionSet set) {
   report(state, rays.size(), hits, c.expected);
 }
 
-// Packets of 16 in the order of the rays.
-std::vector<RayPacket> packets_of(const std::vector<RayQuery>& rays) {
-  std::vector<RayPacket> packets((rays.size() + 15) / 16);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    packets[i / 16].set(static_cast<int>(i % 16), rays[i].ray, rays[i].max_t);
-  }
-  return packets;
-}
-
 void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
   const InstructionSetOverride over(set);
   const OccupancyTree& tree = ray_workload().tree;
-  const std::vector<RayPacket> packets = packets_of(c.rays());
+  const std::vector<RayPacket> packets = workloads::ray_packets(c.rays());
   PacketHits found;
   int hits = 0;
   for (auto _ : state) {

@@ -34,7 +34,7 @@ constexpr std::array kCommands = {
     CommandInfo{Command::DrawBlocks, "Blocky meshes", "F6", SDLK_F6, false, false},
     CommandInfo{Command::DrawSmooth, "Smooth meshes", "F7", SDLK_F7, false, false},
     CommandInfo{Command::NextWireframe, "Edges of triangles", "F8", SDLK_F8, false, false},
-    CommandInfo{Command::NextShading, "Lit, unlit, occlusion, normals", "F9", SDLK_F9, false, false},
+    CommandInfo{Command::NextShading, "Lit, unlit, with or only occlusion, normals", "F9", SDLK_F9, false, false},
     CommandInfo{Command::DetailColours, "Levels of detail in colours", "F10", SDLK_F10, false, false},
     CommandInfo{Command::Panel, "Panel", "F2", SDLK_F2, false, false},
     CommandInfo{Command::Help, "Keys and mouse", "F1", SDLK_F1, false, false},

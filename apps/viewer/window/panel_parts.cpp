@@ -150,7 +150,6 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
   ImGui::SliderInt("radius", &state.brush.radius, 0, kMaxBrush, "%d", ImGuiSliderFlags_AlwaysClamp);
   draw_palette(state);
   draw_new_colour(state);
-  ImGui::SameLine();
   const EditHistory& history = state.open.document->history();
   ImGui::BeginDisabled(!history.can_undo());
   command_button(Command::Undo, "Undo", choice);
@@ -256,10 +255,12 @@ void draw_light_part(ViewState& state) {
   if (!heading("Light")) return;
   LightOptions& light = state.settings.light;
   int shading = static_cast<int>(light.shading);
-  if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit with occlusion\0occlusion alone\0normals\0")) {
+  if (ImGui::Combo("shading", &shading, "lit\0unlit\0unlit + occlusion\0occlusion alone\0normals\0")) {
     light.shading = static_cast<Shading>(shading);
   }
+  ImGui::BeginDisabled(light.shading == Shading::Unlit || light.shading == Shading::Normals);
   draw_occlusion(light, state.settings.mode == DrawMode::Rays);
+  ImGui::EndDisabled();
   ImGui::BeginDisabled(light.shading != Shading::Lit);
   const bool has_shadows = state.open.backend && state.open.backend->traces_light(state.settings.mode);
   ImGui::BeginDisabled(!has_shadows);
@@ -269,7 +270,6 @@ void draw_light_part(ViewState& state) {
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip("meshes have shadows where there is a graphics card; marched rays do everywhere (F5)");
   }
-  ImGui::SameLine();
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   if (ImGui::Checkbox("occlusion of all light", &is_all)) {
     light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
@@ -308,13 +308,13 @@ void draw_statistics_part(const ViewState& state) {
       ImGui::TextUnformatted(value.c_str());
     }
   }
+  // A device's name is long.
   ImGui::TextDisabled("drawn by");
-  ImGui::SameLine(0.5F * ImGui::GetWindowWidth());
-  ImGui::TextUnformatted(state.open.backend ? state.open.backend->name().c_str() : "-");
+  ImGui::TextWrapped("%s", state.open.backend ? state.open.backend->name().c_str() : "-");
 }
 
 void draw_help_table(float scale) {
-  constexpr std::array<std::pair<const char*, const char*>, 9> kMouse = {
+  constexpr std::array<std::pair<const char*, const char*>, 11> kMouse = {
       {{"Left button", "the tool; with Look, and with Alt, turns"},
        {"Right button", "turns: about what is under the mouse, or the head"},
        {"Middle button", "moves sideways"},
@@ -323,7 +323,9 @@ void draw_help_table(float scale) {
        {"W A S D or arrows", "forward, left, back, right"},
        {"Q E", "down, up"},
        {"Shift", "four times as fast"},
-       {"Drop a file", "opens it"}}};
+       {"Drop a file", "opens it"},
+       {"Torch (F2)", "chooses a voxel that lights what is around it"},
+       {"Light (F2)", "sun, sky, lamps; how far occlusion and shadows reach"}}};
   const float column = 170.0F * scale;
   for (const auto& [what, does] : kMouse) {
     ImGui::TextUnformatted(what);

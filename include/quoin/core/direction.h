@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include <quoin/core/vec.h>
@@ -37,6 +38,15 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
   IVec3 n{0};
   n[frame_of(d).axis] = frame_of(d).sign;
   return n;
+}
+
+/// The direction along which a vector points most; x before y before z. PosX of none.
+[[nodiscard]] inline Direction nearest_direction(const DVec3& vector) {
+  int axis = 0;
+  for (int other = 1; other < 3; ++other) {
+    if (std::abs(vector[other]) > std::abs(vector[axis])) axis = other;
+  }
+  return static_cast<Direction>(2 * axis + (vector[axis] < 0.0 ? 1 : 0));
 }
 
 }  // namespace quoin

@@ -110,8 +110,12 @@ class DensityGrid {
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
   [[nodiscard]] DensityNeighbourhood neighbourhood(IVec3 chunk) const;
-  /// The smallest box around all solid samples; empty when there are none. Cost: O(chunks * 4096).
+  /// The smallest box around all solid samples; empty when there are none.
+  /// Cost: O(chunks * 4096) the first time, then that of the chunks that changed.
   [[nodiscard]] IBox solid_bounds() const;
+  /// The smallest box of whole coordinates within which the trilinear field is negative anywhere: the solid lies
+  /// between its sides. Empty where there is none. Cost: as `solid_bounds`.
+  [[nodiscard]] IBox bounds() const;
   [[nodiscard]] std::int64_t solid_count() const;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
@@ -127,10 +131,12 @@ class DensityGrid {
   void compact();
 
  private:
+  friend class Scene;
   struct Impl;
   explicit DensityGrid(std::unique_ptr<Impl> impl);
 
   std::unique_ptr<Impl> impl_;
+  mutable EditNotice notice_;  // a scene that follows it is no part of it
 };
 
 }  // namespace quoin

@@ -62,8 +62,10 @@ struct LoadOptions {
 /// `read_vox` makes them. Otherwise voxels still stand where they stood, but grids are moved to the origin, and those
 /// beyond 256 become several, under a group.
 /// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1.
-/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, with a warning.
-/// Errors:   Unsupported when a transform is not one of the 48 axis-aligned ones or a voxel size is not 1;
+/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, and lamps are left out, each
+///           with a warning.
+/// Errors:   Unsupported when a transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or a grid holds
+///           a field of densities;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
 /// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the

@@ -13,7 +13,7 @@ enum class OcclusionMode : std::uint8_t {
   Off,
   Rays,    ///< short rays over the face's hemisphere
   Vertex,  ///< the occlusion of the face's four corners, interpolated over its triangles, as blocky meshes carry it:
-           ///< it knows of the face's own grid only
+           ///< it knows of the face's own grid only. Fields, which have no such corners, have Rays
 };
 
 /// What ambient occlusion darkens.

@@ -72,7 +72,8 @@ class VulkanRenderer {
   ///
   /// What changed the journals of the scene and its grids tell; it may be another scene each time.
   /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
-  /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels; then the device holds nothing.
+  /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels or hold a field of densities; then the
+  ///         device holds nothing.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
                               Threads threads = {});
   /// Bytes that the last `update` sent to the device.

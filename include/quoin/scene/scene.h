@@ -11,24 +11,30 @@
 #include <quoin/core/changes.h>
 #include <quoin/core/slot_map.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/lamp.h>
 
 namespace quoin {
 
-/// A grid as a scene holds it.
+/// A grid as a scene holds it: blocks, a field of densities, or both in one space, in which sample (i, j, k) of the
+/// field lies at the point (i, j, k), the least corner of voxel (i, j, k).
 struct SceneGrid {
   std::string name;
-  Grid grid;
+  Grid grid;  ///< the voxels
   /// The point of the grid, in voxels, that an instance's position places and about which it turns.
   DVec3 pivot{0.0};
   /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may
   /// lie outside after edits; `declared_box` says how large the grid counts as.
   IBox canvas;
+  /// The densities; its materials are types of the scene's registry, of which transparent ones count as opaque.
+  DensityGrid field = DensityGrid();
 
+  /// The smallest box of whole coordinates around the voxels and the field's solid; empty where there are none.
+  [[nodiscard]] IBox bounds() const { return unite(grid.bounds(), field.bounds()); }
   /// The canvas and the tight bounds together.
-  [[nodiscard]] IBox declared_box() const { return unite(canvas, grid.bounds()); }
+  [[nodiscard]] IBox declared_box() const { return unite(canvas, bounds()); }
 };
 
 using GridHandle = Handle<SceneGrid>;
@@ -99,8 +105,8 @@ class Scene {
 
   [[nodiscard]] const SlotMap<SceneGrid>& grids() const { return grids_; }
   [[nodiscard]] const SlotMap<Instance>& instances() const { return instances_; }
-  /// A grid, to be edited, now or later: the scene learns of every edit of its voxels. Name, pivot and canvas are to be
-  /// changed before the next `changes_since`, since this call is what records the change.
+  /// A grid, to be edited, now or later: the scene learns of every edit of its voxels and its field. Name, pivot and
+  /// canvas are to be changed before the next `changes_since`, since this call is what records the change.
   /// Requires: the handle names a grid.
   [[nodiscard]] SceneGrid& edit(GridHandle handle);
   /// An instance, to be changed before the next `changes_since`: this call is what records it.

@@ -75,7 +75,8 @@ struct BlockySceneOptions {
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
-/// grids' handles, a placement per drawn instance in that of theirs.
+/// grids' handles, a placement per drawn instance in that of theirs. After these come the surfaces of the grids'
+/// fields, as build_smooth_mesh makes them, with placements of their own.
 ///
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
@@ -90,7 +91,8 @@ struct SmoothSceneOptions {
 };
 
 /// Meshes every grid that a drawn instance places, once, with smooth surfaces around the voxels, as field_from_grid and
-/// build_smooth_mesh make them. Placements are in the order of their parts; grids without a surface are left out.
+/// build_smooth_mesh make them; then the surfaces of the grids' fields. Placements are in the order of their parts;
+/// grids without a surface are left out.
 ///
 /// Types:  every voxel that is not air is solid and opaque.
 /// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.

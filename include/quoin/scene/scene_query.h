@@ -16,16 +16,21 @@ namespace quoin {
 /// Where a ray meets a scene.
 struct SceneHit {
   InstanceHandle instance;
-  IVec3 voxel{0};  ///< in the grid that is traced: the instance's own, unless the tracer has halved it
-  VoxelType type = kAir;
-  Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit
+  /// In the grid that is traced: the instance's own, unless the tracer has halved it. Of a field the cell, as in
+  /// DensityHit.
+  IVec3 voxel{0};
+  VoxelType type = kAir;             ///< of a field the material
+  Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit. Of a field that nearest to its normal
   double distance = 0.0;             ///< in lengths of the ray's direction: world units for a unit one
   DVec3 position{0.0};               ///< in the world
   bool starts_inside = false;
+  bool in_field = false;
+  DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
 };
 
-/// The nearest voxel along a ray in the world, transparent ones too; of equally near ones that of the instance that
-/// comes first. Nothing when there is none, or when the ray is not finite or its direction is zero.
+/// The nearest voxel or field's surface along a ray in the world, transparent ones too; of equally near ones that of the
+/// instance that comes first, in it the voxel. Nothing when there is none, or when the ray is not finite or its
+/// direction is zero.
 ///
 /// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
 ///            itself.

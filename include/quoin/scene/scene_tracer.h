@@ -12,6 +12,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
 
 namespace quoin {
@@ -25,6 +26,7 @@ struct PlacedGrid {
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
+  const DensityTree* field = nullptr;          ///< null when the grid's field has no solid
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units a voxel of `voxels`

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include <quoin/core/vec.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -39,6 +40,11 @@ class OccupancyTree {
   /// From the grid's own storage. Cost: 5 to 20 microseconds a chunk that is not uniform.
   static OccupancyTree build(const Grid& grid, const VoxelRegistry& types, Occupancy which = Occupancy::NonAir);
 
+  /// Of a field: of the cells between its samples, those with a solid corner, since the trilinear field is below 0
+  /// nowhere else. Cell (i, j, k), here a voxel, spans the points from sample (i, j, k) to (i + 1, j + 1, k + 1).
+  /// Cost: as that of a grid.
+  static OccupancyTree build(const DensityGrid& field);
+
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///
   /// Requires: `changes` are those since the last update, or what was built; no type has another visibility since then
@@ -46,6 +52,10 @@ class OccupancyTree {
   /// Cost: 5 to 20 microseconds a chunk that changed, all of which is read while only bricks that differ are written;
   ///       when the box of chunks around everything grows or shrinks, the flat tables anew besides.
   void update(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
+
+  /// The same of the field of which it was built. Cost: as that of a grid; for an edit on a chunk's lower faces also
+  /// the chunks below.
+  void update(const DensityGrid& field, const DensityChanges& changes);
 
   /// The smallest box around the occupied voxels, to the voxel.
   [[nodiscard]] IBox bounds() const;
@@ -60,6 +70,8 @@ class OccupancyTree {
  private:
   friend class trace::TreeNodes;
   struct Impl;
+  void finish_build();
+
   std::unique_ptr<Impl> impl_;
   const trace::TreeView* view_ = nullptr;  // in `impl_`
 };

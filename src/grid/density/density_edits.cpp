@@ -82,6 +82,7 @@ bool DensityGrid::set(IVec3 sample, DensitySample value) {
     return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
+  const NoticeOfEdits notice(impl_->store, notice_);
   return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace) != 0;
 }
 
@@ -96,22 +97,27 @@ std::int64_t DensityGrid::edit_rows(
     return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
+  const NoticeOfEdits notice(impl_->store, notice_);
   return impl_->store.edit(box_from(box), true, kAir, rows, change_part);
 }
 
 std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend) {
+  const NoticeOfEdits notice(impl_->store, notice_);
   return add_shape(impl_->store, Sphere(centre, radius), material, blend);
 }
 
 std::int64_t DensityGrid::remove_sphere(DVec3 centre, double radius, double blend) {
+  const NoticeOfEdits notice(impl_->store, notice_);
   return remove_shape(impl_->store, Sphere(centre, radius), blend);
 }
 
 std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend) {
+  const NoticeOfEdits notice(impl_->store, notice_);
   return add_shape(impl_->store, RoundedBox(min, max, rounding), material, blend);
 }
 
 std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, double blend) {
+  const NoticeOfEdits notice(impl_->store, notice_);
   return remove_shape(impl_->store, RoundedBox(min, max, rounding), blend);
 }
 
@@ -120,6 +126,7 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec
   const Brush brush(centre, radius, strength);
   const Plane plane(point, normal);
   if (!brush.is_sound() || !plane.is_sound()) return 0;
+  const NoticeOfEdits notice(impl_->store, notice_);
   DensityStore& store = impl_->store;
   const double band = store.band();
   const auto choose = [&](IVec3 chunk) {

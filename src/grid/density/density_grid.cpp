@@ -18,6 +18,7 @@ DensityGrid::~DensityGrid() = default;
 DensityGrid::DensityGrid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 DensityGrid DensityGrid::snapshot() const {
+  impl_->solid.prepare(impl_->store.journal(), impl_->store.entries());
   return DensityGrid(std::make_unique<Impl>(*impl_));
 }
 
@@ -34,10 +35,12 @@ VoxelType DensityGrid::material(IVec3 sample) const {
 }
 
 void DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
+  const NoticeOfEdits notice(impl_->store, notice_);
   impl_->store.put(chunk, std::move(samples));
 }
 
 void DensityGrid::clear() {
+  const NoticeOfEdits notice(impl_->store, notice_);
   impl_->store.clear();
 }
 
@@ -67,19 +70,12 @@ DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
 }
 
 IBox DensityGrid::solid_bounds() const {
-  IBox box;
-  impl_->store.entries().for_each([&](IVec3 at, const DensityStore::Entry& entry) {
-    IBox inside;
-    for (int z = 0; z < kChunkEdge; ++z) {
-      for (int y = 0; y < kChunkEdge; ++y) {
-        const std::uint64_t solid = entry.samples.solid_row(y, z);
-        if (solid == 0) continue;
-        inside = unite(inside, {{std::countr_zero(solid), y, z}, {kChunkEdge - std::countl_zero(solid), y + 1, z + 1}});
-      }
-    }
-    if (!inside.empty()) box = unite(box, {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge});
-  });
-  return box;
+  return impl_->solid.update(impl_->store.journal(), impl_->store.entries());
+}
+
+IBox DensityGrid::bounds() const {
+  const IBox solid = solid_bounds();
+  return solid.empty() ? IBox{} : IBox{solid.min - 1, solid.max};
 }
 
 std::int64_t DensityGrid::solid_count() const {

@@ -114,6 +114,7 @@ DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
 
 void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row) {
   if (changes.samples != 0) {
+    ++edits_;
     journal_.note(entry.serial, {chunk, changes}, entries_.size());
     if (has_even_row) entry.samples.unite_slabs();
   }
@@ -144,6 +145,7 @@ void DensityStore::put(IVec3 chunk, DensityChunk samples) {
 
 void DensityStore::clear() {
   if (entries_.size() == 0) return;
+  ++edits_;
   journal_.begin_change();
   entries_.for_each([this](IVec3 at, const Entry& entry) {
     std::uint64_t serial = entry.serial;

@@ -49,6 +49,8 @@ class DensityStore {
   [[nodiscard]] float band() const { return float_from_half(far_); }
   [[nodiscard]] const ChunkTrie<Entry>& entries() const { return entries_; }
   [[nodiscard]] const ChangeJournal<DensityRecord>& journal() const { return journal_; }
+  /// A number that grows with every change of a chunk.
+  [[nodiscard]] std::uint64_t edits() const { return edits_; }
   [[nodiscard]] const Entry* find(IVec3 chunk) const { return entries_.find(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] Half get(IVec3 sample) const {
     const Entry* entry = find(chunk_of(sample));
@@ -99,6 +101,7 @@ class DensityStore {
   Half far_;
   ChunkTrie<Entry> entries_;
   ChangeJournal<DensityRecord> journal_;
+  std::uint64_t edits_ = 0;
 };
 
 template <class ChangeRow>

@@ -9,6 +9,7 @@
 #include <quoin/io/scene_file.h>
 
 #include "io/base64.h"
+#include "io/field_check.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/text.h"
 #include "io/whole_file.h"
@@ -224,7 +225,7 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
   std::map<GridHandle, std::size_t> index_of;
   scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
     index_of[handle] = file.grids.size();
-    file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas});
+    file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()});
   });
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
@@ -245,6 +246,9 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
 }
 
 Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads threads, const Progress& progress) {
+  for (const SceneGrid& grid : scene.grids) {
+    if (auto sound = check_has_no_field(grid); !sound) return sound.error();
+  }
   if (auto sound = check_types(scene); !sound) return sound.error();
   if (auto sound = check_readable(scene); !sound) return sound.error();
   std::vector<const Grid*> grids;

@@ -5,6 +5,7 @@
 
 #include <quoin/io/vox.h>
 
+#include "io/field_check.h"
 #include "io/text.h"
 #include "io/vox/chunk_writer.h"
 #include "io/vox/materials.h"
@@ -298,6 +299,9 @@ void Writer::write_materials(const vox::TypeTable& table) {
 }
 
 Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
+  for (const GridHandle handle : scene_.grids().handles()) {
+    if (Status sound = check_has_no_field(scene_.grids()[handle]); !sound) return sound.error();
+  }
   const Result<vox::TypeTable> table = vox::make_type_table(scene_);
   if (!table) return table.error();
   gather_grids();
@@ -316,6 +320,10 @@ Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
   }
   if (rounded_ > 0) {
     warnings.push_back("instances between voxels moved to the nearest: " + std::to_string(rounded_));
+  }
+  if (!scene_.lamps.empty()) {
+    warnings.push_back("lamps left out, which .vox does not hold (a .json keeps them): " +
+                       std::to_string(scene_.lamps.size()));
   }
   return out_.take();
 }

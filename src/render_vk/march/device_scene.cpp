@@ -55,6 +55,22 @@ Status DeviceScene::update(const Scene& scene, InstanceFilter filter, Threads th
   }
 }
 
+namespace {
+
+bool has_field(const Scene& scene, const SceneChanges& changes) {
+  bool found = false;
+  if (changes.all) {
+    scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { found |= grid.field.chunk_count() != 0; });
+  }
+  for (const GridHandle handle : changes.grids) {
+    const SceneGrid* const grid = scene.grids().find(handle);
+    found |= grid != nullptr && grid->field.chunk_count() != 0;
+  }
+  return found;
+}
+
+}  // namespace
+
 void DeviceScene::clear() {
   memory_->discard();
   for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
@@ -148,6 +164,12 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
     for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
     grids_.clear();
     followed_scene_ = {};
+  }
+  // What cannot be drawn is not left out of pictures in silence.
+  ChangeCursor ahead = followed_scene_;
+  if (has_field(scene, scene.changes_since(ahead))) {
+    return make_error(ErrorCode::Unsupported,
+                      "vulkan: a grid holds a field of densities; the CPU renderer draws those");
   }
   bool places = false;
   const std::vector<GridHandle> changed = changed_grids(scene, filter, places);

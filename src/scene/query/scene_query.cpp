@@ -14,11 +14,26 @@ namespace quoin {
 
 namespace {
 
-std::optional<RayHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
-  std::optional<RayHit> hit = first_hit(*placed.opaque, ray, max_t);
-  if (placed.transparent == nullptr) return hit;
-  const std::optional<RayHit> clear = first_hit(*placed.transparent, ray, hit ? hit->t : max_t);
-  return clear && (!hit || clear->t < hit->t) ? clear : hit;
+// What a ray meets in one grid; `normal` in the grid.
+struct GridHit {
+  RayHit hit;
+  bool in_field = false;
+  VoxelType material = kAir;
+  DVec3 normal{0.0};
+};
+
+std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
+  std::optional<GridHit> best;
+  for (const OccupancyTree* const tree : {placed.opaque, placed.transparent}) {
+    if (tree == nullptr) continue;
+    const std::optional<RayHit> hit = first_hit(*tree, ray, best ? best->hit.t : max_t);
+    if (hit && (!best || hit->t < best->hit.t)) best = GridHit{*hit, false, kAir, DVec3(normal_of(hit->face))};
+  }
+  if (placed.field == nullptr) return best;
+  const std::optional<DensityHit> hit = first_hit(*placed.field, ray, best ? best->hit.t : max_t);
+  if (!hit || (best && hit->t >= best->hit.t)) return best;
+  return GridHit{
+      {hit->cell, nearest_direction(hit->normal), hit->t, hit->starts_inside}, true, hit->material, hit->normal};
 }
 
 // What overlap queries ask of a shape in a grid's space.
@@ -98,24 +113,25 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_w
     return std::nullopt;
   }
   double max_t = max_distance;
-  std::optional<RayHit> best;
+  std::optional<GridHit> best;
   std::size_t best_placed = 0;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = tracer.placed()[i];
     const ToGrid to_grid(placed);
     const auto hit = first_of_grid(placed, {to_grid.point(ray.origin), to_grid.axes * ray.direction}, max_t);
-    if (hit && (!best || hit->t < best->t || (hit->t == best->t && i < best_placed))) {
+    if (hit && (!best || hit->hit.t < best->hit.t || (hit->hit.t == best->hit.t && i < best_placed))) {
       best = hit;
       best_placed = i;
-      max_t = hit->t;
+      max_t = hit->hit.t;
     }
     return true;
   });
   if (!best) return std::nullopt;
   const PlacedGrid& placed = tracer.placed()[best_placed];
-  return SceneHit{placed.instance,    best->voxel, placed.voxels->get(best->voxel),
-                  best->face,         best->t,     ray.origin + best->t * ray.direction,
-                  best->starts_inside};
+  const RayHit& hit = best->hit;
+  return SceneHit{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
+                  hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
+                  hit.starts_inside, best->in_field, placed.world_axes * best->normal};
 }
 
 std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, double x, double y, int width,

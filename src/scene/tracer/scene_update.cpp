@@ -119,7 +119,7 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
   }
   has_other_trees |= known->grid != &grid;
   const bool is_new = std::exchange(known->grid, &grid) == nullptr;
-  const IBox tight = grid.grid.bounds();
+  const IBox tight = grid.bounds();
   // What is not a number differs from itself, and is another each time.
   if (!is_new && tight == known->tight && known->pivot == grid.pivot) return true;
   known->shape = ++shapes;
@@ -143,6 +143,7 @@ void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instan
   placed[i].voxels = &grid.grid->grid;
   placed[i].opaque = &grid.trees.opaque();
   placed[i].transparent = grid.trees.transparent();
+  placed[i].field = grid.trees.field();
   placed[i].pivot = grid.pivot;
   placed[i].world_axes = world_axes(instance);
   placed[i].position = instance.position;
@@ -241,7 +242,9 @@ void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads thread
   }
   std::vector<std::uint8_t> is_other(used.size());
   parallel_for(used.size(), threads, [&](std::size_t i) {
-    is_other[i] = static_cast<std::uint8_t>(used[i]->trees.update(used[i]->grid->grid, scene->types));
+    const bool has_other_voxels = used[i]->trees.update(used[i]->grid->grid, scene->types);
+    const bool has_other_field = used[i]->trees.update(used[i]->grid->field);
+    is_other[i] = static_cast<std::uint8_t>(has_other_voxels || has_other_field);
   });
   has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
   if (!changes.all && !has_other_trees) return;
@@ -255,6 +258,7 @@ void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads thread
     placed[i].voxels = &grid.grid->grid;
     placed[i].opaque = &grid.trees.opaque();
     placed[i].transparent = grid.trees.transparent();
+    placed[i].field = grid.trees.field();
   }
 }
 

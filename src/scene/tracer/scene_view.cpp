@@ -10,6 +10,7 @@
 #include "scene/tracer/packet_tree.h"
 #include "scene/tracer/scene_tracer_impl.h"
 #include "scene/tracer/scene_view.h"
+#include "trace/density/smooth_normal.h"
 
 namespace quoin {
 namespace {
@@ -72,6 +73,19 @@ void move(const Affine& by, const RayPacket& from, RayPacket& to) {
   to.active = from.active;
 }
 
+bool has_opaque(const PlacedGrid& placed) {
+  return !placed.opaque->bounds().empty();
+}
+
+// Rays in the space of a placed grid.
+std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid) {
+  std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
+  if (placed.field == nullptr || blocked == rays_in_grid.active) return blocked;
+  RayPacket rest = rays_in_grid;
+  rest.active &= ~blocked;
+  return blocked | quoin::any_hits(*placed.field, rest);
+}
+
 // How far the rays that count go at most.
 double farthest(const RayPacket& rays) {
   double max_t = 0.0;
@@ -110,8 +124,39 @@ struct SceneView::Impl {
       hits.grids.t[i] = found.t[i];
       hits.grids.face[i] = found.face[i];
       hits.placed[i] = index;
+      hits.in_field &= ~bit;
       rays.max_t[i] = found.t[i];
     }
+  }
+
+  // What of a placed grid's field lies nearer than what `hits` knows; the rays are in its grid and go no further.
+  // Returns which lanes met it.
+  static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
+                                 SceneHits& hits) {
+    DensityPacketHits found;
+    quoin::first_hits(*placed.field, rays_in_grid, found);
+    std::uint32_t taken = 0;
+    for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      const auto i = static_cast<std::size_t>(lane);
+      const DensityHit& hit = found.lanes[i];
+      if ((hits.grids.hit >> lane & 1U) != 0) {
+        if (hit.t > hits.grids.t[i]) continue;
+        if (hit.t == hits.grids.t[i] && static_cast<std::int32_t>(index) >= hits.placed[i]) continue;
+      }
+      hits.grids.starts_inside &= ~(1U << lane);
+      hits.grids.set(lane, {hit.cell, nearest_direction(hit.normal), hit.t, hit.starts_inside});
+      hits.placed[i] = static_cast<std::int32_t>(index);
+      const Ray ray = rays_in_grid.ray(lane);
+      const DVec3 normal = smooth_normal(placed.field->field(), ray.origin + ray.direction * hit.t, hit);
+      hits.normal_x[i] = static_cast<float>(normal.x);
+      hits.normal_y[i] = static_cast<float>(normal.y);
+      hits.normal_z[i] = static_cast<float>(normal.z);
+      hits.material[i] = hit.material;
+      taken |= 1U << lane;
+    }
+    hits.in_field |= taken;
+    return taken;
   }
 };
 
@@ -149,11 +194,16 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
   RoomFor<RayPacket> room_for_rays;
   RayPacket& rays = *room_for_rays;
-  hits.grids.hit = hits.grids.starts_inside = 0;
+  hits.grids.hit = hits.grids.starts_inside = hits.in_field = 0;
   if (impl_->is_alone && impl_->sees_all()) {
     move(impl_->grid_from_view[0], rays_in_view, rays);
-    quoin::first_hits(*placed[0].opaque, rays, hits.grids);
+    if (has_opaque(placed[0])) quoin::first_hits(*placed[0].opaque, rays, hits.grids);
     hits.placed.fill(0);
+    if (placed[0].field == nullptr) return;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
+    }
+    (void)Impl::add_field(placed[0], 0, rays, hits);
     return;
   }
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
@@ -167,10 +217,23 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
-    quoin::first_hits(*placed[i].opaque, rays, found);
-    if (found.hit == 0) return true;
-    impl_->take_nearer(i, found, left, hits);
-    for (std::uint32_t each = found.hit; each != 0; each &= each - 1) {
+    std::uint32_t met = 0;
+    if (has_opaque(placed[i])) {
+      quoin::first_hits(*placed[i].opaque, rays, found);
+      met = found.hit;
+      impl_->take_nearer(i, found, left, hits);
+    }
+    if (placed[i].field != nullptr) {
+      rays.max_t = left.max_t;
+      const std::uint32_t taken = Impl::add_field(placed[i], i, rays, hits);
+      for (std::uint32_t each = taken; each != 0; each &= each - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(each));
+        left.max_t[lane] = hits.grids.t[lane];
+      }
+      met |= taken;
+    }
+    if (met == 0) return true;
+    for (std::uint32_t each = met; each != 0; each &= each - 1) {
       const int lane = std::countr_zero(each);
       (*lanes).set_reach(lane, left.max_t[static_cast<std::size_t>(lane)]);
     }
@@ -182,7 +245,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
   const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
   const auto own = static_cast<std::size_t>(home);
-  std::uint32_t blocked = quoin::any_hits(*placed[own].opaque, rays_in_grid);
+  std::uint32_t blocked = blocked_by(placed[own], rays_in_grid);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
   RoomFor<RayPacket> room_in_view;
   RayPacket& in_view = *room_in_view;
@@ -198,7 +261,7 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
     if (near == 0) return true;
     move(impl_->grid_from_view[i], in_view, rays);
     rays.active = near;
-    const std::uint32_t found = quoin::any_hits(*placed[i].opaque, rays);
+    const std::uint32_t found = blocked_by(placed[i], rays);
     blocked |= found;
     in_view.active &= ~found;
     return in_view.active != 0;

@@ -11,10 +11,18 @@
 
 namespace quoin {
 
-/// What a packet of rays met in a scene; lanes whose bit in `grids.hit` is not set hold nothing of meaning.
+/// What a packet of rays met in a scene, voxels or fields; lanes whose bit in `grids.hit` is not set hold nothing of
+/// meaning.
 struct SceneHits {
   PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
   RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
+  /// Lanes that met a field. For these the voxel is the cell, the face that to which the normal is nearest; and here is
+  /// the unit normal, in the grid, and the material.
+  std::uint32_t in_field = 0;
+  RayPacket::Lanes<float> normal_x{}, normal_y{}, normal_z{};
+  RayPacket::Lanes<VoxelType> material{};
+
+  [[nodiscard]] Vec3 normal(std::size_t lane) const { return {normal_x[lane], normal_y[lane], normal_z[lane]}; }
 };
 
 /// A transparent voxel on a ray.
@@ -43,11 +51,12 @@ class SceneView {
   /// They still stop other rays. Cost: O(instances * log instances).
   void leave_to_impostors(std::span<const std::int32_t> placed);
 
-  /// The nearest opaque voxel of all instances for each ray, in view space; of equally near ones the instance that
-  /// comes first.
+  /// The nearest opaque voxel or field of all instances for each ray, in view space; of equally near ones the instance
+  /// that comes first, in it the voxel.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Which rays meet an opaque voxel of any instance. They are in the space of grid `home`, which is asked first.
+  /// Which rays meet an opaque voxel or a field of any instance. They are in the space of grid `home`, which is asked
+  /// first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
 
   /// Which rays meet a transparent voxel of any instance.

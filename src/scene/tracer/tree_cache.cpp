@@ -26,6 +26,25 @@ bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   return true;
 }
 
+bool TreeCache::update(const DensityGrid& field) {
+  ChangeCursor now = followed_field_;
+  const bool is_known = field_ && &field_->field() == &field;
+  if (!is_known && field.chunk_count() == 0) {
+    field_.reset();
+    return false;
+  }
+  const DensityChanges changes = field.changes_since(now);
+  if (is_known && changes.empty()) return false;
+  followed_field_ = {};  // stays so when memory runs out
+  if (is_known) {
+    field_->update(changes);
+  } else {
+    field_.emplace(field);
+  }
+  followed_field_ = now;
+  return true;
+}
+
 // Where there was no tree, there was no transparent voxel but in what changed.
 void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (!transparent_) {

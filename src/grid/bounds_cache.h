@@ -1,0 +1,96 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+
+#include <quoin/core/changes.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
+
+#include "core/change_journal.h"
+#include "grid/chunk_boxes.h"
+
+namespace quoin {
+
+/// The bounds of a grid as they were last asked for. What changed since within them, without touching their sides,
+/// leaves them as they were; where something else changed, the boxes of all chunks are kept from then on.
+///
+/// `Entries` are the grid's chunks and `Record` what its journal holds; `BoxOfEntry::of(entry)` is the box of what
+/// counts in one of them, in the chunk's coordinates.
+/// Threads: any number may ask at once.
+template <class Record, class Entries, class BoxOfEntry>
+class BoundsCache {
+ public:
+  BoundsCache() : is_wanted_(std::make_shared<std::atomic<bool>>(false)) {}
+  /// Copies keep no boxes until they need them.
+  BoundsCache(const BoundsCache& other) : is_wanted_(other.is_wanted_) {
+    const std::lock_guard lock(other.mutex_);
+    cursor_ = other.cursor_;
+    box_ = other.box_;
+  }
+
+  /// Before a copy is made: where bounds are asked of copies they go on from here, instead of each from the last time
+  /// that this was asked.
+  void prepare(const ChangeJournal<Record>& journal, const Entries& entries) {
+    if (is_wanted_->load(std::memory_order_relaxed)) update(journal, entries);
+  }
+
+  IBox update(const ChangeJournal<Record>& journal, const Entries& entries) {
+    is_wanted_->store(true, std::memory_order_relaxed);
+    const std::lock_guard lock(mutex_);
+    bool is_within_all = true;
+    ChangeCursor now = cursor_;
+    const bool is_known = journal.visit_since(now, [&](const Record& record) {
+      is_within_all &= is_within(record);
+      if (boxes_ != nullptr) put(record.chunk, entries);
+    });
+    if (!is_known) {
+      boxes_.reset();
+      box_ = {};
+      entries.for_each([&](IVec3 at, const auto& entry) { box_ = unite(box_, box_of(at, entry)); });
+    } else if (!is_within_all) {
+      if (boxes_ == nullptr) {
+        auto made = std::make_unique<ChunkBoxes>();
+        entries.for_each([&](IVec3 at, const auto& entry) { made->put(at, box_of(at, entry)); });
+        boxes_ = std::move(made);
+      }
+      box_ = boxes_->bounds();
+    }
+    cursor_ = now;
+    return box_;
+  }
+  [[nodiscard]] std::size_t bytes() const {
+    const std::lock_guard lock(mutex_);
+    return boxes_ == nullptr ? 0 : boxes_->bytes();
+  }
+
+ private:
+  static IBox box_of(IVec3 at, const auto& entry) {
+    const IBox inside = BoxOfEntry::of(entry);
+    return {inside.min + at * kChunkEdge, inside.max + at * kChunkEdge};
+  }
+  void put(IVec3 chunk, const Entries& entries) {
+    const auto* const entry = entries.find(chunk.x, chunk.y, chunk.z);
+    boxes_->put(chunk, entry == nullptr ? IBox{} : box_of(chunk, *entry));
+  }
+  [[nodiscard]] bool is_within(const Record& record) const {
+    if (box_.empty()) return false;
+    const IBox changed = record.change().box;
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int64_t first = std::int64_t{record.chunk[axis]} * kChunkEdge;
+      if (first + changed.min[axis] <= box_.min[axis] || first + changed.max[axis] >= box_.max[axis]) return false;
+    }
+    return true;
+  }
+
+  std::shared_ptr<std::atomic<bool>> is_wanted_;  // of this grid or of a copy
+  mutable std::mutex mutex_;
+  ChangeCursor cursor_;
+  IBox box_;
+  std::unique_ptr<ChunkBoxes> boxes_;
+};
+
+}  // namespace quoin

@@ -1,0 +1,170 @@
+// Pictures of fields of densities, lit as blocks are.
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "light/occlusion_directions.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr DVec3 kSun{0.48, 0.6, 0.64};  // unit
+
+RenderOptions lit_by_the_sun(int edge) {
+  RenderOptions options = sized(edge, edge);
+  options.light.sun = kSun;
+  options.light.occlusion = OcclusionMode::Off;
+  return options;
+}
+
+InstanceHandle place_field(Scene& scene, DensityGrid field, DVec3 position = DVec3(0.0)) {
+  SceneGrid placed;
+  placed.field = std::move(field);
+  return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
+}
+
+TEST(RenderField, ABallHasTheLightOfItsNormals) {
+  Scene scene;
+  const Rgba8 colour{200, 120, 60, 255};
+  DensityGrid field;
+  constexpr double kRadius = 24.0;
+  field.add_sphere(DVec3(32.0), kRadius, add_type(scene, colour));
+  place_field(scene, std::move(field), DVec3(-32.0));
+  const Picture picture = taken(scene, from_above(0, 100, 0, 60), lit_by_the_sun(61));
+  int compared = 0;
+  for (int y = 0; y < 61; ++y) {
+    for (int x = 0; x < 61; ++x) {
+      const double px = (x - 30) * 60.0 / 61.0;
+      const double pz = (y - 30) * 60.0 / 61.0;
+      const double square = kRadius * kRadius - px * px - pz * pz;
+      // Next to the outline the surface of cells is not that of the ball.
+      if (square < 60.0) continue;
+      const DVec3 normal = DVec3{px, std::sqrt(square), pz} / kRadius;
+      const double cosine = std::max(glm::dot(normal, kSun), 0.0);
+      // Where the light grazes it, the ball's own cells may or may not be in the way.
+      if (std::abs(glm::dot(normal, kSun)) < 0.1) continue;
+      const Pixel expected = encoded(linear(colour) * static_cast<float>(0.1 + cosine));
+      const Pixel found = pixel_at(picture, x, y);
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 5) << x << ' ' << y;
+      EXPECT_NEAR(depth_at(picture, x, y), 100.0 - std::sqrt(square), 0.05);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 1200);
+}
+
+TEST(RenderField, ItAndBlocksShadeEachOther) {
+  Scene scene;
+  const VoxelType grey = add_type(scene, {188, 188, 188, 255});
+  Grid floor;
+  floor.fill_box({{-40, -1, -40}, {40, 0, 40}}, grey);
+  place(scene, std::move(floor));
+  DensityGrid ball;
+  ball.add_sphere(DVec3(16.0), 8.0, grey);
+  place_field(scene, std::move(ball), {-16, 0, -16});
+  RenderOptions options = lit_by_the_sun(81);
+  options.light.sun = {0, 1, 0};
+  const Picture picture = taken(scene, from_above(0, 100, 0, 81), options);
+  // Beneath the ball's outline lies no pixel that is seen; beside it the floor is lit.
+  EXPECT_EQ(pixel_at(picture, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
+  // With the sun aslant the ball's shadow lies where its centre is cast onto the floor.
+  options.light.sun = {1, 1, 0};
+  const Picture aslant = taken(scene, from_above(0, 100, 0, 81), options);
+  const Pixel in_shadow = encoded(linear({188, 188, 188, 255}) * 0.1F);
+  EXPECT_EQ(pixel_at(aslant, 40 - 16, 40), in_shadow);
+  EXPECT_EQ(pixel_at(aslant, 40 - 22, 40), in_shadow);
+  EXPECT_NE(pixel_at(aslant, 40 - 30, 40), in_shadow);
+  EXPECT_NE(pixel_at(aslant, 40 + 16, 40), in_shadow);
+  // A block over the ball takes its light.
+  Grid roof;
+  roof.fill_box({{-3, 30, -3}, {4, 31, 4}}, grey);
+  place(scene, std::move(roof));
+  options.light.sun = {0, 1, 0};
+  const Picture under = taken(scene, from_above(0, 28, 0, 81), options);
+  EXPECT_EQ(pixel_at(under, 40, 40), in_shadow);
+  EXPECT_NE(pixel_at(under, 40 + 6, 40), in_shadow);
+}
+
+TEST(RenderField, AFlatFloorIsLitAsOneOfBlocks) {
+  const auto floor = [](bool of_blocks) {
+    Scene scene;
+    const VoxelType grey = add_type(scene, {188, 188, 188, 255});
+    if (of_blocks) {
+      Grid grid;
+      grid.fill_box({{0, 0, 0}, {40, 10, 40}}, grey);
+      grid.fill_box({{20, 10, 0}, {40, 20, 40}}, grey);
+      place(scene, std::move(grid));
+    } else {
+      DensityGrid field;
+      field.edit({{-4, -4, -4}, {45, 25, 45}}, [&](IVec3 p, DensitySample) {
+        const auto beyond = [](double at, double low, double high) { return std::max(low - at, at - high); };
+        const double sides = std::max(beyond(p.x, 0, 40), beyond(p.z, 0, 40));
+        const double low = std::max(sides, beyond(p.y, 0, 10));
+        const double high = std::max({beyond(p.x, 20, 40), beyond(p.z, 0, 40), beyond(p.y, 0, 20)});
+        return DensitySample{static_cast<float>(std::min(low, high)), grey};
+      });
+      place_field(scene, std::move(field));
+    }
+    return scene;
+  };
+  for (const int rays : {6, 9, 25}) {
+    RenderOptions options = sized(40, 40);
+    options.samples = 4;
+    options.light.occlusion_rays = rays;
+    const Picture blocks = taken(floor(true), from_above(20, 60, 20, 40), options);
+    const Picture field = taken(floor(false), from_above(20, 60, 20, 40), options);
+    // Away from the edges, which a trilinear field rounds off.
+    for (int y = 4; y < 36; ++y) {
+      for (const int x : {4, 8, 12, 15, 24, 30, 35}) {
+        const Pixel a = pixel_at(blocks, x, y);
+        const Pixel b = pixel_at(field, x, y);
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], rays == 25 ? 6 : 3) << rays << ' ' << x << ' ' << y;
+      }
+    }
+  }
+}
+
+TEST(RenderField, MaterialsColourIt) {
+  Scene scene;
+  const VoxelType red = add_type(scene, {200, 30, 30, 255});
+  const VoxelType glow = add_type(scene, {30, 200, 30, 255}, Visibility::Opaque, 2.0F);
+  DensityGrid field;
+  field.add_box({0, 0, 0}, {10, 10, 10}, red);
+  field.add_box({20, 0, 0}, {30, 10, 10}, glow);
+  field.add_box({40, 0, 0}, {50, 10, 10}, kAir);
+  place_field(scene, std::move(field));
+  RenderOptions options = sized(60, 20);
+  options.light.shading = Shading::Unlit;
+  const Picture unlit = taken(scene, from_above(25, 50, 5, 20), options);
+  EXPECT_EQ(pixel_at(unlit, 10, 10), (Pixel{200, 30, 30}));
+  EXPECT_EQ(pixel_at(unlit, 30, 10), (Pixel{30, 200, 30}));
+  EXPECT_EQ(pixel_at(unlit, 50, 10), (Pixel{255, 255, 255}));
+  options.light.shading = Shading::Normals;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(25, 50, 5, 20), options), 10, 10), (Pixel{128, 255, 128}));
+  options.light.shading = Shading::Lit;
+  options.light.sun_brightness = options.light.sky_brightness = 0.0;
+  const Picture night = taken(scene, from_above(25, 50, 5, 20), options);
+  EXPECT_EQ(pixel_at(night, 10, 10), (Pixel{0, 0, 0}));
+  EXPECT_GT(pixel_at(night, 30, 10)[1], 200);
+}
+
+TEST(RenderField, DirectionsTurnWithTheNormal) {
+  for (const DVec3 normal : {DVec3{0, 1, 0}, DVec3{0, -1, 0}, DVec3{1, 0, 0}, glm::normalize(DVec3{-1, -9, 0.2}),
+                             glm::normalize(DVec3{0.3, 0.2, -0.7})}) {
+    EXPECT_LT(glm::distance(turned_from_up({0, 1, 0}, normal), normal), 1e-9);
+    const DVec3 a = turned_from_up({1, 0, 0}, normal);
+    const DVec3 b = turned_from_up({0, 0, 1}, normal);
+    EXPECT_NEAR(glm::length(a), 1.0, 1e-9);
+    EXPECT_NEAR(glm::dot(a, b), 0.0, 1e-9);
+    EXPECT_NEAR(glm::dot(a, normal), 0.0, 1e-9);
+    EXPECT_LT(glm::distance(glm::cross(b, a), normal), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,323 @@
+#include <quoin/trace/density_ray.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/instruction_sets_for_tests.h"
+
+namespace quoin {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// The trilinear field in double, sample by sample: what rays must agree with.
+class Dense {
+ public:
+  explicit Dense(const DensityGrid& field) : field_(field) {}
+
+  [[nodiscard]] double at(const DVec3& p) const {
+    const DVec3 whole = glm::floor(p);
+    const DVec3 f = p - whole;
+    double sum = 0.0;
+    for (int i = 0; i < 8; ++i) {
+      const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
+      const double weight =
+          (corner.x == 0 ? 1 - f.x : f.x) * (corner.y == 0 ? 1 - f.y : f.y) * (corner.z == 0 ? 1 - f.z : f.z);
+      sum += weight * static_cast<double>(field_.density(IVec3(whole) + corner));
+    }
+    return sum;
+  }
+
+  // The least density on the ray from `from` to `to`, by many samples: more than a cubic has extremes in a cell.
+  [[nodiscard]] double least(const Ray& ray, double from, double to) const {
+    const double step = 0.02 / glm::length(ray.direction);
+    double least = kInfinity;
+    for (double t = from; t < to; t += step) least = std::min(least, at(ray.origin + ray.direction * t));
+    return least;
+  }
+
+ private:
+  const DensityGrid& field_;
+};
+
+struct Tally {
+  int hits = 0;
+  int misses = 0;
+  int inside = 0;
+  int left_out = 0;
+};
+
+// The least index of a solid corner among the nearest to a point of a cell.
+VoxelType material_at(const DensityGrid& field, IVec3 cell, const DVec3& p) {
+  double least = kInfinity;
+  VoxelType found = kAir;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 sample = cell + IVec3{i & 1, i >> 1 & 1, i >> 2};
+    const double away = glm::distance(DVec3(sample), p);
+    if (field.density(sample) < 0.0F && away < least - 1e-7) {
+      least = away;
+      found = field.material(sample);
+    }
+  }
+  return found;
+}
+
+// Before a hit the field is not negative, at it it is 0; where there is none it never is negative.
+void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Tally& tally) {
+  const Dense dense(tree.field());
+  const auto hit = first_hit(tree, ray, max_t);
+  ASSERT_EQ(any_hit(tree, ray, max_t), hit.has_value());
+  // A cell passed for less than 1e-3 may be left out: what is solid there has not this density.
+  constexpr double kLeftOut = -0.02;
+  if (!hit) {
+    ++tally.misses;
+    const double least = dense.least(ray, 0.0, std::min(max_t, far));
+    EXPECT_GE(least, kLeftOut);
+    tally.left_out += least < -1e-9;
+    return;
+  }
+  ASSERT_LE(hit->t, max_t);
+  ASSERT_GE(hit->t, 0.0);
+  const DVec3 p = ray.origin + ray.direction * hit->t;
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_GE(p[axis], hit->cell[axis] - 1e-6);
+    EXPECT_LE(p[axis], hit->cell[axis] + 1 + 1e-6);
+  }
+  if (hit->starts_inside) {
+    ++tally.inside;
+    EXPECT_EQ(hit->t, 0.0);
+    EXPECT_LT(dense.at(p), 1e-9);
+  } else {
+    ++tally.hits;
+    const double least = dense.least(ray, 0.0, hit->t - 1e-9);
+    EXPECT_GE(least, kLeftOut) << hit->t;
+    tally.left_out += least < -1e-9;
+    EXPECT_NEAR(dense.at(p), 0.0, 1e-6) << hit->t;
+    // It goes down from here.
+    EXPECT_LE(glm::dot(hit->normal, ray.direction), 1e-6 * glm::length(ray.direction));
+  }
+  if (hit->normal != DVec3(0.0)) {
+    EXPECT_NEAR(glm::length(hit->normal), 1.0, 1e-9);
+  }
+  EXPECT_EQ(hit->material, material_at(tree.field(), hit->cell, p));
+}
+
+DVec3 random_in(std::mt19937& random, double low, double high) {
+  std::uniform_real_distribution<double> any(low, high);
+  return {any(random), any(random), any(random)};
+}
+
+// Every sample another number: cells with up to three crossings of a ray, and sheets of all kinds.
+DensityGrid noise(IVec3 corner, int edge, unsigned seed, double share_of_air) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> density(-4.0F, 4.0F);
+  std::uniform_real_distribution<double> any(0.0, 1.0);
+  DensityGrid field;
+  field.edit({corner, corner + edge}, [&](IVec3, DensitySample) {
+    const float d = density(random);
+    return DensitySample{any(random) < share_of_air ? std::abs(d) : d, static_cast<VoxelType>(1 + random() % 200)};
+  });
+  return field;
+}
+
+class DensityRays : public testing::TestWithParam<InstructionSet> {
+ protected:
+  void SetUp() override {
+    QUOIN_SKIP_WITHOUT(GetParam());
+    over_.emplace(GetParam());
+  }
+
+ private:
+  std::optional<InstructionSetOverride> over_;
+};
+
+TEST_P(DensityRays, AgreeWithTheTrilinearField) {
+  Tally tally;
+  std::mt19937 random(1);
+  // Within one chunk, over the corner of eight, and among negative numbers.
+  for (const IVec3 corner : {IVec3{20, 20, 20}, IVec3{58, 57, 59}, IVec3{-7, -70, -134}}) {
+    for (const double share_of_air : {0.0, 0.7, 0.98}) {
+      const DensityGrid field = noise(corner, 12, random(), share_of_air);
+      const DensityTree tree(field);
+      const DVec3 middle = DVec3(corner) + 6.0;
+      for (int i = 0; i < 400; ++i) {
+        Ray ray{middle + random_in(random, -14.0, 14.0), random_in(random, -1.0, 1.0)};
+        if (i % 3 == 0) ray.direction = middle + random_in(random, -5.0, 5.0) - ray.origin;
+        // Along axes and planes, from whole numbers.
+        if (i % 5 == 0) ray.direction[i / 5 % 3] = 0.0;
+        if (i % 20 == 0) ray.direction[(i / 5 + 1) % 3] = 0.0;
+        if (i % 7 == 0) ray.origin = glm::round(ray.origin);
+        if (glm::length(ray.direction) == 0.0) continue;
+        const double max_t = i % 4 == 0 ? 10.0 / glm::length(ray.direction) : kInfinity;
+        check(tree, ray, max_t, 40.0 / glm::length(ray.direction), tally);
+      }
+    }
+  }
+  EXPECT_GT(tally.hits, 600);
+  EXPECT_GT(tally.misses, 400);
+  EXPECT_GT(tally.inside, 30);
+  EXPECT_LE(tally.left_out, 1);
+}
+
+TEST_P(DensityRays, AreTheSameInPackets) {
+  const DensityGrid field = noise({58, 57, 59}, 12, 5, 0.8);
+  const DensityTree tree(field);
+  std::mt19937 random(2);
+  int hits = 0;
+  for (int i = 0; i < 300; ++i) {
+    RayPacket packet;
+    const DVec3 eye = DVec3(64.0) + random_in(random, -20.0, 20.0);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      if (random() % 8 == 0) continue;
+      const DVec3 origin = i % 2 == 0 ? eye : DVec3(64.0) + random_in(random, -9.0, 9.0);
+      Ray ray{origin, DVec3(64.0) + random_in(random, -7.0, 7.0) - origin};
+      if (random() % 16 == 0) ray.direction.x = 0.0;
+      if (random() % 64 == 0) ray.direction.x = std::numeric_limits<double>::quiet_NaN();
+      packet.set(lane, ray, random() % 4 == 0 ? 0.5 : random() % 32 == 0 ? -1.0 : kInfinity);
+    }
+    DensityPacketHits found;
+    first_hits(tree, packet, found);
+    const std::uint32_t blocked = any_hits(tree, packet);
+    EXPECT_EQ(blocked, found.hit);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const auto at = static_cast<std::size_t>(lane);
+      const bool is_active = (packet.active >> lane & 1U) != 0;
+      const auto alone = is_active ? first_hit(tree, packet.ray(lane), packet.max_t[at]) : std::nullopt;
+      ASSERT_EQ(found.hit >> lane & 1U, alone.has_value());
+      if (!alone) continue;
+      ++hits;
+      const DensityHit& hit = found.lanes[at];
+      EXPECT_EQ(hit.t, alone->t);
+      EXPECT_EQ(hit.cell, alone->cell);
+      EXPECT_EQ(hit.normal, alone->normal);
+      EXPECT_EQ(hit.material, alone->material);
+      EXPECT_EQ(hit.starts_inside, alone->starts_inside);
+    }
+  }
+  EXPECT_GT(hits, 1200);
+}
+
+TEST_P(DensityRays, MeetASphereWhereItIs) {
+  for (const DVec3 centre : {DVec3(31.5), DVec3(64.0, -64.0, 0.0), DVec3(1'000'000.0, -2'000'000.0, 500'000.0)}) {
+    DensityGrid field;
+    field.add_sphere(centre, 20.0, 7);
+    const DensityTree tree(field);
+    std::mt19937 random(3);
+    for (int i = 0; i < 300; ++i) {
+      const DVec3 out = glm::normalize(random_in(random, -1.0, 1.0));
+      const double distance = i % 2 == 0 ? 60.0 : 5'000.0;
+      const auto hit = first_hit(tree, {centre + out * distance, -out * 3.0});
+      ASSERT_TRUE(hit);
+      EXPECT_NEAR(hit->t * 3.0, distance - 20.0, 0.02);
+      // Of cells: as far from round as their corners are from each other.
+      EXPECT_GT(glm::dot(hit->normal, out), 0.998);
+      EXPECT_EQ(hit->material, 7);
+      // Past it, and away from it.
+      const DVec3 aside = glm::normalize(glm::cross(out, DVec3(0.3, 0.5, 0.8))) * 20.1;
+      EXPECT_FALSE(first_hit(tree, {centre + out * distance + aside, -out}));
+      EXPECT_FALSE(any_hit(tree, {centre + out * 21.0, out}));
+    }
+    const auto inside = first_hit(tree, {centre + 0.25, {0, 1, 0}});
+    ASSERT_TRUE(inside && inside->starts_inside);
+    EXPECT_EQ(inside->t, 0.0);
+  }
+}
+
+TEST(DensityRay, StopsAtItsEnd) {
+  DensityGrid field;
+  field.add_box({10, 10, 10}, {20, 20, 20}, 1);
+  const DensityTree tree(field);
+  const Ray ray{{15.3, 30, 15.6}, {0, -2, 0}};
+  const double surface = first_hit(tree, ray)->t;
+  EXPECT_NEAR(surface, 5.0, 1e-3);
+  EXPECT_TRUE(first_hit(tree, ray, surface + 1e-9));
+  EXPECT_FALSE(first_hit(tree, ray, surface - 1e-9));
+  EXPECT_FALSE(first_hit(tree, ray, 0.0));
+  EXPECT_FALSE(first_hit(tree, ray, -1.0));
+  EXPECT_FALSE(first_hit(tree, ray, std::nan("")));
+  EXPECT_TRUE(any_hit(tree, ray, surface + 1e-9));
+  EXPECT_FALSE(any_hit(tree, ray, surface - 1e-9));
+  for (const double odd : {kInfinity, std::nan("")}) {
+    EXPECT_FALSE(first_hit(tree, {{15, odd, 15}, {0, -1, 0}}));
+    EXPECT_FALSE(first_hit(tree, {{15, 30, 15}, {0, odd, 0}}));
+    EXPECT_FALSE(any_hit(tree, {{15, 30, odd}, {0, -1, 0}}));
+  }
+  EXPECT_FALSE(first_hit(tree, {{15, 30, 15}, {0, 0, 0}}));
+  // Where nothing is.
+  const DensityGrid nothing;
+  const DensityTree empty(nothing);
+  EXPECT_FALSE(first_hit(empty, ray));
+  EXPECT_FALSE(any_hit(empty, ray));
+}
+
+TEST(DensityRay, ComingToZeroIsNoHit) {
+  // A plane of samples that are exactly 0, with air on both sides.
+  DensityGrid field;
+  field.edit({IVec3{0}, IVec3{16}}, [](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(std::abs(p.y - 8)), 1};
+  });
+  // A solid sample far off, so that there is anything to trace.
+  field.set({40, 40, 40}, {-1.0F, 2});
+  const DensityTree tree(field);
+  EXPECT_FALSE(first_hit(tree, {{5.5, 20, 5.5}, {0, -1, 0}}));
+  // With something solid below, the ray goes in where it is 0.
+  field.edit({IVec3{0}, IVec3{16, 8, 16}}, [](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(p.y - 8), 1};
+  });
+  const DensityTree now(field);
+  const auto hit = first_hit(now, {{5.5, 20, 5.5}, {0, -1, 0}});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->t, 12.0, 1e-9);
+  EXPECT_EQ(hit->normal, (DVec3{0, 1, 0}));
+  // From the surface outwards there is air.
+  EXPECT_FALSE(any_hit(now, {{5.5, 8, 5.5}, {0.3, 1, 0}}));
+  EXPECT_TRUE(any_hit(now, {{5.5, 8, 5.5}, {0.3, -1, 0}}));
+}
+
+TEST(DensityTree, FollowsEdits) {
+  DensityGrid field;
+  field.add_sphere(DVec3(64.0), 30.0, 1);
+  DensityTree tree(field);
+  ChangeCursor cursor = field.cursor();
+  std::mt19937 random(4);
+  const auto same = [&] {
+    const DensityTree anew(field);
+    EXPECT_EQ(tree.cells().bounds(), anew.cells().bounds());
+    for (int i = 0; i < 2'000; ++i) {
+      const IVec3 cell{DVec3(64.0) + random_in(random, -75.0, 75.0)};
+      EXPECT_EQ(tree.cells().is_occupied(cell), anew.cells().is_occupied(cell));
+      bool has_solid = false;
+      for (int c = 0; c < 8; ++c) has_solid |= field.density(cell + IVec3{c & 1, c >> 1 & 1, c >> 2}) < 0.0F;
+      ASSERT_EQ(tree.cells().is_occupied(cell), has_solid);
+    }
+  };
+  same();
+  for (int i = 0; i < 30; ++i) {
+    const DVec3 place = DVec3(64.0) + random_in(random, -60.0, 60.0);
+    if (i % 3 == 0) {
+      field.add_sphere(place, 6.0, 2);
+    } else if (i % 3 == 1) {
+      field.remove_sphere(glm::mix(place, DVec3(64.0), 0.6), 8.0);
+    } else {
+      // On the lower faces of a chunk: cells of the chunks below end there.
+      field.set({64, 64, 64 + i}, {field.density({64, 64, 64 + i}) < 0.0F ? 2.0F : -2.0F, 3});
+    }
+    tree.update(field.changes_since(cursor));
+    same();
+  }
+  field.clear();
+  tree.update(field.changes_since(cursor));
+  EXPECT_TRUE(tree.cells().bounds().empty());
+  EXPECT_FALSE(first_hit(tree, {{64, 200, 64}, {0, -1, 0}}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, DensityRays,
+                         testing::Values(InstructionSet::Plain, InstructionSet::Avx2, InstructionSet::Avx512),
+                         name_of_set);
+
+}  // namespace
+}  // namespace quoin
