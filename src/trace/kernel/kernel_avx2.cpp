@@ -4,12 +4,14 @@
 
 #ifdef QUOIN_X86_KERNELS
 
+#include "trace/kernel/field.inl"
 #include "trace/kernel/packet.inl"
 #include "trace/kernel/single.inl"
 
 namespace quoin::trace {
 
-const Kernel kAvx2Kernel = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any};
+const Kernel kAvx2Kernel = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any,
+                            first_in_field<true>,     first_in_field<false>};
 
 }  // namespace quoin::trace
 

@@ -175,6 +175,18 @@ class PathWalk {
 
   template <Ask kAsk>
   [[gnu::always_inline]] SingleHit find() {
+    SingleHit found{false, ray_.is_cut, -1, IVec3{0}};
+    walk([&](int brick, int cell, std::uint64_t met) {
+      found = hit<kAsk>(brick, cell, met);
+      return true;
+    });
+    return found;
+  }
+
+  /// Calls `meet(brick, cell, voxels)` for the occupied voxels that the ray passes, of one cell after the other, until
+  /// it returns true.
+  template <class Meet>
+  [[gnu::always_inline]] void walk(Meet&& meet) {
     std::uint64_t allowed = ~std::uint64_t{0};
     std::uint64_t bricks = 0;
     std::uint64_t cells = 0;
@@ -188,7 +200,7 @@ class PathWalk {
       if (is_set(tree_.chunks[index_].bricks, brick)) {
         if (is_set(node().cells[static_cast<std::size_t>(brick ^ flip_)], own.cell)) {
           const std::uint64_t met = voxels_of(block, brick, own.cell) & kUnits.from[own.voxel];
-          if (met != 0) return hit<kAsk>(brick, own.cell, met);
+          if (met != 0 && meet(brick, own.cell, met)) return;
         }
         cells = cells_of(brick) & kUnits.from[own.cell] & ~(std::uint64_t{1} << own.cell);
       }
@@ -198,10 +210,10 @@ class PathWalk {
       for (; cells != 0; cells &= cells - 1) {
         const int cell = std::countr_zero(cells);
         const std::uint64_t met = voxels_of(block, brick, cell);
-        if (met != 0) return hit<kAsk>(brick, cell, met);
+        if (met != 0 && meet(brick, cell, met)) return;
       }
       while (bricks == 0) {
-        if (is_known && !advance()) return {false, ray_.is_cut, -1, IVec3{0}};
+        if (is_known && !advance()) return;
         is_known = true;
         bricks = bricks_of_chunk() & allowed;
         allowed = ~std::uint64_t{0};
@@ -211,6 +223,21 @@ class PathWalk {
       cells = cells_of(brick);
       block = Paths::brick_of(chunk_, brick);
     }
+  }
+
+  /// The mirrored planes below a cell of a brick of the chunk in which the walk is.
+  [[nodiscard]] F4 corner_of_cell(int brick, int cell) const {
+    const F4 lower = F4{plane_[0], plane_[1], plane_[2], 0.0F} - kChunkSize;
+    return lower + corner_of(brick) * 16.0F + corner_of(cell) * 4.0F;
+  }
+  /// Whether that is further than single precision serves, and left to others.
+  [[nodiscard]] bool is_too_far(F4 in_cell) const {
+    return ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t;
+  }
+  /// The voxel, from the tables' origin, with these mirrored planes below it.
+  [[nodiscard]] I4 native_voxel(F4 voxel) const {
+    const F4 native = mirrored_planes(ray_.backward ? voxel + 1.0F : voxel, ray_.backward);
+    return __builtin_convertvector(native, I4) + ray_.base;
   }
 
  private:
@@ -257,11 +284,8 @@ class PathWalk {
 
   template <Ask kAsk>
   [[gnu::always_inline]] SingleHit hit(int brick, int cell, std::uint64_t voxels) const {
-    const F4 lower = F4{plane_[0], plane_[1], plane_[2], 0.0F} - kChunkSize;
-    const F4 in_cell = lower + corner_of(brick) * 16.0F + corner_of(cell) * 4.0F;
-    // What lies further than single precision serves is left to others.
-    if (ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t)
-      return {false, true, -1, IVec3{0}};
+    const F4 in_cell = corner_of_cell(brick, cell);
+    if (is_too_far(in_cell)) return {false, true, -1, IVec3{0}};
     if (kAsk == Ask::Whether) return {true, false, -1, IVec3{0}};
     const F4 voxel = in_cell + corner_of(std::countr_zero(voxels));
     const F4 nudge = ray_.is_on_plane ? (ray_.forward ? all4(kNudge) : all4(0.0F)) : all4(0.0F);
@@ -269,8 +293,7 @@ class PathWalk {
     const F4 t = (voxel - ray_.origin) * ray_.inverse - nudge;
     const float last = greatest3(t);
     const int axis = last < 0.0F ? -1 : t[2] == last ? 2 : t[1] == last ? 1 : 0;
-    const F4 native = mirrored_planes(ray_.backward ? voxel + 1.0F : voxel, ray_.backward);
-    const I4 at = __builtin_convertvector(native, I4) + ray_.base;
+    const I4 at = native_voxel(voxel);
     return {true, false, axis, IVec3{at[0], at[1], at[2]}};
   }
 
