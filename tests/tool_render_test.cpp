@@ -149,7 +149,7 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
 
 TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
-  EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"no voxel to draw: a picture of the sky"}));
+  EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing to draw: a picture of the sky"}));
   EXPECT_TRUE(exists("a.png"));
   EXPECT_EQ(drawn("tiny.vox -o b.png --size 9x9 --camera 0,90,0 --look-at 0,99,0")["warnings"],
             Json({"no voxel in sight of this camera: a picture of the sky"}));

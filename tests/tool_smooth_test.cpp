@@ -249,7 +249,7 @@ TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {
   EXPECT_NE(run("convert " + arguments + " --simplify 0.1").out.find("Simplified: "), std::string::npos);
 }
 
-TEST_F(ToolSmooth, VolumesBecomeMeshesOnly) {
+TEST_F(ToolSmooth, VolumesBecomeMeshesAndPicturesOnly) {
   write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Int8));
   const ToolRun voxels = run("convert ball.raw out.vox --raw-size 8x8x8 --raw-type int8");
   EXPECT_EQ(voxels.status, 1);
@@ -260,12 +260,17 @@ TEST_F(ToolSmooth, VolumesBecomeMeshesOnly) {
   const ToolRun greedy = run("convert a.nrrd out.glb --mesher greedy");
   EXPECT_EQ(greedy.status, 2);
   EXPECT_NE(greedy.err.find("smooth meshes it"), std::string::npos) << greedy.err;
-  const ToolRun picture = run("render a.nrrd -o out.png");
-  EXPECT_EQ(picture.status, 1);
-  expect_one_error_line(picture);
-  EXPECT_NE(picture.err.find("`quoin convert`"), std::string::npos) << picture.err;
-  EXPECT_NE(picture.err.find("--mesher smooth"), std::string::npos) << picture.err;
-  EXPECT_FALSE(exists("out.vox") || exists("out.glb") || exists("out.png"));
+  EXPECT_FALSE(exists("out.vox") || exists("out.glb"));
+  const ToolRun picture = run("render a.nrrd -o out.png --size 32x32 --iso 98.5 --json");
+  EXPECT_EQ(picture.status, 0) << picture.err;
+  EXPECT_GT(Json::parse(picture.out)["pixels_hit"], 10);
+  EXPECT_TRUE(exists("out.png"));
+  // What is above this is nothing, which is said.
+  EXPECT_NE(run("render a.nrrd -o out.png --size 32x32 --iso 1000").err.find("a picture of the sky"),
+            std::string::npos);
+  EXPECT_EQ(run("render a.nrrd -o out.png --iso much").status, 2);
+  std::ofstream(folder_.file("tiny2.vox"), std::ios::binary) << vox_file({1, 1, 1}, std::string("\0\0\0\1", 4));
+  EXPECT_NE(run("render tiny2.vox -o out.png --iso 3").err.find("--iso is for volumes"), std::string::npos);
   EXPECT_EQ(run("convert a.nrrd out.glb").status, 0);
 }
 

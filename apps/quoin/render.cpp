@@ -5,8 +5,10 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
+#include <quoin/io/volume.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/scene_faces.h>
+#include <quoin/scene/volume_scene.h>
 
 #include "interrupt.h"
 #include "output.h"
@@ -24,6 +26,7 @@ struct Outcome {
   Picture picture;
   Camera camera;
   FaceCounts faces;
+  bool is_volume = false;
   std::uint64_t bytes = 0;
   std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   double read = 0, build = 0, trace = 0, write = 0;
@@ -43,7 +46,7 @@ Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& argu
 void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Picture& picture,
                             std::vector<std::string>& warnings) {
   if (scene.bounds(filter).empty()) {
-    warnings.emplace_back("no voxel to draw: a picture of the sky");
+    warnings.emplace_back("nothing to draw: a picture of the sky");
   } else if (picture.pixels_hit == 0) {
     warnings.emplace_back("no voxel in sight of this camera: a picture of the sky");
   }
@@ -64,13 +67,37 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
   return {};
 }
 
-/// Volumes are not drawn. Files that cannot be read fail later, in the words of the reader.
-Status check_input(const std::filesystem::path& path) {
+Result<LoadedScene> load_volume(const RenderArguments& arguments) {
+  ProgressBar bar;
+  auto volume = read_volume(arguments.common.input);
+  if (!volume) return volume.error();
+  VolumeSceneOptions options;
+  options.iso = arguments.iso ? static_cast<float>(*arguments.iso) : volume_threshold(*volume);
+  auto scene = scene_from_volume(*volume, options, arguments.common.threads, bar.listener("reading"));
+  if (!scene) {
+    Error error = scene.error();
+    error.path = arguments.common.input.string();
+    return error;
+  }
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = volume->format;
+  loaded.warnings = std::move(volume->warnings);
+  return loaded;
+}
+
+/// Files that cannot be read are of none, and fail later in the words of their reader.
+bool holds_volume(const std::filesystem::path& path) {
   const auto format = detect_format(path);
-  if (!format || !*format || !format_info(**format).is_volume) return {};
-  return make_error(ErrorCode::Unsupported,
-                    "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
-                    path.string());
+  return format && *format && format_info(**format).is_volume;
+}
+
+Result<LoadedScene> load_voxels(const RenderArguments& arguments) {
+  auto loaded = load_scene(arguments.common.input, arguments.common.load);
+  if (loaded && arguments.iso) {
+    return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
+  }
+  return loaded;
 }
 
 // Takes the picture and puts it, with its times, into the outcome.
@@ -108,13 +135,14 @@ Result<Outcome> render(const RenderArguments& arguments) {
   const InstanceFilter filter = arguments.common.instances();
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
-  if (auto drawable = check_input(arguments.common.input); !drawable) return drawable.error();
-  auto loaded = load_scene(arguments.common.input, arguments.common.load);
+  const bool is_volume = holds_volume(arguments.common.input);
+  auto loaded = is_volume ? load_volume(arguments) : load_voxels(arguments);
   if (!loaded) return loaded.error();
   const Scene& scene = loaded->scene;
   Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
   outcome.read = watch.lap();
+  outcome.is_volume = is_volume;
   catch_interrupts();
   outcome.faces = count_faces(scene, filter, arguments.common.threads);
   const auto camera = camera_for(*loaded, arguments);
@@ -144,8 +172,8 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
                {"rays", outcome.picture.rays},
                {"pixels_hit", outcome.picture.pixels_hit},
-               {"faces_visible", outcome.faces.visible},
-               {"faces_total", outcome.faces.total},
+               {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
+               {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
                {"backend", arguments.backend},
                {"threads", thread_count(arguments.common.threads)},
                {"camera",
@@ -167,7 +195,8 @@ std::string outcome_text(const Outcome& outcome) {
   const double per_second = static_cast<double>(picture.rays) / std::max(outcome.trace, 1e-9);
   std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
                      std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
-                     " pixels show voxels\n" + to_string(outcome.faces) + "\n";
+                     (outcome.is_volume ? " pixels show its surface\n" : " pixels show voxels\n");
+  if (!outcome.is_volume) text += to_string(outcome.faces) + "\n";
   text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
           with_thousands(std::llround(per_second)) + " a second\n";
   if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";

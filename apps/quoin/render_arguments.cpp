@@ -98,6 +98,11 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
 }
 
+std::optional<double> read_float(const std::string& text) {
+  const auto number = parse_number(text);
+  return number && std::isfinite(static_cast<float>(*number)) ? number : std::nullopt;
+}
+
 void add_detail_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option(
@@ -225,7 +230,8 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--lamp-brightness", read_not_negative, at_least_0, light.lamp_brightness),
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
-      read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure)};
+      read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
+      read_option(command, "--iso", read_float, "a number", arguments.iso)};
   arguments.render.width = size.width;
   arguments.render.height = size.height;
   const auto* const wrong =
@@ -244,6 +250,8 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_light_options(command, arguments);
   command.add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges (default 1)")
       ->check(CLI::Range(1, kMaxSamples));
+  add_text_option(command, "--iso", "VALUE",
+                  "Surface value of a volume; what is above is solid (default: between its two groups of values)");
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
   add_detail_options(command, arguments);
   add_backend_options(command, arguments);

@@ -30,6 +30,7 @@ struct RenderArguments {
   std::string backend = "cpu";
   std::string device;  ///< as VulkanOptions::device
   std::string detail = "near";
+  std::optional<double> iso;  ///< of a volume
 };
 
 /// Adds the command's options, which fill in what CLI11 can read by itself.

@@ -21,7 +21,7 @@ RenderOptions small_picture(bool lit) {
   RenderOptions options;
   options.width = 128;
   options.height = 72;
-  options.light.lit = lit;
+  options.light.shading = lit ? Shading::Lit : Shading::Unlit;
   options.threads = {1};
   return options;
 }

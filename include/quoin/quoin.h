@@ -64,9 +64,11 @@
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/scene/sweep.h>
+#include <quoin/scene/volume_scene.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
+#include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>

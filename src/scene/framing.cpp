@@ -30,10 +30,19 @@ struct Functional {
 };
 
 struct Candidate {
-  double bound;  ///< no voxel of the chunk reaches further
-  const Chunk* chunk;
-  IVec3 first;  ///< the chunk's first voxel in its grid
+  double bound;  ///< nothing of the chunk reaches further
+  const Chunk* voxels;
+  const DensityChunk* samples;  ///< where there are no voxels
+  IVec3 first;                  ///< the chunk's first voxel or sample in its grid
+  IBox box;                     ///< of what counts, in the chunk
   Functional functional;
+
+  [[nodiscard]] std::uint64_t row(int y, int z) const {
+    return samples == nullptr ? ~voxels->row_mask(y, z, kAir) : samples->solid_row(y, z);
+  }
+  /// What is solid around a sample begins after the one before it on each axis.
+  [[nodiscard]] int margin() const { return samples == nullptr ? 0 : 1; }
+  [[nodiscard]] double over(IVec3 min, IVec3 max) const { return functional.over(min - margin(), max); }
 };
 
 void add_candidates(const Instance& instance, const SceneGrid& grid, DVec3 direction, DVec3 middle,
@@ -44,24 +53,31 @@ void add_candidates(const Instance& instance, const SceneGrid& grid, DVec3 direc
   for (const IVec3 coords : grid.grid.chunks()) {
     const Chunk* chunk = grid.grid.find_chunk(coords);
     const IVec3 first = coords * kChunkEdge;
-    const IBox box = chunk->bounds();
-    if (!box.empty()) out.push_back({functional.over(first + box.min, first + box.max), chunk, first, functional});
+    Candidate candidate{0.0, chunk, nullptr, first, chunk->bounds(), functional};
+    candidate.bound = candidate.over(first + candidate.box.min, first + candidate.box.max);
+    if (!candidate.box.empty()) out.push_back(candidate);
+  }
+  for (const IVec3 coords : grid.field.chunks()) {
+    const IVec3 first = coords * kChunkEdge;
+    Candidate candidate{0.0, nullptr, grid.field.find_chunk(coords), first, kWholeChunk, functional};
+    candidate.bound = candidate.over(first, first + kChunkEdge);
+    out.push_back(candidate);
   }
 }
 
-/// The greatest over the voxels of a chunk, if that is more than `least`; else `least`.
+/// The greatest over what a chunk holds, if that is more than `least`; else `least`.
 double scan(const Candidate& candidate, double least) {
-  const IBox box = candidate.chunk->bounds();
+  const IBox& box = candidate.box;
   for (int z = box.min.z; z < box.max.z; ++z) {
     for (int y = box.min.y; y < box.max.y; ++y) {
       const IVec3 low = candidate.first + IVec3{box.min.x, y, z};
       const IVec3 high = candidate.first + IVec3{box.max.x, y + 1, z + 1};
-      if (candidate.functional.over(low, high) <= least) continue;
-      const std::uint64_t voxels = ~candidate.chunk->row_mask(y, z, kAir);
-      if (voxels == 0) continue;
-      const IVec3 first{candidate.first.x + std::countr_zero(voxels), low.y, low.z};
-      const IVec3 last{candidate.first.x + kChunkEdge - std::countl_zero(voxels), high.y, high.z};
-      least = std::max(least, candidate.functional.over(first, last));
+      if (candidate.over(low, high) <= least) continue;
+      const std::uint64_t row = candidate.row(y, z);
+      if (row == 0) continue;
+      const IVec3 first{candidate.first.x + std::countr_zero(row), low.y, low.z};
+      const IVec3 last{candidate.first.x + kChunkEdge - std::countl_zero(row), high.y, high.z};
+      least = std::max(least, candidate.over(first, last));
     }
   }
   return least;

@@ -1,0 +1,152 @@
+#include <quoin/scene/volume_scene.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+namespace quoin {
+namespace {
+
+// Of unit axes, and of spacings by their least.
+constexpr double kSkew = 1e-4;
+constexpr double kUneven = 1e-3;
+
+// Where samples lie: along unit axes, at these distances, from a corner.
+struct Lattice {
+  glm::dmat3 axes{1.0};
+  DVec3 spacing{1.0};
+  DVec3 corner{0.0};
+};
+
+Result<Lattice> lattice_of(const Volume& volume) {
+  Lattice lattice;
+  lattice.corner = DVec3(volume.world_from_voxel[3]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const DVec3 step(volume.world_from_voxel[axis]);
+    const double length = glm::length(step);
+    if (!(length > 0.0) || !std::isfinite(length) || !is_finite(lattice.corner)) {
+      return make_error(ErrorCode::InvalidArgument, "the volume's samples have no place");
+    }
+    lattice.spacing[axis] = length;
+    lattice.axes[axis] = step / length;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(glm::dot(lattice.axes[axis], lattice.axes[(axis + 1) % 3])) > kSkew) {
+      return make_error(ErrorCode::Unsupported, "the volume's axes are not upright to each other");
+    }
+  }
+  return lattice;
+}
+
+// Where a sample of the finer lattice lies between two of the volume's along an axis.
+struct Between {
+  std::size_t low = 0;
+  std::size_t high = 0;
+  float share = 0.0F;
+};
+
+std::vector<Between> stations(int size, double spacing, double step) {
+  std::vector<Between> all(static_cast<std::size_t>(std::floor((size - 1) * spacing / step + kUneven)) + 1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double at = std::min(static_cast<double>(i) * step / spacing, size - 1.0);
+    all[i].low = static_cast<std::size_t>(at);
+    all[i].high = std::min(all[i].low + 1, static_cast<std::size_t>(size - 1));
+    all[i].share = static_cast<float>(at - std::floor(at));
+  }
+  return all;
+}
+
+float mix(float a, float b, float share) {
+  // Not by differences alone: at a sample next to an infinite one it has its own value.
+  return share == 0.0F ? a : a + share * (b - a);
+}
+
+Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, double step, Threads threads) {
+  const std::vector<Between> x = stations(volume.size.x, lattice.spacing.x, step);
+  const std::vector<Between> y = stations(volume.size.y, lattice.spacing.y, step);
+  const std::vector<Between> z = stations(volume.size.z, lattice.spacing.z, step);
+  constexpr double kMostSamples = 0x1p31;
+  if (static_cast<double>(x.size()) * static_cast<double>(y.size()) * static_cast<double>(z.size()) > kMostSamples) {
+    return make_error(ErrorCode::LimitExceeded, "with even spacing the volume has more than 2^31 samples");
+  }
+  Volume even;
+  even.size = {static_cast<int>(x.size()), static_cast<int>(y.size()), static_cast<int>(z.size())};
+  even.min = volume.min;
+  even.max = volume.max;
+  even.values.resize(x.size() * y.size() * z.size());
+  const auto width = static_cast<std::size_t>(volume.size.x);
+  const auto height = static_cast<std::size_t>(volume.size.y);
+  parallel_for(z.size(), threads, [&](std::size_t k) {
+    for (std::size_t j = 0; j < y.size(); ++j) {
+      const auto row = [&](std::size_t sample_y, std::size_t sample_z) {
+        return volume.values.data() + width * (sample_y + height * sample_z);
+      };
+      const float* const rows[4] = {row(y[j].low, z[k].low), row(y[j].high, z[k].low), row(y[j].low, z[k].high),
+                                    row(y[j].high, z[k].high)};
+      float* out = even.values.data() + x.size() * (j + y.size() * k);
+      for (const Between& at : x) {
+        const auto along = [&](const float* values) { return mix(values[at.low], values[at.high], at.share); };
+        const float low = mix(along(rows[0]), along(rows[1]), y[j].share);
+        const float high = mix(along(rows[2]), along(rows[3]), y[j].share);
+        *out++ = mix(low, high, z[k].share);
+      }
+    }
+  });
+  return even;
+}
+
+}  // namespace
+
+Result<Scene> scene_from_volume(const Volume& volume, const VolumeSceneOptions& options, Threads threads,
+                                const Progress& progress) {
+  const auto lattice = lattice_of(volume);
+  if (!lattice) return lattice.error();
+  Scene scene;
+  VoxelProperties look;
+  look.name = volume.name;
+  look.colour = options.colour;
+  const auto material = scene.types.add(look);
+  if (!material) return material.error();
+
+  const DVec3 spacing = lattice->spacing;
+  const double step = std::min(std::min(spacing.x, spacing.y), spacing.z);
+  const VolumeFieldOptions wanted{options.iso, *material};
+  const auto samples = static_cast<std::size_t>(std::max(volume.size.x, 0)) *
+                       static_cast<std::size_t>(std::max(volume.size.y, 0)) *
+                       static_cast<std::size_t>(std::max(volume.size.z, 0));
+  const bool is_even = std::max(std::max(spacing.x, spacing.y), spacing.z) <= step * (1.0 + kUneven);
+  // What field_from_volume refuses it says itself.
+  const bool is_sound = samples > 0 && volume.values.size() == samples;
+  Result<DensityGrid> field = make_error(ErrorCode::InvalidArgument, "no field");
+  if (is_even || !is_sound) {
+    field = field_from_volume(volume, wanted, threads, progress);
+  } else {
+    const auto even = with_even_spacing(volume, *lattice, step, threads);
+    if (!even) return even.error();
+    field = field_from_volume(*even, wanted, threads, progress);
+  }
+  if (!field) return field.error();
+
+  SceneGrid grid;
+  grid.name = volume.name;
+  grid.field = std::move(*field);
+  Instance placed;
+  placed.name = volume.name;
+  placed.position = lattice->corner;
+  placed.voxel_size = step;
+  glm::dmat3 axes = lattice->axes;
+  placed.mirrored = glm::determinant(axes) < 0.0;
+  if (placed.mirrored) axes[0] = -axes[0];
+  placed.rotation = glm::normalize(glm::quat_cast(axes));
+  placed.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(std::move(placed));
+  return scene;
+}
+
+}  // namespace quoin
