@@ -1,6 +1,7 @@
 #include "output.h"
 
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 
@@ -58,6 +59,8 @@ void print_warnings(const std::vector<std::string>& warnings) {
 int print(std::string_view text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (written && std::fflush(stdout) == 0) return kDone;
+  // Whoever reads may have seen enough.
+  if (errno == EPIPE) return kFailed;
   print_error("standard output cannot be written");
   return kFailed;
 }

@@ -16,16 +16,18 @@ enum class SmoothOcclusion : std::uint8_t {
   None,
   SolidShare,         ///< the share of the samples that are solid
   Weighted,           ///< how deep the samples lie in the solid, against the deepest, or `spread` if that is more
-  WeightedPublished,  ///< against the deepest alone: jumps where a sample turns slightly solid
+  WeightedPublished,  ///< against the deepest alone, as published: jumps where a sample turns slightly solid, and what
+                      ///< is open has offset^power
 };
 
 /// Settings of the occlusion; lengths, and densities as depths, in samples of the level that is meshed: a field twice
 /// as large, one level coarser, is as dark.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
-/// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted forms:
-/// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1). Numbers out of their range count as its nearest
-/// end, NaN as the default.
+/// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted:
+/// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1); as published:
+/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). Numbers out of their range count as its nearest end, NaN as the
+/// default.
 struct SmoothOcclusionOptions {
   SmoothOcclusion form = SmoothOcclusion::SolidShare;
   float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2; 1 and 2 are several times faster than others

@@ -28,8 +28,8 @@ struct SceneHit {
   DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
 };
 
-/// The nearest voxel or field's surface along a ray in the world, transparent ones too; of equally near ones that of the
-/// instance that comes first, in it the voxel. Nothing when there is none, or when the ray is not finite or its
+/// The nearest voxel or field's surface along a ray in the world, transparent ones too; of equally near ones that of
+/// the instance that comes first, in it the voxel. Nothing when there is none, or when the ray is not finite or its
 /// direction is zero.
 ///
 /// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray

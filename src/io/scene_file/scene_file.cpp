@@ -6,6 +6,7 @@
 
 #include <quoin/io/formats.h>
 
+#include "io/text.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -105,7 +106,11 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
       of_source = [&](double share) { return progress((before + share) / static_cast<double>(sources.size())); };
     }
     auto part = load_source(folder / source.file, options, of_source);
-    if (!part) return part.error();
+    if (!part) {
+      Error error = part.error();
+      error.message += " (source \"" + printable(source.id) + "\" of the scene file)";
+      return error;
+    }
     for (const std::string& warning : part->warnings) loaded.warnings.push_back(source.file + ": " + warning);
     auto body = take_over(part->scene, loaded.scene);
     if (!body) return body.error();

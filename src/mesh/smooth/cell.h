@@ -168,6 +168,8 @@ struct SampleAxis {
   const float base = ratio + options.offset;
   const bool squared = options.power == 2.0F;
   const float darkness = squared ? base * base : std::pow(base, options.power);
+  // As published, what is open has the offset's darkness.
+  if (options.form == SmoothOcclusion::WeightedPublished) return std::clamp(darkness, 0.0F, 1.0F);
   const float open = squared ? options.offset * options.offset : std::pow(options.offset, options.power);
   return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
 }

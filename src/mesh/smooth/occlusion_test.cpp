@@ -11,6 +11,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
+#include "mesh/smooth/cell.h"
 #include "mesh/smooth/test_support.h"
 
 namespace quoin {
@@ -18,6 +19,11 @@ namespace {
 
 constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
                                       SmoothOcclusion::WeightedPublished};
+
+/// What a surface has that is open: 0, but by the published curve.
+float when_open(SmoothOcclusion form) {
+  return form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;
+}
 
 /// A field as far as a vertex of the middle chunk may read; the rest is not computed.
 World world_of(const std::function<double(IVec3)>& field) {
@@ -57,7 +63,7 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
         const SmoothChunkMesh mesh = mesh_of(world, form, spread);
         ASSERT_GT(mesh.occlusion.size(), 1'000U);
         for (const float occlusion : mesh.occlusion) {
-          ASSERT_EQ(occlusion, 0.0F) << n.x << " " << n.y << " " << n.z << " spread " << spread;
+          ASSERT_EQ(occlusion, when_open(form)) << n.x << " " << n.y << " " << n.z << " spread " << spread;
         }
       }
     }
@@ -67,7 +73,7 @@ TEST(SmoothOcclusion, APlaneOfAnyOrientationIsFullyOpen) {
 TEST(SmoothOcclusion, AConvexSurfaceIsFullyOpen) {
   for (const SmoothOcclusion form : kForms) {
     const SmoothChunkMesh mesh = mesh_of(sphere({31.2, 32.4, 30.9}, 20.0), form);
-    for (const float occlusion : mesh.occlusion) ASSERT_EQ(occlusion, 0.0F);
+    for (const float occlusion : mesh.occlusion) ASSERT_EQ(occlusion, when_open(form));
   }
 }
 
@@ -95,14 +101,37 @@ double occlusion_in_valley(double degrees, SmoothOcclusion form) {
 
 TEST(SmoothOcclusion, AValleyIsTheDarkerTheSharperItIs) {
   for (const SmoothOcclusion form : kForms) {
-    double last = 0.0;
-    EXPECT_EQ(occlusion_in_valley(0, form), 0.0);
+    double last = when_open(form);
+    EXPECT_NEAR(occlusion_in_valley(0, form), last, 1e-6);
     for (const double degrees : {15, 30, 45, 60}) {
       const double occlusion = occlusion_in_valley(degrees, form);
       EXPECT_GT(occlusion, last) << degrees;
       last = occlusion;
     }
     EXPECT_GT(last, 0.2);
+  }
+}
+
+// s = sum of min(density, 0), m the least of them, ratio = s / (27 m); openness = clamp(1 - (ratio + offset)^power).
+TEST(SmoothOcclusion, ThePublishedCurveIsAsPublished) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> any(-4.0F, 4.0F);
+  for (int round = 0; round < 200; ++round) {
+    SmoothOcclusionOptions options;
+    options.form = SmoothOcclusion::WeightedPublished;
+    options.offset = round % 2 == 0 ? 0.4F : 0.1F;
+    options.power = round % 3 == 0 ? 2.0F : 1.5F;
+    std::array<float, 27> samples{};
+    for (float& sample : samples) sample = any(random) + static_cast<float>(round % 9) - 4.0F;
+    double sum = 0.0;
+    double least = 0.0;
+    for (const float sample : samples) {
+      sum += std::min(sample, 0.0F);
+      least = std::min(least, double{sample});
+    }
+    const double ratio = least < -0.001 ? sum / (27.0 * least) : 0.0;
+    const double openness = std::clamp(1.0 - std::pow(ratio + double{options.offset}, double{options.power}), 0.0, 1.0);
+    EXPECT_NEAR(smooth::occlusion_of(samples, options), 1.0 - openness, 1e-5) << round;
   }
 }
 
