@@ -40,6 +40,7 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
       mesh_scene(scene, {{outcome.mesher == "greedy", !options.occlusion_off, options.watertight}, filter},
                  options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
+  outcome.faces = {meshes->stats.faces_visible, meshes->stats.faces_total};
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
   warn_of_lamps(scene, outcome.warnings);
@@ -249,7 +250,6 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   outcome.meshes = meshes.stats;
-  if (outcome.mesher != "smooth") outcome.faces = {meshes.stats.faces_visible, meshes.stats.faces_total};
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();

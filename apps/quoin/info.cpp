@@ -150,9 +150,7 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded, c
 }
 
 int run_info(const CommonOptions& options) {
-  // Files that cannot be read fail below, in the words of the reader.
-  const auto format = detect_format(options.input);
-  if (format && *format && format_info(**format).is_volume) return run_volume_info(options);
+  if (holds_volume(options.input)) return run_volume_info(options);
   const auto loaded = load_scene(options.input, options.load);
   if (!loaded) {
     print_error(loaded.error());

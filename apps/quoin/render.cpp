@@ -17,6 +17,7 @@
 #include "render_arguments.h"
 #include "scene_warnings.h"
 #include "stopwatch.h"
+#include "volume_info.h"
 
 namespace quoin::tool {
 
@@ -84,12 +85,6 @@ Result<LoadedScene> load_volume(const RenderArguments& arguments) {
   loaded.format = volume->format;
   loaded.warnings = std::move(volume->warnings);
   return loaded;
-}
-
-/// Files that cannot be read are of none, and fail later in the words of their reader.
-bool holds_volume(const std::filesystem::path& path) {
-  const auto format = detect_format(path);
-  return format && *format && format_info(**format).is_volume;
 }
 
 Result<LoadedScene> load_voxels(const RenderArguments& arguments) {

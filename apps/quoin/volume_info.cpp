@@ -1,5 +1,6 @@
 #include "volume_info.h"
 
+#include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 
 #include "output.h"
@@ -71,6 +72,11 @@ std::string volume_text(const CommonOptions& options, const Volume& volume) {
 }
 
 }  // namespace
+
+bool holds_volume(const std::filesystem::path& path) {
+  const auto format = detect_format(path);
+  return format && *format && format_info(**format).is_volume;
+}
 
 int run_volume_info(const CommonOptions& options) {
   const auto volume = read_volume(options.input);

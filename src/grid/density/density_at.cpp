@@ -1,7 +1,7 @@
-#include <array>
 #include <cmath>
 
 #include "grid/density/density_grid_impl.h"
+#include "grid/density/trilinear.h"
 
 namespace quoin {
 namespace {
@@ -25,9 +25,8 @@ struct Cell {
   }
 };
 
-// Densities of the corners, by x + 2 y + 4 z.
-std::array<double, 8> corners_of(const DensityStore& store, IVec3 low) {
-  std::array<double, 8> corners{};
+CellCorners corners_of(const DensityStore& store, IVec3 low) {
+  CellCorners corners{};
   const IVec3 local = local_of(low);
   const bool is_in_one_chunk = local.x < kChunkEdge - 1 && local.y < kChunkEdge - 1 && local.z < kChunkEdge - 1;
   const DensityStore::Entry* entry = is_in_one_chunk ? store.find(chunk_of(low)) : nullptr;
@@ -42,34 +41,18 @@ std::array<double, 8> corners_of(const DensityStore& store, IVec3 low) {
   return corners;
 }
 
-double between(double a, double b, double t) {
-  return a + t * (b - a);
-}
-
-double bilinear(double v00, double v10, double v01, double v11, double u, double v) {
-  return between(between(v00, v10, u), between(v01, v11, u), v);
-}
-
 }  // namespace
 
 float DensityGrid::density_at(DVec3 point) const {
   Cell cell;
   if (!cell.locate(point)) return band();
-  const std::array<double, 8> d = corners_of(impl_->store, cell.low);
-  const DVec3 f = cell.fraction;
-  const double low = bilinear(d[0], d[1], d[2], d[3], f.x, f.y);
-  const double high = bilinear(d[4], d[5], d[6], d[7], f.x, f.y);
-  return static_cast<float>(between(low, high, f.z));
+  return static_cast<float>(trilinear(corners_of(impl_->store, cell.low), cell.fraction));
 }
 
 DVec3 DensityGrid::gradient_at(DVec3 point) const {
   Cell cell;
   if (!cell.locate(point)) return DVec3(0.0);
-  const std::array<double, 8> d = corners_of(impl_->store, cell.low);
-  const DVec3 f = cell.fraction;
-  return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
-          bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
-          bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
+  return trilinear_gradient(corners_of(impl_->store, cell.low), cell.fraction);
 }
 
 }  // namespace quoin

@@ -3,13 +3,13 @@
 #include <bit>
 #include <cmath>
 
-#include "trace/density/cell_reader.h"
+#include "grid/density/trilinear.h"
 #include "trace/kernel/kernel.h"
 
 namespace quoin {
 namespace {
 
-using trace::CellCorners, trace::FieldHit;
+using trace::FieldHit;
 
 const DensityStorage* find_storage(const DensityGrid& field, int x, int y, int z) {
   const DensityChunk* const chunk = field.find_chunk({x, y, z});
@@ -17,8 +17,7 @@ const DensityStorage* find_storage(const DensityGrid& field, int x, int y, int z
 }
 
 void read_corners(const DensityGrid& field, int x, int y, int z, float* corners) {
-  const CellCorners read = trace::corners_of(field, {x, y, z});
-  std::copy(read.begin(), read.end(), corners);
+  for (int i = 0; i < 8; ++i) corners[i] = field.density(IVec3{x, y, z} + IVec3{i & 1, i >> 1 & 1, i >> 2});
 }
 
 template <bool kAsksWhere>
@@ -40,25 +39,21 @@ DensityHit described(const DensityGrid& field, const Ray& ray, const FieldHit& f
   CellCorners corners;
   std::copy_n(found.corners, corners.size(), corners.begin());
   const DVec3 at = glm::clamp(ray.origin + ray.direction * hit.t - DVec3(hit.cell), 0.0, 1.0);
-  const DVec3 gradient = trace::gradient_of(corners, at);
+  const DVec3 gradient = trilinear_gradient(corners, at);
   const double length = glm::length(gradient);
   if (length > 0.0) hit.normal = gradient / length;
   double least = std::numeric_limits<double>::infinity();
   IVec3 nearest{0};
-  double density = 0.0;
   for (int i = 0; i < 8; ++i) {
     const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
-    const DVec3 share = glm::mix(1.0 - at, at, DVec3(corner));
-    const auto value = static_cast<double>(corners[static_cast<std::size_t>(i)]);
-    density += share.x * share.y * share.z * value;
     const DVec3 away = DVec3(corner) - at;
     const double square = glm::dot(away, away);
-    if (!(value < 0.0) || !(square < least)) continue;
+    if (!(corners[static_cast<std::size_t>(i)] < 0.0) || !(square < least)) continue;
     least = square;
     nearest = corner;
   }
   hit.material = field.material(hit.cell + nearest);
-  hit.starts_inside = hit.t == 0.0 && density < 0.0;
+  hit.starts_inside = hit.t == 0.0 && trilinear(corners, at) < 0.0;
   return hit;
 }
 
