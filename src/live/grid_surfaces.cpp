@@ -39,7 +39,7 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const Grid& grid, const VoxelReg
     });
     for (const auto& job : jobs) grid_.collect(*job);
   }
-  for (const auto& [handle, chunk] : std::exchange(totals_.ready, {})) grid_.take(chunk, updates);
+  for (const ReadyChunk& ready : std::exchange(totals_.ready, {})) grid_.take(ready.chunk, updates);
   return updates;
 }
 

@@ -23,12 +23,14 @@ double distance_to_chunks(DVec3 point, const IBox& chunks) {
 }  // namespace
 
 void ChunkDistances::add(const Instance& instance, const SceneGrid& grid) {
-  Place place;
-  place.voxel_size = instance.voxel_size;
-  place.eye_in_grid =
-      glm::transpose(world_axes(instance)) * (eye_ - instance.position) / instance.voxel_size + grid.pivot;
-  place.least = distance_to_chunks(place.eye_in_grid, chunks_) * place.voxel_size;
-  places_.push_back(place);
+  for (const DVec3 eye : eyes_) {
+    Place place;
+    place.voxel_size = instance.voxel_size;
+    place.eye_in_grid =
+        glm::transpose(world_axes(instance)) * (eye - instance.position) / instance.voxel_size + grid.pivot;
+    if (!chunks_.empty()) place.least = distance_to_chunks(place.eye_in_grid, chunks_) * place.voxel_size;
+    places_.push_back(place);
+  }
 }
 
 void ChunkDistances::sort() {
@@ -43,6 +45,12 @@ double ChunkDistances::to(IVec3 chunk) const {
     const double distance = distance_to_chunks(place.eye_in_grid, {chunk, chunk + 1}) * place.voxel_size;
     least = std::min(least, distance);
   }
+  return least;
+}
+
+double ChunkDistances::in_voxels(IVec3 chunk) const {
+  double least = places_.empty() ? 0.0 : std::numeric_limits<double>::infinity();
+  for (const Place& place : places_) least = std::min(least, distance_to_chunks(place.eye_in_grid, {chunk, chunk + 1}));
   return least;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -7,18 +8,20 @@
 
 namespace quoin {
 
-/// How far the eye is from chunks of a grid, in the world: from the nearest of its instances.
+/// How far the nearest eye is from chunks of a grid: from the nearest of its instances.
 class ChunkDistances {
  public:
-  /// `chunks` hold all that will be asked for, or nearly so.
-  ChunkDistances(const IBox& chunks, DVec3 eye) : chunks_(chunks), eye_(eye) {}
+  /// `chunks` hold all that will be asked for, or nearly so; empty: no matter which. `eyes` are read while it lives.
+  ChunkDistances(const IBox& chunks, std::span<const DVec3> eyes) : chunks_(chunks), eyes_(eyes) {}
 
   /// Requires: the instance has a place.
   void add(const Instance& instance, const SceneGrid& grid);
   /// Call it once all instances are added.
   void sort();
-  /// 0 where numbers are not finite, or nothing was added.
+  /// In the world. 0 where numbers are not finite, or nothing was added.
   [[nodiscard]] double to(IVec3 chunk) const;
+  /// In voxels, or samples, of the instance that is nearest in these. As `to`.
+  [[nodiscard]] double in_voxels(IVec3 chunk) const;
 
  private:
   struct Place {
@@ -27,7 +30,7 @@ class ChunkDistances {
     double least = 0.0;  // distance of any chunk
   };
   IBox chunks_;
-  DVec3 eye_;
+  std::span<const DVec3> eyes_;
   std::vector<Place> places_;
 };
 

@@ -24,25 +24,6 @@ bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
 
 }  // namespace
 
-// Keeps the totals right while a chunk's state changes.
-class LiveGrid::Change {
- public:
-  Change(LiveTotals& totals, const LiveChunk& state) : totals_(totals), state_(state) {
-    totals_.unfinished -= state.is_unfinished() ? 1 : 0;
-    totals_.pending -= state.is_pending() ? 1 : 0;
-  }
-  Change(const Change&) = delete;
-  Change& operator=(const Change&) = delete;
-  ~Change() {
-    totals_.unfinished += state_.is_unfinished() ? 1 : 0;
-    totals_.pending += state_.is_pending() ? 1 : 0;
-  }
-
- private:
-  LiveTotals& totals_;
-  const LiveChunk& state_;
-};
-
 LiveGrid::LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals)
     : handle_(handle), options_(options), totals_(totals), densities_(reach_of(options.occlusion)) {}
 
@@ -129,10 +110,12 @@ void LiveGrid::see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time
   if (!is_meshed && is_there) remove(chunk);
 }
 
-void LiveGrid::mark_types(const Grid& grid, const std::vector<bool>& changed, LiveClock::time_point now) {
-  for (const IVec3 chunk : grid.chunks()) {
-    const std::vector<VoxelType> types = grid.find_chunk(chunk)->types();
-    const auto has_changed = [&](VoxelType type) { return type < changed.size() && changed[type]; };
+void LiveGrid::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
+  const std::vector<bool>& seen = options_.style == SurfaceStyle::Blocky ? changed.visibility : changed.colour;
+  if (seen.empty()) return;
+  for (const IVec3 chunk : content.grid.chunks()) {
+    const std::vector<VoxelType> types = content.grid.find_chunk(chunk)->types();
+    const auto has_changed = [&](VoxelType type) { return type < seen.size() && seen[type]; };
     if (std::none_of(types.begin(), types.end(), has_changed)) continue;
     for (int i = 0; i < 27; ++i) mark_if_there(chunk + Neighbourhood::offset(i), now);
   }
@@ -179,14 +162,19 @@ void LiveGrid::remove(IVec3 chunk) {
 void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
   state.is_ready = true;
   if (state.is_listed) return;
-  totals_.ready.emplace_back(handle_, chunk);
+  totals_.ready.push_back({{handle_, SurfaceContent::Voxels}, chunk});
   state.is_listed = true;
+}
+
+std::unique_ptr<LiveJob> LiveGrid::make_job(LiveInputs& inputs, IVec3 chunk) {
+  // Smooth jobs have that of their densities.
+  return make_job(options_.style == SurfaceStyle::Blocky ? inputs.voxels() : GridSnapshot(), chunk, *inputs.types);
 }
 
 std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types) {
   const LiveChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<LiveJob>();
-  job->grid = handle_;
+  job->source = {handle_, SurfaceContent::Voxels};
   job->chunk = chunk;
   job->serial = ++totals_.serial;
   job->seen = state.seen;
@@ -290,7 +278,7 @@ void LiveGrid::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
     if (state.is_ready) {
       state.is_ready = false;
       state.is_shown = state.surface != nullptr;
-      out.push_back({handle_, chunk, std::move(state.surface)});
+      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Voxels});
       state.surface.reset();
     }
   }

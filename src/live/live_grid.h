@@ -5,8 +5,6 @@
 #include <memory>
 #include <optional>
 #include <unordered_map>
-#include <unordered_set>
-#include <utility>
 #include <vector>
 
 #include <quoin/live/live_meshes.h>
@@ -14,7 +12,7 @@
 
 #include "grid/coordinate_hash.h"
 #include "live/live_densities.h"
-#include "live/mesh_job_queue.h"
+#include "live/live_source.h"
 
 namespace quoin {
 
@@ -38,54 +36,32 @@ struct LiveChunk {
   [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
 };
 
-/// Totals over all grids.
-struct LiveTotals {
-  std::uint64_t serial = 0;  ///< of the job that was made last
-  std::size_t unfinished = 0;
-  std::size_t pending = 0;
-  std::vector<std::pair<GridHandle, IVec3>> ready;  ///< and perhaps some that are no more
-};
-
-/// What surfaces are made with.
-struct LiveTypes {
-  std::shared_ptr<const VoxelRegistry> registry;
-  std::shared_ptr<const SurfaceMaterials> materials;
-  std::uint64_t generation = 0;
-};
-
-/// Follows one grid of a scene: which of its chunks are to be meshed, and what became of them.
-class LiveGrid {
+/// The voxels of one grid.
+class LiveGrid final : public LiveSource {
  public:
   LiveGrid(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals);
 
-  /// Takes over what was edited, at a cost in proportion to that.
+  void follow(const SceneGrid& content, LiveClock::time_point now) override { follow(content.grid, now); }
   void follow(const Grid& grid, LiveClock::time_point now);
-  /// Nothing of the grid is drawn any more.
-  void leave();
-  /// Makes the next `follow` begin anew.
-  void forget() { followed_ = {}; }
-  /// Chunks that show one of the types are to be meshed again.
-  void mark_types(const Grid& grid, const std::vector<bool>& changed, LiveClock::time_point now);
+  void leave() override;
+  void forget() override { followed_ = {}; }
+  void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
 
-  [[nodiscard]] const std::unordered_set<IVec3, CoordinateHash>& waiting() const { return waiting_; }
-  /// Holds all chunks that wait or are being meshed.
-  [[nodiscard]] const IBox& box() const { return box_; }
-  [[nodiscard]] bool has_chunks() const { return !chunks_.empty(); }
-  /// Requires: the chunk waits; `grid` is as `follow` saw it.
+  void prepare(const SceneGrid&) override {}
+  [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
+  [[nodiscard]] const IBox& box() const override { return box_; }
+  [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
+  [[nodiscard]] std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) override;
+  /// With the grid as `follow` saw it; null for smooth surfaces.
   [[nodiscard]] std::unique_ptr<LiveJob> make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types);
-  /// The job is with the workers.
-  void hand_over(IVec3 chunk, std::uint64_t serial);
-  /// Whether the job is of the chunk's present state.
-  [[nodiscard]] bool is_current(const LiveJob& job) const;
-  /// The job was taken back; what is not meshed anew anyway waits again.
-  void withdrawn(const LiveJob& job);
-  /// The job is done.
-  void collect(LiveJob& job);
-  /// Appends the surface if there is one to be taken.
-  void take(IVec3 chunk, std::vector<SurfaceUpdate>& out);
+  void hand_over(IVec3 chunk, std::uint64_t serial) override;
+  [[nodiscard]] bool is_current(const LiveJob& job) const override;
+  void withdrawn(const LiveJob& job) override;
+  void collect(LiveJob& job) override;
+  void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) override;
 
  private:
-  class Change;
+  using Change = LiveChange<LiveChunk>;
   using Chunks = std::unordered_map<IVec3, LiveChunk, CoordinateHash>;
 
   void begin_anew();
@@ -106,7 +82,7 @@ class LiveGrid {
   LiveTotals& totals_;
   ChangeCursor followed_;
   Chunks chunks_;
-  std::unordered_set<IVec3, CoordinateHash> waiting_;
+  ChunkSet waiting_;
   IBox box_;                // of all chunks that there were
   DensityCache densities_;  // smooth
 };

@@ -25,8 +25,8 @@ struct LiveMeshes::Impl {
 LiveMeshes::LiveMeshes(const LiveMeshOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 LiveMeshes::~LiveMeshes() = default;
 
-void LiveMeshes::update(const Scene& scene, DVec3 eye) {
-  impl_->scheduler.update(scene, eye);
+void LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  impl_->scheduler.update(scene, eye, other_eyes);
 }
 std::vector<SurfaceUpdate> LiveMeshes::take() {
   return impl_->scheduler.take();
@@ -34,8 +34,8 @@ std::vector<SurfaceUpdate> LiveMeshes::take() {
 std::size_t LiveMeshes::pending() const {
   return impl_->scheduler.pending();
 }
-void LiveMeshes::finish(const Scene& scene, DVec3 eye) {
-  impl_->scheduler.finish(scene, eye);
+void LiveMeshes::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  impl_->scheduler.finish(scene, eye, other_eyes);
 }
 LiveMeshes::Stats LiveMeshes::stats() const {
   return impl_->scheduler.stats();

@@ -4,6 +4,7 @@
 #include <quoin/live/live_meshes.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -90,7 +91,56 @@ void edit(benchmark::State& state, SurfaceStyle style, int x, int z) {
   state.counters["latency_seconds"] = benchmark::Counter(latency_seconds, benchmark::Counter::kAvgIterations);
 }
 
+// A ball of radius 6 dug into smooth ground, and filled again: one thread, `corner`: where eight chunks meet.
+void dig(benchmark::State& state, bool corner) {
+  Scene scene;
+  VoxelProperties ground;
+  fail_unless(scene.types.add(ground).has_value(), "no type");
+  const double surface = corner ? 128.3 : 96.3;
+  SceneGrid land;
+  land.field.edit({{0, 64, 0}, {256, 160, 256}}, [&](IVec3 p, DensitySample) {
+    const double waves = 3.0 * std::sin(0.07 * p.x) + 3.0 * std::cos(0.09 * p.z);
+    const double centre = corner ? 0.0 : 1.3;
+    return DensitySample{static_cast<float>(p.y - surface - 0.3 * waves + centre), VoxelType{1}};
+  });
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(land));
+  scene.add_instance(instance);
+  DensityGrid& field = scene.edit(instance.grid).field;
+  const DVec3 at = corner ? DVec3(128.0) : DVec3(96.0);
+  LiveMeshOptions options;
+  options.threads = {1};
+  LiveMeshes meshes(options);
+  meshes.finish(scene, at);
+  fail_unless(!meshes.take().empty(), "nothing was meshed");
+  std::size_t surfaces = 0;
+  bool is_dug = false;
+  double update_seconds = 0.0;
+  for (auto _ : state) {
+    is_dug = !is_dug;
+    if (is_dug) {
+      field.remove_sphere(at, 6.0);
+    } else {
+      field.add_sphere(at, 6.0, 1);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    meshes.update(scene, at);
+    update_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    meshes.finish(scene, at);
+    surfaces = meshes.take().size();
+    fail_unless(surfaces != 0, "the edit changed nothing");
+  }
+  state.counters["chunks"] = static_cast<double>(surfaces);
+  state.counters["update_seconds"] = benchmark::Counter(update_seconds, benchmark::Counter::kAvgIterations);
+}
+
 void register_all() {
+  for (const bool corner : {false, true}) {
+    benchmark::RegisterBenchmark(corner ? "live/density/edit_corner" : "live/density/edit",
+                                 [=](benchmark::State& state) { dig(state, corner); })
+        ->Unit(benchmark::kMillisecond)
+        ->UseRealTime();
+  }
   for (const SurfaceStyle style : {SurfaceStyle::Blocky, SurfaceStyle::Smooth}) {
     const std::string name = style == SurfaceStyle::Blocky ? "live/blocky" : "live/smooth";
     const auto add = [&](const char* which, auto&& run) {

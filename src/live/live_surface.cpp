@@ -46,15 +46,21 @@ DensityNeighbourhood moved(const DensityNeighbourhood& chunks, IVec3 offset) {
   return result;
 }
 
+// Of a chunk as a neighbourhood has it, and of those before it along x, y and z, by the bits of its place.
+int level_at(const std::array<std::uint8_t, 27>& levels, std::size_t previous) {
+  return levels[13 - (previous & 1) - 3 * (previous >> 1 & 1) - 9 * (previous >> 2)];
+}
+
 // A vertex of a cell before the chunk's own looks as it does in that cell's chunk.
-void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials, ChunkSurface& surface) {
+void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
+                   const std::array<std::uint8_t, 27>& levels, ChunkSurface& surface) {
   std::array<DensityNeighbourhood, 8> around;
   for (int i = 0; i < 8; ++i) around[static_cast<std::size_t>(i)] = moved(chunks, -IVec3{i & 1, i >> 1 & 1, i >> 2});
   surface.albedo.reserve(surface.smooth.cells.size());
   surface.types.reserve(surface.smooth.cells.size());
   for (const SmoothCell cell : surface.smooth.cells) {
     const std::size_t previous = cell.bits >> SmoothCell::kPreviousShift & 7U;
-    const SurfaceMaterial material = materials.of_cell(around[previous], cell.cell(), 0);
+    const SurfaceMaterial material = materials.of_cell(around[previous], cell.cell(), level_at(levels, previous));
     surface.albedo.push_back(material.albedo);
     surface.types.push_back(material.type);
   }
@@ -86,34 +92,48 @@ DensityNeighbourhood make_densities(const LiveDensities& densities) {
   return chunks;
 }
 
+void mesh_smooth(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, LiveJob& job,
+                 LiveWorkspace& workspace) {
+  if (!workspace.smooth) workspace.smooth.emplace();
+  SmoothOptions wanted;
+  wanted.occlusion = options.occlusion;
+  wanted.split_sheets = true;
+  wanted.levels = job.levels;
+  workspace.smooth->mesh(chunks, wanted, workspace.mesh);
+  if (workspace.mesh.indices.empty()) return;
+  auto surface = std::make_shared<ChunkSurface>();
+  surface->style = SurfaceStyle::Smooth;
+  surface->level = job.levels[13];
+  copy_exactly(workspace.mesh.positions, surface->smooth.positions);
+  copy_exactly(workspace.mesh.normals, surface->smooth.normals);
+  copy_exactly(workspace.mesh.occlusion, surface->smooth.occlusion);
+  copy_exactly(workspace.mesh.cells, surface->smooth.cells);
+  copy_exactly(workspace.mesh.indices, surface->smooth.indices);
+  add_materials(chunks, *job.materials, job.levels, *surface);
+  job.surface = std::move(surface);
+}
+
 void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
   const DensityNeighbourhood chunks = make_densities(job.densities);
   if (reads_as_before(job, reach_of(options.occlusion))) {
     job.outcome = LiveJob::Outcome::AsBefore;
     return;
   }
-  if (!workspace.smooth) workspace.smooth.emplace();
-  SmoothOptions wanted;
-  wanted.occlusion = options.occlusion;
-  wanted.split_sheets = true;
-  workspace.smooth->mesh(chunks, wanted, workspace.mesh);
-  if (workspace.mesh.indices.empty()) return;
-  auto surface = std::make_shared<ChunkSurface>();
-  surface->style = SurfaceStyle::Smooth;
-  copy_exactly(workspace.mesh.positions, surface->smooth.positions);
-  copy_exactly(workspace.mesh.normals, surface->smooth.normals);
-  copy_exactly(workspace.mesh.occlusion, surface->smooth.occlusion);
-  copy_exactly(workspace.mesh.cells, surface->smooth.cells);
-  copy_exactly(workspace.mesh.indices, surface->smooth.indices);
-  add_materials(chunks, *job.materials, *surface);
-  job.surface = std::move(surface);
+  mesh_smooth(options, chunks, job, workspace);
+}
+
+// Fields have no `last_stamps`: what reads as before is not meshed.
+void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
+  mesh_smooth(options, job.field->neighbourhood(job.chunk), job, workspace);
 }
 
 }  // namespace
 
 void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
   job.outcome = LiveJob::Outcome::Meshed;
-  if (options.style == SurfaceStyle::Blocky) {
+  if (job.source.content == SurfaceContent::Field) {
+    make_field(options, job, workspace);
+  } else if (options.style == SurfaceStyle::Blocky) {
     make_blocky(options, job, workspace);
   } else {
     make_smooth(options, job, workspace);

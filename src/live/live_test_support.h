@@ -23,7 +23,8 @@
 namespace quoin {
 
 inline bool operator<(const SurfaceUpdate& a, const SurfaceUpdate& b) {
-  return a.grid == b.grid ? by_zyx(a.chunk, b.chunk) : a.grid < b.grid;
+  if (!(a.grid == b.grid)) return a.grid < b.grid;
+  return a.content == b.content ? by_zyx(a.chunk, b.chunk) : a.content < b.content;
 }
 
 // The oracles take up to a hundred times as long under the sanitizers.
@@ -52,10 +53,9 @@ inline VoxelRegistry live_types() {
 class ShownSurfaces {
  public:
   void apply(const std::vector<SurfaceUpdate>& updates) {
-    std::set<std::pair<GridHandle, std::array<int, 3>>> given;
+    std::set<SurfaceUpdate> given;
     for (const SurfaceUpdate& update : updates) {
-      EXPECT_TRUE(given.insert({update.grid, {update.chunk.x, update.chunk.y, update.chunk.z}}).second)
-          << "given twice";
+      EXPECT_TRUE(given.insert(update).second) << "given twice";
       const auto found = shown_.find(update);
       if (found != shown_.end()) shown_.erase(found);
       if (update.surface == nullptr) {
@@ -67,8 +67,9 @@ class ShownSurfaces {
     }
   }
   [[nodiscard]] const std::set<SurfaceUpdate>& all() const { return shown_; }
-  [[nodiscard]] const ChunkSurface* find(GridHandle grid, IVec3 chunk) const {
-    const auto found = shown_.find({grid, chunk, nullptr});
+  [[nodiscard]] const ChunkSurface* find(GridHandle grid, IVec3 chunk,
+                                         SurfaceContent content = SurfaceContent::Voxels) const {
+    const auto found = shown_.find({grid, chunk, nullptr, content});
     return found == shown_.end() ? nullptr : found->surface.get();
   }
 

@@ -14,6 +14,7 @@ double seconds(LiveClock::duration duration) {
 // What only workers need; copies of chunks are let go as soon as they are done with.
 void drop_inputs(LiveJob& job) {
   job.voxels = {};
+  job.field.reset();
   job.types.reset();
   job.materials.reset();
 }

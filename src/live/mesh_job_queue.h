@@ -22,9 +22,23 @@ namespace quoin {
 
 using LiveClock = std::chrono::steady_clock;
 
+/// A field as it was at one moment.
+using FieldSnapshot = std::shared_ptr<const DensityGrid>;
+
+/// Whose surfaces: the voxels or the field of a grid.
+struct LiveKey {
+  GridHandle grid;
+  SurfaceContent content = SurfaceContent::Voxels;
+
+  bool operator==(const LiveKey&) const = default;
+  bool operator<(const LiveKey& other) const {
+    return grid == other.grid ? content < other.content : grid < other.grid;
+  }
+};
+
 /// A chunk that is to be meshed, with all that takes, and later its surface.
 struct LiveJob {
-  GridHandle grid;
+  LiveKey source;
   IVec3 chunk{0};
   std::uint64_t serial = 0;
   double distance = 0.0;       ///< from the eye; the least comes first
@@ -33,11 +47,13 @@ struct LiveJob {
   GridSnapshot voxels;                                ///< blocky
   std::shared_ptr<const VoxelRegistry> types;         ///< blocky
   LiveDensities densities;                            ///< smooth
-  std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth
+  std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth, and of fields
   /// Smooth: the stamps of the densities of which the last surface is; meshing what they say again is spared.
   std::optional<DensityStamps> last_stamps;
-  std::uint64_t last_collected = 0;   ///< the job whose surface that was
-  std::uint64_t type_generation = 0;  ///< of `materials`
+  std::uint64_t last_collected = 0;       ///< the job whose surface that was
+  std::uint64_t type_generation = 0;      ///< of `materials`
+  FieldSnapshot field;                    ///< of fields, which take `materials` too
+  std::array<std::uint8_t, 27> levels{};  ///< of fields: of detail, as a neighbourhood has them
 
   enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
   Outcome outcome = Outcome::Meshed;

@@ -8,6 +8,8 @@
 
 #include "core/worker_count.h"
 #include "grid/chunk_order.h"
+#include "live/live_field.h"
+#include "live/live_grid.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -28,8 +30,8 @@ bool is_placed(const Scene& scene, const Instance& instance, InstanceFilter filt
 // A chunk that waits for a job.
 struct MeshScheduler::Candidate {
   double distance = 0.0;
-  LiveGrid* live = nullptr;
-  GridHandle handle;
+  LiveSource* live = nullptr;
+  LiveKey source;
   IVec3 chunk{0};
 };
 
@@ -39,9 +41,13 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
       max_ahead_(jobs_ahead(options.style, workers_)),
       queue_(workers_, std::move(work), options.on_ready) {}
 
-void MeshScheduler::update(const Scene& scene, DVec3 eye) {
+void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
   try {
-    update_or_throw(scene, eye);
+    std::vector<DVec3> eyes{eye};
+    eyes.insert(eyes.end(), other_eyes.begin(), other_eyes.end());
+    are_places_new_ |= eyes != eyes_;
+    eyes_ = std::move(eyes);
+    update_or_throw(scene);
   } catch (...) {
     forget();
     throw;
@@ -50,26 +56,61 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye) {
 
 // Memory ran out in the middle: whatever was lost is found by beginning anew.
 void MeshScheduler::forget() {
-  for (auto& [handle, grid] : grids_) grid.forget();
+  for (auto& [key, source] : sources_) source->forget();
   followed_scene_ = {};
 }
 
-void MeshScheduler::update_or_throw(const Scene& scene, DVec3 eye) {
+void MeshScheduler::update_or_throw(const Scene& scene) {
   const LiveClock::time_point now = LiveClock::now();
   collect();
-  const std::vector<bool> changed_types = follow_types(scene.types);
-  for (const GridHandle handle : follow_scene(scene)) {
-    LiveGrid& live = grids_.try_emplace(handle, handle, options_, totals_).first->second;
-    live.follow(scene.grids()[handle].grid, now);
+  const ChangedTypes changed_types = follow_types(scene.types);
+  for (const GridHandle handle : follow_scene(scene)) follow_grid(scene, handle, now);
+  for (const GridHandle handle : drawn_) {
+    if (changed_types.visibility.empty() && changed_types.colour.empty()) break;
+    for (const SurfaceContent content : {SurfaceContent::Voxels, SurfaceContent::Field}) {
+      LiveSource* const live = find({handle, content});
+      if (live != nullptr) live->mark_types(scene.grids()[handle], changed_types, now);
+    }
   }
-  if (!changed_types.empty()) {
-    for (const GridHandle handle : drawn_) find(handle)->mark_types(scene.grids()[handle].grid, changed_types, now);
+  choose_levels(scene, now);
+  for (auto& [key, live] : sources_) {
+    const SceneGrid* const grid = scene.grids().find(key.grid);
+    if (grid != nullptr) live->prepare(*grid);
   }
   withdraw([&](const LiveJob& job) {
-    const LiveGrid* live = find(job.grid);
+    const LiveSource* live = find(job.source);
     return live == nullptr || !live->is_current(job);
   });
-  if (totals_.unfinished != 0) hand_over(scene, eye);
+  if (totals_.unfinished != 0) hand_over(scene);
+}
+
+void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, LiveClock::time_point now) {
+  const SceneGrid& grid = scene.grids()[handle];
+  const auto [voxels, is_new] = sources_.try_emplace({handle, SurfaceContent::Voxels});
+  if (voxels->second == nullptr) voxels->second = std::make_unique<LiveGrid>(handle, options_, totals_);
+  voxels->second->follow(grid, now);
+  LiveSource* field = find({handle, SurfaceContent::Field});
+  if (field == nullptr) {
+    if (grid.field.chunk_count() == 0) return;
+    field = (sources_[{handle, SurfaceContent::Field}] = std::make_unique<LiveField>(handle, options_, totals_)).get();
+  }
+  field->follow(grid, now);
+}
+
+// Of fields, where eyes moved, or places did, or there are more to be chosen.
+void MeshScheduler::choose_levels(const Scene& scene, LiveClock::time_point now) {
+  if (options_.detail_distance == std::numeric_limits<double>::infinity()) return;
+  std::map<GridHandle, ChunkDistances> distances;
+  for (const auto& [key, live] : sources_) {
+    if (key.content == SurfaceContent::Field && (are_places_new_ || live->wants_levels())) {
+      distances.try_emplace(key.grid, IBox{}, eyes_);
+    }
+  }
+  add_places(scene, distances);
+  for (const auto& [handle, places] : distances) {
+    find({handle, SurfaceContent::Field})->choose_levels(places, now);
+  }
+  are_places_new_ = false;
 }
 
 // The drawn grids that may have changed.
@@ -87,35 +128,39 @@ std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
     return changed;
   }
   drawn_ = drawn_grids(scene);
-  for (auto& [handle, grid] : grids_) {
-    if (!std::binary_search(drawn_.begin(), drawn_.end(), handle)) grid.leave();
+  are_places_new_ = true;
+  const auto is_drawn = [&](GridHandle handle) { return std::binary_search(drawn_.begin(), drawn_.end(), handle); };
+  for (auto& [key, source] : sources_) {
+    if (!is_drawn(key.grid)) source->leave();
   }
-  std::erase_if(grids_, [&](const auto& each) {
-    return !each.second.has_chunks() && !std::binary_search(drawn_.begin(), drawn_.end(), each.first);
-  });
+  std::erase_if(sources_, [&](const auto& each) { return !each.second->has_chunks() && !is_drawn(each.first.grid); });
   return drawn_;
 }
 
-// Which types look otherwise than before, by type; empty when none does.
-std::vector<bool> MeshScheduler::follow_types(const VoxelRegistry& types) {
+// What those that are new, or of another registry, are: all types look otherwise, those that it does not have included.
+ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   ChangeCursor now = followed_types_;
   const TypeChanges changes = types.changes_since(now);
-  const bool is_blocky = options_.style == SurfaceStyle::Blocky;
-  const auto matters = [&](const TypeChange& change) { return is_blocky ? change.visibility : change.colour; };
-  if (!changes.all && std::none_of(changes.items.begin(), changes.items.end(), matters)) {
-    followed_types_ = now;
-    return {};
-  }
-  // Of another registry all types look otherwise, those that it does not have included.
-  std::vector<bool> changed(changes.all ? kMaxVoxelTypes + 1 : types.size(), changes.all);
-  for (const TypeChange& change : changes.items) changed[change.type] = matters(change);
-  if (options_.style == SurfaceStyle::Blocky) {
+  ChangedTypes changed;
+  if (changes.empty()) return changed;
+  const auto add = [&](std::vector<bool>& to, bool TypeChange::*matters) {
+    if (changes.all) to.assign(kMaxVoxelTypes + 1, true);
+    for (const TypeChange& change : changes.items) {
+      if (!(change.*matters)) continue;
+      to.resize(types.size());
+      to[change.type] = true;
+    }
+  };
+  add(changed.visibility, &TypeChange::visibility);
+  add(changed.colour, &TypeChange::colour);
+  if (options_.style == SurfaceStyle::Blocky && !changed.visibility.empty()) {
     types_.registry = std::make_shared<const VoxelRegistry>(types);
-  } else {
+  }
+  if (!changed.colour.empty()) {
     types_.materials = std::make_shared<const SurfaceMaterials>(types);
+    ++types_.generation;
   }
   followed_types_ = now;
-  ++types_.generation;
   return changed;
 }
 
@@ -137,47 +182,55 @@ std::vector<GridHandle> MeshScheduler::drawn_grids(const Scene& scene) const {
 
 void MeshScheduler::collect() {
   for (const std::unique_ptr<LiveJob>& job : queue_.collect()) {
-    if (LiveGrid* live = find(job->grid)) live->collect(*job);
+    if (LiveSource* live = find(job->source)) live->collect(*job);
   }
 }
 
 void MeshScheduler::withdraw(const std::function<bool(const LiveJob&)>& is_unwanted) {
   for (const std::unique_ptr<LiveJob>& job : queue_.withdraw(is_unwanted)) {
-    if (LiveGrid* live = find(job->grid)) live->withdrawn(*job);
+    if (LiveSource* live = find(job->source)) live->withdrawn(*job);
   }
 }
 
-LiveGrid* MeshScheduler::find(GridHandle grid) {
-  const auto found = grids_.find(grid);
-  return found == grids_.end() ? nullptr : &found->second;
+LiveSource* MeshScheduler::find(LiveKey source) {
+  const auto found = sources_.find(source);
+  return found == sources_.end() ? nullptr : found->second.get();
 }
 
-std::map<GridHandle, ChunkDistances> MeshScheduler::distances_of_grids(const Scene& scene, DVec3 eye) const {
-  std::map<GridHandle, ChunkDistances> distances;
-  for (const auto& [handle, live] : grids_) distances.try_emplace(handle, live.box(), eye);
+void MeshScheduler::add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const {
+  if (distances.empty()) return;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     const auto found = distances.find(instance.grid);
     if (found == distances.end() || !is_placed(scene, instance, options_.instances)) return;
     found->second.add(instance, scene.grids()[instance.grid]);
   });
   for (auto& [handle, places] : distances) places.sort();
+}
+
+std::map<GridHandle, ChunkDistances> MeshScheduler::distances_of_grids(const Scene& scene) const {
+  std::map<GridHandle, IBox> boxes;
+  for (const auto& [key, live] : sources_) boxes[key.grid] = unite(boxes[key.grid], live->box());
+  std::map<GridHandle, ChunkDistances> distances;
+  for (const auto& [handle, box] : boxes) distances.try_emplace(handle, box, eyes_);
+  add_places(scene, distances);
   return distances;
 }
 
 bool MeshScheduler::has_waiting() const {
-  return std::any_of(grids_.begin(), grids_.end(), [](const auto& each) { return !each.second.waiting().empty(); });
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [](const auto& each) { return !each.second->waiting().empty(); });
 }
 
 // The chunks that wait for jobs, as many as may get one, the nearest first.
 std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<GridHandle, ChunkDistances>& distances) {
   std::vector<Candidate> all;
-  for (auto& [handle, live] : grids_) {
-    const ChunkDistances& places = distances.at(handle);
-    for (const IVec3 chunk : live.waiting()) all.push_back({places.to(chunk), &live, handle, chunk});
+  for (auto& [key, live] : sources_) {
+    const ChunkDistances& places = distances.at(key.grid);
+    for (const IVec3 chunk : live->waiting()) all.push_back({places.to(chunk), live.get(), key, chunk});
   }
   const auto comes_before = [](const Candidate& a, const Candidate& b) {
     if (a.distance != b.distance) return a.distance < b.distance;
-    return a.handle == b.handle ? by_zyx(a.chunk, b.chunk) : a.handle < b.handle;
+    return a.source == b.source ? by_zyx(a.chunk, b.chunk) : a.source < b.source;
   };
   const std::size_t most = std::min(all.size(), max_ahead_);
   std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(most), all.end(), comes_before);
@@ -186,12 +239,13 @@ std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<G
 }
 
 // Gives jobs to the workers; those that wait and are farther than what comes now have to wait longer.
-void MeshScheduler::hand_over(const Scene& scene, DVec3 eye) {
+void MeshScheduler::hand_over(const Scene& scene) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene, eye);
-  std::map<GridHandle, GridSnapshot> snapshots;
-  std::vector<double> queued = queue_.measure([&](const LiveJob& job) { return distances.at(job.grid).to(job.chunk); });
+  const std::map<GridHandle, ChunkDistances> distances = distances_of_grids(scene);
+  std::map<GridHandle, LiveInputs> inputs;
+  std::vector<double> queued =
+      queue_.measure([&](const LiveJob& job) { return distances.at(job.source.grid).to(job.chunk); });
   double farthest = kNone;  // of those that came and have to go
   for (const Candidate& each : candidates(distances)) {
     if (queued.size() >= max_ahead_) {
@@ -199,11 +253,8 @@ void MeshScheduler::hand_over(const Scene& scene, DVec3 eye) {
       farthest = queued.back();
       queued.pop_back();
     }
-    GridSnapshot& snapshot = snapshots[each.handle];
-    const bool is_blocky = options_.style == SurfaceStyle::Blocky;  // smooth jobs have that of their densities
-    if (is_blocky && snapshot == nullptr)
-      snapshot = std::make_shared<const Grid>(scene.grids()[each.handle].grid.snapshot());
-    std::unique_ptr<LiveJob> job = each.live->make_job(snapshot, each.chunk, types_);
+    LiveInputs& input = inputs.try_emplace(each.source.grid, scene.grids()[each.source.grid], types_).first->second;
+    std::unique_ptr<LiveJob> job = each.live->make_job(input, each.chunk);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;
     queue_.push(std::move(job));
@@ -222,17 +273,17 @@ std::vector<SurfaceUpdate> MeshScheduler::take() {
     forget();
     throw;
   }
-  for (const auto& [handle, chunk] : totals_.ready) {
-    if (LiveGrid* live = find(handle)) live->take(chunk, taken);
+  for (const ReadyChunk& ready : totals_.ready) {
+    if (LiveSource* live = find(ready.source)) live->take(ready.chunk, taken);
   }
   totals_.ready.clear();
   return taken;
 }
 
-void MeshScheduler::finish(const Scene& scene, DVec3 eye) {
+void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
   for (;;) {
     const LiveMeshes::Stats before = stats();
-    update(scene, eye);
+    update(scene, eye, other_eyes);
     if (totals_.unfinished == 0) return queue_.wait(0);  // for what was removed while it was meshed
     queue_.wait(has_waiting() ? max_ahead_ / 2 : 0);
     const LiveMeshes::Stats after = stats();

@@ -4,13 +4,14 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
 #include "live/live_distance.h"
-#include "live/live_grid.h"
+#include "live/live_source.h"
 #include "live/mesh_job_queue.h"
 
 namespace quoin {
@@ -21,27 +22,32 @@ class MeshScheduler {
   /// Calls of `work` come from several threads at once.
   MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
-  void update(const Scene& scene, DVec3 eye);
+  void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
   [[nodiscard]] std::vector<SurfaceUpdate> take();
   [[nodiscard]] std::size_t pending() const { return totals_.pending; }
-  void finish(const Scene& scene, DVec3 eye);
+  void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
   [[nodiscard]] LiveMeshes::Stats stats() const;
 
  private:
   struct Candidate;
 
-  void update_or_throw(const Scene& scene, DVec3 eye);
-  [[nodiscard]] std::vector<bool> follow_types(const VoxelRegistry& types);
+  using Sources = std::map<LiveKey, std::unique_ptr<LiveSource>>;
+
+  void update_or_throw(const Scene& scene);
+  [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
+  void follow_grid(const Scene& scene, GridHandle handle, LiveClock::time_point now);
+  void choose_levels(const Scene& scene, LiveClock::time_point now);
   void forget();
   void collect();
-  void hand_over(const Scene& scene, DVec3 eye);
+  void hand_over(const Scene& scene);
   [[nodiscard]] bool has_waiting() const;
-  [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene, DVec3 eye) const;
+  void add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const;
+  [[nodiscard]] std::map<GridHandle, ChunkDistances> distances_of_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<Candidate> candidates(const std::map<GridHandle, ChunkDistances>& distances);
   void withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
-  [[nodiscard]] LiveGrid* find(GridHandle grid);
+  [[nodiscard]] LiveSource* find(LiveKey source);
 
   const LiveMeshOptions options_;
   const unsigned workers_;
@@ -51,8 +57,10 @@ class MeshScheduler {
   ChangeCursor followed_types_;
   ChangeCursor followed_scene_;
   std::vector<GridHandle> drawn_;  // sorted
-  std::map<GridHandle, LiveGrid> grids_;
-  MeshJobQueue queue_;  // last: its threads end first
+  Sources sources_;
+  std::vector<DVec3> eyes_;
+  bool are_places_new_ = true;  // eyes or instances, since levels were chosen last
+  MeshJobQueue queue_;          // last: its threads end first
 };
 
 }  // namespace quoin

@@ -133,6 +133,46 @@ TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   EXPECT_EQ(storage(91), before) << "nobody shares it any more";
 }
 
+TEST(MeshScheduler, WhatOneEditOfAFieldReachesIsGivenAtOnce) {
+  OneGrid one;
+  DensityGrid& field = one.scene.edit(one.handle).field;
+  field.add_box(DVec3(10.0), DVec3(118.0), 1);  // in eight chunks
+  GatedWork gated(blocky(1));
+  MeshScheduler scheduler(blocky(1), gated.work());
+  scheduler.update(one.scene, {});
+  gated.wait_for_started(1);
+  gated.let_through(1);
+  gated.wait_for_started(2);
+  EXPECT_EQ(scheduler.take().size(), 1U) << "what was never seen waits for nobody";
+  gated.let_through(7);
+  while (scheduler.pending() != 0) {
+    scheduler.update(one.scene, {});
+    (void)scheduler.take();
+  }
+  EXPECT_EQ(gated.started().size(), 8U);
+  field.remove_sphere(DVec3(64.0, 118.0, 64.0), 6.0);
+  scheduler.update(one.scene, {});
+  for (int done = 1; done <= 4; ++done) {
+    EXPECT_TRUE(scheduler.take().empty()) << done;
+    gated.wait_for_started(8U + static_cast<std::size_t>(done));
+    // What comes meanwhile waits for these.
+    if (done == 2) field.remove_sphere(DVec3(64.0, 118.0, 20.0), 6.0);
+    scheduler.update(one.scene, {});
+    gated.let_through(1);
+  }
+  std::size_t given = 0;
+  while (given == 0) {
+    scheduler.update(one.scene, {});
+    given = scheduler.take().size();
+  }
+  EXPECT_EQ(given, 4U);
+  EXPECT_EQ(scheduler.pending(), 2U);
+  gated.open();
+  scheduler.finish(one.scene, {});
+  EXPECT_EQ(scheduler.take().size(), 2U);
+  EXPECT_EQ(gated.started().size(), 14U);
+}
+
 TEST(MeshScheduler, OfSeveralEditsBeforeItsTurnTheLastCounts) {
   OneGrid one;
   fill_row(one.grid(), 2);

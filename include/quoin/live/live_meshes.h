@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/core/parallel.h>
@@ -16,9 +18,16 @@ namespace quoin {
 
 enum class SurfaceStyle : std::uint8_t { Blocky, Smooth };
 
+/// What of a SceneGrid a surface is of.
+enum class SurfaceContent : std::uint8_t {
+  Voxels,  ///< its `grid`, in the style of the meshes
+  Field,   ///< its `field`; always smooth
+};
+
 /// The surface of one chunk as it is drawn; never changed once it was made.
 struct ChunkSurface {
   SurfaceStyle style = SurfaceStyle::Blocky;
+  int level = 0;  ///< of a field: of detail, 0 to kMaxSmoothLevel; its cells are 2^level samples wide
   /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
@@ -37,12 +46,17 @@ struct SurfaceUpdate {
   GridHandle grid;
   IVec3 chunk{0};
   std::shared_ptr<const ChunkSurface> surface;  ///< null: nothing of the chunk is seen any more
+  SurfaceContent content = SurfaceContent::Voxels;
 };
 
 struct LiveMeshOptions {
-  SurfaceStyle style = SurfaceStyle::Blocky;
-  bool merge = true;                                   ///< blocky: neighbouring faces become one quad
-  SmoothOcclusionOptions occlusion;                    ///< of smooth surfaces
+  SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
+  bool merge = true;                          ///< blocky: neighbouring faces become one quad
+  SmoothOcclusionOptions occlusion;           ///< of smooth surfaces, those of fields too
+  /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
+  /// detail 1, at twice that 2, and so on to kMaxSmoothLevel. A level is left only a tenth beyond where it ends. 0 and
+  /// less count as 1, NaN as infinity: level 0 everywhere.
+  double detail_distance = std::numeric_limits<double>::infinity();
   InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
   Threads threads;  ///< the workers. Unlike elsewhere 0 means one less than the machine has, at least 1
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
@@ -50,11 +64,13 @@ struct LiveMeshOptions {
   std::function<void()> on_ready;
 };
 
-/// The meshes of a scene's chunks, kept up to date by worker threads while the scene is edited.
+/// The meshes of a scene's chunks, of voxels and of fields, kept up to date by worker threads while it is edited.
 ///
 /// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only
 /// when an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was
 /// removed meanwhile are dropped.
+/// Seams:   surfaces of a field fit each other at any time: what an edit, or a change of levels of detail, changes in
+///          chunks beside each other is given by one `take`, once all of it is there.
 /// Lifetime: the scene is only read within calls; surfaces belong to whoever took them.
 /// Threads:  all calls come from one thread.
 class LiveMeshes {
@@ -67,13 +83,13 @@ class LiveMeshes {
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
   /// Takes over whatever was changed: voxels, grids, types whose visibility changed (smooth: whose colour did),
-  /// instances that first show a grid or last showed it. Chunks nearest to `eye` (world) come first. Call it after
+  /// instances that first show a grid or last showed it. Chunks nearest to an eye (world) come first. Call it after
   /// edits and once a frame while `pending` is not 0: no more chunks are handed out than keep the workers busy.
   ///
   /// Cost:   O(what changed), whatever the size of the world; O(instances) when some of them came, went or changed, and
   ///         while chunks wait for workers, besides O(chunks that wait).
   /// Errors: bad_alloc; the next call begins anew with all chunks.
-  void update(const Scene& scene, DVec3 eye);
+  void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
   /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
   /// Of chunks of which nothing was, or is, to be seen, none is given.
@@ -84,7 +100,7 @@ class LiveMeshes {
   [[nodiscard]] std::size_t pending() const;
   /// Calls `update` until nothing is left to mesh. For tests and screenshots.
   /// Errors: bad_alloc, also when workers' memory runs out for every chunk that is left.
-  void finish(const Scene& scene, DVec3 eye);
+  void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
   struct Stats {
     std::int64_t chunks_meshed = 0;     ///< in all

@@ -55,17 +55,29 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   return properties;
 }
 
-/// Text of voxels, with its place in the file.
+/// Text of voxels or of densities, with its place in the file.
 struct Piece {
   std::size_t grid = 0;
   std::size_t index = 0;
   const std::string* text = nullptr;
+  bool is_field = false;
 };
+
+void read_pieces(const Object& object, const char* key, bool is_field, std::size_t grid, std::vector<Piece>& pieces) {
+  std::size_t count = 0;
+  read_list(object, key, std::numeric_limits<std::size_t>::max(), [&](const Json& piece, const Place& at) {
+    if (piece.is_string()) {
+      pieces.push_back({grid, count++, &piece.get_ref<const std::string&>(), is_field});
+    } else {
+      object.faults().add(at, "must be a string");
+    }
+  });
+}
 
 SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::vector<Piece>& pieces, Faults& faults) {
   constexpr int kLeast = std::numeric_limits<int>::min();
   constexpr int kMost = std::numeric_limits<int>::max();
-  const Object object(json, place, {"name", "pivot", "canvas", "voxels"}, faults);
+  const Object object(json, place, {"name", "pivot", "canvas", "voxels", "band", "densities"}, faults);
   SceneGrid grid;
   object.read_text("name", grid.name);
   object.read("pivot", grid.pivot);
@@ -73,14 +85,18 @@ SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::
     const std::vector<int> c = object.whole_numbers(*canvas, object.place_of("canvas"), 6, kLeast, kMost);
     grid.canvas = {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
   }
-  std::size_t count = 0;
-  read_list(object, "voxels", std::numeric_limits<std::size_t>::max(), [&](const Json& piece, const Place& at) {
-    if (piece.is_string()) {
-      pieces.push_back({index, count++, &piece.get_ref<const std::string&>()});
+  read_pieces(object, "voxels", false, index, pieces);
+  if (object.find("densities") != nullptr) {
+    double band = static_cast<double>(grid.field.band());
+    object.read("band", band);
+    constexpr double kGreatest = 65'504.0;
+    if (band > 0.0 && band <= kGreatest) {
+      grid.field = DensityGrid(static_cast<float>(band));
     } else {
-      faults.add(at, "must be a string");
+      faults.add(object.place_of("band"), "must be more than 0 and at most 65504");
     }
-  });
+    read_pieces(object, "densities", true, index, pieces);
+  }
   return grid;
 }
 
@@ -100,41 +116,74 @@ std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   return "";
 }
 
-using Decoded = std::vector<Result<std::vector<PlacedChunk>>>;
+// The same of a field.
+std::string put(std::vector<PlacedDensities> chunks, DensityGrid& field) {
+  for (PlacedDensities& chunk : chunks) {
+    if (field.find_chunk(chunk.place) != nullptr) return about(chunk.place, "was given before");
+    field.put_chunk(chunk.place, std::move(chunk.samples));
+    if (field.find_chunk(chunk.place) == nullptr) return about(chunk.place, "holds nothing");
+  }
+  return "";
+}
+
+/// What became of a piece.
+struct Decoded {
+  Result<std::vector<PlacedChunk>> voxels;
+  Result<std::vector<PlacedDensities>> densities;
+};
 
 /// The chunks of all pieces; nothing where they take more than `max_bytes`.
-std::optional<Decoded> decode(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t max_bytes) {
-  Decoded decoded(pieces.size());
+std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, const std::vector<SceneGrid>& grids,
+                                           std::size_t type_count, std::size_t max_bytes) {
+  std::vector<Decoded> decoded(pieces.size());
   std::atomic<std::size_t> bytes = 0;
   parallel_for(pieces.size(), {}, [&](std::size_t i) {
     if (bytes > max_bytes) return;
-    decoded[i] = decode_voxels(*pieces[i].text, type_count);
-    if (!decoded[i]) return;
-    for (const PlacedChunk& chunk : *decoded[i]) bytes += voxel_bytes(chunk.voxels);
+    const Piece& piece = pieces[i];
+    if (piece.is_field) {
+      auto& densities = decoded[i].densities;
+      densities = decode_field(*piece.text, type_count, grids[piece.grid].field.band());
+      if (!densities) return;
+      for (const PlacedDensities& chunk : *densities) bytes += voxel_bytes(chunk.samples);
+      return;
+    }
+    auto& voxels = decoded[i].voxels;
+    voxels = decode_voxels(*piece.text, type_count);
+    if (!voxels) return;
+    for (const PlacedChunk& chunk : *voxels) bytes += voxel_bytes(chunk.voxels);
   });
   if (bytes > max_bytes) return std::nullopt;
   return decoded;
 }
 
+// Puts a piece into its grid, or says what is wrong with it.
+template <class Chunks, class Content>
+void put_or_blame(Result<Chunks>& chunks, Content& content, const Place& place, Faults& faults) {
+  if (!chunks) {
+    faults.add(place, chunks.error().message, chunks.error().code);
+  } else if (const std::string fault = put(std::move(*chunks), content); !fault.empty()) {
+    faults.add(place, fault);
+  }
+}
+
 void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t file_bytes,
                  std::vector<SceneGrid>& grids, Faults& faults) {
-  auto all = decode(pieces, type_count, max_voxel_bytes(file_bytes));
-  if (!all) {
+  auto decoded = decode(pieces, grids, type_count, max_voxel_bytes(file_bytes));
+  if (!decoded) {
     faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
                ErrorCode::LimitExceeded);
     return;
   }
-  Decoded& decoded = *all;
   for (std::size_t i = 0; i < pieces.size() && !faults.error(); ++i) {
     const Piece& piece = pieces[i];
     const Place list{nullptr, "grids", std::nullopt};
     const Place grid{&list, {}, piece.grid};
-    const Place voxels{&grid, "voxels", std::nullopt};
-    const Place place{&voxels, {}, piece.index};
-    if (!decoded[i]) {
-      faults.add(place, decoded[i].error().message, decoded[i].error().code);
-    } else if (const std::string fault = put(std::move(*decoded[i]), grids[piece.grid].grid); !fault.empty()) {
-      faults.add(place, fault);
+    const Place of_content{&grid, piece.is_field ? "densities" : "voxels", std::nullopt};
+    const Place place{&of_content, {}, piece.index};
+    if (piece.is_field) {
+      put_or_blame((*decoded)[i].densities, grids[piece.grid].field, place, faults);
+    } else {
+      put_or_blame((*decoded)[i].voxels, grids[piece.grid].grid, place, faults);
     }
   }
 }

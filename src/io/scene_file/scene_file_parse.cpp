@@ -23,7 +23,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
@@ -195,7 +195,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 and 2 are",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 3 are",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);

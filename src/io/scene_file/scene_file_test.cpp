@@ -199,10 +199,10 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
             "instances[0].position[1]: must be a number");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 3, "files": [], "instances": []})"),
-            "quoin_scene: version 3 is not known; 1 and 2 are");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 4, "files": [], "instances": []})"),
+            "quoin_scene: version 4 is not known; 1 to 3 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not known; 1 and 2 are");
+            "quoin_scene: version 0 is not known; 1 to 3 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
             "files[0].path: must name a file");

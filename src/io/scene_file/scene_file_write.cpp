@@ -9,7 +9,6 @@
 #include <quoin/io/scene_file.h>
 
 #include "io/base64.h"
-#include "io/field_check.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/text.h"
 #include "io/whole_file.h"
@@ -38,15 +37,23 @@ bool is_same(const DQuat& a, const DQuat& b) {
 /// Writes a scene file, and knows which version of the format it needs.
 class SceneText {
  public:
-  using Voxels = std::vector<std::vector<std::string>>;
+  using Texts = std::vector<std::vector<std::string>>;
+  /// By grid.
+  struct Pieces {
+    Texts voxels;
+    Texts densities;
+  };
 
-  /// `voxels`: by grid. Errors: InvalidArgument.
-  Result<std::string> write(const SceneFile& scene, const Voxels& voxels) {
+  /// Errors: InvalidArgument.
+  Result<std::string> write(const SceneFile& scene, const Pieces& pieces) {
     try {
       for (std::size_t type = 1; type < scene.types.size(); ++type) {
         types_.push_back(json_of(scene.types[static_cast<VoxelType>(type)]));
       }
-      for (std::size_t i = 0; i < scene.grids.size(); ++i) grids_.push_back(json_of(scene.grids[i], voxels[i]));
+      for (std::size_t i = 0; i < scene.grids.size(); ++i) {
+        grids_.push_back(json_of(scene.grids[i], pieces.voxels[i], pieces.densities[i]));
+        is_third_ |= !pieces.densities[i].empty();
+      }
       for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(json_of(placement));
       for (const Lamp& lamp : scene.lamps) lamps_.push_back(json_of(lamp));
       is_second_ = is_second_ || !lamps_.empty();
@@ -82,7 +89,8 @@ class SceneText {
     return json;
   }
 
-  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels) {
+  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels,
+               const std::vector<std::string>& densities) {
     Json json = Json::object();
     if (!grid.name.empty()) json["name"] = text(grid.name);
     if (!is_same(grid.pivot, DVec3(0.0))) json["pivot"] = triple(grid.pivot);
@@ -91,6 +99,10 @@ class SceneText {
       json["canvas"] = {canvas.min.x, canvas.min.y, canvas.min.z, canvas.max.x, canvas.max.y, canvas.max.z};
     }
     json["voxels"] = voxels;
+    if (!densities.empty()) {
+      json["band"] = grid.field.band();
+      json["densities"] = densities;
+    }
     return json;
   }
 
@@ -159,7 +171,7 @@ class SceneText {
 
   [[nodiscard]] std::string text_of(const SceneFile& scene) const {
     const bool has_models = !types_.empty() || !grids_.empty();
-    std::string text = std::string("{\n  \"quoin_scene\": ") + (has_models || is_second_ ? "2" : "1");
+    std::string text = std::string("{\n  \"quoin_scene\": ") + (is_third_ ? "3" : has_models || is_second_ ? "2" : "1");
     if (has_models) put_list(text, "types", types_);
     if (has_models) put_list(text, "grids", grids_);
     std::vector<Json> files;
@@ -179,36 +191,69 @@ class SceneText {
   std::vector<Json> lamps_;
   Json camera_;
   bool is_second_ = false;
+  bool is_third_ = false;
 };
 
 Status check_types(const SceneFile& scene) {
   for (std::size_t i = 0; i < scene.grids.size(); ++i) {
-    const std::vector<VoxelType> types = scene.grids[i].grid.types();
-    if (types.empty() || types.back() < scene.types.size()) continue;
+    VoxelType greatest = kAir;
+    for (const VoxelType type : scene.grids[i].grid.types()) greatest = std::max(greatest, type);
+    const DensityGrid& field = scene.grids[i].field;
+    for (const IVec3 chunk : field.chunks()) {
+      for (const VoxelType type : field.find_chunk(chunk)->materials().types()) greatest = std::max(greatest, type);
+    }
+    if (greatest == kAir || greatest < scene.types.size()) continue;
     return make_error(ErrorCode::InvalidArgument, "grids[" + std::to_string(i) + "] has voxels of type " +
-                                                      std::to_string(types.back()) + ", which is not registered");
+                                                      std::to_string(greatest) + ", which is not registered");
   }
   return {};
 }
 
-std::size_t voxel_bytes_of(std::span<const Grid* const> grids) {
-  std::size_t bytes = 0;
-  for (const Grid* grid : grids) {
-    for (const IVec3 chunk : grid->chunks()) bytes += voxel_bytes(*grid->find_chunk(chunk));
+// What there is of voxels, and of densities, in the grids of a file.
+class Contents {
+ public:
+  explicit Contents(const SceneFile& scene) {
+    for (const SceneGrid& grid : scene.grids) {
+      grids_.push_back(&grid.grid);
+      fields_.push_back(&grid.field);
+    }
   }
-  return bytes;
-}
 
-Result<std::string> text_of(const SceneFile& scene, std::span<const Grid* const> grids, VoxelCompression compression,
+  [[nodiscard]] std::size_t bytes() const {
+    std::size_t bytes = 0;
+    for (const Grid* grid : grids_) {
+      for (const IVec3 chunk : grid->chunks()) bytes += voxel_bytes(*grid->find_chunk(chunk));
+    }
+    for (const DensityGrid* field : fields_) {
+      for (const IVec3 chunk : field->chunks()) bytes += voxel_bytes(*field->find_chunk(chunk));
+    }
+    return bytes;
+  }
+
+  Result<SceneText::Pieces> pieces(VoxelCompression compression, Threads threads, const Progress& progress) const {
+    auto voxels = encode_voxels(grids_, compression, threads, progress);
+    if (!voxels) return voxels.error();
+    auto densities = encode_fields(fields_, compression, threads, progress);
+    if (!densities) return densities.error();
+    return SceneText::Pieces{std::move(*voxels), std::move(*densities)};
+  }
+
+ private:
+  std::vector<const Grid*> grids_;
+  std::vector<const DensityGrid*> fields_;
+};
+
+Result<std::string> text_of(const SceneFile& scene, const Contents& contents, VoxelCompression compression,
                             Threads threads, const Progress& progress) {
-  const auto voxels = encode_voxels(grids, compression, threads, progress);
-  if (!voxels) return voxels.error();
-  return SceneText().write(scene, *voxels);
+  const auto pieces = contents.pieces(compression, threads, progress);
+  if (!pieces) return pieces.error();
+  return SceneText().write(scene, *pieces);
 }
 
 // Whatever the reader refuses is not written. Voxels, which it takes as they are written, are left out here.
 Status check_readable(const SceneFile& scene) {
-  const auto text = SceneText().write(scene, SceneText::Voxels(scene.grids.size()));
+  const SceneText::Texts none(scene.grids.size());
+  const auto text = SceneText().write(scene, {none, none});
   if (!text) return text.error();
   const auto read = parse_scene_file(std::as_bytes(std::span(*text)));
   if (read) return {};
@@ -246,17 +291,12 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
 }
 
 Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads threads, const Progress& progress) {
-  for (const SceneGrid& grid : scene.grids) {
-    if (auto sound = check_has_no_field(grid); !sound) return sound.error();
-  }
   if (auto sound = check_types(scene); !sound) return sound.error();
   if (auto sound = check_readable(scene); !sound) return sound.error();
-  std::vector<const Grid*> grids;
-  grids.reserve(scene.grids.size());
-  for (const SceneGrid& grid : scene.grids) grids.push_back(&grid.grid);
-  auto text = text_of(scene, grids, VoxelCompression::Small, threads, progress);
-  if (text && voxel_bytes_of(grids) > max_voxel_bytes(text->size())) {
-    text = text_of(scene, grids, VoxelCompression::Stored, threads, progress);
+  const Contents contents(scene);
+  auto text = text_of(scene, contents, VoxelCompression::Small, threads, progress);
+  if (text && contents.bytes() > max_voxel_bytes(text->size())) {
+    text = text_of(scene, contents, VoxelCompression::Stored, threads, progress);
   }
   if (!text) return text.error();
   const auto bytes = std::as_bytes(std::span(*text));

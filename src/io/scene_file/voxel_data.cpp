@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <utility>
+
+#include <quoin/core/half.h>
 
 #include "core/progress_steps.h"
 #include "io/base64.h"
@@ -16,6 +19,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kChunksPerPiece = 32;
+constexpr std::size_t kFieldChunksPerPiece = 16;  // which are twice as large
 constexpr std::uint32_t kMixedSlab = 0xFFFF'FFFFU;
 constexpr int kSlabs = 256;
 constexpr std::size_t kSlabVoxels = 1'024;
@@ -27,6 +31,9 @@ constexpr int kMinPlace = -kMaxPlace - 1;
 // More than all that a piece can hold: chunks of 65,536 types, none of whose slabs is of one.
 constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
 static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
+
+static_assert(kFieldChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + 2 * kSlabs * (4 + 2 * kSlabVoxels)) <=
+              kMaxPieceBytes);
 
 // Real scenes take up to thirty times their text.
 constexpr std::size_t kFreeBytes = std::size_t{64} << 20;
@@ -70,6 +77,19 @@ class PieceWriter {
       for (int slab = 0; slab < kSlabs; ++slab) put_slab(slab);
     }
     for (const VoxelType type : palette_) index_of_[type] = kNone;
+  }
+  void put(IVec3 place, const DensityChunk& chunk) {
+    put(place, chunk.materials());
+    if (const auto uniform = chunk.uniform()) return put_number(std::uint32_t{*uniform});
+    put_number(kMixedSlab);
+    halves_.resize(kChunkVoxels);
+    auto row = halves_.begin();
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y, row += kChunkEdge) {
+        chunk.read_row(y, z, std::span<Half, kChunkEdge>(row, kChunkEdge));
+      }
+    }
+    for (int slab = 0; slab < kSlabs; ++slab) put_densities(slab);
   }
   [[nodiscard]] const std::vector<std::byte>& bytes() const { return bytes_; }
 
@@ -124,8 +144,32 @@ class PieceWriter {
     });
   }
 
+  void put_densities(int slab) {
+    const std::span<const Half> halves(halves_);
+    const Half first = halves[first_of_slab(slab)];
+    std::vector<std::byte> high;
+    const std::size_t begin = bytes_.size();
+    put_number(kMixedSlab);
+    bool is_uniform = true;
+    for_each_run(halves, slab, [&](std::span<const Half> run) {
+      for (std::size_t i = 0; i < run.size(); ++i) {
+        const Half before = i % kChunkEdge == 0 ? Half{0} : run[i - 1];
+        const auto difference = static_cast<std::uint16_t>(run[i] - before);
+        is_uniform = is_uniform && run[i] == first;
+        bytes_.push_back(static_cast<std::byte>(difference & 0xFF));
+        high.push_back(static_cast<std::byte>(difference >> 8));
+      }
+    });
+    if (is_uniform) {
+      bytes_.resize(begin);
+      return put_number(std::uint32_t{first});
+    }
+    bytes_.insert(bytes_.end(), high.begin(), high.end());
+  }
+
   std::vector<std::byte> bytes_;
   DenseChunk dense_;
+  std::vector<Half> halves_;
   std::vector<std::uint32_t> index_of_;  // by type; kNone but while a chunk is put
   std::vector<VoxelType> palette_;
 };
@@ -166,6 +210,35 @@ class PieceReader {
       if (auto read = read_slab(slab); !read) return read.error();
     }
     chunk.voxels = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
+    return chunk;
+  }
+
+  Result<PlacedDensities> read_densities(float band) {
+    auto materials = read_chunk();
+    if (!materials) return materials.error();
+    band_ = band;
+    PlacedDensities chunk;
+    chunk.place = materials->place;
+    if (!has(sizeof(std::uint32_t))) return cut_off();
+    const auto uniform = take<std::uint32_t>();
+    if (uniform != kMixedSlab) {
+      if (!is_density(uniform)) return wrong_density(at_ - sizeof(uniform));
+      chunk.samples = DensityChunk(static_cast<Half>(uniform));
+      chunk.samples.materials() = std::move(materials->voxels);
+      return chunk;
+    }
+    halves_.resize(kChunkVoxels);
+    for (int slab = 0; slab < kSlabs; ++slab) {
+      if (auto read = read_slab_of_densities(slab); !read) return read.error();
+    }
+    auto row = halves_.cbegin();
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y, row += kChunkEdge) {
+        chunk.samples.write_row(y, z, std::span<const Half, kChunkEdge>(row, kChunkEdge));
+      }
+    }
+    chunk.samples.unite_slabs();
+    chunk.samples.materials() = std::move(materials->voxels);
     return chunk;
   }
 
@@ -222,6 +295,38 @@ class PieceReader {
     });
     return status;
   }
+  // Infinities and NaN are beyond any band.
+  [[nodiscard]] bool is_density(std::uint32_t half) const {
+    return half <= 0xFFFF && std::abs(float_from_half(static_cast<Half>(half))) <= band_;
+  }
+  [[nodiscard]] Error wrong_density(std::size_t at) const { return fault("a density beyond the band", at); }
+
+  Status read_slab_of_densities(int slab) {
+    if (!has(sizeof(std::uint32_t))) return cut_off();
+    const auto uniform = take<std::uint32_t>();
+    const std::span<Half> halves(halves_);
+    if (uniform != kMixedSlab) {
+      if (!is_density(uniform)) return wrong_density(at_ - sizeof(uniform));
+      for_each_run(halves, slab, [&](std::span<Half> run) { std::ranges::fill(run, static_cast<Half>(uniform)); });
+      return {};
+    }
+    if (!has(2 * kSlabVoxels)) return cut_off();
+    Status status;
+    for_each_run(halves, slab, [&](std::span<Half> run) {
+      std::uint32_t before = 0;
+      for (std::size_t i = 0; i < run.size(); ++i, ++at_) {
+        if (i % kChunkEdge == 0) before = 0;
+        const auto low = std::to_integer<std::uint32_t>(bytes_[at_]);
+        const auto high = std::to_integer<std::uint32_t>(bytes_[at_ + kSlabVoxels]);
+        before = (before + low + (high << 8)) & 0xFFFF;
+        if (!is_density(before) && status) status = wrong_density(at_);
+        run[i] = static_cast<Half>(before);
+      }
+    });
+    at_ += kSlabVoxels;
+    return status;
+  }
+
   [[nodiscard]] Error wrong_index(std::uint32_t index, std::size_t at) const {
     return fault("index " + std::to_string(index) + " of a palette of " + std::to_string(palette_.size()), at);
   }
@@ -231,6 +336,8 @@ class PieceReader {
   std::size_t at_ = 0;
   std::vector<VoxelType> palette_;
   DenseChunk dense_;
+  std::vector<Half> halves_;
+  float band_ = 0.0F;
 };
 
 /// An error whose place is no place of the file.
@@ -268,9 +375,17 @@ std::size_t voxel_bytes(const Chunk& chunk) {
   return kBytesAboveChunk + chunk.bytes();
 }
 
-Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
-                                                            VoxelCompression compression, Threads threads,
-                                                            const Progress& progress) {
+std::size_t voxel_bytes(const DensityChunk& chunk) {
+  return kBytesAboveChunk + chunk.bytes();
+}
+
+namespace {
+
+/// As encode_voxels, of anything that has chunks.
+template <class Any>
+Result<std::vector<std::vector<std::string>>> encode(std::span<const Any* const> grids, std::size_t chunks_per_piece,
+                                                     VoxelCompression compression, Threads threads,
+                                                     const Progress& progress) {
   struct Piece {
     std::size_t grid;
     std::vector<IVec3> chunks;
@@ -278,9 +393,9 @@ Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid
   std::vector<Piece> pieces;
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const std::vector<IVec3> chunks = grids[i]->chunks();
-    for (std::size_t at = 0; at < chunks.size(); at += kChunksPerPiece) {
+    for (std::size_t at = 0; at < chunks.size(); at += chunks_per_piece) {
       const auto first = chunks.begin() + static_cast<std::ptrdiff_t>(at);
-      const std::size_t count = std::min(kChunksPerPiece, chunks.size() - at);
+      const std::size_t count = std::min(chunks_per_piece, chunks.size() - at);
       pieces.push_back({i, {first, first + static_cast<std::ptrdiff_t>(count)}});
     }
   }
@@ -289,7 +404,7 @@ Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid
   parallel_for(pieces.size(), threads, [&](std::size_t i) {
     if (steps.cancelled()) return;
     PieceWriter writer;
-    const Grid& grid = *grids[pieces[i].grid];
+    const Any& grid = *grids[pieces[i].grid];
     for (const IVec3 chunk : pieces[i].chunks) writer.put(chunk, *grid.find_chunk(chunk));
     texts[i] = text_of(writer.bytes(), compression);
     steps.step();
@@ -300,17 +415,41 @@ Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid
   return of_grids;
 }
 
-Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count) {
+/// The chunks of a piece, each as `read(reader)` gives it.
+template <class Placed, class Read>
+Result<std::vector<Placed>> decode(std::string_view piece, std::size_t type_count, Read read) {
   const auto bytes = expanded(piece);
   if (!bytes) return bytes.error();
-  std::vector<PlacedChunk> chunks;
+  std::vector<Placed> chunks;
   PieceReader reader(*bytes, type_count);
   while (!reader.is_at_end()) {
-    auto chunk = reader.read_chunk();
+    auto chunk = read(reader);
     if (!chunk) return chunk.error();
     chunks.push_back(std::move(*chunk));
   }
   return chunks;
+}
+
+}  // namespace
+
+Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
+                                                            VoxelCompression compression, Threads threads,
+                                                            const Progress& progress) {
+  return encode(grids, kChunksPerPiece, compression, threads, progress);
+}
+
+Result<std::vector<std::vector<std::string>>> encode_fields(std::span<const DensityGrid* const> fields,
+                                                            VoxelCompression compression, Threads threads,
+                                                            const Progress& progress) {
+  return encode(fields, kFieldChunksPerPiece, compression, threads, progress);
+}
+
+Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count) {
+  return decode<PlacedChunk>(piece, type_count, [](PieceReader& reader) { return reader.read_chunk(); });
+}
+
+Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count, float band) {
+  return decode<PlacedDensities>(piece, type_count, [&](PieceReader& reader) { return reader.read_densities(band); });
 }
 
 }  // namespace quoin

@@ -10,6 +10,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
 // The voxels of a grid as a scene file holds them: pieces of some chunks each, which are gzip streams in base64.
@@ -23,6 +24,14 @@
 //                                   `bits` is the first of 1, 2, 4, 8 and 16 with 2^bits >= n
 //
 // Little-endian; chunk after chunk to the end of the piece.
+//
+// The densities of a field likewise, with their materials:
+//
+//   chunk    a chunk as above, of the materials
+//            uint32 density         of all samples, as a half; or 0xFFFFFFFF, and then 256 slabs as above:
+//              uint32 density       of all of the slab, as a half; or 0xFFFFFFFF, and then
+//              uint8 low[1024], high[1024]  the two bytes of each half's difference, modulo 65,536, from the one before
+//                                           it along x; of the first in a row from 0
 
 namespace quoin {
 
@@ -32,6 +41,7 @@ inline constexpr std::size_t kMaxSceneFileBytes = std::size_t{2} << 30;
 /// it included. What is written keeps to it: where compressed voxels would take more, they are stored as they are.
 [[nodiscard]] std::size_t max_voxel_bytes(std::size_t file_bytes);
 [[nodiscard]] std::size_t voxel_bytes(const Chunk& chunk);
+[[nodiscard]] std::size_t voxel_bytes(const DensityChunk& chunk);
 
 enum class VoxelCompression : std::uint8_t { Stored, Small };
 
@@ -41,9 +51,19 @@ enum class VoxelCompression : std::uint8_t { Stored, Small };
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
 
+/// The same of fields.
+[[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_fields(std::span<const DensityGrid* const> fields,
+                                                                          VoxelCompression compression, Threads threads,
+                                                                          const Progress& progress);
+
 struct PlacedChunk {
   IVec3 place{0};
   Chunk voxels;
+};
+
+struct PlacedDensities {
+  IVec3 place{0};
+  DensityChunk samples{Half{0}};
 };
 
 /// The chunks of a piece.
@@ -52,5 +72,8 @@ struct PlacedChunk {
 ///         types that are not below `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, as
 ///         none that was written does.
 [[nodiscard]] Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count);
+/// The same of a field with that band; also for densities that are not within it.
+[[nodiscard]] Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count,
+                                                                float band);
 
 }  // namespace quoin

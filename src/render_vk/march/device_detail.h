@@ -9,9 +9,9 @@
 #include <quoin/scene/scene.h>
 
 #include "render/picture_detail.h"
-#include "render_vk/march/device_grid.h"
 #include "render_vk/march/device_impostors.h"
 #include "render_vk/march/device_scene.h"
+#include "render_vk/trees/device_grid.h"
 #include "scene/tracer/halved_grid_cache.h"
 
 namespace quoin::vulkan {

@@ -13,7 +13,7 @@
 #include "render/impostor/far.h"
 #include "render/impostor/screen.h"
 #include "render_vk/device/memory.h"
-#include "render_vk/march/shader_data.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 

@@ -26,9 +26,14 @@ bool is_too_wide(const IBox& bounds) {
   return false;
 }
 
+// Of voxels and field.
+IBox content_bounds(const SceneGrid& grid) {
+  return unite(grid.grid.bounds(), grid.field.bounds());
+}
+
 bool can_be_traced(const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
   return grid != nullptr && passes(filter, instance) && has_place(instance) && is_finite(grid->pivot) &&
-         !grid->grid.bounds().empty();
+         !content_bounds(*grid).empty();
 }
 
 PlacedGrid placed_as(const Instance& instance, const SceneGrid& grid, InstanceHandle handle) {
@@ -55,22 +60,6 @@ Status DeviceScene::update(const Scene& scene, InstanceFilter filter, Threads th
   }
 }
 
-namespace {
-
-bool has_field(const Scene& scene, const SceneChanges& changes) {
-  bool found = false;
-  if (changes.all) {
-    scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { found |= grid.field.chunk_count() != 0; });
-  }
-  for (const GridHandle handle : changes.grids) {
-    const SceneGrid* const grid = scene.grids().find(handle);
-    found |= grid != nullptr && grid->field.chunk_count() != 0;
-  }
-  return found;
-}
-
-}  // namespace
-
 void DeviceScene::clear() {
   memory_->discard();
   for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
@@ -94,7 +83,7 @@ void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
     if (!can_be_traced(instance, grid, filter)) return;
     KnownGrid& known = grids_[instance.grid];
     known.is_used = true;
-    known.bounds = grid->grid.bounds();
+    known.bounds = content_bounds(*grid);
     known.pivot = grid->pivot;
     placement_.placed.push_back({placed_as(instance, *grid, handle)});
     boxes.push_back(bounds_in_world(placement_.placed.back().placed, known.bounds));
@@ -120,7 +109,7 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceF
     const auto known = grids_.find(handle);
     const SceneGrid* grid = scene.grids().find(handle);
     // One that was empty may now be placed, and whose pivot moved is placed elsewhere.
-    places |= known == grids_.end() || grid == nullptr || !(grid->grid.bounds() == known->second.bounds) ||
+    places |= known == grids_.end() || grid == nullptr || !(content_bounds(*grid) == known->second.bounds) ||
               grid->pivot != known->second.pivot;
     if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
   }
@@ -143,16 +132,20 @@ void DeviceScene::finish_placed(const Scene& scene) {
 }
 
 Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandle>& changed, Threads threads) {
-  std::vector<std::pair<KnownGrid*, const Grid*>> all;
+  std::vector<std::pair<KnownGrid*, const SceneGrid*>> all;
   for (const GridHandle handle : changed) {
     KnownGrid& known = grids_.find(handle)->second;
     if (is_too_wide(known.bounds))
       return make_error(ErrorCode::Unsupported, "vulkan: a grid spans more than 2^29 voxels");
-    all.emplace_back(&known, &scene.grids()[handle].grid);
+    all.emplace_back(&known, &scene.grids()[handle]);
   }
-  parallel_for(all.size(), threads, [&](std::size_t i) { all[i].first->trees.update(*all[i].second, scene.types); });
+  parallel_for(all.size(), threads, [&](std::size_t i) {
+    all[i].first->trees.update(all[i].second->grid, scene.types);
+    all[i].first->trees.update(all[i].second->field);
+  });
   for (const auto& [known, grid] : all) {
-    Status done = known->voxels.update(*memory_, *grid, known->trees.opaque(), known->trees.transparent());
+    const TreeCache& trees = known->trees;
+    Status done = known->voxels.update(*memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.field()});
     if (!done) return done;
   }
   return {};
@@ -165,12 +158,6 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
     grids_.clear();
     followed_scene_ = {};
   }
-  // What cannot be drawn is not left out of pictures in silence.
-  ChangeCursor ahead = followed_scene_;
-  if (has_field(scene, scene.changes_since(ahead))) {
-    return make_error(ErrorCode::Unsupported,
-                      "vulkan: a grid holds a field of densities; the CPU renderer draws those");
-  }
   bool places = false;
   const std::vector<GridHandle> changed = changed_grids(scene, filter, places);
   if (placement_.placed.size() > kMaxInstances) {
@@ -181,6 +168,8 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   if (places || !changed.empty()) {
     placement_.has_transparent = std::any_of(grids_.begin(), grids_.end(),
                                              [](const auto& grid) { return grid.second.voxels.has_transparent(); });
+    placement_.has_fields =
+        std::any_of(grids_.begin(), grids_.end(), [](const auto& grid) { return grid.second.voxels.has_field(); });
   }
   if (!scene.types.changes_since(followed_types_).empty()) {
     if (Status done = put_surfaces(scene.types); !done) return done;

@@ -12,7 +12,7 @@
 #include "light/lamp_table.h"
 #include "render/impostor/faces.h"
 #include "render_vk/device/memory.h"
-#include "render_vk/march/device_grid.h"
+#include "render_vk/trees/device_grid.h"
 #include "scene/tracer/instance_tree.h"
 #include "scene/tracer/tree_cache.h"
 
@@ -23,7 +23,7 @@ struct DevicePlaced {
   PlacedGrid placed;      ///< of its pointers only `voxels` of a halved grid means anything, until the next picture
   std::int32_t grid = 0;  ///< index into the device's grids
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
-  DVec3 low{0.0};         ///< tight bounds of all voxels, in the tree's coordinates
+  DVec3 low{0.0};         ///< tight bounds of all voxels and the field, in the tree's coordinates
   DVec3 high{0.0};
   bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
   const ImpostorFaces* impostor = nullptr;  ///< of that, until the next picture
@@ -44,6 +44,7 @@ struct Placement {
   InstanceTree instances;            ///< their boxes in the world
   std::uint64_t grids = 0;           ///< the table's address
   bool has_transparent = false;
+  bool has_fields = false;
   std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
 };
 /// Puts a table in place, or in a larger one.

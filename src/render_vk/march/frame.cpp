@@ -139,7 +139,7 @@ void set_spaces(const DevicePlaced& grid, const GridSpace& space, DVec3 view_ori
 
 void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlaced& out) {
   const DVec3 sun_in_grid = glm::transpose(placed.world_axes) * sun;
-  out.to_sun = to_vec4(sun_in_grid);
+  out.to_sun = to_vec4(sun_in_grid, brightness);
   for (const Direction face : kDirections) {
     const auto i = static_cast<std::size_t>(face);
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);

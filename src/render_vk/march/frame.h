@@ -7,7 +7,7 @@
 
 #include "light/lamp_table.h"
 #include "render_vk/march/device_scene.h"
-#include "render_vk/march/shader_data.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 

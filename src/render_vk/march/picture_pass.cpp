@@ -173,7 +173,7 @@ void PicturePass::find_hits(VkCommandBuffer commands, const ShaderPush& push) co
     pipelines_->dispatch_far(commands, Pass::FarDepths, push);
     pipelines_->dispatch_far(commands, Pass::FarFaces, push);
   }
-  pipelines_->dispatch(commands, Pass::Primary, push);
+  pipelines_->dispatch(commands, variant_of(Pass::Primary), push);
 }
 
 Status PicturePass::take_sample(const Tile& tile, int sample) {
@@ -182,7 +182,7 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
   Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
     find_hits(commands, push);
     if (has_glass) return;
-    pipelines_->dispatch(commands, Pass::Light, push);
+    pipelines_->dispatch(commands, variant_of(Pass::Light), push);
   });
   return done && has_glass ? finish_glass(push) : done;
 }
@@ -195,7 +195,7 @@ Status PicturePass::finish_glass(ShaderPush push) {
       device_->api().vkCmdFillBuffer(commands, output_.handle(), pending, 4, 0);
       device_->separate(commands);
       pipelines_->dispatch(commands, Pass::Glass, push);
-      pipelines_->dispatch(commands, Pass::LightWithGlass, push);
+      pipelines_->dispatch(commands, variant_of(Pass::LightWithGlass), push);
       const VkBufferCopy counters{0, 0, sizeof(ShaderCounters)};
       device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &counters);
     });
@@ -292,7 +292,7 @@ Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
     for (const Tile& tile : tiles) {
       const ShaderPush push = push_for_sample(tile, sample);
       find_hits(commands, push);
-      pipelines_->dispatch(commands, Pass::Light, push);
+      pipelines_->dispatch(commands, variant_of(Pass::Light), push);
     }
   });
 }

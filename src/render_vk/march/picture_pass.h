@@ -62,6 +62,7 @@ class PicturePass {
   Status take_sample(std::span<const Tile> tiles, int sample);
   Status resolve(std::span<const Tile> tiles);
   Status finish_glass(ShaderPush push);
+  [[nodiscard]] Pass variant_of(Pass pass) const { return placement_->has_fields ? with_fields(pass) : pass; }
   Status read_tile(const Tile& tile, Picture& picture);
   Status read_counters(ShaderCounters& counters);
   [[nodiscard]] ShaderPush push_for(const Tile& tile) const;

@@ -40,6 +40,7 @@ std::span<const std::uint32_t> code_of(Pass pass) {
     case Pass::FarFaces:
       return kFar;
     case Pass::Primary:
+    case Pass::PrimaryWithFields:
       return kPrimary;
     case Pass::Glass:
       return kGlass;
@@ -52,16 +53,30 @@ std::span<const std::uint32_t> code_of(Pass pass) {
   }
 }
 
+bool is_of_fields(Pass pass) {
+  return pass == Pass::PrimaryWithFields || pass == Pass::LightWithFields || pass == Pass::LightWithGlassAndFields;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   std::unique_ptr<Pipelines> made(new Pipelines(device));
   VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(ShaderPush), made->layout_);
-  for (std::size_t pass = 0; pass < kPassCount && result == VK_SUCCESS; ++pass) {
-    result = made->make(static_cast<Pass>(pass));
+  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
+    const auto pass = static_cast<Pass>(i);
+    if (!is_of_fields(pass)) result = made->make(pass);
   }
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
+}
+
+Status Pipelines::add_fields() {
+  VkResult result = VK_SUCCESS;
+  for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
+    const auto pass = static_cast<Pass>(i);
+    if (is_of_fields(pass) && pipelines_[i] == VK_NULL_HANDLE) result = make(pass);
+  }
+  return device_->check(result, "compiling shaders");
 }
 
 Pipelines::~Pipelines() {
@@ -79,12 +94,14 @@ VkResult Pipelines::make(Pass pass) {
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
   info.stage.pName = "main";
-  // Two passes of a shader differ in its one constant.
-  const VkBool32 is_second = pass == Pass::LightWithGlass || pass == Pass::FarFaces ? VK_TRUE : VK_FALSE;
-  const VkSpecializationMapEntry entry{0, 0, sizeof is_second};
-  const VkSpecializationInfo constants{1, &entry, sizeof is_second, &is_second};
-  const bool has_constant = is_second == VK_TRUE || pass == Pass::Light || pass == Pass::FarDepths;
-  if (has_constant) info.stage.pSpecializationInfo = &constants;
+  // Passes of one shader differ in its constants.
+  const bool is_second =
+      pass == Pass::LightWithGlass || pass == Pass::LightWithGlassAndFields || pass == Pass::FarFaces;
+  const std::array<VkBool32, 2> values{is_second, is_of_fields(pass)};
+  constexpr std::array kEntries = {VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
+                                   VkSpecializationMapEntry{4, sizeof(VkBool32), sizeof(VkBool32)}};
+  const VkSpecializationInfo constants{kEntries.size(), kEntries.data(), sizeof values, values.data()};
+  info.stage.pSpecializationInfo = &constants;
   VkResult result = make_shader(*device_, code_of(pass), info.stage.module);
   if (result != VK_SUCCESS) return result;
   result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr,

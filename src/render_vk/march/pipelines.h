@@ -7,7 +7,7 @@
 #include <span>
 
 #include "render_vk/device/device.h"
-#include "render_vk/march/shader_data.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 
@@ -19,15 +19,27 @@ enum class Pass : std::uint8_t {
   Glass,      ///< the transparent bodies before it
   Light,
   LightWithGlass,
+  PrimaryWithFields,  ///< these where grids have fields
+  LightWithFields,
+  LightWithGlassAndFields,
   Resolve,  ///< the samples' mean as bytes
   Swap,     ///< red and blue change places, of a whole picture
 };
-constexpr std::size_t kPassCount = 8;
+constexpr std::size_t kPassCount = 11;
+
+/// A pass as it is where grids have fields.
+[[nodiscard]] constexpr Pass with_fields(Pass pass) {
+  if (pass == Pass::Primary) return Pass::PrimaryWithFields;
+  if (pass == Pass::Light) return Pass::LightWithFields;
+  return pass == Pass::LightWithGlass ? Pass::LightWithGlassAndFields : pass;
+}
 
 class Pipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
+  /// Makes what `with_fields` names, once.
+  [[nodiscard]] Status add_fields();
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 

@@ -53,6 +53,7 @@ Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads
   const std::uint64_t before = impl_->memory.written();
   try {
     Status done = impl_->scene.update(scene, filter, threads);
+    if (done && impl_->scene.placement().has_fields) done = impl_->pipelines->add_fields();
     impl_->uploaded = impl_->memory.written() - before;
     impl_->look_at(done ? &scene : nullptr, filter);
     return done;

@@ -92,6 +92,7 @@ struct MeshFrameData {
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
+  bool has_fields = false;  ///< among what rays meet
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }
   /// Of the surfaces that are drawn.

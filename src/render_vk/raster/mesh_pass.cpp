@@ -182,13 +182,14 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
   return steps;
 }
 
-Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light) {
+Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light, bool has_fields) {
   for (Step& step : steps) {
     // Edges are as bright as what they lie on, but for shadows.
     const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || step.is_glass());
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
       const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder,
-                                               is_lit ? light : MeshLight::Plain, samples});
+                                               is_lit ? light : MeshLight::Plain,
+                                               is_lit && light != MeshLight::Plain && has_fields, samples});
       if (!found) return found.error();
       out = *found;
       return {};
@@ -210,7 +211,7 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
 Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe, MeshLight light,
                       const Buffer& colours) {
   std::vector<Step> steps = steps_for(data, wireframe, light);
-  Status done = find_pipelines(steps, samples, light);
+  Status done = find_pipelines(steps, samples, light, data.has_fields);
   if (done) done = prepare(data, size, samples);
   if (!done) return done;
   return device_->run(kDoing, [&](VkCommandBuffer commands) { record(commands, data, steps, colours); });

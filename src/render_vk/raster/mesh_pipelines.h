@@ -29,6 +29,7 @@ struct MeshWay {
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
   MeshLight light = MeshLight::Plain;
+  bool fields = false;  ///< rays may meet some
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "render_vk/march/shader_data.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 

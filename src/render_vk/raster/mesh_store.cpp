@@ -109,7 +109,7 @@ Status MeshStore::put_all(std::span<const SurfaceUpdate> surfaces, int level, st
   std::size_t bytes = 0;
   Status done;
   for (const SurfaceUpdate& update : surfaces) {
-    Change& change = changes.emplace_back(Change{{update.grid, level}, update.chunk, {}});
+    Change& change = changes.emplace_back(Change{{update.grid, level, update.content}, update.chunk, {}});
     if (update.surface != nullptr) done = upload(*update.surface, change.mesh);
     if (!done) return done;
     bytes += change.mesh.place.size;

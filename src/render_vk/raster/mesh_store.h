@@ -29,11 +29,15 @@ struct StoredMesh {
   }
 };
 
-/// Whose chunks: those of a grid, or of the grid halved that often.
+/// Whose chunks: those of a grid's voxels, or of these halved that often, or of its field.
 struct MeshKey {
   GridHandle grid;
   int level = 0;
-  bool operator<(const MeshKey& other) const { return grid != other.grid ? grid < other.grid : level < other.level; }
+  SurfaceContent content = SurfaceContent::Voxels;
+  bool operator<(const MeshKey& other) const {
+    if (grid != other.grid) return grid < other.grid;
+    return content != other.content ? content < other.content : level < other.level;
+  }
 };
 
 /// Surfaces of chunks in device memory: 8 bytes a quad, or 28 a vertex and 4 an index.

@@ -96,7 +96,7 @@ struct VulkanMeshRenderer::Impl {
   vulkan::LevelMeshes levels;
   const Scene* scene = nullptr;
   InstanceFilter shown = InstanceFilter::Visible;
-  std::vector<vulkan::MeshInstance> instances;  // in the order of their handles
+  std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
   std::vector<Vec4> surface_table;  // what lies there
   std::int64_t drawn_triangles = 0;
@@ -128,7 +128,7 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene->grids().find(instance.grid);
     if (grid == nullptr || !passes(filter, instance) || !has_place(instance) || !is_finite(grid->pivot)) return;
-    vulkan::MeshInstance& placed = instances.emplace_back();
+    vulkan::MeshInstance placed;
     placed.handle = handle;
     placed.mesh = {instance.grid, 0};
     placed.world_axes = world_axes(instance);
@@ -136,6 +136,10 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
     placed.pivot = grid->pivot;
     placed.voxel_size = instance.voxel_size;
     placed.mirrored = instance.mirrored;
+    instances.push_back(placed);
+    if (grid->field.chunk_count() == 0) return;
+    placed.mesh.content = SurfaceContent::Field;
+    instances.push_back(placed);
   });
 }
 
@@ -226,6 +230,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
 Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement, const Camera& camera,
                                              const RenderOptions& request, vulkan::MeshFrameData& data) {
   data.picture = vulkan::make_frame(placement, camera, request);
+  data.has_fields = placement.has_fields;
   vulkan::ShaderFrame& frame = data.picture.frame;
   frame.grids = placement.grids;
   frame.surfaces = surfaces.address;

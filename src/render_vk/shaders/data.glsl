@@ -1,6 +1,9 @@
-// What the shaders read and write; src/render_vk/march/shader_data.h says the same to the compiler of the processor's side.
+// What the shaders read and write; src/render_vk/trees/shader_data.h says the same to the processor's compiler.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+
+// Whether any grid has a field; where none has, shaders are made without.
+layout(constant_id = 4) const bool kHasFields = false;
 
 const uint kPerspective = 1;
 const uint kLit = 2;
@@ -29,6 +32,7 @@ struct Tree {
 struct GridTrees {
   Tree opaque;
   Tree transparent;
+  Tree field;  // of the cells that touch its solid
 };
 
 // An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
@@ -43,7 +47,7 @@ struct Placed {
   vec4 start;         // w: how far along the rays that is, in lengths of their forward component
   vec4 start_x;
   vec4 start_y;
-  vec4 to_sun;
+  vec4 to_sun;  // w: its brightness
   vec4 diffuse[2];  // by face
   vec4 detail_colour;
   // What is left of numbers above when they are rounded.
@@ -54,12 +58,13 @@ struct Placed {
   ivec4 origin;  // of the tree's coordinates, in the grid; w: how often that is halved
 };
 
-// What a pixel shows.
+// What a pixel shows: a voxel, or a cell of a field.
 struct Point {
   ivec4 voxel;  // w: the instance; -1: none
   vec4 inside;  // where in the voxel; w: t
   uvec4 what;   // type, face, kind; w: as a float, how far behind the start of the instance's ray
 };
+// Of a field the kind has kIsField, and instead of a face there is a normal, as `packed_normal` has it.
 // Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
 // A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
@@ -80,9 +85,13 @@ const uint kSurface = 0;
 const uint kUnlit = 1;
 const uint kGlow = 2;
 const uint kIsFar = 4;
+const uint kIsField = 8;
 
 uint kind_of(Point point) {
   return point.what.z & 3;
+}
+bool is_of_field(Point point) {
+  return kHasFields && (point.what.z & kIsField) != 0;
 }
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Nodes {

@@ -110,30 +110,58 @@ vec3 on_face(vec3 inside, uint face) {
   return at;
 }
 
+// The upright of a surface point, in its grid.
+vec3 grid_normal(Point point) {
+  if (is_of_field(point)) return normal_of(point.what.y);
+  vec3 normal = vec3(0.0);
+  normal[axis_of(point.what.y)] = sign_of(point.what.y);
+  return normal;
+}
+
+// A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: light/occlusion_directions.h.
+vec3 turned_from_up(vec3 direction, vec3 normal) {
+  if (normal.y < -1.0 + 1e-6) return vec3(-direction.xy, direction.z);
+  vec3 axis = vec3(normal.z, 0.0, -normal.x);
+  vec3 once = cross(axis, direction);
+  return direction + once + cross(axis, once) / (1.0 + normal.y);
+}
+
 // Where rays start from a surface point: a little before its face.
 GridRay ray_from(Point point, Placed placed) {
   GridRay ray = GridRay(point.voxel.xyz & ~63, vec3(point.voxel.xyz & 63) + point.inside.xyz, vec3(0.0), 0.0);
+  if (is_of_field(point)) {
+    ray.origin += frame().lift / placed.ref_view.w * normal_of(point.what.y);
+    return ray;
+  }
   ray.origin[axis_of(point.what.y)] += frame().lift / placed.ref_view.w * sign_of(point.what.y);
   return ray;
 }
 
 // Sunlight and openness of a surface point.
 void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out float openness) {
-  uint face = point.what.y;
+  const uint kUp = 2;
+  bool is_field = is_of_field(point);
+  // Directions about a field's surface are those of an upper face, turned with it.
+  uint face = is_field ? kUp : point.what.y;
+  vec3 normal = grid_normal(point);
   float cells = placed.ref_view.w;
   float cosine = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
+  if (is_field) cosine = max(dot(normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
   sunlight = vec3(cosine);
   openness = 0.0;
   GridRay ray = ray_from(point, placed);
   int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
   bool is_far = (point.what.z & kIsFar) != 0;
-  int count = has(kOcclusionRays) && !is_far ? frame().occlusion_count : 0;
+  // A field has no faces with corners.
+  bool traces_occlusion = has(kOcclusionRays) || (is_field && has(kOcclusionVertex));
+  int count = traces_occlusion && !is_far ? frame().occlusion_count : 0;
   ivec2 pixel = push.corner + tile_pixel();
   uint hash = hash_of(uint(pixel.x), uint(pixel.y)) ^ push.seed;
   int open = 0;
   for (int i = first; i < count; ++i) {
     bool is_sun = i < 0;
     ray.direction = is_sun ? placed.to_sun.xyz : occlusion_direction(face, i, hash);
+    if (is_field && !is_sun) ray.direction = turned_from_up(ray.direction, normal);
     float max_t = (is_sun ? frame().shadow_distance : frame().occlusion_distance) / cells;
     bool blocked = is_blocked(point.voxel.w, placed, ray, max_t);
     ++rays_taken;
@@ -149,8 +177,8 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
     openness = openness_of_far(point);
     return;
   }
-  if (has(kOcclusionRays)) openness = float(open) / float(frame().occlusion_count);
-  if (has(kOcclusionVertex)) {
+  if (traces_occlusion) openness = float(open) / float(frame().occlusion_count);
+  if (has(kOcclusionVertex) && !is_field) {
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
     openness = 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
   }
@@ -160,8 +188,8 @@ vec3 unlit_colour(Point point, uint slot, vec3 colour) {
   bool shows_values = has(kShowOcclusion) || has(kShowNormals);
   if (kind_of(point) != kSurface) return shows_values || kind_of(point) == kGlow ? vec3(0.0) : colour;
   if (has(kShowNormals)) {
-    vec3 axis = placed_at(point.voxel.w).view_axes[axis_of(point.what.y)].xyz;
-    return linear_from_srgb(0.5 + 0.5 * sign_of(point.what.y) * axis / length(axis));
+    Placed placed = placed_at(point.voxel.w);
+    return linear_from_srgb(0.5 + 0.5 * turned(placed.view_axes, grid_normal(point)) / placed.ref_inside.w);
   }
   if (!has(kShowOcclusion) && !has(kUnlitOcclusion)) return colour;
   vec3 sunlight;
@@ -179,6 +207,8 @@ vec3 light_of(Point point, uint slot) {
     surface.colour = placed_at(point.voxel.w).detail_colour.xyz;
     surface.emitted = vec3(0.0);
   }
+  // As in smooth meshes, a field without materials is white.
+  if (is_of_field(point) && point.what.x == 0) surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0));
   if (!has(kLit)) return unlit_colour(point, slot, surface.colour);
   if (kind_of(point) == kUnlit) return surface.colour;
   vec3 colour = surface.emitted;
@@ -188,7 +218,7 @@ vec3 light_of(Point point, uint slot) {
     Placed placed = placed_at(point.voxel.w);
     trace_light(point, placed, slot, sunlight, openness);
     if (has(kLamps)) {
-      vec3 normal = placed.view_axes[axis_of(point.what.y)].xyz * (sign_of(point.what.y) / placed.ref_inside.w);
+      vec3 normal = turned(placed.view_axes, grid_normal(point)) / placed.ref_inside.w;
       sunlight += light_of_lamps(slot, point.voxel, placed, ray_from(point, placed), normal);
     }
     colour += surface.colour * light_at(sunlight, openness);
@@ -199,7 +229,8 @@ vec3 light_of(Point point, uint slot) {
 Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
-  point.inside = vec4(exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y), body.lengths.x);
+  vec3 place = exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y);
+  point.inside = vec4(place, body.lengths.x);
   point.what = uvec4(body.what.xy, body.what.z != 0 ? kGlow : kSurface, 0);
   return point;
 }
@@ -241,7 +272,7 @@ bool light_pixel(uint slot, inout State state) {
         break;
       }
     }
-    point.inside.xyz = on_face(point.inside.xyz, point.what.y);
+    if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
     state.colour.xyz += weight * light_of(point, slot);
   }
   return is_last;

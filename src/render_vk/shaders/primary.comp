@@ -63,31 +63,46 @@ Point first_hit(vec2 at) {
        i = next_instance((depth - frame().view_depth) * scale + nearest)) {
     if (visited_is_far) continue;
     Placed placed = placed_at(i);
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    ExactRay exact = exact_ray_in(placed, direction);
-    float moved_t;
-    int moved;
-    if (!move_to_bounds(tree, placed, exact, moved_t, moved)) continue;
-    GridRay in_grid = rounded(placed, exact, placed.start.w * scale);
-    float limit = (depth - placed.start.w) * scale + nearest;
-    float rounding = 1e-6 * max(abs(limit), nearest);
-    float room = limit + rounding - moved_t;
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved) || !find_voxel(room)) continue;
-    float found_t = moved_t + walk_t;
-    // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
-    bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
-    if (is_equal ? i > point.voxel.w : found_t > limit) continue;
-    depth = placed.start.w;
-    nearest = found_t;
-    float t = in_grid.t + found_t;
-    bool is_inside = walk_axis < 0;
-    point.voxel = ivec4(walk_voxel, i);
-    uint face = face_found();
-    point.inside.w = t;
-    point.what = uvec4(type_found(), face, is_inside ? kUnlit : kSurface, floatBitsToUint(found_t));
+    // Its voxels, then its field.
+    for (int content = 0; content < (kHasFields ? 2 : 1); ++content) {
+      bool is_field = kHasFields && content == 1;
+      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
+      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
+      if ((tree.root.x | tree.root.y) == 0) continue;
+      ExactRay exact = exact_ray_in(placed, direction);
+      float moved_t;
+      int moved;
+      if (!move_to_bounds(tree, placed, exact, moved_t, moved)) continue;
+      GridRay in_grid = rounded(placed, exact, placed.start.w * scale);
+      float limit = (depth - placed.start.w) * scale + nearest;
+      float rounding = 1e-6 * max(abs(limit), nearest);
+      float room = limit + rounding - moved_t;
+      if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved)) continue;
+      FieldHit hit;
+      if (is_field ? !find_surface(room, hit) : !find_voxel(room)) continue;
+      float found_t = moved_t + (is_field ? hit.t : walk_t);
+      // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
+      bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
+      if (is_equal ? i + content > point.voxel.w : found_t > limit) continue;
+      depth = placed.start.w;
+      nearest = found_t;
+      float t = in_grid.t + found_t;
+      point.voxel = ivec4(walk_voxel, i);
+      point.inside.w = t;
+      if (is_field) {
+        bool is_inside = hit.starts_inside && moved < 0;
+        point.inside.xyz = hit.inside;
+        point.what = uvec4(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
+                           kIsField | (is_inside ? kUnlit : kSurface), floatBitsToUint(found_t));
+      } else {
+        bool is_inside = walk_axis < 0;
+        point.what =
+            uvec4(type_found(), face_found(), is_inside ? kUnlit : kSurface, floatBitsToUint(found_t));
+      }
+    }
   }
   // Inside a voxel the place does not count.
-  if (point.voxel.w >= 0 && kind_of(point) == kSurface) {
+  if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point)) {
     point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);
   }
   return point;

@@ -3,7 +3,8 @@
 
 uint rays_taken;
 
-// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel of any instance.
+// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel, or the solid
+// of a field, of any instance.
 bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   ViewRay in_view = view_from_grid(own, ray);
   start_visit(in_view);
@@ -18,6 +19,10 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
     is_first = false;
     Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
     if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) && find_voxel(max_t)) return true;
+    if (kHasFields) {
+      Tree field = Grids(frame().grids).at[placed.ref_base.w].field;
+      if (meets_field(field, ray.base, ray.origin, ray.direction, max_t)) return true;
+    }
     if (frame().placed_count == 1) return false;
   }
   return false;

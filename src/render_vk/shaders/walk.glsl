@@ -162,15 +162,20 @@ bool find_voxel(float max_t) {
   }
 }
 
-// The type of the voxel that was found.
-uint type_found() {
-  uvec2 children = walk_level == 2 ? walk_node.zw : walk_stack[2].zw;
-  // A chunk's record: types, storage, then the tree's bricks.
-  uvec4 record = Nodes(uvec2(children.x & ~31u, children.y)).at[0];
+// Where the record of a chunk begins: types, storage, then the tree's bricks.
+uvec2 record_of(uvec4 chunk) {
+  return uvec2(chunk.z & ~31u, chunk.w);
+}
+uvec2 record_found() {
+  return record_of(walk_level == 2 ? walk_node : walk_stack[2]);
+}
+
+// The type of a voxel, or of a sample, of a chunk.
+uint type_in(uvec2 address, ivec3 at) {
+  uvec4 record = Nodes(address).at[0];
   uint bits = record.z;
   if (bits == 0) return record.w;
   Numbers types = Numbers(record.xy);
-  ivec3 at = walk_voxel & 63;
   uint slab = types.at[(at.z >> 2) * 16 + (at.y >> 2)];
   uint index = slab & 0x7FFFFFFF;
   if (index == slab) {
@@ -179,6 +184,11 @@ uint type_found() {
     index = types.at[record.w + row * bits * 2 + (first >> 5)] >> (first & 31) & ((1u << bits) - 1);
   }
   return bits == 16 ? index : types.at[256 + (index >> 1)] >> (16 * (index & 1)) & 0xFFFF;
+}
+
+// The type of the voxel that was found.
+uint type_found() {
+  return type_in(record_found(), walk_voxel & 63);
 }
 
 // The face through which the ray entered the voxel; where it starts inside, the one that looks most against it.
@@ -206,4 +216,251 @@ bool holds(Tree tree, ivec3 voxel) {
     uint child = bitCount(bits & (bit - 1)) + (index < 32 ? 0 : bitCount(node.x));
     node = level > 1 ? Nodes(node.zw).at[child] : uvec4(Words(node.zw).at[child], 1, 0);
   }
+}
+
+// Fields of densities. Their trees hold the cells that touch the solid; in a cell the field along a ray is a cubic,
+// whose first root is found as trace/kernel/cell.inl does on the processor's side, here in single precision.
+
+const int kBlockEdge = 7;
+
+uvec2 address_after(uvec2 address, uint bytes) {
+  uint carry;
+  uint low = uaddCarry(address.x, bytes, carry);
+  return uvec2(low, address.y + carry);
+}
+
+// The samples around the cells of a word, from the one before its first corner on.
+float sample_of(Numbers block, ivec3 at) {
+  uint i = uint((at.z * kBlockEdge + at.y) * kBlockEdge + at.x);
+  vec2 two = unpackHalf2x16(block.at[i >> 1]);
+  return (i & 1) == 0 ? two.x : two.y;
+}
+
+// Those of the cell that was found. False where all of them are solid, as those around it are.
+bool block_found(out Numbers block) {
+  if (walk_level > 0) return false;
+  uvec4 brick = walk_stack[1];
+  ivec3 place = (walk_voxel >> 2) & 3;
+  uint index = uint(place.x + 4 * place.y + 16 * place.z);
+  uint bits = index < 32 ? brick.x : brick.y;
+  uint child = bitCount(bits & ((1u << (index & 31)) - 1)) + (index < 32 ? 0 : bitCount(brick.x));
+  uint words = bitCount(brick.x) + bitCount(brick.y);
+  uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
+  block = Numbers(address_after(record_found(), 4 * from));
+  return from != 0;
+}
+
+// A cubic in powers of s.
+float value_at(vec4 f, float s) {
+  return ((f.w * s + f.z) * s + f.y) * s + f.x;
+}
+
+// The root between `low`, where it is not negative, and `high`, where it is.
+float root_between(vec4 f, float low, float high) {
+  float f_low = value_at(f, low);
+  float f_high = value_at(f, high);
+  float s = low + (high - low) * (f_low / (f_low - f_high));
+  for (int i = 0; i < 24; ++i) {
+    float value = value_at(f, s);
+    if (value < 0.0) {
+      high = s;
+    } else {
+      low = s;
+    }
+    if (!(high - low > 1e-7)) break;
+    float next = s - value / ((3.0 * f.w * s + 2.0 * f.z) * s + f.y);
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (abs(next - s) <= 1e-6) return next;
+    s = next;
+  }
+  return s;
+}
+
+// Where it first becomes negative for 0 <= s <= 1; a negative number where it never does.
+float first_negative(vec4 f) {
+  if (f.x < 0.0) return 0.0;
+  float b1 = f.x + f.y * (1.0 / 3.0);
+  float b2 = f.x + (2.0 * f.y + f.z) * (1.0 / 3.0);
+  float b3 = f.x + f.y + f.z + f.w;
+  if (min(min(b1, b2), b3) >= 0.0) return -1.0;
+  if (b3 < 0.0 && !(b1 < 0.0 && b2 >= 0.0)) return root_between(f, 0.0, 1.0);
+  // Between its extremes the curve only falls or only rises.
+  float a = 3.0 * f.w;
+  float b = 2.0 * f.z;
+  float discriminant = b * b - 4.0 * a * f.y;
+  float low = 0.0;
+  if (discriminant > 0.0) {
+    float q = -0.5 * (b + (b < 0.0 ? -1.0 : 1.0) * sqrt(discriminant));
+    float one = a != 0.0 ? q / a : -1.0;
+    float other = q != 0.0 ? f.y / q : -1.0;
+    for (int i = 0; i < 2; ++i) {
+      float extreme = i == 0 ? min(one, other) : max(one, other);
+      if (!(extreme > low && extreme < 1.0)) continue;
+      if (value_at(f, extreme) < 0.0) return root_between(f, low, extreme);
+      low = extreme;
+    }
+  }
+  return b3 < 0.0 ? root_between(f, low, 1.0) : -1.0;
+}
+
+float mixed_corners(vec4 low, vec4 high, vec3 at) {
+  vec4 z = low + (high - low) * at.z;
+  vec2 y = z.xy + (z.zw - z.xy) * at.y;
+  return y.x + (y.y - y.x) * at.x;
+}
+
+// Corners by x + 2 y, of z and z + 1.
+void corners_of(Numbers block, ivec3 first, out vec4 low, out vec4 high) {
+  low = vec4(sample_of(block, first), sample_of(block, first + ivec3(1, 0, 0)),
+             sample_of(block, first + ivec3(0, 1, 0)), sample_of(block, first + ivec3(1, 1, 0)));
+  high = vec4(sample_of(block, first + ivec3(0, 0, 1)), sample_of(block, first + ivec3(1, 0, 1)),
+              sample_of(block, first + ivec3(0, 1, 1)), sample_of(block, first + ivec3(1, 1, 1)));
+}
+
+// What was found of a field.
+struct FieldHit {
+  float t;
+  vec3 inside;  // where in the cell
+  bool starts_inside;
+};
+
+// The ray in the cell that was found, up to `max_t`.
+bool meet_cell(float max_t, out FieldHit hit) {
+  hit.t = walk_t;
+  hit.starts_inside = walk_axis < 0;
+  vec3 cell = vec3(walk_voxel - ray_base);
+  Numbers block;
+  if (!block_found(block)) {
+    hit.inside = clamp(ray_origin + walk_t * ray_direction - cell, vec3(0.0), vec3(1.0));
+    return true;
+  }
+  vec3 first = (mix(cell + 1.0, cell, ray_forward) - ray_origin) * ray_inverse;
+  vec3 last = (mix(cell, cell + 1.0, ray_forward) - ray_origin) * ray_inverse;
+  first = mix(first, vec3(0.0), ray_still);
+  last = mix(last, vec3(kNever), ray_still);
+  float t_in = max(max(first.x, first.y), max(first.z, 0.0));
+  float t_out = max(min(min(last.x, last.y), last.z), t_in);
+  float size = min(t_out, max_t) - t_in;
+  if (size < 0.0) return false;
+  vec3 entry = clamp(ray_origin + t_in * ray_direction - cell, vec3(0.0), vec3(1.0));
+  vec3 way = ray_direction * size;
+  vec4 low;
+  vec4 high;
+  corners_of(block, (walk_voxel & 3) + 1, low, high);
+  vec4 rise = high - low;
+  vec4 z0 = low + rise * entry.z;
+  vec4 z1 = rise * way.z;
+  vec2 rise0 = z0.zw - z0.xy;
+  vec2 rise1 = z1.zw - z1.xy;
+  vec2 y0 = z0.xy + rise0 * entry.y;
+  vec2 y1 = z1.xy + rise1 * entry.y + rise0 * way.y;
+  vec2 y2 = rise1 * way.y;
+  float x0 = y0.y - y0.x;
+  float x1 = y1.y - y1.x;
+  float x2 = y2.y - y2.x;
+  float s = first_negative(vec4(y0.x + x0 * entry.x, y1.x + x1 * entry.x + x0 * way.x,
+                                y2.x + x2 * entry.x + x1 * way.x, x2 * way.x));
+  if (s < 0.0) return false;
+  hit.t = t_in + s * size;
+  hit.inside = entry + s * way;
+  hit.starts_inside = hit.t <= 0.0;
+  return true;
+}
+
+// As find_voxel, to the first point at which the field of a walk's tree is negative.
+bool find_surface(float max_t, out FieldHit hit) {
+  while (find_voxel(max_t)) {
+    if (meet_cell(max_t, hit)) return true;
+    if (!leave_block(0, max_t)) return false;
+  }
+  return false;
+}
+
+// Whether a ray, in a grid's tree, meets the solid of its field.
+bool meets_field(Tree field, ivec3 base, vec3 origin, vec3 direction, float max_t) {
+  FieldHit hit;
+  return start_walk(field, base, origin, direction, max_t, -1) && find_surface(max_t, hit);
+}
+
+float field_in_block(Numbers block, vec3 at) {
+  vec3 first = clamp(floor(at), vec3(0.0), vec3(float(kBlockEdge - 2)));
+  vec4 low;
+  vec4 high;
+  corners_of(block, ivec3(first), low, high);
+  return mixed_corners(low, high, at - first);
+}
+
+// The normal with which the hit is lit: trace/density/smooth_normal.h on the processor's side. Unit, or 0.
+vec3 normal_found(vec3 inside) {
+  Numbers block;
+  if (!block_found(block)) return vec3(0.0);
+  vec3 at = vec3((walk_voxel & 3) + 1) + inside;
+  vec4 low;
+  vec4 high;
+  corners_of(block, (walk_voxel & 3) + 1, low, high);
+  // Of the cell itself.
+  vec4 z = mix(low, high, inside.z);
+  vec4 along_z = high - low;
+  vec2 y = mix(z.xy, z.zw, inside.y);
+  vec2 along_y = z.zw - z.xy;
+  vec2 z_y = mix(along_z.xy, along_z.zw, inside.y);
+  vec3 own = vec3(y.y - y.x, mix(along_y.x, along_y.y, inside.x), mix(z_y.x, z_y.y, inside.x));
+  float own_size = length(own);
+  own = own_size > 0.0 ? own / own_size : vec3(0.0);
+  vec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    vec3 step = vec3(0.0);
+    step[axis] = 1.0;
+    gradient[axis] = field_in_block(block, at + step) - field_in_block(block, at - step);
+  }
+  float size = length(gradient);
+  return dot(gradient, own) > 0.5 * size ? gradient / size : own;
+}
+
+// The material of the solid sample that is nearest to the hit.
+uint material_found(Tree field, vec3 inside) {
+  ivec3 nearest = ivec3(greaterThan(inside, vec3(0.5)));
+  Numbers block;
+  if (block_found(block)) {
+    float least = kNever;
+    for (int i = 0; i < 8; ++i) {
+      ivec3 corner = ivec3(i & 1, i >> 1 & 1, i >> 2);
+      vec3 away = vec3(corner) - inside;
+      float far = dot(away, away);
+      if (!(sample_of(block, (walk_voxel & 3) + 1 + corner) < 0.0) || !(far < least)) continue;
+      least = far;
+      nearest = corner;
+    }
+  }
+  ivec3 at = walk_voxel + nearest;
+  if (((at ^ walk_voxel) & ~63) == ivec3(0)) return type_in(record_found(), at & 63);
+  // Of the next chunk, whose own cell there touches the sample.
+  if (any(greaterThanEqual(at, field.high.xyz))) return 0;
+  uvec4 node = field.root;
+  for (int level = field.low.w; level > 2; --level) {
+    if ((node.z & 1) != 0) break;
+    ivec3 place = (at >> (2 * level)) & 3;
+    uint index = uint(place.x + 4 * place.y + 16 * place.z);
+    uint bits = index < 32 ? node.x : node.y;
+    uint bit = 1u << (index & 31);
+    if ((bits & bit) == 0) return 0;
+    node = Nodes(node.zw).at[bitCount(bits & (bit - 1)) + (index < 32 ? 0 : bitCount(node.x))];
+  }
+  return type_in(record_of(node), at & 63);
+}
+
+// A unit vector in a word, to 1/20,000: the octahedron's faces folded into a square.
+uint packed_normal(vec3 n) {
+  float size = abs(n.x) + abs(n.y) + abs(n.z);
+  if (!(size > 0.0)) return 0x80008000u;
+  vec2 at = n.xy / size;
+  if (n.z < 0.0) at = (1.0 - abs(at.yx)) * vec2(at.x >= 0.0 ? 1.0 : -1.0, at.y >= 0.0 ? 1.0 : -1.0);
+  return packSnorm2x16(at);
+}
+vec3 normal_of(uint word) {
+  if (word == 0x80008000u) return vec3(0.0);
+  vec2 at = unpackSnorm2x16(word);
+  vec3 n = vec3(at, 1.0 - abs(at.x) - abs(at.y));
+  if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
+  return normalize(n);
 }

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/trace/occupancy_tree.h>
 
-#include "render_vk/march/shader_data.h"
+#include "render_vk/trees/shader_data.h"
 
 namespace quoin::vulkan {
 
@@ -20,6 +21,7 @@ struct ChunkRecord {
   std::vector<std::uint32_t> words;
   Node opaque;  ///< of the whole chunk; mask 0 where there is none
   Node transparent;
+  Node field;
 
   /// Addresses count from the record's beginning until they are moved to where it lies.
   void move_to(std::uint64_t address);
@@ -32,6 +34,14 @@ struct ChunkRecord {
 /// `transparent` may be null.
 [[nodiscard]] ChunkRecord pack_chunk(const OccupancyTree& opaque, const OccupancyTree* transparent, const Chunk& voxels,
                                      IVec3 chunk);
+
+/// A field's chunk: as one of voxels, a tree of the cells that touch its solid, with the materials of its samples.
+/// After the words of a brick's cells comes a number for each: where its samples lie (see kFieldBlockEdge), in words from the
+/// header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
+/// Requires: `cells` holds some of the chunk.
+[[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
+/// How far beyond a chunk's own samples such a record reads.
+constexpr int kFieldRecordReach = 2;
 
 /// The nodes above chunks.
 struct TopTree {

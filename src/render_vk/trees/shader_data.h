@@ -15,6 +15,11 @@ namespace quoin::vulkan {
 using Vec4 = glm::vec4;
 using IVec4 = glm::ivec4;
 
+/// How a record of a field's chunk keeps densities: for each word of 4^3 cells at the surface the samples from the one
+/// before its first corner to the one past its last, along each axis.
+constexpr int kFieldBlockEdge = 7;
+constexpr std::size_t kFieldBlockWords = 172;  ///< two halves a word
+
 /// A node of a sparse tree with 4^3 places a node; see data.glsl.
 struct Node {
   std::uint64_t mask = 0;      ///< bit x + 4 y + 16 z: that place holds something
@@ -31,6 +36,7 @@ struct ShaderTree {
 struct ShaderGrid {
   ShaderTree opaque;
   ShaderTree transparent;
+  ShaderTree field;
 };
 
 struct ShaderPlaced {
@@ -227,7 +233,7 @@ struct SwapPush {
 };
 
 static_assert(sizeof(SwapPush) == 24);
-static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 96);
+static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 144);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
 static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 15 * 16 + 24 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);

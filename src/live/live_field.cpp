@@ -1,0 +1,415 @@
+#include "live/live_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+namespace {
+
+// Levels are changed for so many chunks at a time, so that edits near them need not wait long.
+constexpr std::size_t kMaxLevelChanges = 32;
+
+// The chunks whose samples the cells of a chunk have as corners: it, and those that follow.
+IVec3 corner_chunk(IVec3 chunk, int i) {
+  return chunk + IVec3{i & 1, i >> 1 & 1, i >> 2};
+}
+
+bool is_there(const DensityGrid& field, IVec3 chunk) {
+  for (int i = 0; i < 8; ++i) {
+    if (field.find_chunk(corner_chunk(chunk, i)) != nullptr) return true;
+  }
+  return false;
+}
+
+// The signs of the samples of row y + 64 z; null is far air.
+std::uint64_t signs_of(const DensityChunk* samples, int row) {
+  return samples == nullptr ? 0 : samples->solid_row(row % kChunkEdge, row / kChunkEdge);
+}
+
+// Surfaces are owned by where their lattice edges start: these end in the chunk, or in the first layer of the next one
+// along an axis.
+bool may_have_surface(const DensityGrid& field, IVec3 chunk) {
+  const DensityChunk* const own = field.find_chunk(chunk);
+  const std::uint64_t sign = signs_of(own, 0);
+  if (sign != 0 && ~sign != 0) return true;
+  constexpr int kRows = kChunkEdge * kChunkEdge;
+  for (int row = 0; row < kRows; ++row) {
+    if (signs_of(own, row) != sign) return true;
+  }
+  const DensityChunk* const after_x = field.find_chunk(chunk + IVec3{1, 0, 0});
+  const DensityChunk* const after_y = field.find_chunk(chunk + IVec3{0, 1, 0});
+  const DensityChunk* const after_z = field.find_chunk(chunk + IVec3{0, 0, 1});
+  for (int row = 0; row < kRows; ++row) {
+    if (((signs_of(after_x, row) ^ sign) & 1) != 0) return true;
+  }
+  for (int i = 0; i < kChunkEdge; ++i) {
+    if (signs_of(after_y, i * kChunkEdge) != sign || signs_of(after_z, i) != sign) return true;
+  }
+  return false;
+}
+
+// `present`: the level it has; -1: none.
+int level_for(double distance, int present, double step) {
+  const double first = std::isnan(step) ? std::numeric_limits<double>::infinity() : step > 0.0 ? step : 1.0;
+  const auto level_at = [&](double samples) {
+    int level = 0;
+    while (level < kMaxSmoothLevel && samples > std::ldexp(first, level)) ++level;
+    return level;
+  };
+  constexpr double kRoom = 1.1;
+  if (present < 0) return level_at(distance);
+  return std::clamp(present, level_at(distance / kRoom), level_at(distance * kRoom));
+}
+
+}  // namespace
+
+LiveField::LiveField(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals)
+    : handle_(handle), options_(options), totals_(totals) {}
+
+void LiveField::follow(const SceneGrid& content, LiveClock::time_point now) {
+  ChangeCursor end = followed_;
+  const DensityChanges changes = content.field.changes_since(end);
+  if (changes.empty()) return;
+  followed_ = {};  // stays so when memory runs out
+  if (changes.all) {
+    begin_anew(content.field, now);
+  } else {
+    follow_changes(content.field, changes, now);
+  }
+  followed_ = end;
+}
+
+// What was made so far, or is being made, is of another field.
+void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) {
+  abandon_groups();
+  const bool replaces =
+      std::any_of(chunks_.begin(), chunks_.end(), [](const auto& each) { return each.second.was_given; });
+  Members all;
+  for (const IVec3 chunk : field.chunks()) {
+    for (int i = 0; i < 8; ++i) all.push_back(2 * chunk - corner_chunk(chunk, i));
+  }
+  for (const auto& [chunk, state] : chunks_) all.push_back(chunk);
+  sort_and_unite(all);
+  for (const IVec3 chunk : all) {
+    see_whether_there(field, chunk, replaces, now);
+    if (chunks_.contains(chunk)) mark(chunk, replaces, now);
+  }
+}
+
+void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
+  for (const DensityChange& change : changes.items) {
+    for (int i = 0; i < 8; ++i) see_whether_there(field, 2 * change.chunk - corner_chunk(change.chunk, i), true, now);
+  }
+  for (const DensityChange& change : changes.items) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 offset = Neighbourhood::offset(i);
+      const IVec3 chunk = change.chunk + offset;
+      if (chunks_.contains(chunk) && change.affects(offset, reach_at(chunk))) mark(chunk, true, now);
+    }
+  }
+}
+
+void LiveField::see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, LiveClock::time_point now) {
+  const auto found = chunks_.find(chunk);
+  const bool was_there = found != chunks_.end() && !found->second.is_gone;
+  if (is_there(field, chunk) == was_there) return;
+  if (!was_there) wants_levels_ = true;
+  mark(chunk, is_bound, now);
+  FieldChunk& state = chunks_.at(chunk);
+  state.is_gone = was_there;
+  if (was_there) set_level(chunk, state, 0, now);
+}
+
+void LiveField::mark(IVec3 chunk, bool is_bound, LiveClock::time_point now) {
+  FieldChunk& state = chunks_[chunk];
+  stale_.insert(chunk);
+  box_ = unite(box_, {chunk, chunk + 1});
+  const Change change(totals_, state);
+  state.is_stale = true;
+  state.is_bound |= is_bound;
+  state.seen = now;
+  is_prepared_ = false;
+}
+
+// Those beside it depend on it as much as it does on them.
+void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now) {
+  if (state.level == level) return;
+  state.level = static_cast<std::uint8_t>(level);
+  bool is_seen = !state.is_new();
+  for (int i = 0; i < 27; ++i) {
+    const IVec3 beside = chunk + Neighbourhood::offset(i);
+    const auto found = chunks_.find(beside);
+    if (i == 13 || found == chunks_.end() || found->second.is_new()) continue;
+    mark(beside, true, now);
+    is_seen = true;
+  }
+  if (is_seen) mark(chunk, true, now);
+}
+
+void LiveField::choose_levels(const ChunkDistances& distances, LiveClock::time_point now) {
+  std::erase_if(changing_levels_, [&](IVec3 chunk) {
+    const auto found = chunks_.find(chunk);
+    return found == chunks_.end() || !found->second.is_unfinished();
+  });
+  struct Wish {
+    double distance;
+    IVec3 chunk;
+    int level;
+  };
+  std::vector<Wish> wishes;
+  for (auto& [chunk, state] : chunks_) {
+    if (state.is_gone) continue;
+    const double distance = distances.in_voxels(chunk);
+    const int level = level_for(distance, state.is_new() ? -1 : state.level, options_.detail_distance);
+    if (level == state.level) continue;
+    if (state.is_new()) {
+      set_level(chunk, state, level, now);
+    } else {
+      wishes.push_back({distance, chunk, level});
+    }
+  }
+  wants_levels_ = !wishes.empty();
+  if (wishes.empty() || !changing_levels_.empty()) return;
+  const std::size_t count = std::min(wishes.size(), kMaxLevelChanges);
+  std::partial_sort(wishes.begin(), wishes.begin() + static_cast<std::ptrdiff_t>(count), wishes.end(),
+                    [](const Wish& a, const Wish& b) {
+                      return a.distance != b.distance ? a.distance < b.distance : by_zyx(a.chunk, b.chunk);
+                    });
+  wishes.resize(count);
+  for (const Wish& wish : wishes) {
+    set_level(wish.chunk, chunks_.at(wish.chunk), wish.level, now);
+    changing_levels_.push_back(wish.chunk);
+  }
+}
+
+std::array<std::uint8_t, 27> LiveField::levels_around(IVec3 chunk) const {
+  std::array<std::uint8_t, 27> levels{};
+  for (std::size_t i = 0; i < 27; ++i) {
+    const auto found = chunks_.find(chunk + Neighbourhood::offset(static_cast<int>(i)));
+    if (found != chunks_.end()) levels[i] = found->second.level;
+  }
+  return levels;
+}
+
+int LiveField::reach_at(IVec3 chunk) const {
+  const std::array<std::uint8_t, 27> levels = levels_around(chunk);
+  return reach_of(options_.occlusion, *std::max_element(levels.begin(), levels.end()));
+}
+
+void LiveField::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
+  if (changed.colour.empty()) return;
+  for (const IVec3 chunk : content.field.chunks()) {
+    const std::vector<VoxelType> types = content.field.find_chunk(chunk)->materials().types();
+    const auto has_changed = [&](VoxelType type) { return type < changed.colour.size() && changed.colour[type]; };
+    if (std::none_of(types.begin(), types.end(), has_changed)) continue;
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 beside = chunk + Neighbourhood::offset(i);
+      if (chunks_.contains(beside)) mark(beside, false, now);
+    }
+  }
+}
+
+// The chunks that have to be given together with a stale one.
+LiveField::Members LiveField::members_with(IVec3 chunk) const {
+  Members members{chunk};
+  if (!chunks_.at(chunk).is_bound) return members;
+  ChunkSet seen{chunk};
+  for (std::size_t next = 0; next < members.size(); ++next) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 beside = members[next] + Neighbourhood::offset(i);
+      if (!stale_.contains(beside) || !chunks_.at(beside).is_bound || !seen.insert(beside).second) continue;
+      members.push_back(beside);
+    }
+  }
+  return members;
+}
+
+bool LiveField::may_begin(const Members& members) const {
+  return std::none_of(members.begin(), members.end(), [&](IVec3 chunk) { return chunks_.at(chunk).group != nullptr; });
+}
+
+void LiveField::prepare(const SceneGrid& content) {
+  if (is_prepared_) return;
+  is_blocked_ = false;
+  ChunkSet seen;
+  const Members stale(stale_.begin(), stale_.end());
+  for (const IVec3 chunk : stale) {
+    if (seen.contains(chunk)) continue;
+    const Members members = members_with(chunk);
+    seen.insert(members.begin(), members.end());
+    const bool begins = may_begin(members);
+    bool is_empty = true;
+    for (const IVec3 each : members) {
+      FieldChunk& state = chunks_.at(each);
+      if (state.group != nullptr) continue;  // what it waits for is in its present group
+      state.is_empty = !may_have_surface(content.field, each);
+      is_empty &= state.is_empty;
+      if (begins && !state.is_empty) {
+        waiting_.insert(each);
+      } else {
+        waiting_.erase(each);
+      }
+    }
+    is_blocked_ |= !begins;
+    if (begins && is_empty) begin_group(members, {});
+  }
+  is_prepared_ = true;
+}
+
+void LiveField::begin_group(const Members& members, FieldSnapshot field) {
+  const auto group = std::make_shared<Group>();
+  group->field = std::move(field);
+  group->chunks = members;
+  group->unfinished = members.size();
+  for (const IVec3 chunk : members) {
+    FieldChunk& state = chunks_.at(chunk);
+    const std::array<std::uint8_t, 27> levels = levels_around(chunk);
+    stale_.erase(chunk);
+    const Change change(totals_, state);
+    state.is_stale = state.is_bound = false;
+    state.is_working = state.is_done = false;
+    state.serial = 0;
+    state.levels = levels;
+    state.group = group;
+  }
+  for (const IVec3 chunk : members) {
+    FieldChunk& state = chunks_.at(chunk);
+    if (state.is_empty) finish_chunk(state, nullptr);
+  }
+  if (group->unfinished == 0) give(members);
+}
+
+void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface) {
+  state.is_working = false;
+  state.is_done = true;
+  state.result = std::move(surface);
+  --state.group->unfinished;
+}
+
+// All of a group is there.
+void LiveField::give(const Members& members) {
+  for (const IVec3 chunk : members) {
+    FieldChunk& state = chunks_.at(chunk);
+    {
+      const Change change(totals_, state);
+      state.group.reset();
+      state.is_done = false;
+      state.was_given = true;
+      state.surface = std::move(state.result);
+      state.result.reset();
+      state.is_ready = false;
+      if (state.surface != nullptr || state.is_shown) make_ready(chunk, state);
+    }
+    erase_if_over(chunk);
+  }
+  if (is_blocked_) is_prepared_ = false;
+}
+
+void LiveField::erase_if_over(IVec3 chunk) {
+  const auto found = chunks_.find(chunk);
+  const FieldChunk& state = found->second;
+  if (state.is_gone && !state.is_pending() && !state.is_listed) chunks_.erase(found);
+}
+
+void LiveField::abandon_groups() {
+  for (auto& [chunk, state] : chunks_) {
+    if (state.group == nullptr) continue;
+    stale_.insert(chunk);
+    const Change change(totals_, state);
+    state.group.reset();
+    state.is_stale = true;
+    state.is_working = state.is_done = false;
+    state.result.reset();
+    state.serial = 0;
+  }
+  waiting_.clear();
+  is_prepared_ = false;
+}
+
+void LiveField::leave() {
+  abandon_groups();
+  stale_.clear();
+  Members all;
+  for (auto& [chunk, state] : chunks_) {
+    all.push_back(chunk);
+    const Change change(totals_, state);
+    state.is_stale = state.is_bound = false;
+    state.is_ready = false;
+    state.is_gone = true;
+    state.surface.reset();
+    if (state.is_shown) make_ready(chunk, state);
+  }
+  for (const IVec3 chunk : all) erase_if_over(chunk);
+  followed_ = {};
+}
+
+void LiveField::make_ready(IVec3 chunk, FieldChunk& state) {
+  state.is_ready = true;
+  if (state.is_listed) return;
+  totals_.ready.push_back({{handle_, SurfaceContent::Field}, chunk});
+  state.is_listed = true;
+}
+
+std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
+  if (chunks_.at(chunk).group == nullptr) begin_group(members_with(chunk), inputs.field());
+  const FieldChunk& state = chunks_.at(chunk);
+  auto job = std::make_unique<LiveJob>();
+  job->source = {handle_, SurfaceContent::Field};
+  job->chunk = chunk;
+  job->serial = ++totals_.serial;
+  job->seen = state.seen;
+  job->field = state.group->field;
+  job->levels = state.levels;
+  job->materials = inputs.types->materials;
+  return job;
+}
+
+void LiveField::hand_over(IVec3 chunk, std::uint64_t serial) {
+  FieldChunk& state = chunks_.at(chunk);
+  waiting_.erase(chunk);
+  state.is_working = true;
+  state.serial = serial;
+}
+
+bool LiveField::is_current(const LiveJob& job) const {
+  const auto found = chunks_.find(job.chunk);
+  return found != chunks_.end() && found->second.group != nullptr && found->second.serial == job.serial;
+}
+
+void LiveField::withdrawn(const LiveJob& job) {
+  if (!is_current(job)) return;
+  waiting_.insert(job.chunk);
+  chunks_.at(job.chunk).is_working = false;
+}
+
+void LiveField::collect(LiveJob& job) {
+  if (!is_current(job)) return;
+  FieldChunk& state = chunks_.at(job.chunk);
+  if (job.outcome == LiveJob::Outcome::OutOfMemory) return withdrawn(job);
+  finish_chunk(state, std::move(job.surface));
+  if (state.group->unfinished != 0) return;
+  const std::shared_ptr<Group> group = state.group;
+  give(group->chunks);
+}
+
+void LiveField::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
+  const auto found = chunks_.find(chunk);
+  if (found == chunks_.end()) return;
+  FieldChunk& state = found->second;
+  {
+    const Change change(totals_, state);
+    state.is_listed = false;
+    if (state.is_ready) {
+      state.is_ready = false;
+      state.is_shown = state.surface != nullptr;
+      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Field});
+      state.surface.reset();
+    }
+  }
+  erase_if_over(chunk);
+}
+
+}  // namespace quoin

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "live/live_distance.h"
+#include "live/live_source.h"
+
+namespace quoin {
+
+/// The field of one grid.
+///
+/// Surfaces of chunks beside each other have vertices in common, so those that one change reaches are a group: meshed
+/// from one snapshot, with one choice of levels, and given at once when the last is done. A change that reaches a chunk
+/// whose group is on its way waits until that has been given; what is loaded, and was never seen, waits for nobody.
+class LiveField final : public LiveSource {
+ public:
+  LiveField(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals);
+
+  void follow(const SceneGrid& content, LiveClock::time_point now) override;
+  void leave() override;
+  void forget() override { followed_ = {}; }
+  void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
+
+  [[nodiscard]] bool wants_levels() const override { return wants_levels_; }
+  /// Chunks that nobody has seen have their levels at once; of others some are changed at a time, the nearest first.
+  void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) override;
+  void prepare(const SceneGrid& content) override;
+  [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
+  [[nodiscard]] const IBox& box() const override { return box_; }
+  [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
+  [[nodiscard]] std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) override;
+  void hand_over(IVec3 chunk, std::uint64_t serial) override;
+  [[nodiscard]] bool is_current(const LiveJob& job) const override;
+  void withdrawn(const LiveJob& job) override;
+  void collect(LiveJob& job) override;
+  void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) override;
+
+ private:
+  struct Group {
+    FieldSnapshot field;
+    std::vector<IVec3> chunks;
+    std::size_t unfinished = 0;  // of these
+  };
+  struct FieldChunk {
+    std::shared_ptr<Group> group;  // that it is meshed in; null: in none
+    std::uint64_t serial = 0;      // of the newest job
+    LiveClock::time_point seen;    // when the last change was
+    bool is_stale = false;         // it changed since it was meshed, or put into a group
+    bool is_bound = false;         // what changed it also changed some beside it
+    bool is_working = false;       // the newest job is with the workers
+    bool is_done = false;          // in its group
+    bool is_empty = false;         // there is nothing to mesh
+    bool is_gone = false;          // of the field nothing is there any more
+    bool is_ready = false;         // `surface` is to be taken
+    bool is_listed = false;        // in LiveTotals::ready
+    bool is_shown = false;         // what was taken last is not null
+    bool was_given = false;        // a surface, or that there is none
+    std::uint8_t level = 0;
+    std::array<std::uint8_t, 27> levels{};        // in its group
+    std::shared_ptr<const ChunkSurface> result;   // in its group
+    std::shared_ptr<const ChunkSurface> surface;  // of the last group
+
+    // Whether nothing depends on its level yet.
+    [[nodiscard]] bool is_new() const { return !was_given && group == nullptr; }
+    [[nodiscard]] bool is_unfinished() const { return is_stale || group != nullptr; }
+    [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }
+  };
+  using Change = LiveChange<FieldChunk>;
+  using Chunks = std::unordered_map<IVec3, FieldChunk, CoordinateHash>;
+  using Members = std::vector<IVec3>;
+
+  void begin_anew(const DensityGrid& field, LiveClock::time_point now);
+  void follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now);
+  void see_whether_there(const DensityGrid& field, IVec3 chunk, bool is_bound, LiveClock::time_point now);
+  void mark(IVec3 chunk, bool is_bound, LiveClock::time_point now);
+  void set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now);
+  [[nodiscard]] std::array<std::uint8_t, 27> levels_around(IVec3 chunk) const;
+  [[nodiscard]] int reach_at(IVec3 chunk) const;
+  [[nodiscard]] Members members_with(IVec3 chunk) const;
+  [[nodiscard]] bool may_begin(const Members& members) const;
+  void begin_group(const Members& members, FieldSnapshot field);
+  void finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface);
+  void give(const Members& members);
+  void abandon_groups();
+  void make_ready(IVec3 chunk, FieldChunk& state);
+  void erase_if_over(IVec3 chunk);
+
+  GridHandle handle_;
+  const LiveMeshOptions& options_;
+  LiveTotals& totals_;
+  ChangeCursor followed_;
+  Chunks chunks_;
+  ChunkSet stale_;    // chunks that are
+  ChunkSet waiting_;  // in a group that has begun, or one that may begin
+  bool is_prepared_ = true;
+  bool is_blocked_ = false;  // some group waits for another
+  bool wants_levels_ = false;
+  Members changing_levels_;
+  IBox box_;  // of all chunks that there were
+};
+
+}  // namespace quoin

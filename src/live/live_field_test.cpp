@@ -1,0 +1,301 @@
+#include <quoin/live/live_meshes.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "live/live_test_support.h"
+
+namespace quoin {
+namespace {
+
+using Point = std::tuple<double, double, double>;
+
+/// A scene of one grid with a field, seen once.
+struct OneField {
+  OneField() {
+    scene.types = live_types();
+    instance.grid = handle = scene.add_grid({});
+    placed = scene.add_instance(instance);
+  }
+  DensityGrid& field() { return scene.edit(handle).field; }
+
+  Scene scene;
+  GridHandle handle;
+  Instance instance;
+  InstanceHandle placed;
+};
+
+// How many edges of what is shown have an odd number of triangles: 0 where it is closed.
+std::size_t open_edges(const ShownSurfaces& shown, GridHandle handle) {
+  std::map<std::pair<Point, Point>, int> edges;
+  for (const SurfaceUpdate& each : shown.all()) {
+    if (each.grid != handle || each.content != SurfaceContent::Field) continue;
+    const SmoothChunkMesh& mesh = each.surface->smooth;
+    const auto point = [&](std::size_t i) {
+      const DVec3 p = DVec3(mesh.positions[mesh.indices[i]]) + DVec3(each.chunk) * 64.0;
+      return Point{p.x, p.y, p.z};
+    };
+    for (std::size_t t = 0; t < mesh.indices.size(); t += 3) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        Point a = point(t + i);
+        Point b = point(t + (i + 1) % 3);
+        if (b < a) std::swap(a, b);
+        ++edges[{a, b}];
+      }
+    }
+  }
+  std::size_t odd = 0;
+  for (const auto& [edge, triangles] : edges) odd += static_cast<std::size_t>(triangles & 1);
+  return odd;
+}
+
+// Whether all chunks have the levels that the nearest of the eyes, in samples, asks for.
+void expect_levels(const ShownSurfaces& shown, const std::vector<DVec3>& eyes, double detail_distance) {
+  const auto level_at = [&](double distance) {
+    return std::clamp(static_cast<int>(std::ceil(std::log2(std::max(distance, 1e-3) / detail_distance))), 0, 3);
+  };
+  std::array<int, 4> seen{};
+  for (const SurfaceUpdate& each : shown.all()) {
+    double distance = std::numeric_limits<double>::infinity();
+    for (const DVec3 eye : eyes) {
+      const DVec3 low = DVec3(each.chunk) * 64.0;
+      distance = std::min(distance, glm::length(eye - glm::clamp(eye, low, low + 64.0)));
+    }
+    const int level = each.surface->level;
+    EXPECT_GE(level, level_at(distance / 1.1001));
+    EXPECT_LE(level, level_at(distance * 1.1001));
+    ++seen[static_cast<std::size_t>(level)];
+  }
+  EXPECT_GT(seen[0], 0);
+  EXPECT_GT(seen[1] + seen[2] + seen[3], 0);
+}
+
+void expect_field(const ShownSurfaces& shown, const Scene& scene, GridHandle handle, const LiveMeshOptions& options) {
+  SmoothMeshOptions wanted;
+  wanted.occlusion = options.occlusion;
+  const auto whole = build_smooth_mesh(scene.grids()[handle].field, scene.types, wanted);
+  ASSERT_TRUE(whole.has_value());
+  SmoothTriangles expected = triangles_of(*whole);
+  SmoothTriangles found;
+  for (const SurfaceUpdate& each : shown.all()) {
+    if (each.grid != handle || each.content != SurfaceContent::Field) continue;
+    ASSERT_EQ(each.surface->style, SurfaceStyle::Smooth);
+    const SmoothTriangles part = triangles_of(*each.surface, each.chunk);
+    found.insert(found.end(), part.begin(), part.end());
+  }
+  sort_triangles(expected);
+  sort_triangles(found);
+  ASSERT_EQ(found.size(), expected.size());
+  ASSERT_TRUE(found == expected);
+}
+
+// Hills of a few chunks.
+DensityGrid hills(int chunks, unsigned seed = 3) {
+  DensityGrid field;
+  std::mt19937 random(seed);
+  const double size = 64.0 * chunks;
+  field.add_box({2.0, 2.0, 2.0}, {size - 3.0, 20.0, size - 3.0}, 1);
+  for (int i = 0; i < 6 * chunks * chunks; ++i) {
+    const auto below = [&](double end) { return std::uniform_real_distribution<double>(0.0, end)(random); };
+    const double x = below(size - 40.0);
+    const double z = below(size - 40.0);
+    field.add_sphere({20.0 + x, 12.0 + below(20.0), 20.0 + z}, 4.0 + below(14.0),
+                     static_cast<VoxelType>(1 + random() % 3), 4.0);
+  }
+  return field;
+}
+
+// Some edit that chunks beside each other may see.
+void dig(DensityGrid& field, std::mt19937& random, int chunks) {
+  const auto below = [&](double end) { return std::uniform_real_distribution<double>(0.0, end)(random); };
+  const auto border = [&] { return 64.0 * static_cast<double>(random() % static_cast<unsigned>(chunks)) - 3.0; };
+  const DVec3 at{random() % 3 == 0 ? below(64.0 * chunks) : border() + below(6.0), 10.0 + below(25.0),
+                 random() % 3 == 0 ? below(64.0 * chunks) : border() + below(6.0)};
+  switch (random() % 4) {
+    case 0:
+      field.add_sphere(at, 2.0 + below(8.0), static_cast<VoxelType>(1 + random() % 3), 2.0);
+      return;
+    case 1:
+      field.smooth(at, 8.0, 0.7);
+      return;
+    case 2:
+      field.add_box(at, at + DVec3(below(20.0), below(60.0), below(20.0)), 2);
+      return;
+    default:
+      field.remove_sphere(at, 2.0 + below(9.0), 1.0);
+  }
+}
+
+LiveMeshOptions options_of(unsigned threads) {
+  LiveMeshOptions options;
+  options.threads = {threads};
+  return options;
+}
+
+TEST(LiveField, ItsMeshIsThatOfTheWholeField) {
+  OneField one;
+  one.field() = hills(2);
+  LiveMeshes meshes(options_of(2));
+  ShownSurfaces shown;
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(2)));
+  EXPECT_EQ(open_edges(shown, one.handle), 0U);
+  one.field().clear();
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  EXPECT_TRUE(shown.all().empty());
+}
+
+TEST(LiveField, VoxelsBesideItAreSurfacesOfTheirOwn) {
+  OneField one;
+  one.field().add_sphere({32, 32, 32}, 10, 1);
+  one.scene.edit(one.handle).grid.fill_box({{40, 40, 40}, {50, 50, 50}}, 3);
+  LiveMeshes meshes(options_of(1));
+  ShownSurfaces shown;
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  ASSERT_EQ(shown.all().size(), 2U);
+  EXPECT_EQ(shown.find(one.handle, IVec3(0))->style, SurfaceStyle::Blocky);
+  EXPECT_EQ(shown.find(one.handle, IVec3(0), SurfaceContent::Field)->style, SurfaceStyle::Smooth);
+  one.scene.edit(one.placed).visible = false;
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  EXPECT_TRUE(shown.all().empty()) << "nothing draws the grid any more";
+}
+
+TEST(LiveField, WhatIsShownIsClosedAtAnyTimeWhileItIsEdited) {
+  for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 3U); ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    OneField one;
+    one.field() = hills(2, seed);
+    const LiveMeshOptions options = options_of(1 + seed % 3);
+    LiveMeshes meshes(options);
+    ShownSurfaces shown;
+    meshes.finish(one.scene, DVec3(0.0));
+    shown.apply(meshes.take());
+    std::size_t taken = 0;
+    for (int i = 0; i < (kIsSlow ? 10 : 60); ++i) {
+      if (random() % 3 != 0) dig(one.field(), random, 2);
+      meshes.update(one.scene, DVec3(64.0, 40.0, 64.0));
+      const std::vector<SurfaceUpdate> updates = meshes.take();
+      shown.apply(updates);
+      taken += updates.size();
+      if (!updates.empty()) {
+        ASSERT_EQ(open_edges(shown, one.handle), 0U) << "edit " << i;
+      }
+      if (random() % 30 == 0) meshes.finish(one.scene, DVec3(0.0));
+    }
+    EXPECT_GT(taken, 0U);
+    meshes.finish(one.scene, DVec3(0.0));
+    shown.apply(meshes.take());
+    EXPECT_EQ(meshes.pending(), 0U);
+    ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options));
+  }
+}
+
+TEST(LiveField, LevelsFollowTheEyeWithoutASeamAtAnyTime) {
+  for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 2U); ++seed) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    OneField one;
+    one.field() = hills(4, seed);
+    LiveMeshOptions options = options_of(1 + seed % 3);
+    options.detail_distance = 40.0;
+    LiveMeshes meshes(options);
+    ShownSurfaces shown;
+    DVec3 eye(0.0, 40.0, 0.0);
+    meshes.finish(one.scene, eye);
+    shown.apply(meshes.take());
+    ASSERT_EQ(open_edges(shown, one.handle), 0U);
+    expect_levels(shown, {eye}, 40.0);
+    for (int i = 0; i < (kIsSlow ? 10 : 40); ++i) {
+      eye += DVec3(5.0, 0.0, 3.0 + 2.0 * std::sin(i));
+      if (i % 4 == 0) dig(one.field(), random, 4);
+      meshes.update(one.scene, eye);
+      const std::vector<SurfaceUpdate> updates = meshes.take();
+      shown.apply(updates);
+      if (!updates.empty()) {
+        ASSERT_EQ(open_edges(shown, one.handle), 0U) << "step " << i;
+      }
+    }
+    meshes.finish(one.scene, eye);
+    shown.apply(meshes.take());
+    ASSERT_EQ(open_edges(shown, one.handle), 0U);
+    expect_levels(shown, {eye}, 40.0);
+  }
+}
+
+TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
+  OneField one;
+  one.field() = hills(4);
+  LiveMeshOptions options = options_of(2);
+  options.detail_distance = 40.0;
+  LiveMeshes meshes(options);
+  ShownSurfaces shown;
+  const std::array others{DVec3(250.0, 40.0, 250.0)};
+  meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0), others);
+  shown.apply(meshes.take());
+  expect_levels(shown, {DVec3(0.0, 40.0, 0.0), others[0]}, 40.0);
+  // Half as large: twice as many samples away; moved, it is the other end that is near.
+  one.scene.edit(one.placed).voxel_size = 0.5;
+  one.scene.edit(one.placed).position = {-125.0, 0.0, -125.0};
+  meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0));
+  shown.apply(meshes.take());
+  EXPECT_EQ(open_edges(shown, one.handle), 0U);
+  expect_levels(shown, {DVec3(250.0, 80.0, 250.0)}, 40.0);
+  one.scene.edit(one.placed).voxel_size = std::numeric_limits<double>::quiet_NaN();
+  meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0));
+  shown.apply(meshes.take());
+  EXPECT_TRUE(shown.all().empty());
+}
+
+TEST(LiveField, ColoursOfTypesAreFollowed) {
+  OneField one;
+  one.field().add_sphere({60, 60, 60}, 10, 1);
+  LiveMeshes meshes(options_of(1));
+  ShownSurfaces shown;
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  VoxelProperties properties = one.scene.types[1];
+  properties.colour = {1, 2, 250, 255};
+  one.scene.types.replace(1, properties);
+  meshes.finish(one.scene, DVec3(0.0));
+  const std::vector<SurfaceUpdate> updates = meshes.take();
+  EXPECT_FALSE(updates.empty());
+  shown.apply(updates);
+  ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(1)));
+}
+
+TEST(LiveField, AnotherFieldTakesThePlaceAtOnce) {
+  OneField one;
+  one.field() = hills(2, 1);
+  LiveMeshes meshes(options_of(2));
+  ShownSurfaces shown;
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  one.field() = hills(2, 2);
+  for (int i = 0; i < 1000 && meshes.pending() == 0; ++i) meshes.update(one.scene, DVec3(0.0));
+  while (meshes.pending() != 0) {
+    meshes.update(one.scene, DVec3(0.0));
+    const std::vector<SurfaceUpdate> updates = meshes.take();
+    shown.apply(updates);
+    if (!updates.empty()) {
+      ASSERT_EQ(open_edges(shown, one.handle), 0U);
+    }
+  }
+  ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(2)));
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <unordered_set>
+#include <vector>
+
+#include <quoin/live/live_meshes.h>
+#include <quoin/scene/scene.h>
+
+#include "grid/coordinate_hash.h"
+#include "live/live_distance.h"
+#include "live/mesh_job_queue.h"
+
+namespace quoin {
+
+/// A chunk whose newest surface is to be taken.
+struct ReadyChunk {
+  LiveKey source;
+  IVec3 chunk{0};
+};
+
+/// Totals over all sources.
+struct LiveTotals {
+  std::uint64_t serial = 0;  ///< of the job that was made last
+  std::size_t unfinished = 0;
+  std::size_t pending = 0;
+  std::vector<ReadyChunk> ready;  ///< and perhaps some that are no more
+};
+
+/// Keeps the totals right while a chunk's state changes, which has `is_unfinished` and `is_pending`.
+template <class State>
+class LiveChange {
+ public:
+  LiveChange(LiveTotals& totals, const State& state) : totals_(totals), state_(state) {
+    totals_.unfinished -= state.is_unfinished() ? 1 : 0;
+    totals_.pending -= state.is_pending() ? 1 : 0;
+  }
+  LiveChange(const LiveChange&) = delete;
+  LiveChange& operator=(const LiveChange&) = delete;
+  ~LiveChange() {
+    totals_.unfinished += state_.is_unfinished() ? 1 : 0;
+    totals_.pending += state_.is_pending() ? 1 : 0;
+  }
+
+ private:
+  LiveTotals& totals_;
+  const State& state_;
+};
+
+/// What surfaces are made with.
+struct LiveTypes {
+  std::shared_ptr<const VoxelRegistry> registry;
+  std::shared_ptr<const SurfaceMaterials> materials;
+  std::uint64_t generation = 0;
+};
+
+/// Types that look otherwise than before, by type; empty where none does.
+struct ChangedTypes {
+  std::vector<bool> visibility;
+  std::vector<bool> colour;
+};
+
+/// What jobs of one update are made of; snapshots are taken when the first needs them.
+class LiveInputs {
+ public:
+  LiveInputs(const SceneGrid& content, const LiveTypes& with) : types(&with), content_(&content) {}
+
+  [[nodiscard]] const GridSnapshot& voxels() {
+    if (voxels_ == nullptr) voxels_ = std::make_shared<const Grid>(content_->grid.snapshot());
+    return voxels_;
+  }
+  [[nodiscard]] const FieldSnapshot& field() {
+    if (field_ == nullptr) field_ = std::make_shared<const DensityGrid>(content_->field.snapshot());
+    return field_;
+  }
+
+  const LiveTypes* types;
+
+ private:
+  const SceneGrid* content_;
+  GridSnapshot voxels_;
+  FieldSnapshot field_;
+};
+
+using ChunkSet = std::unordered_set<IVec3, CoordinateHash>;
+
+/// Follows the voxels or the field of one grid of a scene: which of its chunks are to be meshed, and what became of
+/// them.
+class LiveSource {
+ public:
+  LiveSource() = default;
+  LiveSource(const LiveSource&) = delete;
+  LiveSource& operator=(const LiveSource&) = delete;
+  virtual ~LiveSource() = default;
+
+  /// Takes over what was edited, at a cost in proportion to that.
+  virtual void follow(const SceneGrid& content, LiveClock::time_point now) = 0;
+  /// Nothing of it is drawn any more.
+  virtual void leave() = 0;
+  /// Makes the next `follow` begin anew.
+  virtual void forget() = 0;
+  /// Chunks that show one of the types are to be meshed again.
+  virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) = 0;
+  /// Whether it is to choose levels of detail though no eye moved.
+  [[nodiscard]] virtual bool wants_levels() const { return false; }
+  /// Takes over how far chunks are, after `follow`.
+  virtual void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) {
+    (void)distances;
+    (void)now;
+  }
+  /// Sees which chunks may be given to workers. Requires: `content` is as `follow` saw it last.
+  virtual void prepare(const SceneGrid& content) = 0;
+  /// Those chunks.
+  [[nodiscard]] virtual const ChunkSet& waiting() const = 0;
+  /// Holds all chunks that wait or are being meshed.
+  [[nodiscard]] virtual const IBox& box() const = 0;
+  [[nodiscard]] virtual bool has_chunks() const = 0;
+  /// Requires: the chunk waits; the inputs are of what `follow` saw last.
+  [[nodiscard]] virtual std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) = 0;
+  /// The job is with the workers.
+  virtual void hand_over(IVec3 chunk, std::uint64_t serial) = 0;
+  /// Whether the job's result is still wanted.
+  [[nodiscard]] virtual bool is_current(const LiveJob& job) const = 0;
+  /// The job was taken back; what is not meshed anew anyway waits again.
+  virtual void withdrawn(const LiveJob& job) = 0;
+  /// The job is done.
+  virtual void collect(LiveJob& job) = 0;
+  /// Appends the surface if there is one to be taken.
+  virtual void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) = 0;
+};
+
+}  // namespace quoin

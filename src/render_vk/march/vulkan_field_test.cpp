@@ -1,0 +1,188 @@
+// Pictures of fields of densities by a device, beside those of the processor.
+
+#include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "render_vk/device/vulkan_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+using namespace vulkan_test;
+
+struct FieldTypes {
+  VoxelType ground, stone, glow, glass;
+};
+
+FieldTypes add_types(Scene& scene) {
+  FieldTypes types{};
+  types.ground = add_type(scene, {90, 160, 70, 255});
+  types.stone = add_type(scene, {150, 140, 130, 255});
+  VoxelProperties glow;
+  glow.colour = {255, 200, 120, 255};
+  glow.emission = 3.0F;
+  types.glow = scene.types.add(glow).value();
+  VoxelProperties glass;
+  glass.colour = {120, 170, 220, 90};
+  glass.visibility = Visibility::Transparent;
+  types.glass = scene.types.add(glass).value();
+  return types;
+}
+
+// Hills over several chunks, some of them with solid chunks below.
+DensityGrid hills(const FieldTypes& types, int edge) {
+  DensityGrid field;
+  field.edit({{-edge, -100, -edge}, {edge, 40, edge}}, [&](IVec3 p, DensitySample) {
+    const double height = 12.0 * std::sin(0.05 * p.x) * std::cos(0.06 * p.z) + 3.0 * std::sin(0.31 * p.x + 0.23 * p.z);
+    const auto type = p.y > 6 || (p.x / 8 + p.z / 8) % 3 == 0 ? types.stone : types.ground;
+    return DensitySample{static_cast<float>(0.8 * (p.y - height)), type};
+  });
+  field.add_sphere({0.0, 30.0, 0.0}, 9.0, types.glow);
+  field.remove_sphere({20.0, 5.0, 10.0}, 11.0);
+  return field;
+}
+
+SceneGrid village(const FieldTypes& types) {
+  SceneGrid grid;
+  grid.field = hills(types, 90);
+  grid.grid.fill_box({{30, -2, 30}, {44, 22, 44}}, types.stone);
+  grid.grid.fill_box({{33, 4, 44}, {41, 14, 45}}, types.glass);
+  grid.grid.fill_box({{-40, 20, -10}, {-20, 21, 30}}, types.glass);
+  return grid;
+}
+
+InstanceHandle place_grid(Scene& scene, SceneGrid grid) {
+  return scene.add_instance({"", scene.add_grid(std::move(grid)), DVec3(0.0)});
+}
+
+class VulkanField : public VulkanTest {
+ protected:
+  void compare(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
+    expect_equal(taken(scene, camera, options), render_test::taken(scene, camera, options), name);
+  }
+};
+
+TEST_F(VulkanField, HillsWithAHouseAndGlass) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  place_grid(scene, village(types));
+  const Camera camera = towards({110, 70, 130}, {10, 0, 10});
+  RenderOptions options = sized(160, 120);
+  compare(scene, camera, options, "field_village");
+  options.light.occlusion_rays = 16;
+  compare(scene, camera, options, "field_village_16");
+  options.light.occlusion = OcclusionMode::Vertex;
+  compare(scene, camera, options, "field_village_vertex");
+  for (const Shading shading : {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
+    options.light.shading = shading;
+    compare(scene, camera, options, "field_village_shading_" + std::to_string(static_cast<int>(shading)));
+  }
+}
+
+TEST_F(VulkanField, FromWithinAndFromAbove) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  place_grid(scene, village(types));
+  compare(scene, towards({20.0, 4.0, 10.0}, {60.0, 8.0, 30.0}), sized(96, 72), "field_pit");
+  compare(scene, towards({0.3, -40.0, 0.2}, {30.0, -40.0, 10.0}), sized(32, 24), "field_in_stone");
+  compare(scene, from_above(0.3, 100, -0.7, 150), sized(96, 96), "field_from_above");
+  RenderOptions options = sized(96, 72);
+  options.light.lamps = 8;
+  options.light.sun_brightness = 0.0;
+  compare(scene, towards({50, 40, 60}, {0, 10, 0}), options, "field_lamps");
+}
+
+TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  const DVec3 far{3e6, -2e5, 7e5};
+  SceneGrid ground;
+  ground.field = hills(types, 60);
+  const GridHandle hill = scene.add_grid(std::move(ground));
+  SceneGrid ball;
+  ball.field.add_sphere({0, 0, 0}, 10, types.stone);
+  ball.field.remove_box({-20, 2, -20}, {20, 20, 20}, 0.0, 2.0);
+  const GridHandle bowl = scene.add_grid(std::move(ball));
+  Instance instance;
+  instance.grid = hill;
+  instance.position = far;
+  instance.rotation = glm::angleAxis(0.3, glm::normalize(DVec3(1.0, 2.0, 0.5)));
+  scene.add_instance(instance);
+  for (int i = 0; i < 5; ++i) {
+    instance.grid = bowl;
+    instance.position = far + DVec3(20.0 * i - 50.0, 40.0, 10.0 * (i % 2));
+    instance.rotation = glm::angleAxis(0.7 * i, glm::normalize(DVec3(0.3, 0.2, 1.0)));
+    instance.voxel_size = 0.4 + 0.3 * i;
+    scene.add_instance(instance);
+  }
+  Grid blocks;
+  blocks.fill_box({{0, 0, 0}, {20, 20, 20}}, types.stone);
+  SceneGrid house;
+  house.grid = std::move(blocks);
+  instance.grid = scene.add_grid(std::move(house));
+  instance.position = far + DVec3(-40.0, 10.0, 30.0);
+  instance.voxel_size = 1.0;
+  scene.add_instance(instance);
+  compare(scene, towards(far + DVec3(90, 80, 110), far), sized(160, 120), "field_instances");
+}
+
+TEST_F(VulkanField, EditsAreTakenOver) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  const InstanceHandle placed = place_grid(scene, village(types));
+  const GridHandle handle = scene.instances()[placed].grid;
+  const Camera camera = towards({80, 70, 90}, {0, 0, 0});
+  const RenderOptions options = sized(80, 60);
+  compare(scene, camera, options, "field_before");
+  const std::uint64_t all = renderer_->uploaded_bytes();
+  DensityGrid& field = scene.edit(handle).field;
+  std::mt19937 random(5);
+  for (int i = 0; i < 6; ++i) {
+    const auto at = [&] { return static_cast<double>(random() % 120) - 60.0; };
+    field.remove_sphere({at(), 4.0, at()}, 7.0);
+    field.add_sphere({at(), 12.0, at()}, 6.0, types.stone, 3.0);
+    // Across the corner of chunks.
+    field.add_box({-4.0 - i, 0.0, -3.0}, {3.0, 24.0 + i, 5.0}, types.ground);
+    compare(scene, camera, options, "field_edited");
+    EXPECT_LT(renderer_->uploaded_bytes(), all);
+  }
+  // What lies lower, or only has blocks, or only a field.
+  field.add_sphere({-200.0, -150.0, 0.0}, 20.0, types.stone);
+  compare(scene, camera, options, "field_moved_origin");
+  scene.edit(handle).grid.clear();
+  compare(scene, camera, options, "field_alone");
+  scene.edit(handle).grid.fill_box({{-10, 0, -10}, {10, 10, 10}}, types.stone);
+  field.clear();
+  compare(scene, camera, options, "field_gone");
+  scene.edit(handle).grid.clear();
+  EXPECT_EQ(taken(scene, camera, options).pixels_hit, 0);
+  field.add_sphere({0.0, 0.0, 0.0}, 20.0, types.stone);
+  compare(scene, camera, options, "field_again");
+}
+
+TEST_F(VulkanField, MaterialsComeFromTheChunkOfTheSample) {
+  Scene scene;
+  std::vector<VoxelType> all;
+  for (int i = 0; i < 40; ++i) {
+    all.push_back(add_type(scene, {static_cast<std::uint8_t>(37 * i), static_cast<std::uint8_t>(61 * i), 80, 255}));
+  }
+  SceneGrid grid;
+  grid.field.edit({{40, 40, 40}, {90, 90, 90}}, [&](IVec3 p, DensitySample) {
+    const DVec3 d = DVec3(p) - 64.3;
+    const auto type = all[static_cast<std::size_t>((p.x + 3 * p.y + 7 * p.z) % 40)];
+    return DensitySample{static_cast<float>(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z) - 14.0), type};
+  });
+  place_grid(scene, std::move(grid));
+  RenderOptions options = sized(120, 120);
+  options.light.shading = Shading::Unlit;
+  compare(scene, towards({100, 94, 104}, {64, 64, 64}), options, "field_materials");
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,146 @@
+#include "render_vk/trees/device_grid.h"
+
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace quoin::vulkan {
+namespace {
+
+ShaderTree shader_tree(const DeviceTree& tree, const OccupancyTree* of, IVec3 origin) {
+  return of == nullptr ? ShaderTree{} : tree.shader_tree(of->bounds(), origin);
+}
+
+}  // namespace
+
+void DeviceGrid::release(DeviceMemory& memory) {
+  drop_all(memory, chunks_);
+  drop_all(memory, field_chunks_);
+  for (DeviceTree* const tree : {&opaque_, &transparent_, &field_}) tree->release(memory);
+  *this = {};
+}
+
+std::uint64_t DeviceGrid::bytes() const {
+  std::uint64_t sum = opaque_.bytes() + transparent_.bytes() + field_.bytes();
+  for (const Chunks* const chunks : {&chunks_, &field_chunks_}) {
+    for (const auto& [at, chunk] : *chunks) sum += chunk.place.size;
+  }
+  return sum;
+}
+
+Status DeviceGrid::update(DeviceMemory& memory, const Content& content) {
+  const bool is_field_same =
+      content.field == nullptr ? field_chunks_.empty() : !content.field->field().has_changed_since(followed_field_);
+  if (is_field_same && !content.voxels->has_changed_since(followed_)) return {};
+  if (Status done = update_voxels(memory, content); !done) return done;
+  if (Status done = update_field(memory, content.field); !done) return done;
+  IBox bounds = content.voxels->bounds();
+  if (content.field != nullptr) bounds = unite(bounds, content.field->cells().bounds());
+  origin_ = chunk_of(bounds.min);
+  if (Status done = put_top(memory, opaque_, chunks_, &DeviceChunk::opaque); !done) return done;
+  if (Status done = put_top(memory, transparent_, chunks_, &DeviceChunk::transparent); !done) return done;
+  if (Status done = put_top(memory, field_, field_chunks_, &DeviceChunk::field); !done) return done;
+  const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
+  shader_grid_ = {shader_tree(opaque_, content.opaque, this->origin()),
+                  shader_tree(transparent_, content.transparent, this->origin()),
+                  shader_tree(field_, cells, this->origin())};
+  return {};
+}
+
+Status DeviceGrid::update_voxels(DeviceMemory& memory, const Content& content) {
+  ChangeCursor now = followed_;
+  const GridChanges changes = content.voxels->changes_since(now);
+  if (changes.all) {
+    drop_all(memory, chunks_);
+    for (const IVec3 at : content.voxels->chunks()) {
+      if (Status done = put_voxels(memory, content, at); !done) return done;
+    }
+  }
+  for (const ChunkChange& change : changes.items) {
+    if (Status done = put_voxels(memory, content, change.chunk); !done) return done;
+  }
+  followed_ = now;
+  return {};
+}
+
+Status DeviceGrid::update_field(DeviceMemory& memory, const DensityTree* field) {
+  if (field == nullptr) {
+    drop_all(memory, field_chunks_);
+    followed_field_ = {};
+    return {};
+  }
+  ChangeCursor now = followed_field_;
+  const DensityChanges changes = field->field().changes_since(now);
+  std::map<IVec3, bool, ByPlace> reached;
+  if (changes.all) {
+    drop_all(memory, field_chunks_);
+    for (const IVec3 chunk : field->field().chunks()) {
+      // Cells lie before their samples.
+      for (int i = 0; i < 8; ++i) reached[chunk - IVec3{i & 1, i >> 1 & 1, i >> 2}] = true;
+    }
+  }
+  for (const DensityChange& change : changes.items) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 offset = Neighbourhood::offset(i);
+      if (change.affects(offset, kFieldRecordReach)) reached[change.chunk + offset] = true;
+    }
+  }
+  for (const auto& [chunk, is_reached] : reached) {
+    if (Status done = put_field(memory, *field, chunk); !done) return done;
+  }
+  followed_field_ = now;
+  return {};
+}
+
+void DeviceGrid::drop(DeviceMemory& memory, Chunks& chunks, IVec3 chunk) {
+  const auto old = chunks.find(chunk);
+  if (old == chunks.end()) return;
+  memory.release(old->second.place);
+  chunks.erase(old);
+}
+
+void DeviceGrid::drop_all(DeviceMemory& memory, Chunks& chunks) {
+  for (auto& [at, chunk] : chunks) memory.release(chunk.place);
+  chunks.clear();
+}
+
+Status DeviceGrid::put_voxels(DeviceMemory& memory, const Content& content, IVec3 chunk) {
+  const Chunk* voxels = content.voxels->find_chunk(chunk);
+  if (voxels == nullptr) {
+    drop(memory, chunks_, chunk);
+    return {};
+  }
+  return put_record(memory, chunks_[chunk], pack_chunk(*content.opaque, content.transparent, *voxels, chunk));
+}
+
+Status DeviceGrid::put_field(DeviceMemory& memory, const DensityTree& field, IVec3 chunk) {
+  ChunkRecord record = pack_field_chunk(field.cells(), field.field(), chunk);
+  if (record.field.mask == 0) {
+    drop(memory, field_chunks_, chunk);
+    return {};
+  }
+  return put_record(memory, field_chunks_[chunk], std::move(record));
+}
+
+Status DeviceGrid::put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record) {
+  memory.release(entry.place);
+  const auto place = memory.allocate(record.words.size() * 4, "uploading voxels");
+  if (!place) return place.error();
+  entry.place = *place;
+  record.move_to(place->address);
+  entry.opaque = record.opaque;
+  entry.transparent = record.transparent;
+  entry.field = record.field;
+  return memory.write(entry.place, std::as_bytes(std::span(record.words)));
+}
+
+Status DeviceGrid::put_top(DeviceMemory& memory, DeviceTree& tree, const Chunks& chunks,
+                           Node DeviceChunk::*node) const {
+  std::vector<ChunkNodeAt> nodes;
+  for (const auto& [at, chunk] : chunks) {
+    if ((chunk.*node).mask != 0) nodes.push_back({at - origin_, chunk.*node});
+  }
+  return tree.put(memory, std::move(nodes));
+}
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include <quoin/grid/grid.h>
+#include <quoin/trace/density_ray.h>
+#include <quoin/trace/occupancy_tree.h>
+
+#include "render_vk/device/memory.h"
+#include "render_vk/trees/device_tree.h"
+#include "render_vk/trees/tree_packing.h"
+
+namespace quoin::vulkan {
+
+/// One grid's voxels and field in device memory.
+class DeviceGrid {
+ public:
+  /// What rays know of a grid: its trees as it is. Null: there is no such voxel, no field.
+  struct Content {
+    const Grid* voxels = nullptr;
+    const OccupancyTree* opaque = nullptr;
+    const OccupancyTree* transparent = nullptr;
+    const DensityTree* field = nullptr;
+  };
+
+  /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the
+  /// memory is flushed. After an error it is to be released.
+  ///
+  /// Requires: the types' visibility is that of the last time.
+  [[nodiscard]] Status update(DeviceMemory& memory, const Content& content);
+  void release(DeviceMemory& memory);
+
+  [[nodiscard]] IVec3 origin() const { return origin_ * kChunkEdge; }  ///< of the trees' coordinates, in the grid
+  [[nodiscard]] bool has_transparent() const { return !transparent_.empty(); }
+  [[nodiscard]] bool has_field() const { return !field_.empty(); }
+  /// What shaders know it by.
+  [[nodiscard]] const ShaderGrid& shader_grid() const { return shader_grid_; }
+  /// Of device memory.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  struct DeviceChunk {
+    Place place;
+    Node opaque;
+    Node transparent;
+    Node field;
+  };
+  using Chunks = std::map<IVec3, DeviceChunk, ByPlace>;
+
+  Status update_voxels(DeviceMemory& memory, const Content& content);
+  Status update_field(DeviceMemory& memory, const DensityTree* field);
+  Status put_voxels(DeviceMemory& memory, const Content& content, IVec3 chunk);
+  Status put_field(DeviceMemory& memory, const DensityTree& field, IVec3 chunk);
+  static Status put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record);
+  static void drop(DeviceMemory& memory, Chunks& chunks, IVec3 chunk);
+  static void drop_all(DeviceMemory& memory, Chunks& chunks);
+  Status put_top(DeviceMemory& memory, DeviceTree& tree, const Chunks& chunks, Node DeviceChunk::*node) const;
+
+  ChangeCursor followed_;
+  ChangeCursor followed_field_;
+  Chunks chunks_;
+  Chunks field_chunks_;
+  IVec3 origin_{0};  // in chunks
+  DeviceTree opaque_;
+  DeviceTree transparent_;
+  DeviceTree field_;
+  ShaderGrid shader_grid_;
+};
+
+}  // namespace quoin::vulkan
