@@ -135,11 +135,16 @@ Result<bool> holds_volume(const ConvertOptions& options) {
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
-  if (is_volume && !format.is_mesh) {
+  if (is_volume && (format.format == FileFormat::Vox || (options.raw && !format.is_mesh))) {
     return make_error(
         ErrorCode::Unsupported,
         "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.extension),
         options.common.input.string());
+  }
+  if (is_volume && !format.is_mesh) {
+    ConvertOptions as_scene = options;
+    if (options.iso) as_scene.common.load.iso = static_cast<float>(*options.iso);
+    return convert_scene(as_scene, format);
   }
   return is_volume ? convert_volume(options, format) : convert_scene(options, format);
 }

@@ -2,6 +2,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_faces.h>
+#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
@@ -23,7 +24,9 @@ struct GenerateOptions {
   std::filesystem::path output;
   std::string seed = "42";
   std::string chunks = "4x2x4";
+  bool is_smooth = false;
   TerrainOptions terrain;
+  SmoothTerrainOptions smooth;  ///< what of it the other has not
   Threads threads;
   bool json = false;
 };
@@ -38,6 +41,11 @@ struct Outcome {
   std::vector<std::string> warnings;
 };
 
+/// How many voxels, or samples, a unit of the world's size has along each axis.
+int edge_of_unit(const GenerateOptions& options) {
+  return options.is_smooth ? kChunkEdge : kTerrainUnit;
+}
+
 /// What is wrong with the options, which are read into `options.terrain`; empty when nothing is.
 std::string read_options(GenerateOptions& options) {
   const auto seed = parse_unsigned(options.seed);
@@ -46,30 +54,33 @@ std::string read_options(GenerateOptions& options) {
   const auto parsed = parse_box_size(options.chunks);
   if (!parsed) return "--chunks: must be like 4x2x4" + got;
   const IVec3 size = *parsed;
-  if (size.x < 1 || size.y < 1 || size.z < 1 || size.x > 1'024 || size.y > 32 || size.z > 1'024) {
-    return "--chunks: must be 1 to 1024 wide and deep and 1 to 32 high" + got;
+  const IVec3 most = options.is_smooth ? IVec3{512, 16, 512} : IVec3{1'024, 32, 1'024};
+  if (glm::any(glm::lessThan(size, IVec3{1})) || glm::any(glm::greaterThan(size, most))) {
+    return "--chunks: must be 1 to " + std::to_string(most.x) + " wide and deep and 1 to " + std::to_string(most.y) +
+           " high" + got;
   }
-  constexpr std::int64_t kUnitVoxels = std::int64_t{kTerrainUnit} * kTerrainUnit * kTerrainUnit;
-  if (std::int64_t{size.x} * size.y * size.z > kMaxVoxels / kUnitVoxels) {
-    return "--chunks: must be at most " + with_thousands(kMaxVoxels / kUnitVoxels) + " in all" + got;
+  const std::int64_t unit = edge_of_unit(options);
+  if (std::int64_t{size.x} * size.y * size.z > kMaxVoxels / (unit * unit * unit)) {
+    return "--chunks: must be at most " + with_thousands(kMaxVoxels / (unit * unit * unit)) + " in all" + got;
   }
-  options.terrain.seed = *seed;
-  options.terrain.size = size;
+  options.terrain.seed = options.smooth.seed = *seed;
+  options.terrain.size = options.smooth.size = size;
   return "";
 }
 
-Scene scene_of(Grid grid, VoxelRegistry types, IVec3 size) {
-  Scene scene;
-  scene.types = std::move(types);
-  SceneGrid entry;
-  entry.name = "terrain";
-  entry.grid = std::move(grid);
-  entry.canvas = {IVec3{0}, size * kTerrainUnit};
-  Instance instance;
-  instance.name = entry.name;
-  instance.grid = scene.add_grid(std::move(entry));
-  scene.add_instance(std::move(instance));
-  return scene;
+/// The world's voxels, or its field. Errors: Cancelled.
+Status make_content(const GenerateOptions& options, const TerrainTypes& types, const Progress& progress,
+                    SceneGrid& content) {
+  if (options.is_smooth) {
+    auto field = generate_smooth_terrain(options.smooth, types, options.threads, progress);
+    if (!field) return field.error();
+    content.field = std::move(*field);
+    return {};
+  }
+  auto grid = generate_terrain(options.terrain, types, options.threads, progress);
+  if (!grid) return grid.error();
+  content.grid = std::move(*grid);
+  return {};
 }
 
 Result<Outcome> generate(const GenerateOptions& options) {
@@ -77,17 +88,22 @@ Result<Outcome> generate(const GenerateOptions& options) {
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
   ProgressBar bar;
-  VoxelRegistry types;
-  const auto materials = add_terrain_types(types);
-  if (!materials) return materials.error();
-  auto grid = generate_terrain(options.terrain, *materials, options.threads, bar.listener("generating"));
-  if (!grid) return grid.error();
-  Outcome outcome;
-  outcome.voxels = grid->voxel_count();
-  outcome.types = grid->types().size();
-  outcome.seconds_generate = watch.lap();
   LoadedScene made;
-  made.scene = scene_of(std::move(*grid), std::move(types), options.terrain.size);
+  Scene& scene = made.scene;
+  const auto materials = add_terrain_types(scene.types);
+  if (!materials) return materials.error();
+  SceneGrid content;
+  content.name = "terrain";
+  content.canvas = {IVec3{0}, options.terrain.size * edge_of_unit(options)};
+  if (Status done = make_content(options, *materials, bar.listener("generating"), content); !done) return done.error();
+  Outcome outcome;
+  outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
+  outcome.types = options.is_smooth ? scene.types.size() - 1 : content.grid.types().size();
+  outcome.seconds_generate = watch.lap();
+  Instance instance;
+  instance.name = content.name;
+  instance.grid = scene.add_grid(std::move(content));
+  scene.add_instance(std::move(instance));
   outcome.faces = count_faces(made.scene, InstanceFilter::All, options.threads);
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
   const auto bytes = save_scene(made, options.output, outcome.warnings, options.threads, bar.listener("writing"));
@@ -99,13 +115,15 @@ Result<Outcome> generate(const GenerateOptions& options) {
 
 Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
   const IVec3 size = options.terrain.size;
+  const int unit = edge_of_unit(options);
+  // A field has no faces.
   return {{"seed", options.terrain.seed},
           {"chunks", {size.x, size.y, size.z}},
-          {"size", {size.x * kTerrainUnit, size.y * kTerrainUnit, size.z * kTerrainUnit}},
+          {"size", {size.x * unit, size.y * unit, size.z * unit}},
           {"voxels", outcome.voxels},
           {"types", outcome.types},
-          {"faces_visible", outcome.faces.visible},
-          {"faces_total", outcome.faces.total},
+          {"faces_visible", options.is_smooth ? Json() : Json(outcome.faces.visible)},
+          {"faces_total", options.is_smooth ? Json() : Json(outcome.faces.total)},
           {"bytes", outcome.bytes},
           {"files", {options.output.string()}},
           {"seconds", {{"generate", outcome.seconds_generate}, {"write", outcome.seconds_write}}},
@@ -113,19 +131,22 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
 }
 
 std::string outcome_text(const GenerateOptions& options, const Outcome& outcome) {
-  const IVec3 size = options.terrain.size * kTerrainUnit;
+  const IVec3 size = options.terrain.size * edge_of_unit(options);
   return "Terrain: seed " + std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " +
-         std::to_string(size.y) + " x " + std::to_string(size.z) + "\nVoxels: " + with_thousands(outcome.voxels) +
-         " of " + std::to_string(outcome.types) + " types\n" + to_string(outcome.faces) + "\nWrote " +
-         options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
+         std::to_string(size.y) + " x " + std::to_string(size.z) +
+         (options.is_smooth ? "\nSolid samples: " : "\nVoxels: ") + with_thousands(outcome.voxels) + " of " +
+         std::to_string(outcome.types) + " types\n" + (options.is_smooth ? "" : to_string(outcome.faces) + "\n") +
+         "Wrote " + options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
          number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
 }
 
 int run_generate(GenerateOptions& options) {
   const auto format = format_for_writing(options.output);
-  if (!format || format->is_mesh) {
-    print_error(options.output.string() +
-                ": a terrain is written as .vox or .json; `quoin convert` turns that into other formats");
+  const bool is_wrong = !format || format->is_mesh || (options.is_smooth && format->format == FileFormat::Vox);
+  if (is_wrong) {
+    print_error(options.output.string() + ": a " + (options.is_smooth ? "smooth terrain" : "terrain") +
+                " is written as " + (options.is_smooth ? "" : ".vox or ") +
+                ".json; `quoin convert` turns that into other formats");
     return kWrongUsage;
   }
   if (const std::string fault = read_options(options); !fault.empty()) {
@@ -145,24 +166,43 @@ int run_generate(GenerateOptions& options) {
 
 }  // namespace
 
+namespace {
+
+std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, const char* chunks, int& status) {
+  const auto options = std::make_shared<GenerateOptions>();
+  command.add_option("OUT", options->output, files)->required()->check(file_name());
+  command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
+  command.add_option("--chunks", options->chunks, chunks);
+  command.add_flag("--json", options->json, "Print one JSON object instead of text");
+  command.add_option("--threads", options->threads.count, "Threads to use (default: all)")
+      ->check(CLI::Range(1U, 1024U));
+  command.callback([options, &status] { status = run_generate(*options); });
+  return options;
+}
+
+}  // namespace
+
 void add_generate_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("generate", "Make a world from a seed");
   command->require_subcommand(1);
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
-  const auto options = std::make_shared<GenerateOptions>();
-  terrain->add_option("OUT", options->output, "File to write: .vox, .json")->required()->check(file_name());
-  terrain->add_option("--seed", options->seed, "Which world: a whole number (default 42)");
-  terrain->add_option(
-      "--chunks", options->chunks,
-      "Width x height x depth in units of 32 voxels (default 4x2x4); 1024x32x1024 at most, 65,536 in all");
-  terrain->add_flag("--json", options->json, "Print one JSON object instead of text");
-  terrain->add_option("--threads", options->threads.count, "Threads to use (default: all)")
-      ->check(CLI::Range(1U, 1024U));
+  add_world(*terrain, "File to write: .vox, .json",
+            "Width x height x depth in units of 32 voxels (default 4x2x4); 1024x32x1024 at most, 65,536 in all",
+            status);
   terrain->footer(
       "The same seed gives the same world on every machine. The landscape's forms grow with the world's height.\n"
       "Example: quoin generate terrain hills.vox --seed 7 --chunks 8x3x8");
-  terrain->callback([options, &status] { status = run_generate(*options); });
+  CLI::App* smooth = command->add_subcommand("smooth-terrain", "Smooth hills with cliffs, arches and caves");
+  const auto options = add_world(
+      *smooth, "File to write: .json",
+      "Width x height x depth in units of 64 samples (default 4x2x4); 512x16x512 at most, 8,192 in all", status);
+  options->is_smooth = true;
+  smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "No cliffs that overhang, no arches");
+  smooth->add_flag("!--no-caves", options->smooth.caves, "No caves");
+  smooth->footer(
+      "The same seed gives the same world on every machine, of the same heights as `terrain` has.\n"
+      "Example: quoin generate smooth-terrain hills.json && quoin render hills.json hills.png");
 }
 
 }  // namespace quoin::tool

@@ -68,28 +68,12 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
   return {};
 }
 
-Result<LoadedScene> load_volume(const RenderArguments& arguments) {
+Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume) {
+  LoadOptions options = arguments.common.load;
+  if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
   ProgressBar bar;
-  auto volume = read_volume(arguments.common.input);
-  if (!volume) return volume.error();
-  VolumeSceneOptions options;
-  options.iso = arguments.iso ? static_cast<float>(*arguments.iso) : volume_threshold(*volume);
-  auto scene = scene_from_volume(*volume, options, arguments.common.threads, bar.listener("reading"));
-  if (!scene) {
-    Error error = scene.error();
-    error.path = arguments.common.input.string();
-    return error;
-  }
-  LoadedScene loaded;
-  loaded.scene = std::move(*scene);
-  loaded.format = volume->format;
-  loaded.warnings = std::move(volume->warnings);
-  return loaded;
-}
-
-Result<LoadedScene> load_voxels(const RenderArguments& arguments) {
-  auto loaded = load_scene(arguments.common.input, arguments.common.load);
-  if (loaded && arguments.iso) {
+  auto loaded = load_scene(arguments.common.input, options, bar.listener("reading"));
+  if (loaded && arguments.iso && !is_volume) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
   }
   return loaded;
@@ -131,7 +115,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common.input);
-  auto loaded = is_volume ? load_volume(arguments) : load_voxels(arguments);
+  auto loaded = load(arguments, is_volume);
   if (!loaded) return loaded.error();
   const Scene& scene = loaded->scene;
   Outcome outcome;

@@ -38,10 +38,7 @@ Status check_input(const std::filesystem::path& path) {
     return make_error(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
                       path.string());
   }
-  if (!format_info(**format).is_volume) return {};
-  return make_error(ErrorCode::Unsupported,
-                    "a volume of values, which is not drawn; `quoin convert` makes a mesh of it (--mesher smooth)",
-                    path.string());
+  return {};
 }
 
 int run_view(const ViewArguments& arguments) {
@@ -113,6 +110,8 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
   command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole());
+  command->add_option("--iso", arguments->load.iso,
+                      "Surface value of a volume; what is above is solid (default: between its two groups of values)");
   command->add_option("--size", "Of the window, 320x240 to 16384 a side (default: as it was last)")->type_name("WxH");
   command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")

@@ -4,6 +4,8 @@
 #include <array>
 
 #include <quoin/io/scene_file.h>
+#include <quoin/io/volume.h>
+#include <quoin/scene/volume_scene.h>
 
 #include "io/byte_stream.h"
 #include "io/volume/header.h"
@@ -60,15 +62,28 @@ Error unrecognised(std::span<const std::byte> bytes) {
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
 
+// A volume's path may lead to what lies beside it.
+Result<LoadedScene> read_volume_scene(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                                      const LoadOptions& options, const Progress& progress) {
+  auto volume = path.empty() ? read_volume(bytes) : read_volume(path);
+  if (!volume) return volume.error();
+  VolumeSceneOptions wanted;
+  wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
+  auto scene = scene_from_volume(*volume, wanted, {}, progress);
+  if (!scene) return scene.error();
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = volume->format;
+  loaded.warnings = std::move(volume->warnings);
+  return loaded;
+}
+
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                const LoadOptions& options, const Progress& progress) {
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes);
-  if (format && format_info(*format).is_volume) {
-    return make_error(ErrorCode::Unsupported,
-                      "a volume of values (" + std::string(format_info(*format).name) + "), not voxels");
-  }
+  if (format && format_info(*format).is_volume) return read_volume_scene(path, bytes, options, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";

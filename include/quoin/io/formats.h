@@ -27,7 +27,7 @@ struct FormatInfo {
   bool readable;
   bool writable;
   bool is_mesh;    ///< written from meshes rather than from voxels
-  bool is_volume;  ///< read by read_volume rather than by load_scene
+  bool is_volume;  ///< values, which read_volume reads as such and load_scene as a field
 };
 
 /// All formats, those that can be read first.
@@ -50,10 +50,10 @@ struct FormatInfo {
 /// Errors: Unsupported, naming the extensions there are.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
-/// Reads a file of any readable format that holds voxels.
+/// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it.
 ///
 /// The content decides; the name only helps to say what is wrong with a file that is of no known format.
-/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported, also for volumes; those of
+/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of
 ///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
 ///         set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},

@@ -13,26 +13,32 @@ namespace quoin {
 
 namespace {
 
-/// The grid with its types renumbered; itself where none changes.
-Grid with_types(Grid grid, const std::vector<VoxelType>& new_type_of) {
-  const std::vector<VoxelType> used = grid.types();
+/// Gives types new numbers; returns whether any changed.
+bool renumber(Chunk& chunk, const std::vector<VoxelType>& new_type_of) {
   bool is_same = true;
-  for (const VoxelType type : used) is_same = is_same && new_type_of[type] == type;
-  if (is_same) return grid;
+  for (const VoxelType type : chunk.types()) is_same = is_same && new_type_of[type] == type;
+  if (is_same) return false;
   std::array<VoxelType, kChunkEdge> row{};
-  for (const IVec3 at : grid.chunks()) {
-    Chunk chunk = *grid.find_chunk(at);
-    for (int z = 0; z < kChunkEdge; ++z) {
-      for (int y = 0; y < kChunkEdge; ++y) {
-        chunk.read_row(y, z, row);
-        for (VoxelType& type : row) type = new_type_of[type];
-        chunk.write_row(y, z, row);
-      }
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      chunk.read_row(y, z, row);
+      for (VoxelType& type : row) type = new_type_of[type];
+      chunk.write_row(y, z, row);
     }
-    chunk.compact();
-    grid.put_chunk(at, std::move(chunk));
   }
-  return grid;
+  chunk.compact();
+  return true;
+}
+
+void renumber(SceneGrid& grid, const std::vector<VoxelType>& new_type_of) {
+  for (const IVec3 at : grid.grid.chunks()) {
+    Chunk chunk = *grid.grid.find_chunk(at);
+    if (renumber(chunk, new_type_of)) grid.grid.put_chunk(at, std::move(chunk));
+  }
+  for (const IVec3 at : grid.field.chunks()) {
+    DensityChunk chunk = *grid.field.find_chunk(at);
+    if (renumber(chunk.materials(), new_type_of)) grid.field.put_chunk(at, std::move(chunk));
+  }
 }
 
 /// A file that was read, its grids moved into the scene.
@@ -51,7 +57,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   std::map<GridHandle, GridHandle> new_grid_of;
   for (const GridHandle handle : from.grids().handles()) {
     SceneGrid grid = std::move(from.edit(handle));
-    grid.grid = with_types(std::move(grid.grid), new_type_of);
+    renumber(grid, new_type_of);
     new_grid_of[handle] = into.add_grid(std::move(grid));
   }
   Body body;
