@@ -1,0 +1,151 @@
+// The vertices of labels: where they start, and how they are relaxed.
+//
+//   crossings of a cell, 12 bits:  | along rows: dy + 2 dz | from row to row: dx + 2 dz | from slice to slice: dx + 2 dy |
+
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "mesh/array/kernel.h"
+#include "mesh/array/rows.inl"
+
+namespace quoin::array {
+namespace {
+
+// Of the cells with certain crossings: the sum of their places, in halves of a cell, and the faces they lie on.
+struct CrossingSum {
+  std::uint8_t halves[3];
+  std::uint8_t count;
+  std::uint8_t links;
+};
+
+constexpr auto kCrossingSums = [] {
+  std::array<CrossingSum, 4096> sums{};
+  for (unsigned crossings = 0; crossings < 4096; ++crossings) {
+    CrossingSum& sum = sums[crossings];
+    for (unsigned edge = 0; edge < 12; ++edge) {
+      if ((crossings >> edge & 1U) == 0) continue;
+      const unsigned axis = edge / 4;
+      // Of the other two axes, in their order: at their low or high end.
+      const unsigned ends[2] = {edge & 1U, edge >> 1 & 1U};
+      const unsigned others[2] = {axis == 0 ? 1U : 0U, axis == 2 ? 1U : 2U};
+      ++sum.count;
+      ++sum.halves[axis];
+      for (int i = 0; i < 2; ++i) {
+        sum.halves[others[i]] = static_cast<std::uint8_t>(sum.halves[others[i]] + 2 * ends[i]);
+        sum.links = static_cast<std::uint8_t>(sum.links | 1U << (2 * others[i] + ends[i]));
+      }
+    }
+  }
+  return sums;
+}();
+
+inline std::uint64_t shifted(const std::uint64_t* row, std::size_t w) {
+  return row[w] << 1 | (w == 0 ? 0 : row[w - 1] >> 63);
+}
+
+void label_vertices(const CellSlice& slice, const RankedRows& ranked, Vec3* fractions, std::uint8_t* links) {
+  for (std::size_t row = 0; row <= slice.rows; ++row) {
+    std::uint32_t vertex = ranked.first[row];
+    if (vertex == ranked.first[row + 1]) continue;
+    const RowEdges e = edges_of_row(slice, row);
+    const std::uint64_t* const active = ranked.active + row * slice.words;
+    for (std::size_t w = 0; w < slice.words; ++w) {
+      if (active[w] == 0) continue;
+      const std::uint64_t bits[12] = {e.along[0][w],
+                                      e.along[1][w],
+                                      e.along[2][w],
+                                      e.along[3][w],
+                                      shifted(e.between[0], w),
+                                      e.between[0][w],
+                                      shifted(e.between[1], w),
+                                      e.between[1][w],
+                                      shifted(e.across[0], w),
+                                      e.across[0][w],
+                                      shifted(e.across[1], w),
+                                      e.across[1][w]};
+      for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
+        const int bit = std::countr_zero(left);
+        unsigned crossings = 0;
+        for (int i = 0; i < 12; ++i) crossings |= static_cast<unsigned>(bits[i] >> bit & 1U) << i;
+        const CrossingSum& sum = kCrossingSums[crossings];
+        const float half = 0.5F / static_cast<float>(sum.count);
+        float* const to = &fractions[vertex].x;
+        for (int axis = 0; axis < 3; ++axis) to[axis] = static_cast<float>(sum.halves[axis]) * half;
+        if (links != nullptr) links[vertex] = sum.links;
+      }
+    }
+  }
+}
+
+// Vertices keep that far from their cell's faces, so that no two come to one place.
+constexpr float kMargin = 1.0F / 32.0F;
+// How far a vertex goes towards the middle of its neighbours: the whole way would swing to and fro.
+constexpr float kStep = 0.625F;
+
+inline float relaxed(float from, float sum, float count) {
+  const float to = from + kStep * (sum / count - from);
+  const float low = to < kMargin ? kMargin : to;
+  return low > 1.0F - kMargin ? 1.0F - kMargin : low;
+}
+
+// Where the fractions of vertices are as they were before this step.
+struct OldFractions {
+  const RelaxSource& source;
+  [[nodiscard]] const float* operator[](std::uint32_t vertex) const {
+    return &(vertex < source.end ? source.old[vertex - source.begin] : source.fractions[vertex]).x;
+  }
+};
+
+// A vertex among its neighbours, by the bits of its links.
+inline void relax_vertex(const OldFractions& old, std::uint32_t vertex, const std::uint32_t (&neighbours)[6],
+                         unsigned links, Vec3& out) {
+  const float* const own = old[vertex];
+  float sum[3] = {0.0F, 0.0F, 0.0F};
+  float count = 0.0F;
+  for (int i = 0; i < 6; ++i) {
+    if ((links >> i & 1U) == 0) continue;
+    const float* const other = old[neighbours[i]];
+    for (int axis = 0; axis < 3; ++axis) sum[axis] += other[axis];
+    sum[i / 2] += (i & 1) != 0 ? 1.0F : -1.0F;
+    count += 1.0F;
+  }
+  float* const to = &out.x;
+  for (int axis = 0; axis < 3; ++axis) to[axis] = relaxed(own[axis], sum[axis], count);
+}
+
+void relax(const CellSlice& slice, const RankedRows& ranked, const RelaxSource& source, Vec3* fractions) {
+  const OldFractions old{source};
+  const auto row_words = static_cast<std::ptrdiff_t>(slice.words);
+  const std::ptrdiff_t slice_rows = static_cast<std::ptrdiff_t>(slice.rows) + 1;
+  for (std::ptrdiff_t row = 0; row < slice_rows; ++row) {
+    const std::uint32_t* const first = ranked.first + row;
+    if (first[0] == first[1]) continue;
+    // Beyond the array nothing is linked: there any row will do.
+    const std::ptrdiff_t steps[4] = {row == 0 ? 0 : -1, row == slice_rows - 1 ? 0 : 1,
+                                     source.is_first_slice ? 0 : -slice_rows, source.is_last_slice ? 0 : slice_rows};
+    const std::uint64_t* const active = ranked.active + row * row_words;
+    const std::uint64_t* rows[4];
+    std::uint32_t at[4];
+    for (int i = 0; i < 4; ++i) {
+      rows[i] = active + steps[i] * row_words;
+      at[i] = first[steps[i]];
+    }
+    std::uint32_t vertex = *first;
+    for (std::size_t w = 0; w < slice.words; ++w) {
+      for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
+        const std::uint64_t below = (left & (0 - left)) - 1;
+        std::uint32_t neighbours[6] = {vertex - 1, vertex + 1};
+        for (int i = 0; i < 4; ++i) neighbours[2 + i] = at[i] + count_of(rows[i][w] & below);
+        relax_vertex(old, vertex, neighbours, source.links[vertex], fractions[vertex]);
+      }
+      for (int i = 0; i < 4; ++i) at[i] += count_of(rows[i][w]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin::array
