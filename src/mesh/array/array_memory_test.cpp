@@ -73,11 +73,11 @@ TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
 
 TEST(ArrayMemory, OfLabelsIsAtMostAByteASampleBesideInputAndOutput) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
-  const Size size = {64, 128, 256};
+  const Size size = {128, 64, 256};
   const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);
   // Slabs of several labels, as tissues are; a vertex a few samples.
   const TestArray<std::uint8_t> labels(size, [](DVec3 p) {
-    return static_cast<std::uint8_t>(static_cast<int>(p.x / 9 + p.y / 11) % 7 + 2 * (static_cast<int>(p.z) / 16 % 3));
+    return static_cast<std::uint8_t>(static_cast<int>(p.y / 9 + p.x / 11) % 7 + 2 * (static_cast<int>(p.z) / 16 % 3));
   });
   for (const int steps : {0, 4}) {
     const LabelSurfaceOptions options{0, steps};

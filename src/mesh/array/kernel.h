@@ -72,15 +72,15 @@ struct LabelRows {
   std::uint64_t sign;        // what makes a key of a label's bits
 };
 
-// What a step of relaxation reads.
-struct RelaxSource {
-  const Vec3* old;  // the vertices of the slice of cells before and of the slice, as they were
-  std::uint32_t begin;
-  std::uint32_t end;
-  const Vec3* fractions;  // all vertices; those of slices after as they still are
-  const std::uint8_t* links;
+// A step of relaxation of a slice of cells.
+struct RelaxStep {
+  std::size_t rows;  // of samples
+  std::size_t words;
   bool is_first_slice;
   bool is_last_slice;
+  const std::uint8_t* links;  // of all vertices, as their fractions
+  const Vec3* from;
+  Vec3* to;
 };
 
 // Densities beyond these would overflow when they are subtracted.
@@ -120,9 +120,8 @@ struct Kernel {
   /// The vertices of a slice of cells: at the mean of the crossings' middles, as fractions of their cells. `links` gets
   /// which of the six neighbouring cells share a crossed edge with them: bits -x, x, -y, y, -z, z.
   void (*label_vertices)(const CellSlice& slice, const RankedRows& ranked, Vec3* fractions, std::uint8_t* links);
-  /// One step of relaxation of the vertices of a slice of cells: towards the mean of those that they are linked with,
-  /// within their cells.
-  void (*relax)(const CellSlice& slice, const RankedRows& ranked, const RelaxSource& source, Vec3* fractions);
+  /// Moves the vertices of a slice of cells towards the mean of those that they are linked with, within their cells.
+  void (*relax)(const RelaxStep& step, const RankedRows& ranked);
 };
 
 extern const Kernel kPlainKernel;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -152,10 +151,9 @@ class Builder {
     if (done) {
       list_interfaces();
       out_.positions.resize(index_.vertices());
-      out_.indices.resize(6 * index_.quads());
       done = add_vertices();
     }
-    for (int step = 0; done && step < options_.relaxation_steps; ++step) done = relax();
+    if (done) done = relax();
     if (done) done = place();
     if (done) done = add_quads();
     if (!done) return done.error();
@@ -205,40 +203,24 @@ class Builder {
   [[nodiscard]] std::uint32_t first_of(std::size_t slice) const {
     return index_.first[std::min(slice, lattice_.slices() + 1) * (lattice_.rows() + 1)];
   }
-  void append_slice(std::size_t slice, std::vector<Vec3>& to) const {
-    to.insert(to.end(), out_.positions.data() + first_of(slice), out_.positions.data() + first_of(slice + 1));
-  }
 
-  // All vertices at once go by where the others were before: those of neighbouring slabs are kept.
+  // All vertices go at once, from one buffer to the other; the triangles' memory is not taken yet.
   Status relax() {
-    std::vector<std::vector<Vec3>> before(slab_count(lattice_));
-    std::vector<std::vector<Vec3>> after(slab_count(lattice_));
-    for (std::size_t slab = 0; slab < before.size(); ++slab) {
-      const std::size_t first = slab * kSlabSlices;
-      if (slab > 0) append_slice(first - 1, before[slab]);
-      if (slab + 1 < before.size()) append_slice(first + kSlabSlices, after[slab]);
+    if (options_.relaxation_steps == 0) return {};
+    Buffer<Vec3> relaxed;
+    relaxed.resize(index_.vertices());
+    Status done;
+    for (int step = 0; done && step < options_.relaxation_steps; ++step) {
+      done = for_each_slab(lattice_, threads_, steps_, [&](std::size_t, std::size_t first, std::size_t end) {
+        for (std::size_t slice = first; slice < end; ++slice) {
+          const RelaxStep from{lattice_.rows(), lattice_.words,        slice == 0,    slice == lattice_.slices(),
+                               links_.data(),   out_.positions.data(), relaxed.data()};
+          kernel().relax(from, index_.rows_of(lattice_, slice));
+        }
+      });
+      std::swap(out_.positions, relaxed);
     }
-    return for_each_slab(lattice_, threads_, steps_, [&](std::size_t slab, std::size_t first, std::size_t end) {
-      std::vector<Vec3> old = std::move(before[slab]);
-      std::size_t last_count = old.size();
-      for (std::size_t slice = first; slice < end; ++slice) {
-        const std::uint32_t begin = first_of(slice) - static_cast<std::uint32_t>(last_count);
-        const std::size_t count = first_of(slice + 1) - first_of(slice);
-        append_slice(slice, old);
-        if (slice + 1 == end) old.insert(old.end(), after[slab].begin(), after[slab].end());
-        const RelaxSource from{old.data(),
-                               begin,
-                               begin + static_cast<std::uint32_t>(old.size()),
-                               out_.positions.data(),
-                               links_.data(),
-                               slice == 0,
-                               slice == lattice_.slices()};
-        kernel().relax({lattice_.rows(), lattice_.words, nullptr, {}, {}, nullptr}, index_.rows_of(lattice_, slice),
-                       from, out_.positions.data());
-        old.erase(old.begin(), old.begin() + static_cast<std::ptrdiff_t>(last_count));
-        last_count = count;
-      }
-    });
+    return done;
   }
 
   // From their cells to space.
@@ -281,6 +263,7 @@ class Builder {
   }
 
   Status add_quads() {
+    out_.indices.resize(6 * index_.quads());
     const QuadRules rules{out_.positions.data(), lattice_.is_mirrored};
     const auto quads = kernel().label_quads[code_.size_index()];
     return for_each_slab(lattice_, threads_, steps_, [&](std::size_t slab, std::size_t first, std::size_t end) {

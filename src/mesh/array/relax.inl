@@ -86,47 +86,41 @@ constexpr float kMargin = 1.0F / 32.0F;
 // How far a vertex goes towards the middle of its neighbours: the whole way would swing to and fro.
 constexpr float kStep = 0.625F;
 
-inline float relaxed(float from, float sum, float count) {
-  const float to = from + kStep * (sum / count - from);
+inline float relaxed(float from, float mean) {
+  const float to = from + kStep * (mean - from);
   const float low = to < kMargin ? kMargin : to;
   return low > 1.0F - kMargin ? 1.0F - kMargin : low;
 }
 
-// Where the fractions of vertices are as they were before this step.
-struct OldFractions {
-  const RelaxSource& source;
-  [[nodiscard]] const float* operator[](std::uint32_t vertex) const {
-    return &(vertex < source.end ? source.old[vertex - source.begin] : source.fractions[vertex]).x;
-  }
-};
-
 // A vertex among its neighbours, by the bits of its links.
-inline void relax_vertex(const OldFractions& old, std::uint32_t vertex, const std::uint32_t (&neighbours)[6],
-                         unsigned links, Vec3& out) {
-  const float* const own = old[vertex];
+inline void relax_vertex(const Vec3* from, std::uint32_t vertex, const std::uint32_t (&neighbours)[6], unsigned links,
+                         Vec3& out) {
   float sum[3] = {0.0F, 0.0F, 0.0F};
   float count = 0.0F;
   for (int i = 0; i < 6; ++i) {
-    if ((links >> i & 1U) == 0) continue;
-    const float* const other = old[neighbours[i]];
-    for (int axis = 0; axis < 3; ++axis) sum[axis] += other[axis];
-    sum[i / 2] += (i & 1) != 0 ? 1.0F : -1.0F;
-    count += 1.0F;
+    // Without branches: what is not linked counts nothing.
+    const bool is_linked = (links >> i & 1U) != 0;
+    const float* const other = &from[is_linked ? neighbours[i] : vertex].x;
+    const float one = is_linked ? 1.0F : 0.0F;
+    for (int axis = 0; axis < 3; ++axis) sum[axis] += one * other[axis];
+    sum[i / 2] += (i & 1) != 0 ? one : -one;
+    count += one;
   }
+  const float* const own = &from[vertex].x;
   float* const to = &out.x;
-  for (int axis = 0; axis < 3; ++axis) to[axis] = relaxed(own[axis], sum[axis], count);
+  const float share = 1.0F / count;
+  for (int axis = 0; axis < 3; ++axis) to[axis] = relaxed(own[axis], sum[axis] * share);
 }
 
-void relax(const CellSlice& slice, const RankedRows& ranked, const RelaxSource& source, Vec3* fractions) {
-  const OldFractions old{source};
-  const auto row_words = static_cast<std::ptrdiff_t>(slice.words);
-  const std::ptrdiff_t slice_rows = static_cast<std::ptrdiff_t>(slice.rows) + 1;
+void relax(const RelaxStep& step, const RankedRows& ranked) {
+  const auto row_words = static_cast<std::ptrdiff_t>(step.words);
+  const std::ptrdiff_t slice_rows = static_cast<std::ptrdiff_t>(step.rows) + 1;
   for (std::ptrdiff_t row = 0; row < slice_rows; ++row) {
     const std::uint32_t* const first = ranked.first + row;
     if (first[0] == first[1]) continue;
     // Beyond the array nothing is linked: there any row will do.
     const std::ptrdiff_t steps[4] = {row == 0 ? 0 : -1, row == slice_rows - 1 ? 0 : 1,
-                                     source.is_first_slice ? 0 : -slice_rows, source.is_last_slice ? 0 : slice_rows};
+                                     step.is_first_slice ? 0 : -slice_rows, step.is_last_slice ? 0 : slice_rows};
     const std::uint64_t* const active = ranked.active + row * row_words;
     const std::uint64_t* rows[4];
     std::uint32_t at[4];
@@ -135,12 +129,12 @@ void relax(const CellSlice& slice, const RankedRows& ranked, const RelaxSource& 
       at[i] = first[steps[i]];
     }
     std::uint32_t vertex = *first;
-    for (std::size_t w = 0; w < slice.words; ++w) {
+    for (std::size_t w = 0; w < step.words; ++w) {
       for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
         const std::uint64_t below = (left & (0 - left)) - 1;
         std::uint32_t neighbours[6] = {vertex - 1, vertex + 1};
         for (int i = 0; i < 4; ++i) neighbours[2 + i] = at[i] + count_of(rows[i][w] & below);
-        relax_vertex(old, vertex, neighbours, source.links[vertex], fractions[vertex]);
+        relax_vertex(step.from, vertex, neighbours, step.links[vertex], step.to[vertex]);
       }
       for (int i = 0; i < 4; ++i) at[i] += count_of(rows[i][w]);
     }
