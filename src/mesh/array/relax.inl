@@ -15,7 +15,8 @@
 namespace quoin::array {
 namespace {
 
-// Of the cells with certain crossings: the sum of their places, in halves of a cell, and the faces they lie on.
+// Of the cells with certain crossings: the sum of their places, in halves of a cell, and the faces over which the
+// vertex is linked with its neighbours.
 struct CrossingSum {
   std::uint8_t halves[3];
   std::uint8_t count;
@@ -26,6 +27,7 @@ constexpr auto kCrossingSums = [] {
   std::array<CrossingSum, 4096> sums{};
   for (unsigned crossings = 0; crossings < 4096; ++crossings) {
     CrossingSum& sum = sums[crossings];
+    unsigned on_face[6] = {};
     for (unsigned edge = 0; edge < 12; ++edge) {
       if ((crossings >> edge & 1U) == 0) continue;
       const unsigned axis = edge / 4;
@@ -36,8 +38,15 @@ constexpr auto kCrossingSums = [] {
       ++sum.halves[axis];
       for (int i = 0; i < 2; ++i) {
         sum.halves[others[i]] = static_cast<std::uint8_t>(sum.halves[others[i]] + 2 * ends[i]);
-        sum.links = static_cast<std::uint8_t>(sum.links | 1U << (2 * others[i] + ends[i]));
+        ++on_face[2 * others[i] + ends[i]];
       }
+    }
+    // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices of such
+    // lines go by their neighbours on the line alone, so that it is smooth too. Four may be two labels, crosswise.
+    unsigned least = 1;
+    for (const unsigned count : on_face) least = count == 3 ? 3 : least;
+    for (unsigned face = 0; face < 6; ++face) {
+      if (on_face[face] >= least) sum.links = static_cast<std::uint8_t>(sum.links | 1U << face);
     }
   }
   return sums;
@@ -88,8 +97,8 @@ constexpr float kStep = 0.625F;
 
 inline float relaxed(float from, float mean) {
   const float to = from + kStep * (mean - from);
-  const float low = to < kMargin ? kMargin : to;
-  return low > 1.0F - kMargin ? 1.0F - kMargin : low;
+  const float low = to > kMargin ? to : kMargin;
+  return low < 1.0F - kMargin ? low : 1.0F - kMargin;
 }
 
 // A vertex among its neighbours, by the bits of its links.
