@@ -139,7 +139,7 @@ Status find_cells(const Lattice& lattice, MakeSource make_source, Threads thread
   index.first.resize(cell_slices * cell_rows + 1);
   index.quads_before.assign(slab_count(lattice) + 1, 0);
   index.vertices_before.assign(slab_count(lattice) + 1, 0);
-  const Status found =
+  Status found =
       for_each_slab(lattice, threads, steps, [&](std::size_t slab, std::size_t first, std::size_t end) {
         EdgeWindow window(lattice, make_source());
         for (std::size_t slice = first; slice < end; ++slice) {
