@@ -27,6 +27,9 @@ struct ArraySurfaceOptions {
   double iso = 0.0;  ///< the value of the surface
   SolidSide solid = SolidSide::Above;
   ArrayBorder border = ArrayBorder::Closed;
+  /// Gives a cell that several sheets of the surface pass through a vertex for each, so that the mesh is manifold; but
+  /// for cells at an open border. Without, some edges have four triangles.
+  bool split_sheets = false;
 };
 
 /// A welded surface. The vertex arrays have one entry a vertex; every vertex has a triangle.
@@ -44,14 +47,15 @@ struct ArraySurface {
 /// Normals:  the gradient of the trilinear field at the vertex, in space; (0, 1, 0) where that is 0.
 /// Faces:    turned right whatever the strides and the signs of the spacing: nothing is mirrored.
 /// Closed:   every edge has an even number of triangles (but for the ends of an open border), as many in one direction
-///           as in the other. Where two sheets pass through one cell they share its vertex, and an edge of two such
-///           cells may have four: the mesh is then not manifold there.
+///           as in the other; two with `split_sheets`. Without, two sheets that pass through one cell share its vertex,
+///           and an edge of two such cells may have four triangles: the mesh is then not manifold there.
 /// Values:   NaN is air, about as far from the surface as its neighbours; infinities are far air and deep solid; whole
 ///           numbers of 64 bits are compared and subtracted exactly.
-/// Order:    along the axis with the largest stride, then the next; the same bytes at any thread count and on every
-///           instruction set.
+/// Order:    along the axis with the largest stride, then the next; the vertices of further sheets last; the same bytes
+///           at any thread count and on every instruction set.
 /// Memory:   beside input and output a quarter of a byte a sample and a few slices, where the axis of the smallest
-///           stride has 256 samples; up to a byte where it has 40.
+///           stride has 256 samples; up to a byte where it has 40. With `split_sheets` 24 bytes for each cell that
+///           gets several vertices, and a bit for each other.
 /// Errors:   InvalidArgument when `iso` is NaN, a size is not positive, the data null, a spacing 0 or, as the origin,
 ///           not finite, or the strides lead out of the address space; LimitExceeded for more than 2^32 - 2 vertices or
 ///           an axis of more than 2^31 - 2 samples; Cancelled.

@@ -3,6 +3,7 @@
 // Which cells of an array have a vertex, and which vertex: what fields and labels have in common.
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -112,6 +113,23 @@ Status for_each_slab(const Lattice& lattice, Threads threads, ProgressSteps& ste
   return {};
 }
 
+// Calls visit(cell) for each cell with a vertex in some slices, in the order of the vertices.
+template <class Visit>
+void for_each_cell(const Lattice& lattice, const CellIndex& index, std::size_t first, std::size_t end, Visit visit) {
+  for (std::size_t slice = first; slice < end; ++slice) {
+    const RankedRows ranked = index.rows_of(lattice, slice);
+    for (std::size_t row = 0; row <= lattice.rows(); ++row) {
+      if (ranked.first[row] == ranked.first[row + 1]) continue;
+      for (std::size_t w = 0; w < lattice.words; ++w) {
+        for (std::uint64_t left = ranked.active[row * lattice.words + w]; left != 0; left &= left - 1) {
+          visit(
+              IVec3(static_cast<int>(64 * w) + std::countr_zero(left), static_cast<int>(row), static_cast<int>(slice)));
+        }
+      }
+    }
+  }
+}
+
 // Makes of the counts of rows the numbers before them.
 [[nodiscard]] inline Status sum_up(const Lattice& lattice, CellIndex& index) {
   for (std::vector<std::uint64_t>* counts : {&index.quads_before, &index.vertices_before}) {
@@ -139,20 +157,19 @@ Status find_cells(const Lattice& lattice, MakeSource make_source, Threads thread
   index.first.resize(cell_slices * cell_rows + 1);
   index.quads_before.assign(slab_count(lattice) + 1, 0);
   index.vertices_before.assign(slab_count(lattice) + 1, 0);
-  Status found =
-      for_each_slab(lattice, threads, steps, [&](std::size_t slab, std::size_t first, std::size_t end) {
-        EdgeWindow window(lattice, make_source());
-        for (std::size_t slice = first; slice < end; ++slice) {
-          const CellSlice edges = window.at(slice);
-          std::uint32_t* const counts = index.first.data() + slice * cell_rows;
-          k.find_active(edges, index.active.data() + slice * lattice.cell_slice_words(), counts);
-          for (std::size_t row = 0; row < cell_rows; ++row) index.vertices_before[slab] += counts[row];
-          index.quads_before[slab] += k.count_bits(edges.between_slices, lattice.slice_words()) +
-                                      k.count_bits(edges.low.along_rows, lattice.slice_words()) +
-                                      k.count_bits(edges.low.between_rows, lattice.cell_slice_words());
-          also(slab, slice, edges);
-        }
-      });
+  Status found = for_each_slab(lattice, threads, steps, [&](std::size_t slab, std::size_t first, std::size_t end) {
+    EdgeWindow window(lattice, make_source());
+    for (std::size_t slice = first; slice < end; ++slice) {
+      const CellSlice edges = window.at(slice);
+      std::uint32_t* const counts = index.first.data() + slice * cell_rows;
+      k.find_active(edges, index.active.data() + slice * lattice.cell_slice_words(), counts);
+      for (std::size_t row = 0; row < cell_rows; ++row) index.vertices_before[slab] += counts[row];
+      index.quads_before[slab] += k.count_bits(edges.between_slices, lattice.slice_words()) +
+                                  k.count_bits(edges.low.along_rows, lattice.slice_words()) +
+                                  k.count_bits(edges.low.between_rows, lattice.cell_slice_words());
+      also(slab, slice, edges);
+    }
+  });
   if (!found) return found;
   return sum_up(lattice, index);
 }

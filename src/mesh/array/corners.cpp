@@ -149,6 +149,19 @@ auto with_type(ScalarType type, Visit visit) {
 
 }  // namespace
 
+CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice) {
+  CornerRows corners{{}, {}, lattice.stride[0], lattice.size[0]};
+  for (std::int64_t i = 0; i < 4; ++i) {
+    const std::int64_t y = row - 1 + i % 2;
+    const std::int64_t z = slice - 1 + i / 2;
+    const std::int64_t inner_y = std::clamp<std::int64_t>(y, 0, lattice.size[1] - 1);
+    const std::int64_t inner_z = std::clamp<std::int64_t>(z, 0, lattice.size[2] - 1);
+    corners.rows[i] = lattice.row(inner_y, inner_z);
+    corners.is_beyond[i] = y != inner_y || z != inner_z;
+  }
+  return corners;
+}
+
 CornerReader corner_reader(ScalarType type) {
   return with_type(type, [](auto value) -> CornerReader {
     return {read_corners<decltype(value)>, convert_corners<decltype(value)>};

@@ -7,6 +7,7 @@
 
 #include "mesh/array/density.h"
 #include "mesh/array/kernel.h"
+#include "mesh/array/lattice.h"
 
 namespace quoin::array {
 
@@ -18,6 +19,9 @@ struct CornerRows {
   std::ptrdiff_t stride;
   std::int64_t size;  // samples of a row
 };
+
+// Of a row of cells.
+[[nodiscard]] CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice);
 
 // The values at cells' corners as they are, [x + 2 y + 4 z][cell], and which corners lie beyond the array.
 struct RawCorners {

@@ -61,6 +61,11 @@ struct RankedRows {
 struct QuadRules {
   const Vec3* positions;
   bool is_mirrored;
+  // A bit for each vertex of a cell with several sheets, and what such a cell's vertex is on an edge, by 4 * axis +
+  // du + 2 dv of the edge's start in the cell; null: there are none.
+  const std::uint64_t* split = nullptr;
+  const void* split_cells = nullptr;
+  std::uint32_t (*vertex_on_edge)(const void* split_cells, std::uint32_t vertex, unsigned edge) = nullptr;
 };
 
 // A label array as kernels read it.

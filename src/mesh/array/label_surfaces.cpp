@@ -238,30 +238,13 @@ class Builder {
         to += count;
         count = 0;
       };
-      for_each_cell(first, end, [&](std::int32_t cell, std::size_t row, std::size_t slice) {
-        batch.cells[0][count] = cell;
-        batch.cells[1][count] = static_cast<std::int32_t>(row);
-        batch.cells[2][count] = static_cast<std::int32_t>(slice);
+      for_each_cell(lattice_, index_, first, end, [&](IVec3 cell) {
+        for (int axis = 0; axis < 3; ++axis) batch.cells[axis][count] = cell[axis];
         if (++count == kBatch) finish();
       });
       finish();
     });
   }
-  template <class Visit>
-  void for_each_cell(std::size_t first, std::size_t end, Visit visit) const {
-    for (std::size_t slice = first; slice < end; ++slice) {
-      const RankedRows ranked = index_.rows_of(lattice_, slice);
-      for (std::size_t row = 0; row <= lattice_.rows(); ++row) {
-        if (ranked.first[row] == ranked.first[row + 1]) continue;
-        for (std::size_t w = 0; w < lattice_.words; ++w) {
-          for (std::uint64_t left = ranked.active[row * lattice_.words + w]; left != 0; left &= left - 1) {
-            visit(static_cast<std::int32_t>(64 * w) + std::countr_zero(left), row, slice);
-          }
-        }
-      }
-    }
-  }
-
   Status add_quads() {
     out_.indices.resize(6 * index_.quads());
     const QuadRules rules{out_.positions.data(), lattice_.is_mirrored};

@@ -9,12 +9,6 @@
 namespace quoin::array {
 namespace {
 
-// Rounded once: what is between is double.
-inline float in_space(const Placement& placement, int axis, std::int32_t cell, float fraction) {
-  const double sample = (static_cast<double>(cell) - 1.0) + static_cast<double>(fraction);
-  return static_cast<float>(placement.origin[axis] + placement.spacing[axis] * sample);
-}
-
 // Arrays of coordinates as one of vectors, with the axes in the view's order.
 inline void interleave(const float (&parts)[3][kBatch], const int (&view_axis)[3], std::size_t count, Vec3* out) {
   const float* in_order[3];

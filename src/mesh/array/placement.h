@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "mesh/array/lattice.h"
 
@@ -26,6 +27,12 @@ struct Placement {
     placement.gradient_scale[i] = static_cast<float>(least / s[i]);
   }
   return placement;
+}
+
+// A coordinate of a vertex within a cell. Rounded once: what is between is double.
+[[gnu::always_inline]] inline float in_space(const Placement& placement, int axis, std::int32_t cell, float fraction) {
+  const double sample = (static_cast<double>(cell) - 1.0) + static_cast<double>(fraction);
+  return static_cast<float>(placement.origin[axis] + placement.spacing[axis] * sample);
 }
 
 }  // namespace quoin::array

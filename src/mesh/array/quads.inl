@@ -105,9 +105,11 @@ struct FieldQuads {
   std::uint32_t* out;
   const std::uint64_t* starts = nullptr;  // solid samples of the row where the edges start
   std::size_t shift = 0;                  // from an edge's bit to that of its start
+  int edge_axis = 0;
 
   [[nodiscard]] bool has_low() const { return solid != nullptr; }
   void begin_row(int axis, std::size_t row) {
+    edge_axis = axis;
     shift = axis == 0 ? 1 : 0;
     const bool is_inside = solid != nullptr && (axis != 1 || row != 0);
     starts = is_inside ? solid + (axis == 1 ? row - 1 : row) * slice.words : nullptr;
@@ -117,7 +119,20 @@ struct FieldQuads {
     const std::size_t at = place - shift;
     return (starts[at / kWordBits] >> (at % kWordBits) & 1U) != 0;
   }
+  // The vertex of a cell that may have several, on the edge that is at work.
+  [[nodiscard]] std::uint32_t resolved(std::uint32_t vertex, unsigned corner) const {
+    if ((rules.split[vertex / kWordBits] >> (vertex % kWordBits) & 1U) == 0) return vertex;
+    // Where the edge lies in the cell: at the high end of the axes in which the cell lies before it.
+    constexpr unsigned kEnds[4] = {3, 2, 0, 1};
+    return rules.vertex_on_edge(rules.split_cells, vertex, 4 * static_cast<unsigned>(edge_axis) + kEnds[corner]);
+  }
   void operator()(std::size_t place, std::uint32_t q0, std::uint32_t q1, std::uint32_t q2, std::uint32_t q3) {
+    if (rules.split != nullptr) {
+      q0 = resolved(q0, 0);
+      q1 = resolved(q1, 1);
+      q2 = resolved(q2, 2);
+      q3 = resolved(q3, 3);
+    }
     write_quad(rules.positions, q0, q1, q2, q3, starts_solid(place) == rules.is_mirrored, out);
     out += 6;
   }
