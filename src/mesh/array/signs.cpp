@@ -60,14 +60,18 @@ Status Signs::find(Threads threads, ProgressSteps& steps) {
 }
 
 std::uint32_t Signs::solid_corners(IVec3 cell) const {
+  const auto word = static_cast<std::size_t>(cell.x / 64);
+  const auto bit = static_cast<unsigned>(cell.x % 64);
   std::uint32_t solid = 0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    const std::int64_t x = cell.x - 1 + static_cast<int>(corner & 1U);
-    const std::int64_t y = cell.y - 1 + static_cast<int>(corner >> 1 & 1U);
-    const std::int64_t z = cell.z - 1 + static_cast<int>(corner >> 2);
-    if (x < 0 || y < 0 || z < 0 || y >= lattice_.size[1] || z >= lattice_.size[2]) continue;
+  for (unsigned i = 0; i < 4; ++i) {
+    const std::int64_t y = cell.y - 1 + static_cast<int>(i & 1U);
+    const std::int64_t z = cell.z - 1 + static_cast<int>(i >> 1);
+    if (y < 0 || z < 0 || y >= lattice_.size[1] || z >= lattice_.size[2]) continue;
     const std::uint64_t* const row = slice(static_cast<std::size_t>(z)) + static_cast<std::size_t>(y) * lattice_.words;
-    solid |= static_cast<std::uint32_t>(row[x / 64] >> (x % 64) & 1U) << corner;
+    // Samples x - 1 and x.
+    const std::uint64_t last = word == 0 ? 0 : row[word - 1] >> 63;
+    const std::uint64_t pair = bit == 0 ? row[word] << 1 | last : row[word] >> (bit - 1);
+    solid |= static_cast<std::uint32_t>(pair & 3U) << (2 * i);
   }
   return solid;
 }
