@@ -1,4 +1,5 @@
-// Unit gradients of trilinear cells, a register of lanes at a time. The arithmetic is that of smooth/cell.h, step for step.
+// Unit gradients of trilinear cells, a register of lanes at a time. The arithmetic is that of smooth/cell.h, step for
+// step.
 
 #pragma once
 

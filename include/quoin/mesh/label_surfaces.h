@@ -42,7 +42,8 @@ struct LabelSurfaces {
 /// Input:    whole numbers; those of 64 bits without sign count as the signed number of the same bits where labels are
 ///           named, and are ordered as they are.
 /// Vertices: one in each cell of eight samples whose labels are not all the same, at the mean of the crossings of its
-///           edges, which are in their middles; relaxed, it stays within its cell, a thirty-second of it from its faces.
+///           edges, which are in their middles; relaxed, it stays within its cell, a thirty-second of it from its
+///           faces.
 /// Quads:    one between any two neighbouring samples of different labels, split along the diagonal that is shorter in
 ///           space; beyond the array lies the background.
 /// Labels:   each triangle has exactly two. The triangles of the interfaces of one label are its surface, which is

@@ -17,14 +17,6 @@ void copy_values(const CornerRows& rows, std::ptrdiff_t low, std::ptrdiff_t high
   }
 }
 
-inline void prefetch(const std::byte* at, std::ptrdiff_t ahead) {
-#if defined(__GNUC__)
-  // An address beyond the array does no harm, but may not be formed as a pointer.
-  __builtin_prefetch(
-      reinterpret_cast<const void*>(reinterpret_cast<std::uintptr_t>(at) + static_cast<std::uintptr_t>(ahead)));
-#endif
-}
-
 // A bit for each corner beyond the array.
 std::uint8_t corners_beyond(const CornerRows& rows, bool is_low_beyond, bool is_high_beyond) {
   unsigned bits = (is_low_beyond ? 0x55U : 0U) | (is_high_beyond ? 0xAAU : 0U);
@@ -44,7 +36,9 @@ void read_corners(const CornerRows& rows, const std::int32_t* cells, std::size_t
     if (cell > 0 && cell < rows.size) {
       copy_values<T>(rows, (cell - 1) * rows.stride, cell * rows.stride, to + i * sizeof(T));
       // The next slice crosses the surface nearby.
-      prefetch(rows.rows[3] + cell * rows.stride, rows.rows[3] - rows.rows[1]);
+#if defined(__GNUC__)
+      if (rows.next != nullptr) __builtin_prefetch(rows.next + cell * rows.stride);
+#endif
       continue;
     }
     const std::ptrdiff_t end = cell == 0 ? 0 : (rows.size - 1) * rows.stride;
@@ -75,12 +69,15 @@ void convert_doubles(const double* values, const Densities<double>& densities, s
 
 void convert_floats(const float* values, const Densities<float>& densities, CornerBatch& out) {
   const float iso = densities.iso();
-  float* const to = out.densities[0];
   // All places, so that compilers do several at once. 0 is to have no sign.
-  if (densities.is_below()) {
-    for (std::size_t i = 0; i < 8 * kBatch; ++i) to[i] = (values[i] - iso) + 0.0F;
-  } else {
-    for (std::size_t i = 0; i < 8 * kBatch; ++i) to[i] = (iso - values[i]) + 0.0F;
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const float* const from = values + corner * kBatch;
+    float* const to = out.densities[corner];
+    if (densities.is_below()) {
+      for (std::size_t i = 0; i < kBatch; ++i) to[i] = (from[i] - iso) + 0.0F;
+    } else {
+      for (std::size_t i = 0; i < kBatch; ++i) to[i] = (iso - from[i]) + 0.0F;
+    }
   }
 }
 
@@ -150,7 +147,7 @@ auto with_type(ScalarType type, Visit visit) {
 }  // namespace
 
 CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice) {
-  CornerRows corners{{}, {}, lattice.stride[0], lattice.size[0]};
+  CornerRows corners{{}, {}, nullptr, lattice.stride[0], lattice.size[0]};
   for (std::int64_t i = 0; i < 4; ++i) {
     const std::int64_t y = row - 1 + i % 2;
     const std::int64_t z = slice - 1 + i / 2;
@@ -159,6 +156,7 @@ CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t sl
     corners.rows[i] = lattice.row(inner_y, inner_z);
     corners.is_beyond[i] = y != inner_y || z != inner_z;
   }
+  if (slice + 1 < lattice.size[2]) corners.next = lattice.row(std::min(row, lattice.size[1] - 1), slice + 1);
   return corners;
 }
 

@@ -16,6 +16,7 @@ namespace quoin::array {
 struct CornerRows {
   const std::byte* rows[4];
   bool is_beyond[4];
+  const std::byte* next;  // after in y, in the slice after both; null where there is none
   std::ptrdiff_t stride;
   std::int64_t size;  // samples of a row
 };

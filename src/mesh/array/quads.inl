@@ -97,7 +97,8 @@ template <class Emitter>
   }
 }
 
-// Quads of a field, one after the other.
+// Quads of a field, one after the other; where some cells have several vertices, or none has.
+template <bool kHasSplitCells>
 struct FieldQuads {
   const CellSlice& slice;
   const std::uint64_t* solid;  // of the slice of samples before; null beyond the array
@@ -127,7 +128,7 @@ struct FieldQuads {
     return rules.vertex_on_edge(rules.split_cells, vertex, 4 * static_cast<unsigned>(edge_axis) + kEnds[corner]);
   }
   void operator()(std::size_t place, std::uint32_t q0, std::uint32_t q1, std::uint32_t q2, std::uint32_t q3) {
-    if (rules.split != nullptr) {
+    if constexpr (kHasSplitCells) {
       q0 = resolved(q0, 0);
       q1 = resolved(q1, 1);
       q2 = resolved(q2, 2);
@@ -140,9 +141,12 @@ struct FieldQuads {
 
 std::uint32_t* quads(const CellSlice& slice, const std::uint64_t* solid, const RankedRows& ranked,
                      const QuadRules& rules, std::uint32_t* out) {
-  FieldQuads emit{slice, solid, rules, out};
-  for_each_quad(slice, ranked, emit);
-  return emit.out;
+  const auto write = [&](auto emit) {
+    for_each_quad(slice, ranked, emit);
+    return emit.out;
+  };
+  return rules.split != nullptr ? write(FieldQuads<true>{slice, solid, rules, out})
+                                : write(FieldQuads<false>{slice, solid, rules, out});
 }
 
 // The labels at both ends of the edges of a row.

@@ -1,6 +1,7 @@
 // The vertices of labels: where they start, and how they are relaxed.
 //
-//   crossings of a cell, 12 bits:  | along rows: dy + 2 dz | from row to row: dx + 2 dz | from slice to slice: dx + 2 dy |
+//   crossings of a cell   | along rows | from row to row | from slice to slice |    12 bits
+//                         | dy + 2 dz  | dx + 2 dz       | dx + 2 dy           |    which of the four edges
 
 #pragma once
 

@@ -1,8 +1,8 @@
 // The vertices of cells with eight densities each, a register of lanes at a time. The arithmetic of the plain kernel,
 // step for step; smooth/cell.h has what both share.
 //
-// Each crossing has a division of its own. The chunk kernels divide once for four, which densities of halves allow; here
-// they may be of any size, and a product of four would overflow or vanish.
+// Each crossing has a division of its own. The chunk kernels divide once for four, which densities of halves allow;
+// here they may be of any size, and a product of four would overflow or vanish.
 
 #pragma once
 
