@@ -53,9 +53,9 @@ struct ArraySurface {
 ///           numbers of 64 bits are compared and subtracted exactly.
 /// Order:    along the axis with the largest stride, then the next; the vertices of further sheets last; the same bytes
 ///           at any thread count and on every instruction set.
-/// Memory:   beside input and output a quarter of a byte a sample and a few slices, where the axis of the smallest
-///           stride has 256 samples; up to a byte where it has 40. With `split_sheets` 24 bytes for each cell that
-///           gets several vertices, and a bit for each other.
+/// Memory:   beside input and output a third of a byte a sample and a few slices, where the axis of the smallest
+///           stride has 256 samples or more; two thirds where it has 40. With `split_sheets` 24 bytes for each cell
+///           that gets several vertices, and a bit for each other.
 /// Errors:   InvalidArgument when `iso` is NaN, a size is not positive, the data null, a spacing 0 or, as the origin,
 ///           not finite, or the strides lead out of the address space; LimitExceeded for more than 2^32 - 2 vertices or
 ///           an axis of more than 2^31 - 2 samples; Cancelled.

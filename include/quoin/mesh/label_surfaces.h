@@ -53,8 +53,8 @@ struct LabelSurfaces {
 /// Order:    within an interface along the axis with the largest stride, then the next; the same bytes at any thread
 ///           count and on every instruction set.
 /// Memory:   beside input and output a fifth of a byte a sample, and a byte a vertex with relaxation, where the axis of
-///           the smallest stride has 256 samples; a few slices; and 40 bytes for each pair of labels that touch, for
-///           each 16 slices in which they do.
+///           the smallest stride has 256 samples or more; a few slices; and some 100 bytes for each pair of labels that
+///           touch, for each 16 slices in which they do.
 /// Errors:   as surface_from_array; InvalidArgument also for arrays of Float32 and Float64, for a background that the
 ///           array's type cannot hold, and for relaxation steps out of their range.
 /// Cost:     each sample is read three times, from neighbouring places.

@@ -34,6 +34,7 @@ class VertexMaker {
     }
   }
   void finish() {
+    if (count_ == 0) return;
     reader_.convert(raw_, rule_, count_, corners_);
     kernel().vertices(corners_, count_, placement_, batch_, out_.positions.data() + first_,
                       out_.normals.data() + first_);
@@ -81,6 +82,20 @@ Status make_vertices(const Lattice& lattice, const SolidRule& rule, const CellIn
   });
 }
 
+Status make_quads(const Lattice& lattice, const Signs& signs, const CellIndex& index, const SplitCells& split,
+                  Threads threads, ProgressSteps& steps, ArraySurface& out) {
+  QuadRules rules{out.positions.data(), lattice.is_mirrored};
+  split.add_to(rules);
+  return for_each_slab(lattice, threads, steps, [&](std::size_t slab, std::size_t first, std::size_t end) {
+    EdgeWindow window(lattice, Borrowed<const Signs>{&signs});
+    std::uint32_t* to = out.indices.data() + 6 * index.quads_before[slab];
+    for (std::size_t slice = first; slice < end; ++slice) {
+      const std::uint64_t* const solid = slice == 0 ? nullptr : signs.slice(slice - 1);
+      to = kernel().quads(window.at(slice), solid, index.rows_of(lattice, slice), rules, to);
+    }
+  });
+}
+
 }  // namespace
 
 Result<ArraySurface> surface_from_array(const ArrayView& array, const ArraySurfaceOptions& options, Threads threads,
@@ -107,16 +122,7 @@ Result<ArraySurface> surface_from_array(const ArrayView& array, const ArraySurfa
   done = make_vertices(lattice, signs.rule(), index, threads, steps, out);
   if (!done) return done.error();
   split.place(lattice, signs.rule(), threads, out);
-  QuadRules rules{out.positions.data(), lattice.is_mirrored};
-  split.add_to(rules);
-  done = for_each_slab(lattice, threads, steps, [&](std::size_t slab, std::size_t first, std::size_t end) {
-    EdgeWindow window(lattice, source());
-    std::uint32_t* to = out.indices.data() + 6 * index.quads_before[slab];
-    for (std::size_t slice = first; slice < end; ++slice) {
-      const std::uint64_t* const solid = slice == 0 ? nullptr : signs.slice(slice - 1);
-      to = kernel().quads(window.at(slice), solid, index.rows_of(lattice, slice), rules, to);
-    }
-  });
+  done = make_quads(lattice, signs, index, split, threads, steps, out);
   if (!done) return done.error();
   return out;
 }

@@ -136,18 +136,13 @@ class Builder {
     labels_.sign = code_.sign();
   }
 
- private:
-  [[nodiscard]] auto source() const {
-    return [this] { return LabelEdges(lattice_, code_, options_.background); };
-  }
-
- public:
   Result<LabelSurfaces> build() {
     const auto count = kernel().count_interfaces[code_.size_index()];
     const auto also = [&](std::size_t slab, std::size_t slice, const CellSlice& edges) {
       count(edges, labels_, static_cast<std::int64_t>(slice), tables_[slab]);
     };
-    Status done = find_cells(lattice_, source(), threads_, steps_, index_, also);
+    Status done = find_cells(
+        lattice_, [this] { return edges(); }, threads_, steps_, index_, also);
     if (done) {
       list_interfaces();
       out_.positions.resize(index_.vertices());
@@ -161,6 +156,8 @@ class Builder {
   }
 
  private:
+  [[nodiscard]] LabelEdges edges() const { return {lattice_, code_, options_.background}; }
+
   // Numbers of quads become their places: by interface, and within it by slab.
   void list_interfaces() {
     struct Part {
@@ -191,7 +188,7 @@ class Builder {
   Status add_vertices() {
     if (options_.relaxation_steps > 0) links_.resize(index_.vertices());
     return for_each_slab(lattice_, threads_, steps_, [&](std::size_t, std::size_t first, std::size_t end) {
-      EdgeWindow window(lattice_, source()());
+      EdgeWindow window(lattice_, edges());
       for (std::size_t slice = first; slice < end; ++slice) {
         kernel().label_vertices(window.at(slice), index_.rows_of(lattice_, slice), out_.positions.data(),
                                 links_.data());
@@ -231,6 +228,7 @@ class Builder {
       std::size_t count = 0;
       Vec3* to = out_.positions.data() + first_of(first);
       const auto finish = [&] {
+        if (count == 0) return;
         for (std::size_t i = 0; i < count; ++i) {
           for (int axis = 0; axis < 3; ++axis) batch.fractions[axis][i] = to[i][axis];
         }
@@ -250,7 +248,7 @@ class Builder {
     const QuadRules rules{out_.positions.data(), lattice_.is_mirrored};
     const auto quads = kernel().label_quads[code_.size_index()];
     return for_each_slab(lattice_, threads_, steps_, [&](std::size_t slab, std::size_t first, std::size_t end) {
-      EdgeWindow window(lattice_, source()());
+      EdgeWindow window(lattice_, edges());
       for (std::size_t slice = first; slice < end; ++slice) {
         quads(window.at(slice), labels_, static_cast<std::int64_t>(slice), index_.rows_of(lattice_, slice), rules,
               tables_[slab], out_.indices.data());
