@@ -4,14 +4,12 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/array/quads.inl"
-#include "mesh/array/relax.inl"
-#include "mesh/array/rows.inl"
+#include "mesh/array/table.inl"
 #include "mesh/array/vertices.inl"
 
 namespace quoin::array {
 
-const Kernel kAvx2Kernel = QUOIN_ARRAY_KERNEL;
+const Kernel kAvx2Kernel = make_kernel();
 
 }  // namespace quoin::array
 

@@ -5,9 +5,7 @@
 #include "mesh/array/cell.h"
 #include "mesh/array/kernel.h"
 #include "mesh/array/place.inl"
-#include "mesh/array/quads.inl"
-#include "mesh/array/relax.inl"
-#include "mesh/array/rows.inl"
+#include "mesh/array/table.inl"
 
 namespace quoin::array {
 namespace {
@@ -33,6 +31,6 @@ void vertices(const CornerBatch& corners, std::size_t count, const Placement& pl
 
 }  // namespace
 
-const Kernel kPlainKernel = QUOIN_ARRAY_KERNEL;
+const Kernel kPlainKernel = make_kernel();
 
 }  // namespace quoin::array

@@ -251,19 +251,3 @@ void label_quads(const CellSlice& slice, const LabelRows& labels, std::int64_t z
 
 }  // namespace
 }  // namespace quoin::array
-
-// One of all types, in the order of ScalarType and of the members of Kernel.
-#define QUOIN_ARRAY_SOLID(type) \
-  { solid_row<type, false>, solid_row<type, true> }
-#define QUOIN_ARRAY_BY_SIZE(function) \
-  { function<std::uint8_t>, function<std::uint16_t>, function<std::uint32_t>, function<std::uint64_t> }
-#define QUOIN_ARRAY_KERNEL                                                                                 \
-  {                                                                                                        \
-    {QUOIN_ARRAY_SOLID(std::uint8_t),  QUOIN_ARRAY_SOLID(std::int8_t),   QUOIN_ARRAY_SOLID(std::uint16_t), \
-     QUOIN_ARRAY_SOLID(std::int16_t),  QUOIN_ARRAY_SOLID(std::uint32_t), QUOIN_ARRAY_SOLID(std::int32_t),  \
-     QUOIN_ARRAY_SOLID(std::uint64_t), QUOIN_ARRAY_SOLID(std::int64_t),  QUOIN_ARRAY_SOLID(float),         \
-     QUOIN_ARRAY_SOLID(double)},                                                                           \
-        QUOIN_ARRAY_BY_SIZE(differing), differences, differences_along, find_active, count_bits, vertices, \
-        place_vertices, quads, QUOIN_ARRAY_BY_SIZE(count_interfaces), QUOIN_ARRAY_BY_SIZE(label_quads),    \
-        label_vertices, relax                                                                              \
-  }
