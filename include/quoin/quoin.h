@@ -15,6 +15,7 @@
 #include <quoin/core/slot_map.h>
 #include <quoin/core/thousands.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/array_view.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/connected.h>
 #include <quoin/grid/copy_box.h>
@@ -35,8 +36,10 @@
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/label_surfaces.h>
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/quad.h>

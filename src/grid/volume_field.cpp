@@ -17,6 +17,7 @@ namespace quoin {
 namespace {
 
 constexpr float kBand = 8.0F;
+constexpr Half kSolidSign = 0x8000;
 
 // Positive sizes whose product is the number of values, without overflow.
 bool is_consistent(const Volume& volume) {
@@ -160,10 +161,14 @@ class ChunkMaker {
 
  private:
   [[nodiscard]] Half density(float value) const {
+    const double exact = (double{options_.iso} - value) * scale_;
+    // Most samples are far from the surface.
+    if (exact >= double{kBand}) return far_;
+    if (exact <= -double{kBand}) return static_cast<Half>(far_ | kSolidSign);
     if (std::isnan(value)) return far_;
     // Equal infinities have no difference; the value of the surface is air.
     if (value == options_.iso) return 0;
-    const auto scaled = static_cast<float>((double{options_.iso} - value) * scale_);
+    const auto scaled = static_cast<float>(exact);
     if (scaled != 0.0F) return stored_within(scaled, far_);
     constexpr float kLeast = std::numeric_limits<float>::min();
     return stored_within(value > options_.iso ? -kLeast : kLeast, far_);

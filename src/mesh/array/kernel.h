@@ -1,0 +1,148 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/volume.h>
+
+#include "core/instruction_set.h"
+#include "mesh/array/interfaces.h"
+#include "mesh/array/placement.h"
+
+// What is compiled for each instruction set. Every kernel gives the same bits.
+
+namespace quoin::array {
+
+inline constexpr std::size_t kScalarTypes = 10;
+
+// How many cells are worked on at a time.
+inline constexpr std::size_t kBatch = 128;
+
+// Densities of cells' corners: [x + 2 y + 4 z][cell]; solid below 0, never -0. They may be infinite; NaN
+// is air.
+struct CornerBatch {
+  alignas(64) float densities[8][kBatch];
+};
+
+// The same cells, and their vertices: where they lie in them, to 1/65,536, and the unit gradient in space.
+struct VertexBatch {
+  alignas(64) std::int32_t cells[3][kBatch];  // by walked axis
+  alignas(64) float fractions[3][kBatch];
+  alignas(64) float normals[3][kBatch];
+};
+
+// The crossed edges that get quads, of a slice of samples: along rows, bit c between samples c - 1 and c; and from row
+// to row, row r between rows r - 1 and r.
+struct EdgePlanes {
+  const std::uint64_t* along_rows;    // [row][word]
+  const std::uint64_t* between_rows;  // [row, one more][word]
+};
+
+// A slice of cells: the crossed edges around it.
+struct CellSlice {
+  std::size_t rows;  // of samples; of cells one more
+  std::size_t words;
+  const std::uint64_t* no_edges;        // a row without any
+  EdgePlanes low;                       // of the slice of samples before
+  EdgePlanes high;                      // of that after
+  const std::uint64_t* between_slices;  // [row][word], bit x: of sample x
+};
+
+// Cells that have a vertex, and the first vertex of each of their rows; slice after slice.
+struct RankedRows {
+  const std::uint64_t* active;
+  const std::uint32_t* first;
+};
+
+// What all quads of a mesh have in common.
+struct QuadRules {
+  const Vec3* positions;
+  bool is_mirrored;
+  // A bit for each vertex of a cell with several sheets, and what such a cell's vertex is on an edge, by 4 * axis +
+  // du + 2 dv of the edge's start in the cell; null: there are none.
+  const std::uint64_t* split = nullptr;
+  const void* split_cells = nullptr;
+  std::uint32_t (*vertex_on_edge)(const void* split_cells, std::uint32_t vertex, unsigned edge) = nullptr;
+};
+
+// A label array as kernels read it.
+struct LabelRows {
+  const std::byte* data;
+  std::ptrdiff_t stride[3];
+  std::int64_t size[3];
+  std::uint64_t background;  // its key
+  std::uint64_t sign;        // what makes a key of a label's bits
+};
+
+// A step of relaxation of a slice of cells.
+struct RelaxStep {
+  std::size_t rows;  // of samples
+  std::size_t words;
+  bool is_first_slice;
+  bool is_last_slice;
+  const std::uint8_t* links;  // of all vertices, as their fractions
+  const Vec3* from;
+  Vec3* to;
+};
+
+// Densities beyond these would overflow when they are subtracted.
+inline constexpr float kFarthest = 0x1p100F;
+// Gradients of less have no direction.
+inline constexpr float kLeastGradient = std::numeric_limits<float>::min();
+
+struct Kernel {
+  /// Which of `count` neighbouring values are solid, by type and side (above, below), against a limit of that type.
+  /// Writes whole words; bits from `count` on are 0.
+  void (*solid_row[kScalarTypes][2])(const std::byte* row, std::size_t count, const std::byte* limit,
+                                     std::uint64_t* out);
+  /// Which of `count` neighbouring values of 1, 2, 4 or 8 bytes differ from those of another row; or, without one, from
+  /// a value. Writes whole words.
+  void (*differing[4])(const std::byte* row, const std::byte* other, std::uint64_t value, std::size_t count,
+                       std::uint64_t* out);
+  /// The edges between rows of samples and others, and between neighbours in rows: bit c between c - 1 and c.
+  void (*differences)(const std::uint64_t* a, const std::uint64_t* b, std::size_t words, std::uint64_t* out);
+  void (*differences_along)(const std::uint64_t* a, std::size_t words, std::uint64_t* out);
+  /// Finds the cells of a slice that touch an edge; `count` gets how many there are in each row.
+  void (*find_active)(const CellSlice& slice, std::uint64_t* active, std::uint32_t* count);
+  std::uint64_t (*count_bits)(const std::uint64_t* words, std::size_t count);
+  /// The vertices of cells, which are in place i of `out`.
+  void (*vertices)(const CornerBatch& corners, std::size_t count, const Placement& placement, VertexBatch& batch,
+                   Vec3* positions, Vec3* normals);
+  /// The places of vertices from their cells and fractions.
+  void (*place)(const VertexBatch& batch, std::size_t count, const Placement& placement, Vec3* positions);
+  /// Writes the triangles around the edges that start in the slice of samples before a slice of cells; returns where
+  /// they end. `solid` are the signs of these samples, null beyond the array; `ranked` begins at this slice.
+  std::uint32_t* (*quads)(const CellSlice& slice, const std::uint64_t* solid, const RankedRows& ranked,
+                          const QuadRules& rules, std::uint32_t* out);
+  /// The same of labels, by their sizes in bytes: counts quads into the interfaces' slots, ...
+  void (*count_interfaces[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, InterfaceTable& table);
+  /// ... and writes them to where the interfaces' slots say.
+  void (*label_quads[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, const RankedRows& ranked,
+                         const QuadRules& rules, InterfaceTable& table, std::uint32_t* out);
+  /// The vertices of a slice of cells: at the mean of the crossings' middles, as fractions of their cells. `links` gets
+  /// which of the six neighbouring cells share a crossed edge with them: bits -x, x, -y, y, -z, z.
+  void (*label_vertices)(const CellSlice& slice, const RankedRows& ranked, Vec3* fractions, std::uint8_t* links);
+  /// Moves the vertices of a slice of cells towards the mean of those that they are linked with, within their cells.
+  void (*relax)(const RelaxStep& step, const RankedRows& ranked);
+};
+
+extern const Kernel kPlainKernel;
+#ifdef QUOIN_X86_KERNELS
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx2Kernel, &kAvx512Kernel};
+#endif
+
+/// That of the widest instructions that this machine has.
+[[nodiscard]] inline const Kernel& kernel() {
+#ifdef QUOIN_X86_KERNELS
+  return *kKernels[static_cast<std::size_t>(instruction_set())];
+#else
+  return kPlainKernel;
+#endif
+}
+
+}  // namespace quoin::array

@@ -1,0 +1,16 @@
+// The kernel for x86-64 processors with AVX-512 (VBMI2 too); called only where all were found.
+
+#include "mesh/array/kernel.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "mesh/array/table.inl"
+#include "mesh/array/vertices.inl"
+
+namespace quoin::array {
+
+const Kernel kAvx512Kernel = make_kernel();
+
+}  // namespace quoin::array
+
+#endif

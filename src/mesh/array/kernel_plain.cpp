@@ -1,0 +1,36 @@
+// The kernel for any processor.
+
+#include <cstddef>
+
+#include "mesh/array/cell.h"
+#include "mesh/array/kernel.h"
+#include "mesh/array/place.inl"
+#include "mesh/array/table.inl"
+
+namespace quoin::array {
+namespace {
+
+void vertices(const CornerBatch& corners, std::size_t count, const Placement& placement, VertexBatch& batch,
+              Vec3* positions, Vec3* normals) {
+  const float* const scale = placement.gradient_scale;
+  for (std::size_t i = 0; i < count; ++i) {
+    smooth::Corners d;
+    for (std::size_t corner = 0; corner < 8; ++corner) d[corner] = corners.densities[corner][i];
+    make_finite(d);
+    const Vec3 at = mean_crossing(d);
+    const Vec3 g = smooth::trilinear_gradient(d, at);
+    const Vec3 n = unit_of_any({g.x * scale[0], g.y * scale[1], g.z * scale[2]});
+    for (int axis = 0; axis < 3; ++axis) {
+      batch.fractions[axis][i] = smooth::snap(at[axis]);
+      batch.normals[axis][i] = n[axis];
+    }
+  }
+  place_vertices(batch, count, placement, positions);
+  interleave(batch.normals, placement.view_axis, count, normals);
+}
+
+}  // namespace
+
+const Kernel kPlainKernel = make_kernel();
+
+}  // namespace quoin::array

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/array_view.h>
+
+namespace quoin::array {
+
+// An array as it is walked: axis 0 along rows, 1 from row to row within a slice, 2 from slice to slice.
+//
+// Cell c of an axis spans samples c - 1 and c: cells 0 and n, at its ends, have a sample on one side only. A bit row of
+// samples or cells is `words` words, that of sample or cell c at bit c; bits beyond the last are 0.
+struct Lattice {
+  const std::byte* data = nullptr;  // sample (0, 0, 0) as it is walked
+  ScalarType type = ScalarType::Float32;
+  std::array<std::int64_t, 3> size{};
+  std::array<std::ptrdiff_t, 3> stride{};  // bytes; of axis 0 never negative
+  std::array<int, 3> view_axis{};          // which of the view's axes each is
+  DVec3 origin{0.0};                       // of sample (0, 0, 0), by the walked axes
+  DVec3 spacing{1.0};
+  bool is_mirrored = false;  // the walked axes, as they lie in space, are left-handed
+  std::size_t words = 0;
+
+  [[nodiscard]] std::size_t item_bytes() const { return bytes_of(type); }
+  [[nodiscard]] bool has_packed_rows() const {
+    return stride[0] == static_cast<std::ptrdiff_t>(item_bytes()) || size[0] == 1;
+  }
+  [[nodiscard]] const std::byte* row(std::int64_t y, std::int64_t z) const {
+    return data + y * stride[1] + z * stride[2];
+  }
+  [[nodiscard]] std::size_t rows() const { return static_cast<std::size_t>(size[1]); }
+  [[nodiscard]] std::size_t slices() const { return static_cast<std::size_t>(size[2]); }
+  // Words of a slice of samples, and of one of cells.
+  [[nodiscard]] std::size_t slice_words() const { return rows() * words; }
+  [[nodiscard]] std::size_t cell_slice_words() const { return (rows() + 1) * words; }
+};
+
+// The way to walk an array, or what is wrong with it.
+[[nodiscard]] Result<Lattice> lattice_of(const ArrayView& array);
+
+// Copies a row to neighbouring places.
+void pack_row(const Lattice& lattice, std::int64_t y, std::int64_t z, std::byte* to);
+
+}  // namespace quoin::array

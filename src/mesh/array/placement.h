@@ -1,0 +1,38 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "mesh/array/lattice.h"
+
+namespace quoin::array {
+
+// From the walked axes to the view's, in space.
+struct Placement {
+  double origin[3];  // by walked axis
+  double spacing[3];
+  int view_axis[3];
+  float gradient_scale[3];  // what makes of a gradient over samples one in space, but for its length
+};
+
+[[nodiscard]] inline Placement placement_of(const Lattice& lattice) {
+  Placement placement{};
+  const DVec3 s = lattice.spacing;
+  const double least = std::min({std::abs(s.x), std::abs(s.y), std::abs(s.z)});
+  for (int i = 0; i < 3; ++i) {
+    placement.origin[i] = lattice.origin[i];
+    placement.spacing[i] = s[i];
+    placement.view_axis[i] = lattice.view_axis[static_cast<std::size_t>(i)];
+    placement.gradient_scale[i] = static_cast<float>(least / s[i]);
+  }
+  return placement;
+}
+
+// A coordinate of a vertex within a cell. Rounded once: what is between is double.
+[[gnu::always_inline]] inline float in_space(const Placement& placement, int axis, std::int32_t cell, float fraction) {
+  const double sample = (static_cast<double>(cell) - 1.0) + static_cast<double>(fraction);
+  return static_cast<float>(placement.origin[axis] + placement.spacing[axis] * sample);
+}
+
+}  // namespace quoin::array

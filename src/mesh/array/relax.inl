@@ -1,0 +1,155 @@
+// The vertices of labels: where they start, and how they are relaxed.
+//
+//   crossings of a cell   | along rows | from row to row | from slice to slice |    12 bits
+//                         | dy + 2 dz  | dx + 2 dz       | dx + 2 dy           |    which of the four edges
+
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "mesh/array/kernel.h"
+#include "mesh/array/rows.inl"
+
+namespace quoin::array {
+namespace {
+
+// Of the cells with certain crossings: the sum of their places, in halves of a cell, and the faces over which the
+// vertex is linked with its neighbours.
+struct CrossingSum {
+  std::uint8_t halves[3];
+  std::uint8_t count;
+  std::uint8_t links;
+};
+
+constexpr auto kCrossingSums = [] {
+  std::array<CrossingSum, 4096> sums{};
+  for (unsigned crossings = 0; crossings < 4096; ++crossings) {
+    CrossingSum& sum = sums[crossings];
+    unsigned on_face[6] = {};
+    for (unsigned edge = 0; edge < 12; ++edge) {
+      if ((crossings >> edge & 1U) == 0) continue;
+      const unsigned axis = edge / 4;
+      // Of the other two axes, in their order: at their low or high end.
+      const unsigned ends[2] = {edge & 1U, edge >> 1 & 1U};
+      const unsigned others[2] = {axis == 0 ? 1U : 0U, axis == 2 ? 1U : 2U};
+      ++sum.count;
+      ++sum.halves[axis];
+      for (int i = 0; i < 2; ++i) {
+        sum.halves[others[i]] = static_cast<std::uint8_t>(sum.halves[others[i]] + 2 * ends[i]);
+        ++on_face[2 * others[i] + ends[i]];
+      }
+    }
+    // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices of such
+    // lines go by their neighbours on the line alone, so that it is smooth too. Four may be two labels, crosswise.
+    unsigned least = 1;
+    for (const unsigned count : on_face) least = count == 3 ? 3 : least;
+    for (unsigned face = 0; face < 6; ++face) {
+      if (on_face[face] >= least) sum.links = static_cast<std::uint8_t>(sum.links | 1U << face);
+    }
+  }
+  return sums;
+}();
+
+inline std::uint64_t shifted(const std::uint64_t* row, std::size_t w) {
+  return row[w] << 1 | (w == 0 ? 0 : row[w - 1] >> 63);
+}
+
+void label_vertices(const CellSlice& slice, const RankedRows& ranked, Vec3* fractions, std::uint8_t* links) {
+  for (std::size_t row = 0; row <= slice.rows; ++row) {
+    std::uint32_t vertex = ranked.first[row];
+    if (vertex == ranked.first[row + 1]) continue;
+    const RowEdges e = edges_of_row(slice, row);
+    const std::uint64_t* const active = ranked.active + row * slice.words;
+    for (std::size_t w = 0; w < slice.words; ++w) {
+      if (active[w] == 0) continue;
+      const std::uint64_t bits[12] = {e.along[0][w],
+                                      e.along[1][w],
+                                      e.along[2][w],
+                                      e.along[3][w],
+                                      shifted(e.between[0], w),
+                                      e.between[0][w],
+                                      shifted(e.between[1], w),
+                                      e.between[1][w],
+                                      shifted(e.across[0], w),
+                                      e.across[0][w],
+                                      shifted(e.across[1], w),
+                                      e.across[1][w]};
+      for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
+        const int bit = std::countr_zero(left);
+        unsigned crossings = 0;
+        for (int i = 0; i < 12; ++i) crossings |= static_cast<unsigned>(bits[i] >> bit & 1U) << i;
+        const CrossingSum& sum = kCrossingSums[crossings];
+        const float half = 0.5F / static_cast<float>(sum.count);
+        float* const to = &fractions[vertex].x;
+        for (int axis = 0; axis < 3; ++axis) to[axis] = static_cast<float>(sum.halves[axis]) * half;
+        if (links != nullptr) links[vertex] = sum.links;
+      }
+    }
+  }
+}
+
+// Vertices keep that far from their cell's faces, so that no two come to one place.
+constexpr float kMargin = 1.0F / 32.0F;
+// How far a vertex goes towards the middle of its neighbours: the whole way would swing to and fro.
+constexpr float kStep = 0.625F;
+
+inline float relaxed(float from, float mean) {
+  const float to = from + kStep * (mean - from);
+  const float low = to > kMargin ? to : kMargin;
+  return low < 1.0F - kMargin ? low : 1.0F - kMargin;
+}
+
+// A vertex among its neighbours, by the bits of its links.
+inline void relax_vertex(const Vec3* from, std::uint32_t vertex, const std::uint32_t (&neighbours)[6], unsigned links,
+                         Vec3& out) {
+  float sum[3] = {0.0F, 0.0F, 0.0F};
+  float count = 0.0F;
+  for (int i = 0; i < 6; ++i) {
+    // Without branches: what is not linked counts nothing.
+    const bool is_linked = (links >> i & 1U) != 0;
+    const float* const other = &from[is_linked ? neighbours[i] : vertex].x;
+    const float one = is_linked ? 1.0F : 0.0F;
+    for (int axis = 0; axis < 3; ++axis) sum[axis] += one * other[axis];
+    sum[i / 2] += (i & 1) != 0 ? one : -one;
+    count += one;
+  }
+  const float* const own = &from[vertex].x;
+  float* const to = &out.x;
+  const float share = 1.0F / count;
+  for (int axis = 0; axis < 3; ++axis) to[axis] = relaxed(own[axis], sum[axis] * share);
+}
+
+void relax(const RelaxStep& step, const RankedRows& ranked) {
+  const auto row_words = static_cast<std::ptrdiff_t>(step.words);
+  const std::ptrdiff_t slice_rows = static_cast<std::ptrdiff_t>(step.rows) + 1;
+  for (std::ptrdiff_t row = 0; row < slice_rows; ++row) {
+    const std::uint32_t* const first = ranked.first + row;
+    if (first[0] == first[1]) continue;
+    // Beyond the array nothing is linked: there any row will do.
+    const std::ptrdiff_t steps[4] = {row == 0 ? 0 : -1, row == slice_rows - 1 ? 0 : 1,
+                                     step.is_first_slice ? 0 : -slice_rows, step.is_last_slice ? 0 : slice_rows};
+    const std::uint64_t* const active = ranked.active + row * row_words;
+    const std::uint64_t* rows[4];
+    std::uint32_t at[4];
+    for (int i = 0; i < 4; ++i) {
+      rows[i] = active + steps[i] * row_words;
+      at[i] = first[steps[i]];
+    }
+    std::uint32_t vertex = *first;
+    for (std::size_t w = 0; w < step.words; ++w) {
+      for (std::uint64_t left = active[w]; left != 0; left &= left - 1, ++vertex) {
+        const std::uint64_t below = (left & (0 - left)) - 1;
+        std::uint32_t neighbours[6] = {vertex - 1, vertex + 1};
+        for (int i = 0; i < 4; ++i) neighbours[2 + i] = at[i] + count_of(rows[i][w] & below);
+        relax_vertex(step.from, vertex, neighbours, step.links[vertex], step.to[vertex]);
+      }
+      for (int i = 0; i < 4; ++i) at[i] += count_of(rows[i][w]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin::array
