@@ -1,0 +1,73 @@
+#pragma once
+
+// What a search in a field asks of a shape: when it can first meet the solid of a piece at all, a point in which it
+// does, and which part of the piece it passes.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "scene/query/field_piece.h"
+#include "scene/query/moving_box.h"
+
+namespace quoin {
+
+/// How deep a shape may be in a field's solid and count as touching it, in voxels.
+inline constexpr double kFieldTouch = 1e-6;
+
+/// A box on its way, or at rest.
+///
+/// The directions that can part it from the solid of a piece: its own three; the plane's, less what of it runs along
+/// each of the box's edges; the plane's; the grid's three. With a piece small enough for its solid to be what the plane
+/// says, one of them is the one along which the two would part: a face of the box lies on the surface, or an edge, or a
+/// corner.
+class BoxInField {
+ public:
+  /// `until`: the fraction of the way at which it ends.
+  BoxInField(const MovingBox& box, double until)
+      : box_(box), until_(until), reach_(reach_of_axes(box.half_axes)), rates_(box.displacement * box.axes) {}
+
+  /// Whether the piece's solid can be met; then `enter`, `slack` and `axis` are set.
+  [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  /// Whether it is surely met by the time `until`.
+  [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
+  /// When to ask that for a piece that it does meet: once it is in it deeper than the plane's doubt.
+  [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
+  /// The box of the piece that it passes between two fractions.
+  [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  /// From the solid towards the box, of unit length, in the grid; 0 where nothing is known.
+  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point) const;
+
+ private:
+  struct Course;
+  [[nodiscard]] DVec3 direction(const FieldPiece& piece) const;
+  [[nodiscard]] std::optional<DVec3> by_support(const FieldPiece& piece, const DVec3& centre) const;
+  [[nodiscard]] DVec3 nearest(const DVec3& centre, const DVec3& point) const;
+
+  const MovingBox& box_;
+  double until_;
+  DVec3 reach_;
+  DVec3 rates_;  // of the displacement along the box's axes
+};
+
+/// A ball at rest.
+class BallInField {
+ public:
+  BallInField(DVec3 centre, double radius) : centre_(centre), radius_(radius) {}
+  [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
+  [[nodiscard]] static double time_beyond_doubt(const FieldPiece& /*piece*/) { return 0.0; }
+  [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point) const;
+
+ private:
+  DVec3 centre_;
+  double radius_;
+};
+
+}  // namespace quoin
