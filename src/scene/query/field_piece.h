@@ -37,9 +37,10 @@ struct FieldPiece {
   double doubt = 0.0;
   DVec3 twist{0.0};  ///< how much of the doubt each axis has a share in
   // Of what is searched for:
-  double enter = 0.0;  ///< no solid of it is met before
-  double slack = 0.0;  ///< after which time it is met surely, but for the doubt
-  int axis = -1;       ///< of the shape's directions, the one that parts it until then; -1 none does
+  double enter = 0.0;     ///< no solid of it is met before
+  double slack = 0.0;     ///< after which time it is met surely, but for the doubt
+  int axis = -1;          ///< of the shape's directions, the one that parts it until then; -1 none does
+  bool is_exact = false;  ///< of all directions, not of the first few alone
 
   [[nodiscard]] bool has_solid() const {
     double least = corners[0];
@@ -101,13 +102,30 @@ struct FieldPiece {
     double behind = 0.0;
   };
   [[nodiscard]] Extent extent(const DVec3& along_half, double along_slope) const {
-    const auto sum = [](const DVec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); };
     const double whole = sum(along_half);
     if (along_slope == 0.0) return {whole, whole};
-    // The direction less any multiple of the slope says as much, and the plane ends the solid along the slope.
-    const double multiple = along_slope / square_of_slope;
-    const double cut = std::min(whole, sum(along_half - multiple * rise) - std::abs(multiple) * level);
+    const double cut = std::min(whole, below_plane(along_half, along_slope / square_of_slope));
     return along_slope > 0.0 ? Extent{cut, whole} : Extent{whole, cut};
+  }
+  /// The same, exactly.
+  [[nodiscard]] Extent exact_extent(const DVec3& along_half) const {
+    const double whole = sum(along_half);
+    Extent extent{whole, whole};
+    for (int i = 0; i < 3; ++i) {
+      if (rise[i] == 0.0) continue;
+      const double multiple = along_half[i] / rise[i];
+      double& end = multiple > 0.0 ? extent.ahead : extent.behind;
+      end = std::min(end, below_plane(along_half, multiple));
+    }
+    return extent;
+  }
+
+ private:
+  static double sum(const DVec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+  // A direction less any multiple of the slope says as much of what lies below the plane, which ends the solid along
+  // the slope; the best multiple leaves one of the axes out.
+  [[nodiscard]] double below_plane(const DVec3& along_half, double multiple) const {
+    return sum(along_half - multiple * rise) - std::abs(multiple) * level;
   }
 };
 

@@ -128,7 +128,10 @@ class FieldSearch {
   void keep(FieldPiece& piece) {
     if (!piece.has_solid()) return;
     piece.measure();
-    if (!shape_.may_meet(piece)) return;
+    if (shape_.may_meet(piece)) push(piece);
+  }
+
+  void push(const FieldPiece& piece) {
     pieces_.push_back(piece);
     std::push_heap(pieces_.begin(), pieces_.end(), later);
   }
@@ -149,19 +152,19 @@ class FieldSearch {
     const Cut below = cut_above_plane(piece);
     if (below == Cut::Nothing) return;
     if (much == Cut::Much || below == Cut::Much) return keep(piece);
+    if (!piece.is_exact) {
+      if (shape_.may_meet_exactly(piece)) push(piece);
+      return;
+    }
     halve(piece);
   }
 
   void halve(const FieldPiece& piece) {
-    int axis = 0;
-    // Where the doubt comes from; of pieces without, the longest side.
-    const DVec3& share = piece.doubt > 1e-9 ? piece.twist : piece.half;
-    for (int other = 1; other < 3; ++other) {
-      if (share[other] > share[axis]) axis = other;
-    }
-    if (piece.half[axis] <= kSmallest) {
-      for (int other = 0; other < 3; ++other) axis = piece.half[other] > piece.half[axis] ? other : axis;
-    }
+    const auto greatest = [](const DVec3& v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; };
+    int axis = greatest(piece.half);
+    // Where the doubt comes from, if that is what is left to be settled.
+    if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[axis]) axis = greatest(piece.twist);
+    if (piece.half[axis] <= kSmallest) axis = greatest(piece.half);
     for (const double side : {-1.0, 1.0}) {
       FieldPiece part = piece;
       DVec3 low = piece.middle - piece.half;

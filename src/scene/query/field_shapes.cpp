@@ -8,6 +8,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kFirstEdge = 3;
 constexpr int kSlope = 6;
 constexpr int kFirstOfGrid = 7;
+constexpr int kFirstCrease = 10;  // edges of the plane and the piece's sides, by three of the box
+constexpr int kFirstSide = 19;    // edges of the piece, by three of the box
+constexpr int kAllDirections = 28;
 
 bool is_in(const FieldPiece& piece, const DVec3& point) {
   const DVec3 away = glm::abs(point - piece.middle) - piece.half;
@@ -44,6 +47,7 @@ std::optional<DVec3> by_turns(const FieldPiece& piece, Nearest&& nearest) {
 // The times during which nothing is known to part a box from the solid of a piece.
 struct BoxInField::Course {
   double until;
+  double at_once;  // times that differ by less are the same
   double enter = -kInfinity;
   double leave = kInfinity;
   double slack = 0.0;
@@ -63,7 +67,7 @@ struct BoxInField::Course {
     if (left <= touch || gap + rate * until >= -touch) return false;
     if (rate == 0.0) return true;
     leave = std::min(leave, left / -rate);
-    if (gap > -touch && gap / -rate > enter + 1e-12) {
+    if (gap > -touch && gap / -rate > enter + at_once) {
       enter = gap / -rate;
       slack = (2.0 * touch - std::min(gap, 0.0)) / -rate;
       axis = which;
@@ -72,101 +76,115 @@ struct BoxInField::Course {
   }
 };
 
-bool BoxInField::may_meet(FieldPiece& piece) const {
-  Course course{until_};
+bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
+  Course course{until_, at_once_};
   const DVec3 apart = box_.centre - DVec3(piece.cell) - piece.middle;
-  const DVec3 along = piece.slope * box_.axes;
-  const DVec3 reaches = glm::abs(along) * box_.half_size;
-  const double square = piece.square_of_slope;
-  for (int i = 0; i < 3; ++i) {
-    const DVec3& axis = box_.axes[i];
-    if (!course.passes(i, piece.extent(axis * piece.half, along[i]), glm::dot(axis, apart), box_.half_size[i],
-                       rates_[i], 1.0)) {
-      return false;
-    }
-  }
-  for (int i = 0; i < 3; ++i) {
-    DVec3 along_half(0.0);
-    along_half[i] = piece.half[i];
-    if (!course.passes(kFirstOfGrid + i, piece.extent(along_half, piece.slope[i]), apart[i], reach_[i],
-                       box_.displacement[i], 1.0)) {
-      return false;
-    }
-  }
-  if (square > 0.0) {
-    const double reach = reaches.x + reaches.y + reaches.z;
-    const double slope_apart = glm::dot(piece.slope, apart);
-    const double rate = glm::dot(piece.slope, box_.displacement);
-    for (int i = 0; i < 3; ++i) {
-      const double rest = square - along[i] * along[i];
-      if (rest <= 1e-9 * square) continue;
-      const DVec3 direction = piece.slope - along[i] * box_.axes[i];
-      if (!course.passes(kFirstEdge + i, piece.extent(direction * piece.half, rest),
-                         slope_apart - along[i] * glm::dot(box_.axes[i], apart), reach - reaches[i],
-                         rate - along[i] * rates_[i], std::sqrt(rest))) {
-        return false;
-      }
-    }
-    if (!course.passes(kSlope, piece.extent(piece.rise, square), slope_apart, reach, rate, std::sqrt(square))) {
+  const int last = is_exact ? kAllDirections : piece.square_of_slope > 0.0 ? kFirstCrease : kFirstOfGrid + 3;
+  for (int which = 0; which < last; ++which) {
+    const DVec3 along = direction(piece, which);
+    const double square = glm::dot(along, along);
+    if (!(square > 0.0)) continue;
+    const DVec3 along_half = along * piece.half;
+    const auto extent =
+        is_exact ? piece.exact_extent(along_half) : piece.extent(along_half, glm::dot(along, piece.slope));
+    const DVec3 reaches = glm::abs(along * box_.axes) * half_size_;
+    if (!course.passes(which, extent, glm::dot(along, apart), reaches.x + reaches.y + reaches.z,
+                       glm::dot(along, box_.displacement), std::sqrt(square))) {
       return false;
     }
   }
   piece.axis = course.axis;
   piece.slack = course.slack;
+  piece.is_exact = is_exact;
   // What is inside from the start comes before what is met at once.
   piece.enter = course.axis < 0 ? -1.0 : std::max(course.enter, 0.0);
   return true;
 }
 
-DVec3 BoxInField::direction(const FieldPiece& piece) const {
-  DVec3 along(0.0);
-  if (piece.axis < 0 || piece.axis == kSlope) {
-    along = piece.slope;
-  } else if (piece.axis < kFirstEdge) {
-    along = box_.axes[piece.axis];
-  } else if (piece.axis < kSlope) {
-    const DVec3& edge = box_.axes[piece.axis - kFirstEdge];
-    along = piece.slope - glm::dot(piece.slope, edge) * edge;
-  } else {
-    along[piece.axis - kFirstOfGrid] = 1.0;
+bool BoxInField::may_meet(FieldPiece& piece) const {
+  return follow(piece, false);
+}
+
+bool BoxInField::may_meet_exactly(FieldPiece& piece) const {
+  return follow(piece, true);
+}
+
+// 0 where two edges are parallel.
+DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
+  const auto across = [](const DVec3& a, const DVec3& b) {
+    const DVec3 product = glm::cross(a, b);
+    return glm::dot(product, product) > 1e-12 * glm::dot(a, a) * glm::dot(b, b) ? product : DVec3(0.0);
+  };
+  const auto of_grid = [](int axis) {
+    DVec3 unit(0.0);
+    unit[axis] = 1.0;
+    return unit;
+  };
+  if (which < kFirstEdge) return box_.axes[which];
+  if (which < kSlope) {
+    const DVec3& edge = box_.axes[which - kFirstEdge];
+    const DVec3 rest = piece.slope - glm::dot(piece.slope, edge) * edge;
+    return glm::dot(rest, rest) > 1e-9 * piece.square_of_slope ? rest : DVec3(0.0);
   }
+  if (which == kSlope) return piece.slope;
+  if (which < kFirstCrease) return of_grid(which - kFirstOfGrid);
+  const int pair = (which - kFirstCrease) % 9;
+  const DVec3 side = of_grid(pair / 3);
+  const DVec3 edge = which < kFirstSide ? across(piece.slope, side) : side;
+  return across(edge, box_.axes[pair % 3]);
+}
+
+// What parts the two until they meet, towards the box; of what is inside from the start the plane's.
+DVec3 BoxInField::parting(const FieldPiece& piece) const {
+  const DVec3 along = direction(piece, piece.axis < 0 ? kSlope : piece.axis);
   return piece.axis >= 0 && glm::dot(along, box_.displacement) > 0.0 ? -along : along;
 }
 
 DVec3 BoxInField::normal(const FieldPiece& piece, const DVec3& point) const {
   // The grid's own directions only tell where the piece ends.
-  if (piece.axis >= 0 && piece.axis < kSlope) return unit_or_zero(direction(piece));
+  if (piece.axis >= 0 && (piece.axis < kFirstOfGrid || (piece.axis >= kFirstCrease && piece.axis < kFirstSide))) {
+    return unit_or_zero(parting(piece));
+  }
   const DVec3 gradient = unit_or_zero(piece.gradient(point));
   if (gradient != DVec3(0.0) && glm::dot(gradient, box_.displacement) <= 0.0) return gradient;
   return unit_or_zero(-box_.displacement);
 }
 
 DVec3 BoxInField::nearest(const DVec3& centre, const DVec3& point) const {
-  const DVec3 at = glm::clamp((point - centre) * box_.axes, -box_.half_size, box_.half_size);
+  const DVec3 at = glm::clamp((point - centre) * box_.axes, -half_size_, half_size_);
   return centre + box_.axes * at;
 }
 
 // The point of the box that is deepest below what parts the two; where a whole edge or face is, the point of it that is
 // nearest to where the plane is highest.
 std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3& centre) const {
-  const DVec3 up = direction(piece);
+  const DVec3 up = parting(piece);
   const double square = piece.square_of_slope;
-  DVec3 highest = piece.middle;
+  DVec3 corner = piece.middle;
+  DVec3 highest = corner;
   if (square > 0.0) {
     const DVec3 rest = (up - glm::dot(up, piece.slope) / square * piece.slope) * piece.half;
     const double least = 1e-9 * (std::abs(rest.x) + std::abs(rest.y) + std::abs(rest.z));
     for (int i = 0; i < 3; ++i) {
-      if (std::abs(rest[i]) > least) highest[i] += std::copysign(piece.half[i], rest[i]);
+      if (std::abs(rest[i]) > least) corner[i] += std::copysign(piece.half[i], rest[i]);
     }
-    const double above = piece.density(highest);
-    highest = clamped(piece, highest - piece.slope * (above / square));
+    const double above = piece.density(corner);
+    highest = clamped(piece, corner - piece.slope * (above / square));
   }
   const DVec3 along = up * box_.axes;
   DVec3 at = (highest - centre) * box_.axes;
   const double length = glm::length(up);
   for (int i = 0; i < 3; ++i) {
-    at[i] = std::abs(along[i]) > 1e-7 * length ? std::copysign(box_.half_size[i], -along[i])
-                                               : std::clamp(at[i], -box_.half_size[i], box_.half_size[i]);
+    at[i] = std::abs(along[i]) > 1e-7 * length ? std::copysign(half_size_[i], -along[i])
+                                               : std::clamp(at[i], -half_size_[i], half_size_[i]);
+  }
+  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) {
+    // Where the edge of the box crosses the side of the piece.
+    const int side = (piece.axis - kFirstCrease) / 3;
+    const int edge = (piece.axis - kFirstCrease) % 3;
+    at[edge] = 0.0;
+    const DVec3 from = centre + box_.axes * at;
+    at[edge] = std::clamp((corner[side] - from[side]) / box_.axes[edge][side], -half_size_[edge], half_size_[edge]);
   }
   const DVec3 point = centre + box_.axes * at;
   return is_in(piece, point) && piece.density(point) < 0.0 ? std::optional(point) : std::nullopt;
@@ -193,9 +211,17 @@ DBox BoxInField::bounds(IVec3 cell, double from, double to) const {
 bool BallInField::may_meet(FieldPiece& piece) const {
   const DVec3 centre = centre_ - DVec3(piece.cell);
   piece.enter = -1.0;
-  if (glm::length(clamped(piece, centre) - centre) >= radius_ - kFieldTouch) return false;
-  const double above = glm::dot(piece.slope, centre - piece.middle) + piece.level;
-  return above < (radius_ - kFieldTouch) * std::sqrt(piece.square_of_slope) || piece.square_of_slope == 0.0;
+  piece.is_exact = true;
+  // By turns within the piece and below its plane: near to the nearest point of its solid.
+  DVec3 nearest = clamped(piece, centre);
+  for (int turn = 0; turn < 4 && piece.square_of_slope > 0.0; ++turn) {
+    const double above = glm::dot(piece.slope, nearest - piece.middle) + piece.level;
+    if (!(above > 0.0)) break;
+    nearest = clamped(piece, nearest - piece.slope * (above / piece.square_of_slope));
+  }
+  const DVec3 away = unit_or_zero(centre - nearest);
+  const double apart = glm::dot(away, centre - piece.middle) - piece.exact_extent(away * piece.half).ahead;
+  return apart < radius_ - kFieldTouch;
 }
 
 std::optional<DVec3> BallInField::point_in_solid(const FieldPiece& piece, double /*until*/) const {

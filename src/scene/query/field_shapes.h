@@ -23,17 +23,23 @@ inline constexpr double kFieldTouch = 1e-6;
 /// A box on its way, or at rest.
 ///
 /// The directions that can part it from the solid of a piece: its own three; the plane's, less what of it runs along
-/// each of the box's edges; the plane's; the grid's three. With a piece small enough for its solid to be what the plane
-/// says, one of them is the one along which the two would part: a face of the box lies on the surface, or an edge, or a
-/// corner.
+/// each of the box's edges; the plane's; the grid's three. These ten mostly do: a face of the box comes to lie on the
+/// surface, or an edge, or a corner. With the products of the box's edges and those of the solid, where the plane or
+/// two sides of the piece meet, nothing else can: what is left is the plane's doubt.
 class BoxInField {
  public:
   /// `until`: the fraction of the way at which it ends.
   BoxInField(const MovingBox& box, double until)
-      : box_(box), until_(until), reach_(reach_of_axes(box.half_axes)), rates_(box.displacement * box.axes) {}
+      : box_(box),
+        until_(until),
+        at_once_(1e-9 / std::max(length_of(box.displacement), 1e-6)),
+        half_size_(glm::max(box.half_size, DVec3(2.0 * kFieldTouch))),
+        reach_(glm::max(reach_of_axes(box.half_axes), DVec3(2.0 * kFieldTouch))) {}
 
   /// Whether the piece's solid can be met; then `enter`, `slack` and `axis` are set.
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  /// The same by all directions.
+  [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const;
   /// Whether it is surely met by the time `until`.
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   /// When to ask that for a piece that it does meet: once it is in it deeper than the plane's doubt.
@@ -45,14 +51,17 @@ class BoxInField {
 
  private:
   struct Course;
-  [[nodiscard]] DVec3 direction(const FieldPiece& piece) const;
+  [[nodiscard]] bool follow(FieldPiece& piece, bool is_exact) const;
+  [[nodiscard]] DVec3 direction(const FieldPiece& piece, int which) const;
+  [[nodiscard]] DVec3 parting(const FieldPiece& piece) const;
   [[nodiscard]] std::optional<DVec3> by_support(const FieldPiece& piece, const DVec3& centre) const;
   [[nodiscard]] DVec3 nearest(const DVec3& centre, const DVec3& point) const;
 
   const MovingBox& box_;
   double until_;
+  double at_once_;
+  DVec3 half_size_;  // thick enough to be more than touched, also where it has no thickness
   DVec3 reach_;
-  DVec3 rates_;  // of the displacement along the box's axes
 };
 
 /// A ball at rest.
@@ -60,6 +69,7 @@ class BallInField {
  public:
   BallInField(DVec3 centre, double radius) : centre_(centre), radius_(radius) {}
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
+  [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const { return may_meet(piece); }
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   [[nodiscard]] static double time_beyond_doubt(const FieldPiece& /*piece*/) { return 0.0; }
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
