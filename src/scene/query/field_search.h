@@ -30,6 +30,7 @@ class FieldCells {
  private:
   const DensityChunk* chunk_of_sample(IVec3 sample);
   [[nodiscard]] bool collides_at(IVec3 sample);
+  [[nodiscard]] float density(IVec3 sample);
 
   const DensityTree& tree_;
   const VoxelRegistry& types_;
@@ -70,8 +71,10 @@ class FieldSearch {
       if (piece.enter > before) break;
       const bool is_inside = piece.enter < 0.0;
       const double enter = std::max(piece.enter, 0.0);
-      if (const auto point = shape_.point_in_solid(piece, is_inside ? 0.0 : std::min(enter + piece.slack, until))) {
-        return FieldContact{enter, is_inside, piece, *point};
+      const bool is_flat = piece.doubt <= kFlat * std::sqrt(piece.square_of_slope);
+      if (is_inside || is_flat) {
+        const auto point = shape_.point_in_solid(piece, is_inside ? 0.0 : std::min(enter + piece.slack, until));
+        if (point) return FieldContact{enter, is_inside, piece, *point};
       }
       const bool is_tiny = std::max({piece.half.x, piece.half.y, piece.half.z}) <= kSmallest;
       // What is neither in it nor parted from it by then is as near as touching: met, if it is on the way.
@@ -86,6 +89,8 @@ class FieldSearch {
  private:
   // Pieces no larger than this are not halved.
   static constexpr double kSmallest = 1e-6;
+  // How far a piece's plane may be off, in voxels, for the box to be in its solid once it is deeper than touching.
+  static constexpr double kFlat = 2.0 * kFieldTouch;
   // What many pieces cannot tell is met.
   static constexpr int kMostPieces = 4'000;
 
@@ -152,19 +157,19 @@ class FieldSearch {
     const Cut below = cut_above_plane(piece);
     if (below == Cut::Nothing) return;
     if (much == Cut::Much || below == Cut::Much) return keep(piece);
-    if (!piece.is_exact) {
-      if (shape_.may_meet_exactly(piece)) push(piece);
-      return;
+    // Where the doubt comes from, if that is what is left to be settled; then all directions; then the longest side.
+    const int longest = greatest(piece.half);
+    if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[longest]) {
+      const int axis = greatest(piece.twist);
+      return halve(piece, piece.half[axis] > kSmallest ? axis : longest);
     }
-    halve(piece);
+    if (piece.is_exact) return halve(piece, longest);
+    if (shape_.may_meet_exactly(piece)) push(piece);
   }
 
-  void halve(const FieldPiece& piece) {
-    const auto greatest = [](const DVec3& v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; };
-    int axis = greatest(piece.half);
-    // Where the doubt comes from, if that is what is left to be settled.
-    if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[axis]) axis = greatest(piece.twist);
-    if (piece.half[axis] <= kSmallest) axis = greatest(piece.half);
+  static int greatest(const DVec3& v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; }
+
+  void halve(const FieldPiece& piece, int axis) {
     for (const double side : {-1.0, 1.0}) {
       FieldPiece part = piece;
       DVec3 low = piece.middle - piece.half;

@@ -11,6 +11,7 @@ constexpr int kFirstOfGrid = 7;
 constexpr int kFirstCrease = 10;  // edges of the plane and the piece's sides, by three of the box
 constexpr int kFirstSide = 19;    // edges of the piece, by three of the box
 constexpr int kAllDirections = 28;
+constexpr std::array<DVec3, 3> kUnits = {DVec3(1.0, 0.0, 0.0), DVec3(0.0, 1.0, 0.0), DVec3(0.0, 0.0, 1.0)};
 
 bool is_in(const FieldPiece& piece, const DVec3& point) {
   const DVec3 away = glm::abs(point - piece.middle) - piece.half;
@@ -67,8 +68,10 @@ struct BoxInField::Course {
     if (left <= touch || gap + rate * until >= -touch) return false;
     if (rate == 0.0) return true;
     leave = std::min(leave, left / -rate);
-    if (gap > -touch && gap / -rate > enter + at_once) {
-      enter = gap / -rate;
+    // Of directions that part them equally long, the first.
+    const double begin = gap / -rate;
+    if (gap > -touch && begin > enter + (which < axis ? -at_once : at_once)) {
+      enter = std::max(begin, enter);
       slack = (2.0 * touch - std::min(gap, 0.0)) / -rate;
       axis = which;
     }
@@ -79,19 +82,28 @@ struct BoxInField::Course {
 bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
   Course course{until_, at_once_};
   const DVec3 apart = box_.centre - DVec3(piece.cell) - piece.middle;
-  const int last = is_exact ? kAllDirections : piece.square_of_slope > 0.0 ? kFirstCrease : kFirstOfGrid + 3;
-  for (int which = 0; which < last; ++which) {
-    const DVec3 along = direction(piece, which);
-    const double square = glm::dot(along, along);
-    if (!(square > 0.0)) continue;
+  // `length`: what touching is measured in.
+  const auto passes = [&](int which, const DVec3& along, double length) {
     const DVec3 along_half = along * piece.half;
     const auto extent =
         is_exact ? piece.exact_extent(along_half) : piece.extent(along_half, glm::dot(along, piece.slope));
     const DVec3 reaches = glm::abs(along * box_.axes) * half_size_;
-    if (!course.passes(which, extent, glm::dot(along, apart), reaches.x + reaches.y + reaches.z,
-                       glm::dot(along, box_.displacement), std::sqrt(square))) {
-      return false;
-    }
+    return course.passes(which, extent, glm::dot(along, apart), reaches.x + reaches.y + reaches.z,
+                         glm::dot(along, box_.displacement), length);
+  };
+  // The plane's parts most that are not met, so it comes first.
+  const bool has_slope = piece.square_of_slope > 0.0;
+  if (has_slope && !passes(kSlope, piece.slope, std::sqrt(piece.square_of_slope))) return false;
+  for (int i = 0; i < 3; ++i) {
+    if (!passes(i, box_.axes[i], 1.0)) return false;
+    if (!is_upright_ && !passes(kFirstOfGrid + i, kUnits[static_cast<std::size_t>(i)], 1.0)) return false;
+  }
+  const int last = !is_exact ? kSlope : is_upright_ ? kFirstSide : kAllDirections;
+  for (int which = kFirstEdge; which < last && has_slope; ++which) {
+    if (which == kSlope) which = kFirstCrease;
+    const DVec3 along = direction(piece, which);
+    const double square = glm::dot(along, along);
+    if (square > 0.0 && !passes(which, along, std::sqrt(square))) return false;
   }
   piece.axis = course.axis;
   piece.slack = course.slack;
@@ -115,11 +127,6 @@ DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
     const DVec3 product = glm::cross(a, b);
     return glm::dot(product, product) > 1e-12 * glm::dot(a, a) * glm::dot(b, b) ? product : DVec3(0.0);
   };
-  const auto of_grid = [](int axis) {
-    DVec3 unit(0.0);
-    unit[axis] = 1.0;
-    return unit;
-  };
   if (which < kFirstEdge) return box_.axes[which];
   if (which < kSlope) {
     const DVec3& edge = box_.axes[which - kFirstEdge];
@@ -127,9 +134,9 @@ DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
     return glm::dot(rest, rest) > 1e-9 * piece.square_of_slope ? rest : DVec3(0.0);
   }
   if (which == kSlope) return piece.slope;
-  if (which < kFirstCrease) return of_grid(which - kFirstOfGrid);
+  if (which < kFirstCrease) return kUnits[static_cast<std::size_t>(which - kFirstOfGrid)];
   const int pair = (which - kFirstCrease) % 9;
-  const DVec3 side = of_grid(pair / 3);
+  const DVec3 side = kUnits[static_cast<std::size_t>(pair / 3)];
   const DVec3 edge = which < kFirstSide ? across(piece.slope, side) : side;
   return across(edge, box_.axes[pair % 3]);
 }
@@ -192,8 +199,10 @@ std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3
 
 std::optional<DVec3> BoxInField::point_in_solid(const FieldPiece& piece, double until) const {
   const DVec3 centre = box_.centre - DVec3(piece.cell) + until * box_.displacement;
+  // Of what tells where the box comes upon the surface, only there.
   if (piece.axis >= 0) {
-    if (const auto point = by_support(piece, centre)) return point;
+    const auto point = by_support(piece, centre);
+    if (point || !piece.is_exact) return point;
   }
   return by_turns(piece, [&](const DVec3& point) { return nearest(centre, point); });
 }

@@ -34,7 +34,8 @@ class BoxInField {
         until_(until),
         at_once_(1e-9 / std::max(length_of(box.displacement), 1e-6)),
         half_size_(glm::max(box.half_size, DVec3(2.0 * kFieldTouch))),
-        reach_(glm::max(reach_of_axes(box.half_axes), DVec3(2.0 * kFieldTouch))) {}
+        reach_(glm::max(reach_of_axes(box.half_axes), DVec3(2.0 * kFieldTouch))),
+        is_upright_(is_along_grid(box.axes)) {}
 
   /// Whether the piece's solid can be met; then `enter`, `slack` and `axis` are set.
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
@@ -50,6 +51,12 @@ class BoxInField {
   [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point) const;
 
  private:
+  static bool is_along_grid(const glm::dmat3& axes) {
+    return std::all_of(&axes[0], &axes[0] + 3, [](const DVec3& axis) {
+      return std::max({std::abs(axis.x), std::abs(axis.y), std::abs(axis.z)}) > 1.0 - 1e-15;
+    });
+  }
+
   struct Course;
   [[nodiscard]] bool follow(FieldPiece& piece, bool is_exact) const;
   [[nodiscard]] DVec3 direction(const FieldPiece& piece, int which) const;
@@ -62,6 +69,7 @@ class BoxInField {
   double at_once_;
   DVec3 half_size_;  // thick enough to be more than touched, also where it has no thickness
   DVec3 reach_;
+  bool is_upright_;  // its axes are the grid's
 };
 
 /// A ball at rest.

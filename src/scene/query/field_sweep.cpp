@@ -23,14 +23,28 @@ bool FieldCells::collides_at(IVec3 sample) {
   return type == kAir || collides(types_, type);
 }
 
+float FieldCells::density(IVec3 sample) {
+  const DensityChunk* const chunk = chunk_of_sample(sample);
+  const IVec3 local = local_of(sample);
+  return chunk == nullptr ? field().band() : float_from_half(chunk->get(local.x, local.y, local.z));
+}
+
 bool FieldCells::read(IVec3 cell, CellCorners& corners) {
   if (!tree_.cells().is_occupied(cell)) return false;
-  for (int i = 0; i < 8; ++i) {
-    const IVec3 sample = cell + IVec3{i & 1, i >> 1 & 1, i >> 2};
-    const DensityChunk* const chunk = chunk_of_sample(sample);
-    const IVec3 local = local_of(sample);
-    corners[static_cast<std::size_t>(i)] =
-        chunk == nullptr ? double{field().band()} : double{float_from_half(chunk->get(local.x, local.y, local.z))};
+  const IVec3 local = local_of(cell);
+  const bool is_in_one_chunk = std::max({local.x, local.y, local.z}) < kChunkEdge - 1;
+  for (int row = 0; row < 4; ++row) {
+    const IVec3 sample = cell + IVec3{0, row & 1, row >> 1};
+    const auto i = static_cast<std::size_t>(2 * row);
+    const DensityChunk* const chunk = is_in_one_chunk ? chunk_of_sample(cell) : nullptr;
+    const Half* const samples = chunk == nullptr ? nullptr : chunk->row(local_of(sample).y, local_of(sample).z);
+    if (samples != nullptr) {
+      corners[i] = double{float_from_half(samples[local.x])};
+      corners[i + 1] = double{float_from_half(samples[local.x + 1])};
+    } else {
+      corners[i] = double{density(sample)};
+      corners[i + 1] = double{density(sample + IVec3{1, 0, 0})};
+    }
   }
   for (int i = 0; i < 8; ++i) {
     if (corners[static_cast<std::size_t>(i)] < 0.0 && collides_at(cell + IVec3{i & 1, i >> 1 & 1, i >> 2})) return true;
