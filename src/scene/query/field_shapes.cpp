@@ -147,14 +147,44 @@ DVec3 BoxInField::parting(const FieldPiece& piece) const {
   return piece.axis >= 0 && glm::dot(along, box_.displacement) > 0.0 ? -along : along;
 }
 
-DVec3 BoxInField::normal(const FieldPiece& piece, const DVec3& point) const {
-  // The grid's own directions only tell where the piece ends.
-  if (piece.axis >= 0 && (piece.axis < kFirstOfGrid || (piece.axis >= kFirstCrease && piece.axis < kFirstSide))) {
-    return unit_or_zero(parting(piece));
+DVec3 BoxInField::normal(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const {
+  if (piece.axis >= 0 && piece.axis < kFirstOfGrid) return unit_or_zero(parting(piece));
+  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) {
+    return across_crease(piece, DVec3(piece.cell) + point, field);
   }
+  // The grid's own directions only tell where the piece ends.
   const DVec3 gradient = unit_or_zero(piece.gradient(point));
   if (gradient != DVec3(0.0) && glm::dot(gradient, box_.displacement) <= 0.0) return gradient;
-  return unit_or_zero(-box_.displacement);
+  return unit_or_zero(piece.axis >= 0 ? parting(piece) : -box_.displacement);
+}
+
+// Where two cells meet in a ridge, what parts an edge of the box from it lies between the gradients of both; where the
+// field goes on beyond a side of the piece, there is no ridge, and its gradient does.
+DVec3 BoxInField::across_crease(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const {
+  const DVec3 normal = unit_or_zero(parting(piece));
+  const DVec3& edge = box_.axes[(piece.axis - kFirstCrease) % 3];
+  const DVec3 side = glm::cross(edge, normal);
+  DVec3 nearest(0.0);
+  double least = -kInfinity;
+  double greatest = kInfinity;
+  for (int i = 0; i < 8; ++i) {
+    constexpr double kNear = 1e-4;
+    const DVec3 away =
+        DVec3((i & 1) != 0 ? kNear : -kNear, (i & 2) != 0 ? kNear : -kNear, (i & 4) != 0 ? kNear : -kNear);
+    const DVec3 gradient = field.gradient_at(point + away);
+    const double along = glm::dot(gradient, normal);
+    if (!(along > 0.0)) continue;
+    // The gradient's angle from the normal, about the edge, as its tangent.
+    const double angle = glm::dot(gradient, side) / along;
+    if (nearest == DVec3(0.0) || std::abs(angle) < std::min(std::abs(least), std::abs(greatest))) {
+      nearest = gradient - glm::dot(gradient, edge) * edge;
+    }
+    if (angle <= 0.0) least = std::max(least, angle);
+    if (angle >= 0.0) greatest = std::min(greatest, angle);
+  }
+  const bool is_between = least > -kInfinity && greatest < kInfinity;
+  const bool is_against = glm::dot(nearest, box_.displacement) < 0.0;
+  return is_between || !is_against ? normal : unit_or_zero(nearest);
 }
 
 DVec3 BoxInField::nearest(const DVec3& centre, const DVec3& point) const {
@@ -245,11 +275,6 @@ std::optional<DVec3> BallInField::point_in_solid(const FieldPiece& piece, double
 DBox BallInField::bounds(IVec3 cell, double /*from*/, double /*to*/) const {
   const DVec3 centre = centre_ - DVec3(cell);
   return {centre - radius_, centre + radius_};
-}
-
-DVec3 BallInField::normal(const FieldPiece& piece, const DVec3& point) const {
-  const DVec3 gradient = unit_or_zero(piece.gradient(point));
-  return gradient != DVec3(0.0) ? gradient : unit_or_zero(centre_ - DVec3(piece.cell) - point);
 }
 
 }  // namespace quoin

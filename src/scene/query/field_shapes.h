@@ -12,6 +12,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/grid/density_grid.h>
+
 #include "scene/query/field_piece.h"
 #include "scene/query/moving_box.h"
 
@@ -48,7 +50,7 @@ class BoxInField {
   /// The box of the piece that it passes between two fractions.
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
   /// From the solid towards the box, of unit length, in the grid; 0 where nothing is known.
-  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point) const;
+  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const;
 
  private:
   static bool is_along_grid(const glm::dmat3& axes) {
@@ -62,6 +64,7 @@ class BoxInField {
   [[nodiscard]] DVec3 direction(const FieldPiece& piece, int which) const;
   [[nodiscard]] DVec3 parting(const FieldPiece& piece) const;
   [[nodiscard]] std::optional<DVec3> by_support(const FieldPiece& piece, const DVec3& centre) const;
+  [[nodiscard]] DVec3 across_crease(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const;
   [[nodiscard]] DVec3 nearest(const DVec3& centre, const DVec3& point) const;
 
   const MovingBox& box_;
@@ -81,7 +84,6 @@ class BallInField {
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   [[nodiscard]] static double time_beyond_doubt(const FieldPiece& /*piece*/) { return 0.0; }
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
-  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point) const;
 
  private:
   DVec3 centre_;
