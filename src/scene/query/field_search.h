@@ -39,14 +39,6 @@ class FieldCells {
   bool knows_chunk_ = false;
 };
 
-/// Where a shape meets a field.
-struct FieldContact {
-  double fraction = std::numeric_limits<double>::infinity();
-  bool starts_inside = false;
-  FieldPiece piece;
-  DVec3 point{0.0};  ///< relative to the piece's cell
-};
-
 template <class Shape>
 class FieldSearch {
  public:
@@ -79,7 +71,10 @@ class FieldSearch {
       const bool is_tiny = std::max({piece.half.x, piece.half.y, piece.half.z}) <= kSmallest;
       // What is neither in it nor parted from it by then is as near as touching: met, if it is on the way.
       if (is_tiny && is_inside) continue;
-      if (is_tiny || looked_at >= kMostPieces) return FieldContact{enter, false, piece, piece.middle};
+      if (is_tiny || looked_at >= kMostPieces) {
+        piece.axis = -1;  // as good as any other
+        return FieldContact{enter, false, piece, piece.middle};
+      }
       learn(piece, until, known);
       refine(piece, enter, known ? known->fraction : until);
     }

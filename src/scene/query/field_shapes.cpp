@@ -147,31 +147,66 @@ DVec3 BoxInField::parting(const FieldPiece& piece) const {
   return piece.axis >= 0 && glm::dot(along, box_.displacement) > 0.0 ? -along : along;
 }
 
-DVec3 BoxInField::normal(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const {
-  if (piece.axis >= 0 && piece.axis < kFirstOfGrid) return unit_or_zero(parting(piece));
-  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) {
-    return across_crease(piece, DVec3(piece.cell) + point, field);
+DVec3 BoxInField::normal(const FieldContact& contact, const DensityGrid& field) const {
+  const FieldPiece& piece = contact.piece;
+  if (piece.axis >= kFirstEdge && piece.axis < kFirstOfGrid) return unit_or_zero(parting(piece));
+  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) return across_crease(contact, field);
+  if (piece.axis >= 0 && piece.axis < kFirstEdge) return of_face(contact, field);
+  // The grid's own directions only tell where the piece ends; then the gradient about that is most in the way.
+  DVec3 normal = unit_or_zero(contact.piece.gradient(contact.point));
+  for (const DVec3& gradient : gradients_about(contact, field)) {
+    const DVec3 other = unit_or_zero(gradient);
+    if (glm::dot(other, box_.displacement) < glm::dot(normal, box_.displacement)) normal = other;
   }
-  // The grid's own directions only tell where the piece ends.
-  const DVec3 gradient = unit_or_zero(piece.gradient(point));
-  if (gradient != DVec3(0.0) && glm::dot(gradient, box_.displacement) <= 0.0) return gradient;
+  if (normal != DVec3(0.0) && glm::dot(normal, box_.displacement) <= 0.0) return normal;
   return unit_or_zero(piece.axis >= 0 ? parting(piece) : -box_.displacement);
+}
+
+// A face that comes to lie on a peak parts the two, and there the gradient is the face's normal, or there are gradients
+// to all sides of it. Otherwise the box meets it with an edge or a corner of the face at the same time.
+DVec3 BoxInField::of_face(const FieldContact& contact, const DensityGrid& field) const {
+  const DVec3 normal = unit_or_zero(parting(contact.piece));
+  const auto aside = [&](const DVec3& gradient) { return gradient - glm::dot(gradient, normal) * normal; };
+  const DVec3 here = contact.piece.gradient(contact.point);
+  const double most = 0.02 * glm::length(here);
+  if (glm::length(aside(here)) <= most) return normal;
+  const std::array<DVec3, 8> gradients = gradients_about(contact, field);
+  DVec3 mean(0.0);
+  for (const DVec3& gradient : gradients) mean += aside(gradient);
+  const bool is_peak =
+      std::any_of(gradients.begin(), gradients.end(), [&](const DVec3& g) { return glm::dot(aside(g), mean) <= 0.0; });
+  if (is_peak) return normal;
+  const DVec3 centre = box_.centre + contact.fraction * box_.displacement;
+  const DVec3 at = glm::abs((DVec3(contact.piece.cell) + contact.point - centre) * box_.axes);
+  DVec3 along = here;
+  for (int i = 0; i < 3; ++i) {
+    if (at[i] < half_size_[i] - 1e-3) along -= glm::dot(along, box_.axes[i]) * box_.axes[i];
+  }
+  along = unit_or_zero(along);
+  return glm::dot(along, box_.displacement) < 0.0 ? along : normal;
+}
+
+std::array<DVec3, 8> BoxInField::gradients_about(const FieldContact& contact, const DensityGrid& field) {
+  constexpr double kNear = 1e-4;
+  std::array<DVec3, 8> gradients{};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const DVec3 away((i & 1) != 0 ? kNear : -kNear, (i & 2) != 0 ? kNear : -kNear, (i & 4) != 0 ? kNear : -kNear);
+    gradients[i] = field.gradient_at(DVec3(contact.piece.cell) + contact.point + away);
+  }
+  return gradients;
 }
 
 // Where two cells meet in a ridge, what parts an edge of the box from it lies between the gradients of both; where the
 // field goes on beyond a side of the piece, there is no ridge, and its gradient does.
-DVec3 BoxInField::across_crease(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const {
+DVec3 BoxInField::across_crease(const FieldContact& contact, const DensityGrid& field) const {
+  const FieldPiece& piece = contact.piece;
   const DVec3 normal = unit_or_zero(parting(piece));
   const DVec3& edge = box_.axes[(piece.axis - kFirstCrease) % 3];
   const DVec3 side = glm::cross(edge, normal);
   DVec3 nearest(0.0);
   double least = -kInfinity;
   double greatest = kInfinity;
-  for (int i = 0; i < 8; ++i) {
-    constexpr double kNear = 1e-4;
-    const DVec3 away =
-        DVec3((i & 1) != 0 ? kNear : -kNear, (i & 2) != 0 ? kNear : -kNear, (i & 4) != 0 ? kNear : -kNear);
-    const DVec3 gradient = field.gradient_at(point + away);
+  for (const DVec3& gradient : gradients_about(contact, field)) {
     const double along = glm::dot(gradient, normal);
     if (!(along > 0.0)) continue;
     // The gradient's angle from the normal, about the edge, as its tangent.

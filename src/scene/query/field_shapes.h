@@ -22,6 +22,14 @@ namespace quoin {
 /// How deep a shape may be in a field's solid and count as touching it, in voxels.
 inline constexpr double kFieldTouch = 1e-6;
 
+/// Where a shape meets a field.
+struct FieldContact {
+  double fraction = std::numeric_limits<double>::infinity();
+  bool starts_inside = false;
+  FieldPiece piece;
+  DVec3 point{0.0};  ///< relative to the piece's cell
+};
+
 /// A box on its way, or at rest.
 ///
 /// The directions that can part it from the solid of a piece: its own three; the plane's, less what of it runs along
@@ -50,7 +58,7 @@ class BoxInField {
   /// The box of the piece that it passes between two fractions.
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
   /// From the solid towards the box, of unit length, in the grid; 0 where nothing is known.
-  [[nodiscard]] DVec3 normal(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const;
+  [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
 
  private:
   static bool is_along_grid(const glm::dmat3& axes) {
@@ -64,7 +72,9 @@ class BoxInField {
   [[nodiscard]] DVec3 direction(const FieldPiece& piece, int which) const;
   [[nodiscard]] DVec3 parting(const FieldPiece& piece) const;
   [[nodiscard]] std::optional<DVec3> by_support(const FieldPiece& piece, const DVec3& centre) const;
-  [[nodiscard]] DVec3 across_crease(const FieldPiece& piece, const DVec3& point, const DensityGrid& field) const;
+  [[nodiscard]] DVec3 of_face(const FieldContact& contact, const DensityGrid& field) const;
+  [[nodiscard]] DVec3 across_crease(const FieldContact& contact, const DensityGrid& field) const;
+  [[nodiscard]] static std::array<DVec3, 8> gradients_about(const FieldContact& contact, const DensityGrid& field);
   [[nodiscard]] DVec3 nearest(const DVec3& centre, const DVec3& point) const;
 
   const MovingBox& box_;

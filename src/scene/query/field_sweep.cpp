@@ -83,7 +83,7 @@ void FieldSweep::check(const IBox& near, double from, double to) {
 }
 
 DVec3 FieldSweep::normal() const {
-  return BoxInField(box_, most_).normal(best_.piece, best_.point, cells_.field());
+  return BoxInField(box_, most_).normal(best_, cells_.field());
 }
 
 namespace {

@@ -45,12 +45,18 @@ struct Body {
   [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
     return sweep_box(tracer, types, box, displacement);
   }
-  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was.
+  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in a
+  // hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
   double move_to(const SweepHit& hit, DVec3 displacement) {
     const double speed = -glm::dot(displacement, hit.normal);
     const double back = speed > 0.0 ? options.skin / speed : 0.0;
     const double fraction = std::max(0.0, hit.fraction - back);
     box.centre += displacement * fraction;
+    const double gap = hit.fraction * speed;
+    if (fraction == 0.0 && hit.in_field && gap < 0.5 * options.skin) {
+      const DVec3 away = hit.normal * (options.skin - gap);
+      if (!sweep(away)) box.centre += away;
+    }
     return fraction;
   }
   void move_out(const SweepHit& hit) { box.centre += hit.normal * (hit.depth + options.skin); }
