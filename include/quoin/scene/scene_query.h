@@ -62,7 +62,7 @@ struct SceneOverlap {
 /// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
 /// nothing, nor does a sphere of radius 0; a box of size 0 is a plate, a rod or a point.
 ///
-/// Fields:  which cells collide, and what is told of too many parts of cells, is as for `sweep_box`: the latter overlap.
+/// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
 /// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
 /// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre,

@@ -24,11 +24,11 @@ struct SweepHit {
 /// field of an instance is negative, however fast it is.
 ///
 /// The box keeps its rotation; grids stand still, in any rotation. Touching is not meeting: a box may slide along a
-/// face. Of voxels met at once the one with an exposed face counts. Numbers that are not finite meet nothing. Sizes of 0
-/// make it a plate, a rod or a point.
+/// face. Of voxels met at once the one with an exposed face counts. Numbers that are not finite meet nothing. Sizes of
+/// 0 make it a plate, a rod or a point.
 ///
 /// Fields: a cell's solid collides where the material of any of its solid samples does; solid without a material does.
-///         The box stops before it or touching it, 1e-6 voxels away at most, whatever the densities mean; less than
+///         The box stops before it or touching it, less than 1e-5 voxels away, whatever the densities mean; less than
 ///         1e-6 voxels deep is touching. Where bounds do not tell within 4,000 parts of cells (a large box that lies
 ///         almost flush on an uneven surface), it stops at the first that is open, up to a part's size away.
 /// Inside: of a field's solid the way out is along the gradient where the box is deepest, and `depth` leads out of all
@@ -45,8 +45,8 @@ struct SweepHit {
 struct FloorOptions {
   DVec3 up{0.0, 1.0, 0.0};  ///< in the world, of any length; where it is 0 or not finite nothing is a floor
   double max_slope = 45.0;  ///< degrees from level
-  /// How high an obstacle may be that is stepped onto, world units; 0: none. There must be a floor on it, or within half
-  /// of the box's width beyond its edge, and room for the box above.
+  /// How high an obstacle may be that is stepped onto, world units; 0: none. There must be a floor on it, or within
+  /// half of the box's width beyond its edge, and room for the box above.
   double step_height = 0.0;
   /// How far below its feet a box that stood on a floor finds the next one, world units: it walks down slopes and steps
   /// without leaving the ground; 0: it falls.

@@ -95,7 +95,10 @@ class FieldSearch {
 
   // Leaves what the shape passes of a piece, unless that is nearly all of it.
   Cut cut(FieldPiece& piece, double from, double to, double share) const {
-    const DBox passed = shape_.bounds(piece.cell, from, to);
+    DBox passed = shape_.bounds(piece.cell, from, to);
+    passed.min = glm::max(passed.min, piece.middle - piece.half);
+    passed.max = glm::min(passed.max, piece.middle + piece.half);
+    shape_.shrink(passed, piece.cell, from, to);
     return cut_to(piece, passed.min - kSmallest / 2.0, passed.max + kSmallest / 2.0, share);
   }
 

@@ -307,6 +307,30 @@ std::optional<DVec3> BallInField::point_in_solid(const FieldPiece& piece, double
   });
 }
 
+void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
+  const DVec3 apart = box_.centre - DVec3(cell);
+  for (int i = 0; i < 3 && !is_upright_; ++i) {
+    const DVec3& axis = box_.axes[i];
+    const double middle = glm::dot(axis, apart);
+    const double a = middle + from * glm::dot(axis, box_.displacement);
+    const double b = middle + to * glm::dot(axis, box_.displacement);
+    const double low = std::min(a, b) - half_size_[i] - kFieldTouch;
+    const double high = std::max(a, b) + half_size_[i] + kFieldTouch;
+    // Along each axis what the slab leaves wherever on the other two.
+    const DVec3 at_min = axis * part.min;
+    const DVec3 at_max = axis * part.max;
+    const DVec3 least = glm::min(at_min, at_max);
+    const DVec3 most = glm::max(at_min, at_max);
+    for (int j = 0; j < 3; ++j) {
+      if (std::abs(axis[j]) < 1e-3) continue;
+      const double begin = low - (most.x + most.y + most.z - most[j]);
+      const double end = high - (least.x + least.y + least.z - least[j]);
+      part.min[j] = std::max(part.min[j], (axis[j] > 0.0 ? begin : end) / axis[j]);
+      part.max[j] = std::min(part.max[j], (axis[j] > 0.0 ? end : begin) / axis[j]);
+    }
+  }
+}
+
 DBox BallInField::bounds(IVec3 cell, double /*from*/, double /*to*/) const {
   const DVec3 centre = centre_ - DVec3(cell);
   return {centre - radius_, centre + radius_};

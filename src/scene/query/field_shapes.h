@@ -55,8 +55,10 @@ class BoxInField {
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   /// When to ask that for a piece that it does meet: once it is in it deeper than the plane's doubt.
   [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
-  /// The box of the piece that it passes between two fractions.
+  /// What it passes between two fractions, relative to a cell.
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  /// Leaves of a box relative to a cell about what it passes between two fractions.
+  void shrink(DBox& part, IVec3 cell, double from, double to) const;
   /// From the solid towards the box, of unit length, in the grid; 0 where nothing is known.
   [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
 
@@ -94,6 +96,7 @@ class BallInField {
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
   [[nodiscard]] static double time_beyond_doubt(const FieldPiece& /*piece*/) { return 0.0; }
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
+  static void shrink(DBox& /*part*/, IVec3 /*cell*/, double /*from*/, double /*to*/) {}
 
  private:
   DVec3 centre_;

@@ -45,8 +45,8 @@ struct Body {
   [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
     return sweep_box(tracer, types, box, displacement);
   }
-  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in a
-  // hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
+  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
+  // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
   double move_to(const SweepHit& hit, DVec3 displacement) {
     const double speed = -glm::dot(displacement, hit.normal);
     const double back = speed > 0.0 ? options.skin / speed : 0.0;
