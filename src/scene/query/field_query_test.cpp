@@ -457,6 +457,22 @@ TEST(FieldQuery, BlocksAndFieldsOfOneGridAreMetTogether) {
   EXPECT_LT(glm::length(field[0].normal - DVec3(0, 1, 0)), 1e-9);
 }
 
+TEST(FieldQuery, PointsAndPlatesMeetBlocksAsWell) {
+  SceneGrid wall;
+  wall.grid.fill_box({{2, -3, -3}, {8, 4, 3}}, kWood);
+  const Scene scene = scene_of(std::move(wall), {});
+  const SceneTracer tracer(scene);
+  for (const DVec3 half : {DVec3(0.0), DVec3(0.0, 1.0, 1.0), DVec3(0.0, 0.0, 1.0)}) {
+    const OrientedBox box{{0.1, 0.2, 0.3}, half, {1, 0, 0, 0}};
+    const auto hit = sweep_box(tracer, scene.types, box, {4, 0, 0});
+    ASSERT_TRUE(hit.has_value());
+    EXPECT_NEAR(hit->fraction, 1.9 / 4.0, 1e-8);
+    EXPECT_EQ(hit->normal, DVec3(-1, 0, 0));
+    EXPECT_TRUE(overlaps(tracer, scene.types, box).empty());
+    EXPECT_EQ(overlaps(tracer, scene.types, moved(box, {2.5, 0, 0})).size(), 1U);
+  }
+}
+
 TEST(FieldQuery, EditsAreMetOnceTheTracerIsUpdated) {
   Scene scene = scene_of(DensityGrid(), {});
   const GridHandle grid = scene.grids().handles()[0];

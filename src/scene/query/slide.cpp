@@ -274,14 +274,13 @@ class Walk {
     const double probe = skin + skin / std::max(steepest_, 0.1);
     const DVec3 down = -up_ * std::max(floor_.snap_distance, probe);
     const auto hit = body_.sweep(down);
-    if (!hit) {
-      is_on_floor_ = false;
-    } else if (hit->depth == 0.0 && is_floor(hit->normal)) {
+    if (hit && hit->depth == 0.0 && is_floor(hit->normal)) {
       body_.move_to(*hit, down);
       land(hit->normal);
-    } else if (!meets_floor_ || hit->fraction * glm::length(down) > probe) {
-      is_on_floor_ = false;
+      return;
     }
+    // On the edge of a step, or between a floor and what is steeper.
+    is_on_floor_ = meets_floor_ && hit && hit->fraction * glm::length(down) <= probe;
   }
 
   Body body_;
