@@ -34,7 +34,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/coordinate_hash.h", {"live", "scene", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
-    {"grid/density/trilinear.h", {"trace"}},
+    {"grid/density/trilinear.h", {"scene", "trace"}},
     {"grid/long_box.h", {"live"}},
     {"light/corner_light.h", {"render"}},
     {"light/glass.h", {"render"}},

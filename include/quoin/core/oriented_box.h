@@ -7,7 +7,7 @@ namespace quoin {
 /// A box anywhere in the world.
 struct OrientedBox {
   DVec3 centre{0.0};
-  DVec3 half_size{0.5};                ///< more than 0; edits take 0 too, queries then meet nothing
+  DVec3 half_size{0.5};                ///< 0 or more: a box, a plate, a rod or a point
   DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length; a zero one counts as no rotation
 };
 

@@ -48,15 +48,21 @@ struct SceneHit {
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x,
                                                      double y, int width, int height, float depth);
 
-/// A voxel that collides (VoxelProperties::collides) and meets a shape.
+/// A voxel that collides (VoxelProperties::collides) and meets a shape, or a cell of a field whose solid does.
 struct SceneOverlap {
   InstanceHandle instance;
-  IVec3 voxel{0};
+  IVec3 voxel{0};         ///< of a field the cell, as in DensityHit
+  VoxelType type = kAir;  ///< of a field the material, of the nearest sample whose material collides
+  bool in_field = false;
+  DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
 };
 
 /// For each instance that has a colliding voxel within a sphere or a box, the first of these (z, then y, then x), in
-/// the order of the instances. To touch is not to overlap. Numbers that are not finite or negative meet nothing.
+/// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
+/// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
+/// nothing, nor does a sphere of radius 0; a box of size 0 is a plate, a rod or a point.
 ///
+/// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
 /// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
 /// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre,

@@ -6,25 +6,52 @@
 
 namespace quoin {
 
-/// Where a moving box first meets a voxel.
+/// Where a moving box first meets a voxel or the solid of a field.
 struct SweepHit {
   double fraction = 0.0;  ///< of the displacement, 0 to 1; 0 when it starts inside
-  DVec3 normal{0.0};      ///< in the world, unit, from the voxel towards the box
+  /// In the world, unit, out of what is met, towards the box. Of a field what parts the two at the contact: the
+  /// field's gradient where a corner of the box meets it, less what of it runs along an edge where that does, and of a
+  /// face of the box that comes to lie on a peak the face's own.
+  DVec3 normal{0.0};
   InstanceHandle instance;
-  IVec3 voxel{0};
-  double depth = 0.0;  ///< how deep it starts inside, in world units along `normal`; 0 when it does not
+  IVec3 voxel{0};         ///< of a field the cell, as in DensityHit
+  double depth = 0.0;     ///< how deep it starts inside, in world units along `normal`; 0 when it does not
+  VoxelType type = kAir;  ///< of a field the material
+  bool in_field = false;
 };
 
-/// The first colliding voxel (VoxelProperties::collides) that a box meets on its way, however fast it is.
+/// The first colliding voxel (VoxelProperties::collides) that a box meets on its way, or the first point at which the
+/// field of an instance is negative, however fast it is.
 ///
 /// The box keeps its rotation; grids stand still, in any rotation. Touching is not meeting: a box may slide along a
-/// face. Of voxels met at once the one with an exposed face counts. Numbers that are not finite meet nothing.
+/// face. Of voxels met at once the one with an exposed face counts. Numbers that are not finite meet nothing. Sizes of
+/// 0 make it a plate, a rod or a point.
 ///
-/// Cost:   for each instance on the way, the voxels about the box for each step of its own size.
+/// Fields: a cell's solid collides where the material of any of its solid samples does; solid without a material does.
+///         The box stops before it or touching it, less than 1e-5 voxels away, whatever the densities mean; less than
+///         1e-6 voxels deep is touching. Where bounds do not tell within 4,000 parts of cells (a large box that lies
+///         almost flush on an uneven surface), it stops at the first that is open, up to a part's size away.
+/// Inside: of a field's solid the way out is along the gradient where the box is deepest, and `depth` leads out of all
+///         of that field that is about the box; of what is nowhere near a surface it leads a voxel on.
+/// Cost:   for each instance on the way, the voxels about the box for each step of its own size; of a field those that
+///         hold solid, and the more parts of these the nearer the box comes to lie along the surface.
 /// Source: the separating axes of two boxes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996), each with the times
-///         at which they begin and cease to part them.
+///         at which they begin and cease to part them; in a field of the box and what lies below planes under the
+///         trilinear field, halved until these are near enough to it.
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry& types,
                                                 const OrientedBox& box, DVec3 displacement);
+
+/// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope`.
+struct FloorOptions {
+  DVec3 up{0.0, 1.0, 0.0};  ///< in the world, of any length; where it is 0 or not finite nothing is a floor
+  double max_slope = 45.0;  ///< degrees from level
+  /// How high an obstacle may be that is stepped onto, world units; 0: none. There must be a floor on it, or within
+  /// half of the box's width beyond its edge, and room for the box above.
+  double step_height = 0.0;
+  /// How far below its feet a box that stood on a floor finds the next one, world units: it walks down slopes and steps
+  /// without leaving the ground; 0: it falls.
+  double snap_distance = 0.0;
+};
 
 struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
@@ -33,19 +60,27 @@ struct SlideOptions {
   /// A box that starts inside is moved out first. Without, it stays where it is: `is_blocked`, with the displacement as
   /// it was.
   bool pushes_out = true;
+  std::optional<FloorOptions> floor = std::nullopt;  ///< nothing: a body that slides, whatever it lies on
 };
 
 struct SlideResult {
-  DVec3 centre{0.0};        ///< where the box ends
-  DVec3 displacement{0.0};  ///< without what went into the contacts: over the time step, the velocity to go on with
-  bool is_blocked = false;  ///< whether anything was met
-  DVec3 normal{0.0};        ///< of the last contact
+  DVec3 centre{0.0};         ///< where the box ends
+  DVec3 displacement{0.0};   ///< without what went into the contacts: over the time step, the velocity to go on with
+  bool is_blocked = false;   ///< whether anything was met; with `SlideOptions::floor`, anything but a floor
+  DVec3 normal{0.0};         ///< of the last such contact
+  bool is_on_floor = false;  ///< at the end, with `SlideOptions::floor`
+  DVec3 floor_normal{0.0};   ///< of that floor
 };
 
 /// Moves a box and lets it slide along what it meets: the part of the displacement that goes into a face is dropped, in
 /// a crease of two faces what does not run along it, in a corner all.
 ///
-/// Cost:    a sweep for each contact, `max_contacts` at most.
+/// With a floor: on one the box keeps the level part of its displacement, and goes up and down with the ground; what
+/// points down is dropped, so that it stands still on a slope, and what is left in the result is level. What is steeper
+/// is a wall to it while it stands: it does not climb it; when it falls it slides down along it. A displacement that
+/// points up leaves the floor. Gravity belongs to the displacement in every frame.
+///
+/// Cost:    a sweep for each contact, `max_contacts` at most. With a floor two more, and four for an attempt to step.
 /// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
                                          DVec3 displacement, const SlideOptions& options = {});

@@ -50,12 +50,12 @@ inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
   return box;
 }
 
-/// Whether a box is one: finite, and larger than nothing.
+/// Whether a box is one: finite, and no less than a point.
 inline bool is_box(const OrientedBox& box) {
   const DVec3 half = box.half_size;
   const DQuat& q = box.rotation;
-  return is_finite(box.centre) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) && is_finite(half) && half.x > 0.0 &&
-         half.y > 0.0 && half.z > 0.0;
+  return is_finite(box.centre) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w) && is_finite(half) &&
+         half.x >= 0.0 && half.y >= 0.0 && half.z >= 0.0;
 }
 
 /// A box's half edges in the world, as columns.

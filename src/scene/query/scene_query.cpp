@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "scene/query/field_search.h"
+#include "scene/query/moving_box.h"
 #include "scene/query/query_in_grid.h"
 
 namespace quoin {
@@ -45,6 +47,7 @@ class SphereInGrid {
     const DVec3 nearest = glm::clamp(centre_, DVec3(voxel), DVec3(voxel + 1));
     return glm::length(nearest - centre_) < radius_ - kTouch;
   }
+  [[nodiscard]] BallInField in_field() const { return {centre_, radius_}; }
 
  private:
   DVec3 centre_;
@@ -53,40 +56,51 @@ class SphereInGrid {
 
 class BoxInGrid {
  public:
-  // `half_axes`: the box's half edges.
-  BoxInGrid(DVec3 centre, const glm::dmat3& half_axes)
-      : centre_(centre), half_axes_(half_axes), separators_(separating_axes(half_axes)) {}
-  [[nodiscard]] DBox bounds() const {
-    const DVec3 reach = reach_of_axes(half_axes_);
-    return {centre_ - reach, centre_ + reach};
-  }
+  explicit BoxInGrid(const MovingBox& box) : box_(box), separators_(separating_axes(box.half_axes)) {}
+  [[nodiscard]] DBox bounds() const { return bounds_between(box_, reach_of_axes(box_.half_axes), 0.0, 0.0); }
   [[nodiscard]] bool meets(IVec3 voxel) const {
-    const DVec3 between = DVec3(voxel) + 0.5 - centre_;
+    const DVec3 between = DVec3(voxel) + 0.5 - box_.centre;
     return std::all_of(separators_.begin(), separators_.end(), [&](DVec3 axis) {
       if (axis == DVec3(0.0)) return true;  // of parallel edges: the other axes decide
-      return std::abs(glm::dot(between, axis)) < reach_along(axis, half_axes_) - kTouch;
+      return std::abs(glm::dot(between, axis)) < reach_along(axis, box_.half_axes) - kTouch;
     });
   }
+  [[nodiscard]] BoxInField in_field() const { return {box_, 0.0}; }
 
  private:
-  DVec3 centre_;
-  glm::dmat3 half_axes_;
+  MovingBox box_;
   SeparatingAxes separators_;
 };
 
 template <class Shape>
-std::optional<IVec3> first_overlap(const Grid& grid, const VoxelRegistry& types, const Shape& shape) {
+std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const VoxelRegistry& types, const Shape& shape) {
+  const Grid& grid = *placed.voxels;
   const IBox box = voxels_within(shape.bounds(), grid.bounds());
   GridReader reader(grid);
   for (int z = box.min.z; z < box.max.z; ++z) {
     for (int y = box.min.y; y < box.max.y; ++y) {
       for (int x = box.min.x; x < box.max.x; ++x) {
         const IVec3 voxel(x, y, z);
-        if (collides(types, reader.get(voxel)) && shape.meets(voxel)) return voxel;
+        const VoxelType type = reader.get(voxel);
+        if (collides(types, type) && shape.meets(voxel)) return SceneOverlap{placed.instance, voxel, type};
       }
     }
   }
   return std::nullopt;
+}
+
+template <class Shape>
+std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const VoxelRegistry& types, const Shape& shape) {
+  if (placed.field == nullptr) return std::nullopt;
+  FieldCells cells(*placed.field, types);
+  const auto in_field = shape.in_field();
+  const auto contact = first_overlap_in_field(cells, in_field);
+  if (!contact) return std::nullopt;
+  const IVec3 cell = contact->piece.cell;
+  const DVec3 gradient = contact->piece.gradient(contact->point);
+  const double length = glm::length(gradient);
+  const DVec3 normal = length > 0.0 ? placed.world_axes * (gradient / length) : DVec3(0.0);
+  return SceneOverlap{placed.instance, cell, cells.material(cell, contact->point), true, normal};
 }
 
 // `shape_of(placed)` is the shape in that grid's space.
@@ -99,8 +113,10 @@ std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegi
   std::vector<SceneOverlap> found;
   for (const std::size_t i : near) {
     const PlacedGrid& placed = tracer.placed()[i];
-    const auto voxel = first_overlap(*placed.voxels, types, shape_of(placed));
-    if (voxel) found.push_back({placed.instance, *voxel});
+    const auto shape = shape_of(placed);
+    auto overlap = first_of_voxels(placed, types, shape);
+    if (!overlap) overlap = first_of_field(placed, types, shape);
+    if (overlap) found.push_back(*overlap);
   }
   return found;
 }
@@ -162,10 +178,9 @@ std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistr
 std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box) {
   if (!is_box(box)) return {};
   const glm::dmat3 half_axes = half_axes_of(box);
-  const DBox bounds = BoxInGrid(box.centre, half_axes).bounds();
-  return overlaps_of(tracer, types, bounds, [&](const PlacedGrid& placed) {
-    const ToGrid to_grid(placed);
-    return BoxInGrid(to_grid.point(box.centre), to_grid.axes * half_axes);
+  const DVec3 reach = reach_of_axes(half_axes);
+  return overlaps_of(tracer, types, {box.centre - reach, box.centre + reach}, [&](const PlacedGrid& placed) {
+    return BoxInGrid(moving_in_grid(placed, box, half_axes, DVec3(0.0)));
   });
 }
 

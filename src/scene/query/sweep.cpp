@@ -3,6 +3,8 @@
 #include <array>
 #include <limits>
 
+#include "scene/query/field_sweep.h"
+#include "scene/query/moving_box.h"
 #include "scene/query/query_in_grid.h"
 
 namespace quoin {
@@ -12,21 +14,19 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Fractions that differ by less are of voxels met at once.
 constexpr double kAtOnce = 1e-9;
 
-// Of any finite vector: the square of a large one would be infinite.
-double length_of(DVec3 v) {
-  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  if (largest == 0.0) return 0.0;
-  return std::min(largest * glm::length(v / largest), std::numeric_limits<double>::max());
-}
-
-// A box on its way through a grid's space.
+// A moving box, with what parts it from voxels.
 struct Moving {
   DVec3 centre{0.0};
-  glm::dmat3 half_axes{1.0};
-  DVec3 displacement{0.0};
   SeparatingAxes axes{};
   std::array<double, 15> reach{};
   std::array<double, 15> speed{};
+
+  explicit Moving(const MovingBox& box) : centre(box.centre), axes(separating_axes(box.half_axes)) {
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      reach[i] = reach_along(axes[i], box.half_axes);
+      speed[i] = glm::dot(box.displacement, axes[i]);
+    }
+  }
 };
 
 // When a moving box meets a voxel.
@@ -84,56 +84,15 @@ Contact meet(const Moving& box, IVec3 voxel) {
   return contact;
 }
 
-// One grid, and the best contact in it so far.
-class GridSweep {
+// The voxels of one grid, and the best contact with them so far; for `follow_way`.
+class BlockSweep {
  public:
-  GridSweep(const Grid& grid, const VoxelRegistry& types, const Moving& box, double most)
-      : grid_(grid), reader_(grid), types_(types), box_(box), most_(most) {}
+  BlockSweep(const Grid& grid, const VoxelRegistry& types, const MovingBox& box)
+      : reader_(grid), types_(types), box_(box), bounds_(grid.bounds()) {}
 
-  void run() {
-    const DVec3 reach = reach_of_axes(box_.half_axes);
-    const double length = length_of(box_.displacement);
-    const double step = std::max(1.0, std::min({reach.x, reach.y, reach.z}));
-    const auto [first, last] = times_within(reach);
-    if (first > last) return;
-    // Whole steps from the start, so that what is met does not depend on the grid's bounds.
-    const double steps = std::max(1.0, std::ceil(length / step));
-    double i = std::floor(first * steps);
-    // So far away steps are lost in rounding; what there is within the bounds is looked at in one.
-    if (i + 1.0 == i) return check_part(reach, first, std::min(last, most_));
-    for (; i / steps <= std::min(last, most_); ++i) {
-      check_part(reach, i / steps, std::min((i + 1.0) / steps, 1.0));
-      if (best_.fraction <= (i + 1.0) / steps || i + 1.0 >= steps) break;
-    }
-  }
-
-  [[nodiscard]] const Contact& best() const { return best_; }
-  [[nodiscard]] IVec3 voxel() const { return voxel_; }
-
- private:
-  // When the box's bounds are within those of the grid's voxels.
-  [[nodiscard]] std::pair<double, double> times_within(DVec3 reach) const {
-    const IBox tight = grid_.bounds();
-    double first = 0.0;
-    double last = 1.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double low = tight.min[axis] - reach[axis] - 1.0 - box_.centre[axis];
-      const double high = tight.max[axis] + reach[axis] + 1.0 - box_.centre[axis];
-      const double d = box_.displacement[axis];
-      if (d == 0.0) {
-        if (low > 0.0 || high < 0.0) return {1.0, 0.0};
-        continue;
-      }
-      first = std::max(first, std::min(low / d, high / d));
-      last = std::min(last, std::max(low / d, high / d));
-    }
-    return {first, last};
-  }
-
-  void check_part(DVec3 reach, double from, double to) {
-    const DVec3 a = box_.centre + from * box_.displacement;
-    const DVec3 b = box_.centre + to * box_.displacement;
-    const IBox near = voxels_within({glm::min(a, b) - reach - 1e-6, glm::max(a, b) + reach + 1e-6}, grid_.bounds());
+  [[nodiscard]] const IBox& bounds() const { return bounds_; }
+  [[nodiscard]] double fraction() const { return best_.fraction; }
+  void check(const IBox& near, double /*from*/, double /*to*/) {
     for (int z = near.min.z; z < near.max.z; ++z) {
       for (int y = near.min.y; y < near.max.y; ++y) {
         for (int x = near.min.x; x < near.max.x; ++x) check_voxel({x, y, z});
@@ -141,6 +100,11 @@ class GridSweep {
     }
   }
 
+  [[nodiscard]] const Contact& best() const { return best_; }
+  [[nodiscard]] IVec3 voxel() const { return voxel_; }
+  [[nodiscard]] VoxelType type() { return reader_.get(voxel_); }
+
+ private:
   void check_voxel(IVec3 voxel) {
     if (!collides(types_, reader_.get(voxel))) return;
     const Contact contact = meet(box_, voxel);
@@ -162,29 +126,49 @@ class GridSweep {
     return !collides(types_, reader_.get(before));
   }
 
-  const Grid& grid_;
   GridReader reader_;
   const VoxelRegistry& types_;
-  const Moving& box_;
-  double most_;
+  Moving box_;
+  IBox bounds_;
   Contact best_;
   IVec3 voxel_{0};
   bool best_is_exposed_ = false;
 };
 
-Moving moving_in_grid(const PlacedGrid& placed, const OrientedBox& box, const glm::dmat3& half_axes,
-                      DVec3 displacement) {
-  const ToGrid to_grid(placed);
-  Moving moving;
-  moving.centre = to_grid.point(box.centre);
-  moving.half_axes = to_grid.axes * half_axes;
-  moving.displacement = to_grid.axes * displacement;
-  moving.axes = separating_axes(moving.half_axes);
-  for (std::size_t i = 0; i < moving.axes.size(); ++i) {
-    moving.reach[i] = reach_along(moving.axes[i], moving.half_axes);
-    moving.speed[i] = glm::dot(moving.displacement, moving.axes[i]);
+// The first contact with what an instance places, up to the fraction `most`.
+std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const VoxelRegistry& types, const MovingBox& box,
+                                        double most) {
+  if (placed.voxels->bounds().empty()) return std::nullopt;
+  BlockSweep sweep(*placed.voxels, types, box);
+  follow_way(box, most, sweep);
+  const Contact& best = sweep.best();
+  if (best.axis < 0) return std::nullopt;
+  return SweepHit{best.fraction,
+                  glm::normalize(placed.world_axes * best.normal),
+                  placed.instance,
+                  sweep.voxel(),
+                  best.depth * placed.voxel_size,
+                  sweep.type()};
+}
+
+std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const VoxelRegistry& types, const MovingBox& box,
+                                       double most) {
+  FieldSweep sweep(*placed.field, types, box, most);
+  follow_way(box, most, sweep);
+  const FieldContact& best = sweep.best();
+  if (!(best.fraction <= most)) return std::nullopt;
+  SweepHit hit{best.fraction, sweep.normal(), placed.instance, best.piece.cell, 0.0, sweep.material(), true};
+  if (best.starts_inside) {
+    const WayOut out = way_out(*placed.field, types, box, best);
+    hit.normal = out.normal;
+    hit.depth = out.depth * placed.voxel_size;
   }
-  return moving;
+  hit.normal = glm::normalize(placed.world_axes * hit.normal);
+  return hit;
+}
+
+bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
+  return !first || hit.fraction < first->fraction || (hit.fraction == first->fraction && hit.depth > first->depth);
 }
 
 }  // namespace
@@ -202,78 +186,14 @@ std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry
   std::optional<SweepHit> first;
   for (const std::size_t i : near) {
     const PlacedGrid& placed = tracer.placed()[i];
-    const Moving moving = moving_in_grid(placed, box, half_axes, displacement);
-    GridSweep sweep(*placed.voxels, types, moving, first ? first->fraction : 1.0);
-    sweep.run();
-    const Contact& best = sweep.best();
-    if (best.axis < 0) continue;
-    const double depth = best.depth * placed.voxel_size;
-    if (first && (best.fraction > first->fraction || (best.fraction == first->fraction && depth <= first->depth))) {
-      continue;
-    }
-    first =
-        SweepHit{best.fraction, glm::normalize(placed.world_axes * best.normal), placed.instance, sweep.voxel(), depth};
+    const MovingBox moving = moving_in_grid(placed, box, half_axes, displacement);
+    const auto of_voxels = first_of_voxels(placed, types, moving, first ? first->fraction : 1.0);
+    if (of_voxels && is_sooner(*of_voxels, first)) first = of_voxels;
+    if (placed.field == nullptr) continue;
+    const auto of_field = first_of_field(placed, types, moving, first ? first->fraction : 1.0);
+    if (of_field && is_sooner(*of_field, first)) first = of_field;
   }
   return first;
-}
-
-namespace {
-
-// What is left of a displacement after the contacts so far.
-DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
-  const auto goes_into = [&](DVec3 d) {
-    return std::any_of(normals.begin(), normals.end(),
-                       [&](DVec3 normal) { return glm::dot(d, normal) < -1e-9 * glm::length(d); });
-  };
-  if (!goes_into(displacement)) return displacement;
-  for (const DVec3 normal : normals) {
-    const DVec3 slid = displacement - glm::dot(displacement, normal) * normal;
-    if (glm::dot(displacement, normal) < 0.0 && !goes_into(slid)) return slid;
-  }
-  for (std::size_t i = 0; i < normals.size(); ++i) {
-    for (std::size_t j = i + 1; j < normals.size(); ++j) {
-      const DVec3 crease = glm::cross(normals[i], normals[j]);
-      const double squared = glm::dot(crease, crease);
-      if (squared < 1e-12) continue;
-      const DVec3 slid = crease * (glm::dot(displacement, crease) / squared);
-      if (!goes_into(slid)) return slid;
-    }
-  }
-  return DVec3(0.0);
-}
-
-}  // namespace
-
-SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
-                           DVec3 displacement, const SlideOptions& options) {
-  SlideResult result{box.centre, displacement, false, DVec3(0.0)};
-  OrientedBox moving = box;
-  DVec3 left = displacement;
-  std::vector<DVec3> normals;
-  for (int contact = 0; contact < options.max_contacts; ++contact) {
-    const auto hit = sweep_box(tracer, types, moving, left);
-    if (!hit) {
-      if (is_finite(left)) moving.centre += left;
-      break;
-    }
-    result.is_blocked = true;
-    result.normal = hit->normal;
-    if (hit->depth > 0.0) {
-      if (!options.pushes_out) break;
-      moving.centre += hit->normal * (hit->depth + options.skin);
-      continue;
-    }
-    const double speed = -glm::dot(left, hit->normal);
-    const double back = speed > 0.0 ? options.skin / speed : 0.0;
-    const double fraction = std::max(0.0, hit->fraction - back);
-    moving.centre += left * fraction;
-    normals.push_back(hit->normal);
-    left = along_contacts(left * (1.0 - fraction), normals);
-    if (left == DVec3(0.0)) break;
-  }
-  result.displacement = along_contacts(displacement, normals);
-  result.centre = moving.centre;
-  return result;
 }
 
 }  // namespace quoin

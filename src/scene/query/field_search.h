@@ -1,0 +1,203 @@
+#pragma once
+
+// Where a shape first meets the solid of a field: the pieces that it may meet soonest are looked at first, and halved
+// where their bounds do not tell.
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/half.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/trace/density_ray.h>
+
+#include "scene/query/field_piece.h"
+#include "scene/query/field_shapes.h"
+
+namespace quoin {
+
+/// The cells of a field that hold solid that collides.
+class FieldCells {
+ public:
+  FieldCells(const DensityTree& tree, const VoxelRegistry& types) : tree_(tree), types_(types) {}
+  [[nodiscard]] IBox bounds() const { return tree_.cells().bounds(); }
+  [[nodiscard]] const DensityGrid& field() const { return tree_.field(); }
+  /// Whether a solid corner of the cell collides; the corners' densities.
+  bool read(IVec3 cell, CellCorners& corners);
+  /// Of the nearest solid corner that collides; of several, the least of (z, y, x). `point` is relative to the cell.
+  [[nodiscard]] VoxelType material(IVec3 cell, const DVec3& point);
+
+ private:
+  const DensityChunk* chunk_of_sample(IVec3 sample);
+  [[nodiscard]] bool collides_at(IVec3 sample);
+  [[nodiscard]] float density(IVec3 sample);
+
+  const DensityTree& tree_;
+  const VoxelRegistry& types_;
+  const DensityChunk* chunk_ = nullptr;
+  IVec3 chunk_at_{0};
+  bool knows_chunk_ = false;
+};
+
+template <class Shape>
+class FieldSearch {
+ public:
+  explicit FieldSearch(const Shape& shape) : shape_(shape) {}
+
+  /// Of a cell the part that the shape passes between two fractions.
+  void add(IVec3 cell, const CellCorners& corners, double from, double to) {
+    FieldPiece piece;
+    piece.cell = cell;
+    piece.corners = corners;
+    if (cut(piece, from, to, 1.0) != Cut::Nothing) keep(piece);
+  }
+
+  /// The first contact of what was added, up to the fraction `until`.
+  [[nodiscard]] std::optional<FieldContact> first(double until) {
+    std::optional<FieldContact> known;  // no later than this
+    for (int looked_at = 0; !pieces_.empty(); ++looked_at) {
+      std::pop_heap(pieces_.begin(), pieces_.end(), later);
+      FieldPiece piece = pieces_.back();
+      pieces_.pop_back();
+      const double before = known ? known->fraction : until;
+      if (piece.enter > before) break;
+      const bool is_inside = piece.enter < 0.0;
+      const double enter = std::max(piece.enter, 0.0);
+      const bool is_flat = piece.doubt <= kFlat * std::sqrt(piece.square_of_slope);
+      if (is_inside || is_flat) {
+        const auto point = shape_.point_in_solid(piece, is_inside ? 0.0 : std::min(enter + piece.slack, until));
+        if (point) return FieldContact{enter, is_inside, piece, *point};
+      }
+      const bool is_tiny = std::max({piece.half.x, piece.half.y, piece.half.z}) <= kSmallest;
+      // What is neither in it nor parted from it by then is as near as touching: met, if it is on the way.
+      if (is_tiny && is_inside) continue;
+      if (is_tiny || looked_at >= kMostPieces) {
+        piece.axis = -1;  // as good as any other
+        return FieldContact{enter, false, piece, piece.middle};
+      }
+      learn(piece, until, known);
+      refine(piece, enter, known ? known->fraction : until);
+    }
+    return known;
+  }
+
+ private:
+  // Pieces no larger than this are not halved.
+  static constexpr double kSmallest = 1e-6;
+  // How far a piece's plane may be off, in voxels, for the box to be in its solid once it is deeper than touching.
+  static constexpr double kFlat = 2.0 * kFieldTouch;
+  // What many pieces cannot tell is met.
+  static constexpr int kMostPieces = 4'000;
+
+  static bool later(const FieldPiece& a, const FieldPiece& b) { return a.enter > b.enter; }
+
+  enum class Cut { Nothing, Little, Much };
+
+  // Leaves what the shape passes of a piece, unless that is nearly all of it.
+  Cut cut(FieldPiece& piece, double from, double to, double share) const {
+    DBox passed = shape_.bounds(piece.cell, from, to);
+    passed.min = glm::max(passed.min, piece.middle - piece.half);
+    passed.max = glm::min(passed.max, piece.middle + piece.half);
+    shape_.shrink(passed, piece.cell, from, to);
+    return cut_to(piece, passed.min - kSmallest / 2.0, passed.max + kSmallest / 2.0, share);
+  }
+
+  static Cut cut_to(FieldPiece& piece, DVec3 low, DVec3 high, double share) {
+    low = glm::max(low, piece.middle - piece.half);
+    high = glm::min(high, piece.middle + piece.half);
+    const DVec3 size = high - low;
+    if (!(size.x > 0.0 && size.y > 0.0 && size.z > 0.0)) return Cut::Nothing;
+    if (size.x * size.y * size.z >= share * 8.0 * piece.half.x * piece.half.y * piece.half.z) return Cut::Little;
+    piece.restrict_to(low, high);
+    return Cut::Much;
+  }
+
+  // The box of what lies below its plane.
+  static Cut cut_above_plane(FieldPiece& piece) {
+    DVec3 low(-1.0);
+    DVec3 high(1.0);
+    const DVec3 rises = glm::abs(piece.rise);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(rises[axis] > 0.0)) continue;
+      const double most = (rises.x + rises.y + rises.z - rises[axis] - piece.level) / rises[axis] + 1e-9;
+      if (most < -1.0) return Cut::Nothing;
+      if (most >= 1.0) continue;
+      (piece.rise[axis] > 0.0 ? high : low)[axis] = piece.rise[axis] > 0.0 ? most : -most;
+    }
+    const DVec3 room(kSmallest / 2.0);
+    return cut_to(piece, piece.middle + piece.half * low - room, piece.middle + piece.half * high + room, 0.7);
+  }
+
+  void keep(FieldPiece& piece) {
+    if (!piece.has_solid()) return;
+    piece.measure();
+    if (shape_.may_meet(piece)) push(piece);
+  }
+
+  void push(const FieldPiece& piece) {
+    pieces_.push_back(piece);
+    std::push_heap(pieces_.begin(), pieces_.end(), later);
+  }
+
+  void learn(const FieldPiece& piece, double until, std::optional<FieldContact>& known) const {
+    const double time = shape_.time_beyond_doubt(piece);
+    if (!(time < (known ? known->fraction : until))) return;
+    if (const auto point = shape_.point_in_solid(piece, time)) known = FieldContact{time, false, piece, *point};
+  }
+
+  void refine(FieldPiece& piece, double from, double to) {
+    Cut much = cut(piece, from, to, 0.7);
+    if (much == Cut::Nothing) return;
+    if (much == Cut::Much) {
+      if (!piece.has_solid()) return;
+      piece.measure();
+    }
+    const Cut below = cut_above_plane(piece);
+    if (below == Cut::Nothing) return;
+    if (much == Cut::Much || below == Cut::Much) return keep(piece);
+    // Where the doubt comes from, if that is what is left to be settled; then all directions; then the longest side.
+    const int longest = greatest(piece.half);
+    if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[longest]) {
+      const int axis = greatest(piece.twist);
+      return halve(piece, piece.half[axis] > kSmallest ? axis : longest);
+    }
+    if (piece.is_exact) return halve(piece, longest);
+    if (shape_.may_meet_exactly(piece)) push(piece);
+  }
+
+  static int greatest(const DVec3& v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; }
+
+  void halve(const FieldPiece& piece, int axis) {
+    for (const double side : {-1.0, 1.0}) {
+      FieldPiece part = piece;
+      DVec3 low = piece.middle - piece.half;
+      DVec3 high = piece.middle + piece.half;
+      (side < 0.0 ? high : low)[axis] = piece.middle[axis];
+      part.restrict_to(low, high);
+      keep(part);
+    }
+  }
+
+  const Shape& shape_;
+  std::vector<FieldPiece> pieces_;  // a heap, the soonest first
+};
+
+/// The first cell (z, then y, then x) whose colliding solid a shape at rest meets, deeper than kFieldTouch.
+template <class Shape>
+std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shape& shape) {
+  const IBox box = voxels_within(shape.bounds(IVec3{0}, 0.0, 0.0), cells.bounds());
+  CellCorners corners;
+  FieldSearch<Shape> search(shape);
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      for (int x = box.min.x; x < box.max.x; ++x) {
+        if (!cells.read({x, y, z}, corners)) continue;
+        search.add({x, y, z}, corners, 0.0, 0.0);
+        if (const auto contact = search.first(0.0)) return contact;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace quoin

@@ -1,0 +1,339 @@
+#include "scene/query/field_shapes.h"
+
+namespace quoin {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Of the directions that may part a box from a piece.
+constexpr int kFirstEdge = 3;
+constexpr int kSlope = 6;
+constexpr int kFirstOfGrid = 7;
+constexpr int kFirstCrease = 10;  // edges of the plane and the piece's sides, by three of the box
+constexpr int kFirstSide = 19;    // edges of the piece, by three of the box
+constexpr int kAllDirections = 28;
+constexpr std::array<DVec3, 3> kUnits = {DVec3(1.0, 0.0, 0.0), DVec3(0.0, 1.0, 0.0), DVec3(0.0, 0.0, 1.0)};
+
+bool is_in(const FieldPiece& piece, const DVec3& point) {
+  const DVec3 away = glm::abs(point - piece.middle) - piece.half;
+  return std::max({away.x, away.y, away.z}) <= 1e-9;
+}
+
+DVec3 clamped(const FieldPiece& piece, const DVec3& point) {
+  return glm::clamp(point, piece.middle - piece.half, piece.middle + piece.half);
+}
+
+DVec3 unit_or_zero(const DVec3& v) {
+  const double length = glm::length(v);
+  return length > 0.0 ? v / length : DVec3(0.0);
+}
+
+// By turns the nearest point of a shape, and a step from there down the field.
+template <class Nearest>
+std::optional<DVec3> by_turns(const FieldPiece& piece, Nearest&& nearest) {
+  DVec3 point = piece.middle;
+  for (int turn = 0; turn < 4; ++turn) {
+    const double density = piece.density(point);
+    if (density >= 0.0 && piece.square_of_slope > 0.0) {
+      point = clamped(piece, point - piece.slope * ((density + piece.doubt) / piece.square_of_slope));
+    }
+    point = nearest(point);
+    if (is_in(piece, point) && piece.density(point) < 0.0) return point;
+    point = clamped(piece, point);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+// The times during which nothing is known to part a box from the solid of a piece.
+struct BoxInField::Course {
+  double until;
+  double at_once;  // times that differ by less are the same
+  double enter = -kInfinity;
+  double leave = kInfinity;
+  double slack = 0.0;
+  int axis = -1;
+
+  // A direction of any length: how far the solid reaches along it from the piece's middle, how far away the box's
+  // centre is from there and how far it reaches itself, and how fast it moves. Returns whether they may meet at all.
+  bool passes(int which, FieldPiece::Extent solid, double apart, double reach, double rate, double length) {
+    if (rate > 0.0) {
+      rate = -rate;
+      apart = -apart;
+      std::swap(solid.ahead, solid.behind);
+    }
+    const double gap = apart - reach - solid.ahead;
+    const double left = apart + reach + solid.behind;
+    const double touch = kFieldTouch * length;
+    if (left <= touch || gap + rate * until >= -touch) return false;
+    if (rate == 0.0) return true;
+    leave = std::min(leave, left / -rate);
+    // Of directions that part them equally long, the first.
+    const double begin = gap / -rate;
+    if (gap > -touch && begin > enter + (which < axis ? -at_once : at_once)) {
+      enter = std::max(begin, enter);
+      slack = (2.0 * touch - std::min(gap, 0.0)) / -rate;
+      axis = which;
+    }
+    return enter <= leave;
+  }
+};
+
+bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
+  Course course{until_, at_once_};
+  const DVec3 apart = box_.centre - DVec3(piece.cell) - piece.middle;
+  // `length`: what touching is measured in.
+  const auto passes = [&](int which, const DVec3& along, double length) {
+    const DVec3 along_half = along * piece.half;
+    const auto extent =
+        is_exact ? piece.exact_extent(along_half) : piece.extent(along_half, glm::dot(along, piece.slope));
+    const DVec3 reaches = glm::abs(along * box_.axes) * half_size_;
+    return course.passes(which, extent, glm::dot(along, apart), reaches.x + reaches.y + reaches.z,
+                         glm::dot(along, box_.displacement), length);
+  };
+  // The plane's parts most that are not met, so it comes first.
+  const bool has_slope = piece.square_of_slope > 0.0;
+  if (has_slope && !passes(kSlope, piece.slope, std::sqrt(piece.square_of_slope))) return false;
+  for (int i = 0; i < 3; ++i) {
+    if (!passes(i, box_.axes[i], 1.0)) return false;
+    if (!is_upright_ && !passes(kFirstOfGrid + i, kUnits[static_cast<std::size_t>(i)], 1.0)) return false;
+  }
+  const int last = !is_exact ? kSlope : is_upright_ ? kFirstSide : kAllDirections;
+  for (int which = kFirstEdge; which < last && has_slope; ++which) {
+    if (which == kSlope) which = kFirstCrease;
+    const DVec3 along = direction(piece, which);
+    const double square = glm::dot(along, along);
+    if (square > 0.0 && !passes(which, along, std::sqrt(square))) return false;
+  }
+  piece.axis = course.axis;
+  piece.slack = course.slack;
+  piece.is_exact = is_exact;
+  // What is inside from the start comes before what is met at once.
+  piece.enter = course.axis < 0 ? -1.0 : std::max(course.enter, 0.0);
+  return true;
+}
+
+bool BoxInField::may_meet(FieldPiece& piece) const {
+  return follow(piece, false);
+}
+
+bool BoxInField::may_meet_exactly(FieldPiece& piece) const {
+  return follow(piece, true);
+}
+
+// 0 where two edges are parallel.
+DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
+  const auto across = [](const DVec3& a, const DVec3& b) {
+    const DVec3 product = glm::cross(a, b);
+    return glm::dot(product, product) > 1e-12 * glm::dot(a, a) * glm::dot(b, b) ? product : DVec3(0.0);
+  };
+  if (which < kFirstEdge) return box_.axes[which];
+  if (which < kSlope) {
+    const DVec3& edge = box_.axes[which - kFirstEdge];
+    const DVec3 rest = piece.slope - glm::dot(piece.slope, edge) * edge;
+    return glm::dot(rest, rest) > 1e-9 * piece.square_of_slope ? rest : DVec3(0.0);
+  }
+  if (which == kSlope) return piece.slope;
+  if (which < kFirstCrease) return kUnits[static_cast<std::size_t>(which - kFirstOfGrid)];
+  const int pair = (which - kFirstCrease) % 9;
+  const DVec3 side = kUnits[static_cast<std::size_t>(pair / 3)];
+  const DVec3 edge = which < kFirstSide ? across(piece.slope, side) : side;
+  return across(edge, box_.axes[pair % 3]);
+}
+
+// What parts the two until they meet, towards the box; of what is inside from the start the plane's.
+DVec3 BoxInField::parting(const FieldPiece& piece) const {
+  const DVec3 along = direction(piece, piece.axis < 0 ? kSlope : piece.axis);
+  return piece.axis >= 0 && glm::dot(along, box_.displacement) > 0.0 ? -along : along;
+}
+
+DVec3 BoxInField::normal(const FieldContact& contact, const DensityGrid& field) const {
+  const FieldPiece& piece = contact.piece;
+  if (piece.axis >= kFirstEdge && piece.axis < kFirstOfGrid) return unit_or_zero(parting(piece));
+  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) return across_crease(contact, field);
+  if (piece.axis >= 0 && piece.axis < kFirstEdge) return of_face(contact, field);
+  // The grid's own directions only tell where the piece ends; then the gradient about that is most in the way.
+  DVec3 normal = unit_or_zero(contact.piece.gradient(contact.point));
+  for (const DVec3& gradient : gradients_about(contact, field)) {
+    const DVec3 other = unit_or_zero(gradient);
+    if (glm::dot(other, box_.displacement) < glm::dot(normal, box_.displacement)) normal = other;
+  }
+  if (normal != DVec3(0.0) && glm::dot(normal, box_.displacement) <= 0.0) return normal;
+  return unit_or_zero(piece.axis >= 0 ? parting(piece) : -box_.displacement);
+}
+
+// A face that comes to lie on a peak parts the two, and there the gradient is the face's normal, or there are gradients
+// to all sides of it. Otherwise the box meets it with an edge or a corner of the face at the same time.
+DVec3 BoxInField::of_face(const FieldContact& contact, const DensityGrid& field) const {
+  const DVec3 normal = unit_or_zero(parting(contact.piece));
+  const auto aside = [&](const DVec3& gradient) { return gradient - glm::dot(gradient, normal) * normal; };
+  const DVec3 here = contact.piece.gradient(contact.point);
+  const double most = 0.02 * glm::length(here);
+  if (glm::length(aside(here)) <= most) return normal;
+  const std::array<DVec3, 8> gradients = gradients_about(contact, field);
+  DVec3 mean(0.0);
+  for (const DVec3& gradient : gradients) mean += aside(gradient);
+  const bool is_peak =
+      std::any_of(gradients.begin(), gradients.end(), [&](const DVec3& g) { return glm::dot(aside(g), mean) <= 0.0; });
+  if (is_peak) return normal;
+  const DVec3 centre = box_.centre + contact.fraction * box_.displacement;
+  const DVec3 at = glm::abs((DVec3(contact.piece.cell) + contact.point - centre) * box_.axes);
+  DVec3 along = here;
+  for (int i = 0; i < 3; ++i) {
+    if (at[i] < half_size_[i] - 1e-3) along -= glm::dot(along, box_.axes[i]) * box_.axes[i];
+  }
+  along = unit_or_zero(along);
+  return glm::dot(along, box_.displacement) < 0.0 ? along : normal;
+}
+
+std::array<DVec3, 8> BoxInField::gradients_about(const FieldContact& contact, const DensityGrid& field) {
+  constexpr double kNear = 1e-4;
+  std::array<DVec3, 8> gradients{};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const DVec3 away((i & 1) != 0 ? kNear : -kNear, (i & 2) != 0 ? kNear : -kNear, (i & 4) != 0 ? kNear : -kNear);
+    gradients[i] = field.gradient_at(DVec3(contact.piece.cell) + contact.point + away);
+  }
+  return gradients;
+}
+
+// Where two cells meet in a ridge, what parts an edge of the box from it lies between the gradients of both; where the
+// field goes on beyond a side of the piece, there is no ridge, and its gradient does.
+DVec3 BoxInField::across_crease(const FieldContact& contact, const DensityGrid& field) const {
+  const FieldPiece& piece = contact.piece;
+  const DVec3 normal = unit_or_zero(parting(piece));
+  const DVec3& edge = box_.axes[(piece.axis - kFirstCrease) % 3];
+  const DVec3 side = glm::cross(edge, normal);
+  DVec3 nearest(0.0);
+  double least = -kInfinity;
+  double greatest = kInfinity;
+  for (const DVec3& gradient : gradients_about(contact, field)) {
+    const double along = glm::dot(gradient, normal);
+    if (!(along > 0.0)) continue;
+    // The gradient's angle from the normal, about the edge, as its tangent.
+    const double angle = glm::dot(gradient, side) / along;
+    if (nearest == DVec3(0.0) || std::abs(angle) < std::min(std::abs(least), std::abs(greatest))) {
+      nearest = gradient - glm::dot(gradient, edge) * edge;
+    }
+    if (angle <= 0.0) least = std::max(least, angle);
+    if (angle >= 0.0) greatest = std::min(greatest, angle);
+  }
+  const bool is_between = least > -kInfinity && greatest < kInfinity;
+  const bool is_against = glm::dot(nearest, box_.displacement) < 0.0;
+  return is_between || !is_against ? normal : unit_or_zero(nearest);
+}
+
+DVec3 BoxInField::nearest(const DVec3& centre, const DVec3& point) const {
+  const DVec3 at = glm::clamp((point - centre) * box_.axes, -half_size_, half_size_);
+  return centre + box_.axes * at;
+}
+
+// The point of the box that is deepest below what parts the two; where a whole edge or face is, the point of it that is
+// nearest to where the plane is highest.
+std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3& centre) const {
+  const DVec3 up = parting(piece);
+  const double square = piece.square_of_slope;
+  DVec3 corner = piece.middle;
+  DVec3 highest = corner;
+  if (square > 0.0) {
+    const DVec3 rest = (up - glm::dot(up, piece.slope) / square * piece.slope) * piece.half;
+    const double least = 1e-9 * (std::abs(rest.x) + std::abs(rest.y) + std::abs(rest.z));
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(rest[i]) > least) corner[i] += std::copysign(piece.half[i], rest[i]);
+    }
+    const double above = piece.density(corner);
+    highest = clamped(piece, corner - piece.slope * (above / square));
+  }
+  const DVec3 along = up * box_.axes;
+  DVec3 at = (highest - centre) * box_.axes;
+  const double length = glm::length(up);
+  for (int i = 0; i < 3; ++i) {
+    at[i] = std::abs(along[i]) > 1e-7 * length ? std::copysign(half_size_[i], -along[i])
+                                               : std::clamp(at[i], -half_size_[i], half_size_[i]);
+  }
+  if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) {
+    // Where the edge of the box crosses the side of the piece.
+    const int side = (piece.axis - kFirstCrease) / 3;
+    const int edge = (piece.axis - kFirstCrease) % 3;
+    at[edge] = 0.0;
+    const DVec3 from = centre + box_.axes * at;
+    at[edge] = std::clamp((corner[side] - from[side]) / box_.axes[edge][side], -half_size_[edge], half_size_[edge]);
+  }
+  const DVec3 point = centre + box_.axes * at;
+  return is_in(piece, point) && piece.density(point) < 0.0 ? std::optional(point) : std::nullopt;
+}
+
+std::optional<DVec3> BoxInField::point_in_solid(const FieldPiece& piece, double until) const {
+  const DVec3 centre = box_.centre - DVec3(piece.cell) + until * box_.displacement;
+  // Of what tells where the box comes upon the surface, only there.
+  if (piece.axis >= 0) {
+    const auto point = by_support(piece, centre);
+    if (point || !piece.is_exact) return point;
+  }
+  return by_turns(piece, [&](const DVec3& point) { return nearest(centre, point); });
+}
+
+double BoxInField::time_beyond_doubt(const FieldPiece& piece) const {
+  const double rate = -glm::dot(piece.slope, box_.displacement);
+  return rate > 0.0 ? std::max(piece.enter, 0.0) + piece.slack + 2.01 * piece.doubt / rate : kInfinity;
+}
+
+DBox BoxInField::bounds(IVec3 cell, double from, double to) const {
+  const DBox within = bounds_between(box_, reach_, from, to);
+  return {within.min - DVec3(cell), within.max - DVec3(cell)};
+}
+
+bool BallInField::may_meet(FieldPiece& piece) const {
+  const DVec3 centre = centre_ - DVec3(piece.cell);
+  piece.enter = -1.0;
+  piece.is_exact = true;
+  // By turns within the piece and below its plane: near to the nearest point of its solid.
+  DVec3 nearest = clamped(piece, centre);
+  for (int turn = 0; turn < 4 && piece.square_of_slope > 0.0; ++turn) {
+    const double above = glm::dot(piece.slope, nearest - piece.middle) + piece.level;
+    if (!(above > 0.0)) break;
+    nearest = clamped(piece, nearest - piece.slope * (above / piece.square_of_slope));
+  }
+  const DVec3 away = unit_or_zero(centre - nearest);
+  const double apart = glm::dot(away, centre - piece.middle) - piece.exact_extent(away * piece.half).ahead;
+  return apart < radius_ - kFieldTouch;
+}
+
+std::optional<DVec3> BallInField::point_in_solid(const FieldPiece& piece, double /*until*/) const {
+  const DVec3 centre = centre_ - DVec3(piece.cell);
+  return by_turns(piece, [&](const DVec3& point) {
+    const DVec3 away = point - centre;
+    const double length = glm::length(away);
+    return length > radius_ ? centre + away * (radius_ / length) : point;
+  });
+}
+
+void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
+  const DVec3 apart = box_.centre - DVec3(cell);
+  for (int i = 0; i < 3 && !is_upright_; ++i) {
+    const DVec3& axis = box_.axes[i];
+    const double middle = glm::dot(axis, apart);
+    const double a = middle + from * glm::dot(axis, box_.displacement);
+    const double b = middle + to * glm::dot(axis, box_.displacement);
+    const double low = std::min(a, b) - half_size_[i] - kFieldTouch;
+    const double high = std::max(a, b) + half_size_[i] + kFieldTouch;
+    // Along each axis what the slab leaves wherever on the other two.
+    const DVec3 at_min = axis * part.min;
+    const DVec3 at_max = axis * part.max;
+    const DVec3 least = glm::min(at_min, at_max);
+    const DVec3 most = glm::max(at_min, at_max);
+    for (int j = 0; j < 3; ++j) {
+      if (std::abs(axis[j]) < 1e-3) continue;
+      const double begin = low - (most.x + most.y + most.z - most[j]);
+      const double end = high - (least.x + least.y + least.z - least[j]);
+      part.min[j] = std::max(part.min[j], (axis[j] > 0.0 ? begin : end) / axis[j]);
+      part.max[j] = std::min(part.max[j], (axis[j] > 0.0 ? end : begin) / axis[j]);
+    }
+  }
+}
+
+DBox BallInField::bounds(IVec3 cell, double /*from*/, double /*to*/) const {
+  const DVec3 centre = centre_ - DVec3(cell);
+  return {centre - radius_, centre + radius_};
+}
+
+}  // namespace quoin

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/trace/density_ray.h>
+
+#include "scene/query/field_search.h"
+#include "scene/query/moving_box.h"
+
+namespace quoin {
+
+/// The first contact of a moving box with a field; for `follow_way`.
+class FieldSweep {
+ public:
+  FieldSweep(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box, double most)
+      : cells_(tree, types), box_(box), most_(most) {}
+
+  [[nodiscard]] IBox bounds() const { return cells_.bounds(); }
+  [[nodiscard]] double fraction() const { return best_.fraction; }
+  void check(const IBox& near, double from, double to);
+
+  [[nodiscard]] const FieldContact& best() const { return best_; }
+  [[nodiscard]] VoxelType material() { return cells_.material(best_.piece.cell, best_.point); }
+  [[nodiscard]] DVec3 normal() const;
+
+ private:
+  FieldCells cells_;
+  const MovingBox& box_;
+  double most_;
+  FieldContact best_;
+};
+
+/// The way out of a field's solid.
+struct WayOut {
+  DVec3 normal{0.0};  ///< in the grid, unit
+  double depth = 0.0;
+};
+
+/// For a box that starts inside: along the gradient where it is deepest, or along the grid's axis along which it is out
+/// soonest where there is none. Where neither leads out within twice the box's size, it leads a voxel along the first.
+///
+/// Cost: some sweeps about as long as the box.
+[[nodiscard]] WayOut way_out(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box,
+                             const FieldContact& contact);
+
+}  // namespace quoin

@@ -1,0 +1,94 @@
+#pragma once
+
+// A box on its way through the space of a grid, and the voxels or cells that are near it on that way.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+
+#include "scene/query/query_in_grid.h"
+
+namespace quoin {
+
+/// Lengths are those of the grid's voxels.
+struct MovingBox {
+  DVec3 centre{0.0};
+  glm::dmat3 axes{1.0};  ///< columns: the box's own, unit
+  DVec3 half_size{0.0};  ///< along them
+  glm::dmat3 half_axes{1.0};
+  DVec3 displacement{0.0};
+};
+
+/// `half_axes`: `half_axes_of(box)`.
+inline MovingBox moving_in_grid(const PlacedGrid& placed, const OrientedBox& box, const glm::dmat3& half_axes,
+                                DVec3 displacement) {
+  const ToGrid to_grid(placed);
+  return {to_grid.point(box.centre), glm::transpose(placed.world_axes) * glm::mat3_cast(unit_rotation(box.rotation)),
+          box.half_size / placed.voxel_size, to_grid.axes * half_axes, to_grid.axes * displacement};
+}
+
+/// Of any finite vector: the square of a large one would be infinite.
+inline double length_of(DVec3 v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (largest == 0.0) return 0.0;
+  return std::min(largest * glm::length(v / largest), std::numeric_limits<double>::max());
+}
+
+/// The fractions of the way at which the box's bounds are within `tight`.
+inline std::pair<double, double> times_within(const MovingBox& box, DVec3 reach, const IBox& tight) {
+  double first = 0.0;
+  double last = 1.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = tight.min[axis] - reach[axis] - 1.0 - box.centre[axis];
+    const double high = tight.max[axis] + reach[axis] + 1.0 - box.centre[axis];
+    const double d = box.displacement[axis];
+    if (d == 0.0) {
+      if (low > 0.0 || high < 0.0) return {1.0, 0.0};
+      continue;
+    }
+    first = std::max(first, std::min(low / d, high / d));
+    last = std::min(last, std::max(low / d, high / d));
+  }
+  return {first, last};
+}
+
+/// The box's bounds between two fractions of its way.
+inline DBox bounds_between(const MovingBox& box, DVec3 reach, double from, double to) {
+  const DVec3 a = box.centre + from * box.displacement;
+  const DVec3 b = box.centre + to * box.displacement;
+  return {glm::min(a, b) - reach, glm::max(a, b) + reach};
+}
+
+/// Follows the way in steps of the box's own size, up to the fraction `most`: `contents.check(near, from, to)` looks
+/// at the voxels or cells that are near between two fractions, within `contents.bounds()`; the way ends where
+/// `contents.fraction()`, of the best contact so far, has been passed.
+template <class Contents>
+void follow_way(const MovingBox& box, double most, Contents& contents) {
+  const DVec3 reach = reach_of_axes(box.half_axes);
+  const IBox tight = contents.bounds();
+  const auto check = [&](double from, double to) {
+    const DBox bounds = bounds_between(box, reach, from, to);
+    contents.check(voxels_within({bounds.min - 1e-6, bounds.max + 1e-6}, tight), from, to);
+  };
+  const double length = length_of(box.displacement);
+  const double step = std::max(1.0, std::min({reach.x, reach.y, reach.z}));
+  if (tight.empty()) return;
+  const auto [first, last] = times_within(box, reach, tight);
+  if (first > last) return;
+  // Whole steps from the start, so that what is met does not depend on the grid's bounds.
+  const double steps = std::max(1.0, std::ceil(length / step));
+  double i = std::floor(first * steps);
+  // So far away steps are lost in rounding; what there is within the bounds is looked at in one.
+  if (i + 1.0 == i) return check(first, std::min(last, most));
+  for (; i / steps <= std::min(last, most); ++i) {
+    check(i / steps, std::min((i + 1.0) / steps, 1.0));
+    if (contents.fraction() <= (i + 1.0) / steps || i + 1.0 >= steps) break;
+  }
+}
+
+}  // namespace quoin

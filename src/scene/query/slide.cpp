@@ -1,0 +1,313 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include <quoin/scene/sweep.h>
+
+#include "scene/query/query_in_grid.h"
+
+namespace quoin {
+namespace {
+
+// What is left of a displacement after the contacts so far.
+DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
+  const auto goes_into = [&](DVec3 d) {
+    return std::any_of(normals.begin(), normals.end(),
+                       [&](DVec3 normal) { return glm::dot(d, normal) < -1e-9 * glm::length(d); });
+  };
+  if (!goes_into(displacement)) return displacement;
+  for (const DVec3 normal : normals) {
+    const DVec3 slid = displacement - glm::dot(displacement, normal) * normal;
+    if (glm::dot(displacement, normal) < 0.0 && !goes_into(slid)) return slid;
+  }
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    for (std::size_t j = i + 1; j < normals.size(); ++j) {
+      const DVec3 crease = glm::cross(normals[i], normals[j]);
+      const double squared = glm::dot(crease, crease);
+      if (squared < 1e-12) continue;
+      const DVec3 slid = crease * (glm::dot(displacement, crease) / squared);
+      if (!goes_into(slid)) return slid;
+    }
+  }
+  return DVec3(0.0);
+}
+
+// A box among what it may meet.
+struct Body {
+  const SceneTracer& tracer;
+  const VoxelRegistry& types;
+  const SlideOptions& options;
+  OrientedBox box;
+
+  [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
+    return sweep_box(tracer, types, box, displacement);
+  }
+  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
+  // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
+  double move_to(const SweepHit& hit, DVec3 displacement) {
+    const double speed = -glm::dot(displacement, hit.normal);
+    const double back = speed > 0.0 ? options.skin / speed : 0.0;
+    const double fraction = std::max(0.0, hit.fraction - back);
+    box.centre += displacement * fraction;
+    const double gap = hit.fraction * speed;
+    if (fraction == 0.0 && hit.in_field && gap < 0.5 * options.skin) {
+      const DVec3 away = hit.normal * (options.skin - gap);
+      if (!sweep(away)) box.centre += away;
+    }
+    return fraction;
+  }
+  void move_out(const SweepHit& hit) { box.centre += hit.normal * (hit.depth + options.skin); }
+  // Moves it as far as it goes; returns what it met.
+  std::optional<SweepHit> advance(DVec3 displacement) {
+    const auto hit = sweep(displacement);
+    if (!hit) {
+      if (is_finite(displacement)) box.centre += displacement;
+    } else if (hit->depth == 0.0) {
+      move_to(*hit, displacement);
+    }
+    return hit;
+  }
+};
+
+SlideResult slide(Body body, DVec3 displacement) {
+  SlideResult result{body.box.centre, displacement};
+  DVec3 left = displacement;
+  std::vector<DVec3> normals;
+  for (int contact = 0; contact < body.options.max_contacts; ++contact) {
+    const auto hit = body.sweep(left);
+    if (!hit) {
+      if (is_finite(left)) body.box.centre += left;
+      break;
+    }
+    result.is_blocked = true;
+    result.normal = hit->normal;
+    if (hit->depth > 0.0) {
+      if (!body.options.pushes_out) break;
+      body.move_out(*hit);
+      continue;
+    }
+    const double fraction = body.move_to(*hit, left);
+    normals.push_back(hit->normal);
+    left = along_contacts(left * (1.0 - fraction), normals);
+    if (left == DVec3(0.0)) break;
+  }
+  result.displacement = along_contacts(displacement, normals);
+  result.centre = body.box.centre;
+  return result;
+}
+
+// A body that walks. On a floor it has a level displacement, which walls turn aside and the floor lifts and lowers; off
+// it, it slides as any body.
+class Walk {
+ public:
+  Walk(const Body& body, const FloorOptions& floor, DVec3 up)
+      : body_(body), floor_(floor), up_(up), steepest_(std::cos(floor.max_slope * std::numbers::pi / 180.0) - 1e-6) {}
+
+  SlideResult run(DVec3 displacement) {
+    displacement_ = displacement;
+    if (!find_ground(displacement)) return result();
+    if (is_on_floor_) displacement_ = level(displacement_);
+    left_ = displacement_;
+    for (int contact = 0; contact < body_.options.max_contacts && left_ != DVec3(0.0); ++contact) {
+      const DVec3 way = is_on_floor_ ? along_floor(left_) : left_;
+      const auto hit = body_.sweep(way);
+      if (!hit) {
+        if (is_finite(way)) body_.box.centre += way;
+        break;
+      }
+      if (!meet(*hit, way)) break;
+    }
+    if (is_on_floor_) settle();
+    return result();
+  }
+
+ private:
+  [[nodiscard]] bool is_floor(DVec3 normal) const { return glm::dot(normal, up_) >= steepest_; }
+  [[nodiscard]] DVec3 level(DVec3 v) const { return v - glm::dot(v, up_) * up_; }
+  // A level displacement as the floor lifts it.
+  [[nodiscard]] DVec3 along_floor(DVec3 v) const {
+    return v - up_ * (glm::dot(v, result_.floor_normal) / glm::dot(result_.floor_normal, up_));
+  }
+  [[nodiscard]] SlideResult result() {
+    result_.centre = body_.box.centre;
+    result_.displacement = displacement_;
+    result_.is_on_floor = is_on_floor_;
+    if (!is_on_floor_) result_.floor_normal = DVec3(0.0);
+    return result_;
+  }
+
+  // Moves it out of what it is in, and looks for what it stands on. False where it is not to move.
+  bool find_ground(DVec3 displacement) {
+    const double skin = body_.options.skin;
+    const DVec3 down = -up_ * (skin + skin / std::max(steepest_, 0.1));
+    for (int contact = 0; contact < body_.options.max_contacts; ++contact) {
+      const auto hit = body_.sweep(down);
+      if (!hit) return true;
+      if (hit->depth == 0.0) {
+        is_supported_ = !(glm::dot(displacement, up_) > 0.0);
+        if (is_supported_ && is_floor(hit->normal)) land(hit->normal);
+        return true;
+      }
+      result_.is_blocked = true;
+      result_.normal = hit->normal;
+      if (!body_.options.pushes_out) return false;
+      body_.move_out(*hit);
+    }
+    return true;
+  }
+
+  void land(DVec3 normal) {
+    // Walls that were met in the air, as it meets them on foot.
+    if (!is_on_floor_) make_walls_upright();
+    is_on_floor_ = true;
+    result_.floor_normal = normal;
+  }
+
+  [[nodiscard]] bool make_upright(DVec3& wall) const {
+    wall = level(wall);
+    const double length = glm::length(wall);
+    if (!(length > 1e-6)) return false;
+    wall /= length;
+    return true;
+  }
+
+  void make_walls_upright() {
+    std::vector<DVec3> upright;
+    for (DVec3 wall : walls_) {
+      if (make_upright(wall)) upright.push_back(wall);
+    }
+    walls_ = std::move(upright);
+  }
+
+  // Goes to a contact and turns what is left of the way; false where it is over.
+  bool meet(const SweepHit& hit, DVec3 way) {
+    if (hit.depth > 0.0) {
+      result_.is_blocked = true;
+      result_.normal = hit.normal;
+      if (body_.options.pushes_out) body_.move_out(hit);
+      return body_.options.pushes_out;
+    }
+    left_ *= 1.0 - body_.move_to(hit, way);
+    if (is_floor(hit.normal) && !(glm::dot(displacement_, up_) > 0.0)) {
+      land(hit.normal);
+      displacement_ = along_contacts(level(displacement_), walls_);
+      left_ = along_contacts(level(left_), walls_);
+      meets_floor_ = true;
+      return true;
+    }
+    if ((is_supported_ || is_on_floor_) && floor_.step_height > 0.0 && steps(level(left_), hit.normal)) return false;
+    result_.is_blocked = true;
+    result_.normal = hit.normal;
+    is_on_floor_ ? turn_aside(hit.normal) : turn(hit.normal);
+    return true;
+  }
+
+  // While it stands, walls are upright, and a ceiling over a rising floor is one too.
+  void turn_aside(DVec3 normal) {
+    DVec3 wall = normal;
+    if (!make_upright(wall)) {
+      wall = result_.floor_normal;
+      if (!make_upright(wall)) {
+        left_ = displacement_ = DVec3(0.0);
+        return;
+      }
+    }
+    walls_.push_back(wall);
+    left_ = along_contacts(left_, walls_);
+    displacement_ = along_contacts(displacement_, walls_);
+  }
+
+  // While it falls or rises: what pushes it into a slope from the side does not lift it.
+  void turn(DVec3 normal) {
+    const auto turned = [&](DVec3 v) {
+      const DVec3 slid = along_contacts(v, walls_);
+      const DVec3 wall = level(normal);
+      const double square = glm::dot(wall, wall);
+      if (!(glm::dot(slid, up_) > std::max(glm::dot(v, up_), 0.0)) || square < 1e-12) return slid;
+      return along_contacts(v - std::min(glm::dot(v, wall), 0.0) / square * wall, walls_);
+    };
+    walls_.push_back(normal);
+    left_ = turned(left_);
+    displacement_ = turned(displacement_);
+  }
+
+  // Tries to go up, on and down again onto a floor. What is left of the way is then done.
+  bool steps(DVec3 ahead, DVec3 normal) {
+    const double length = glm::length(ahead);
+    if (!(length > 0.0) || glm::dot(ahead, normal) >= 0.0) return false;
+    Body raised = body_;
+    raised.advance(up_ * floor_.step_height);
+    const double rise = glm::dot(raised.box.centre - body_.box.centre, up_);
+    if (!(rise > body_.options.skin)) return false;
+    Body landed = raised;
+    landed.advance(ahead);
+    // Not where the wall goes on above.
+    if (glm::dot(landed.box.centre - raised.box.centre, ahead) < 0.25 * length * length) return false;
+    const DVec3 down = -up_ * (rise + 2.0 * body_.options.skin);
+    auto ground = landed.advance(down);
+    if (!ground || ground->depth > 0.0) return false;
+    DVec3 floor_normal = ground->normal;
+    if (!is_floor(floor_normal)) {
+      // On the edge of the step: the floor may begin a little further on.
+      Body further = raised;
+      const DVec3 half = glm::abs(body_.box.half_size);
+      further.advance(ahead * std::max(1.0, std::min({half.x, half.y, half.z}) / length));
+      ground = further.advance(down);
+      if (!ground || ground->depth > 0.0 || !is_floor(ground->normal)) return false;
+      if (glm::dot(further.box.centre - body_.box.centre, up_) < body_.options.skin) return false;
+      floor_normal = ground->normal;
+    }
+    body_.box.centre = landed.box.centre;
+    displacement_ = level(displacement_);
+    left_ = DVec3(0.0);
+    meets_floor_ = true;
+    land(floor_normal);
+    return true;
+  }
+
+  // Down to the floor, if there is one near.
+  void settle() {
+    const double skin = body_.options.skin;
+    const double probe = skin + skin / std::max(steepest_, 0.1);
+    const DVec3 down = -up_ * std::max(floor_.snap_distance, probe);
+    const auto hit = body_.sweep(down);
+    if (hit && hit->depth == 0.0 && is_floor(hit->normal)) {
+      body_.move_to(*hit, down);
+      land(hit->normal);
+      return;
+    }
+    // On the edge of a step, or between a floor and what is steeper.
+    is_on_floor_ = meets_floor_ && hit && hit->fraction * glm::length(down) <= probe;
+  }
+
+  Body body_;
+  const FloorOptions& floor_;
+  DVec3 up_;
+  double steepest_;  // of the normals of floors, along `up_`
+  SlideResult result_;
+  DVec3 displacement_{0.0};  // all of it, without what went into contacts
+  DVec3 left_{0.0};          // of the way; level on a floor
+  std::vector<DVec3> walls_;
+  bool is_on_floor_ = false;
+  bool meets_floor_ = false;   // on the way
+  bool is_supported_ = false;  // by a floor or a slope, from the start
+};
+
+}  // namespace
+
+SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
+                           DVec3 displacement, const SlideOptions& options) {
+  const Body body{tracer, types, options, box};
+  if (options.floor) {
+    const double length = glm::length(options.floor->up);
+    if (length > 0.0 && std::isfinite(length) && is_finite(displacement)) {
+      return Walk(body, *options.floor, options.floor->up / length).run(displacement);
+    }
+  }
+  return slide(body, displacement);
+}
+
+}  // namespace quoin
