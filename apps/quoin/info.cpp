@@ -82,6 +82,7 @@ Json grid_json(const GridReport& report) {
                 {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
                 {"instances", Json::array()}};
   for (const Instance* instance : report.instances) entry["instances"].push_back(instance_json(*instance));
+  if (report.grid->field.chunk_count() != 0) entry["solid_samples"] = report.grid->field.solid_count();
   return entry;
 }
 
@@ -126,7 +127,11 @@ std::string instance_text(const Instance& instance) {
 
 std::string grid_text(const GridReport& report) {
   std::string text = "  " + quoted(report.grid->name) + "  " + three(DVec3(report.grid->declared_box().size()), " x ") +
-                     ", " + count_of(report.grid->grid.voxel_count(), "voxel") + "\n";
+                     ", " + count_of(report.grid->grid.voxel_count(), "voxel");
+  if (report.grid->field.chunk_count() != 0) {
+    text += ", a field of " + count_of(report.grid->field.solid_count(), "solid sample");
+  }
+  text += "\n";
   if (report.instances.empty()) text += "    not placed\n";
   for (const Instance* instance : report.instances) text += instance_text(*instance);
   return text;

@@ -24,6 +24,9 @@ VoxelType outcome(const Brush& brush, VoxelType current) {
       return kAir;
     case BrushAction::Paint:
       return current == kAir ? kAir : brush.type;
+    case BrushAction::Smooth:
+    case BrushAction::Flatten:
+      break;
   }
   return current;
 }

@@ -13,10 +13,17 @@ namespace quoin::viewer {
 
 /// What a brush does to the voxels that it covers.
 enum class BrushAction : std::uint8_t {
-  Place,   ///< air becomes the brush's type
-  Remove,  ///< everything becomes air
-  Paint,   ///< what is not air becomes the brush's type
+  Place,    ///< air becomes the brush's type
+  Remove,   ///< everything becomes air
+  Paint,    ///< what is not air becomes the brush's type
+  Smooth,   ///< of fields only
+  Flatten,  ///< likewise: towards the plane of the first touch
 };
+
+/// Whether a stroke follows the surface, rather than the layer or plane of its first touch.
+[[nodiscard]] constexpr bool follows_surface(BrushAction action) {
+  return action != BrushAction::Place && action != BrushAction::Remove;
+}
 
 enum class BrushShape : std::uint8_t { Box, Sphere };
 

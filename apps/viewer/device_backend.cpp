@@ -21,6 +21,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {8, 4, 2, 1};
 constexpr int kMeshSamples = 4;
+constexpr double kDetailDistance = 256.0;  // samples of fields
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -118,6 +119,7 @@ Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
   live.instances = options.cpu.instances;
   live.threads = options.cpu.threads;
   live.on_ready = on_frame;
+  live.detail_distance = kDetailDistance;
   meshes.reset(new Meshes{style, LiveMeshes(live), std::move(*drawer)});
   is_request_new = true;
   return {};
@@ -142,7 +144,9 @@ Result<bool> DeviceBackend::Impl::take_surfaces() {
   if (is_scene_changed) {
     if (Status taken = meshes->renderer.update(*scene, options.cpu.instances); !taken) return taken.error();
   }
-  if (is_scene_changed || meshes->live.pending() > 0) meshes->live.update(*scene, request->camera.position);
+  // The levels of detail of fields follow the camera.
+  if (is_scene_changed || is_request_new || meshes->live.pending() > 0)
+    meshes->live.update(*scene, request->camera.position);
   const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
   if (surfaces.empty()) return *updated || is_scene_changed;
   if (Status put = meshes->renderer.put(surfaces); !put) return put.error();

@@ -1,9 +1,11 @@
 #include "document.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 
@@ -19,6 +21,10 @@ const char* name_of(BrushAction action) {
       return "remove";
     case BrushAction::Paint:
       return "paint";
+    case BrushAction::Smooth:
+      return "smooth";
+    case BrushAction::Flatten:
+      return "flatten";
   }
   return "";
 }
@@ -72,10 +78,17 @@ bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
   end_stroke();
   const Instance* instance = loaded_.scene.instances().find(hit.instance);
   if (instance == nullptr || loaded_.scene.grids().find(instance->grid) == nullptr) return false;
-  const bool needs_type = brush.action != BrushAction::Remove;
+  const bool needs_type = brush.action != BrushAction::Remove && brush.action != BrushAction::Smooth;
   if (needs_type && (brush.type == kAir || brush.type >= loaded_.scene.types.size())) return false;
+  if (const auto surface = SurfacePlace::of(hit, *instance, loaded_.scene.grids()[instance->grid])) {
+    stroke_ = Stroke{brush, instance->grid, hit.instance, {}, {}, surface, surface->point};
+    history_.begin(name_of(brush.action));
+    touch_surface(surface->point);
+    return true;
+  }
+  if (brush.action == BrushAction::Smooth || brush.action == BrushAction::Flatten) return false;
   const IVec3 target = target_of(brush.action, hit.voxel, hit.face);
-  stroke_ = Stroke{brush, instance->grid, hit.instance, {hit.voxel, hit.face}, target};
+  stroke_ = Stroke{brush, instance->grid, hit.instance, {hit.voxel, hit.face}, target, {}, {}};
   history_.begin(name_of(brush.action));
   touch(target);
   return true;
@@ -87,11 +100,43 @@ std::int64_t Document::touch(IVec3 voxel) {
   return apply(stroke_->brush, voxel, grid);
 }
 
+std::int64_t Document::touch_surface(DVec3 point) {
+  DensityGrid& field = loaded_.scene.edit(stroke_->grid).field;
+  history_.touch(stroke_->grid, field, reach_of(stroke_->brush, point, field));
+  return sculpt(stroke_->brush, point, *stroke_->surface, field);
+}
+
+std::int64_t Document::drag_surface(const Ray& ray_in_world, const std::optional<SceneHit>& hit,
+                                    const Instance& instance, const SceneGrid& grid) {
+  std::optional<DVec3> target;
+  if (follows_surface(stroke_->brush.action)) {
+    const bool is_same_grid = hit && hit->instance == stroke_->instance;
+    const auto place = is_same_grid ? SurfacePlace::of(*hit, instance, grid) : std::nullopt;
+    if (place) target = place->point;
+  } else if (const auto ray = ray_in_grid(instance, grid, ray_in_world)) {
+    target = stroke_->surface->in_plane(*ray);
+  }
+  if (!target) return 0;
+  const DVec3 from = stroke_->last_point;
+  const double length = glm::length(*target - from);
+  const double stride = 0.5 * sculpt_radius(stroke_->brush);
+  constexpr double kLongestWay = 512.0;  // a leap beyond that is no drag of a hand
+  if (!(length >= 0.5 * stride) || length > kLongestWay) return 0;
+  std::int64_t changed = 0;
+  const int steps = std::max(1, static_cast<int>(std::ceil(length / stride)));
+  for (int step = 1; step <= steps; ++step) {
+    changed += touch_surface(from + (*target - from) * (static_cast<double>(step) / steps));
+  }
+  stroke_->last_point = *target;
+  return changed;
+}
+
 std::int64_t Document::drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit) {
   if (!stroke_) return 0;
   const Instance* instance = loaded_.scene.instances().find(stroke_->instance);
   const SceneGrid* grid = loaded_.scene.grids().find(stroke_->grid);
   if (instance == nullptr || grid == nullptr) return 0;
+  if (stroke_->surface) return drag_surface(ray_in_world, hit, *instance, *grid);
   if (stroke_->brush.action == BrushAction::Paint) {
     const bool is_same_grid = hit && hit->instance == stroke_->instance;
     if (!is_same_grid || hit->voxel == stroke_->last) return 0;

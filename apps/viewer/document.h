@@ -13,6 +13,7 @@
 
 #include "brush.h"
 #include "edit_history.h"
+#include "sculpt.h"
 
 namespace quoin::viewer {
 
@@ -44,10 +45,12 @@ class Document {
   /// the document was made. Requires: no edit is under way on another thread.
   [[nodiscard]] const FaceCounts& faces() { return faces_.update(loaded_.scene); }
 
-  /// Begins a stroke with its first touch, where the user points. False, without a stroke, when the instance or its
-  /// grid is gone, or the brush's type is not registered.
+  /// Begins a stroke with its first touch, where the user points: of voxels, or of the field whose surface was hit.
+  /// False, without a stroke, when the instance or its grid is gone, the brush's type is not registered, or the action
+  /// is one of fields only and voxels were hit.
   bool begin_stroke(const Brush& brush, const SceneHit& hit);
-  /// Goes on to where a ray of the world meets the layer of the first touch, without gaps; to `hit` when painting.
+  /// Goes on to where a ray of the world meets the layer, or plane, of the first touch, without gaps; to `hit` where
+  /// the action follows the surface.
   /// Returns how many voxels changed.
   std::int64_t drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit);
   /// The whole stroke is one step to undo.
@@ -78,9 +81,14 @@ class Document {
     InstanceHandle instance;
     StrokeLayer layer;
     IVec3 last{0};
+    std::optional<SurfacePlace> surface;  ///< of a field: where it began
+    DVec3 last_point{0.0};
   };
 
   std::int64_t touch(IVec3 voxel);
+  std::int64_t touch_surface(DVec3 point);
+  std::int64_t drag_surface(const Ray& ray_in_world, const std::optional<SceneHit>& hit, const Instance& instance,
+                            const SceneGrid& grid);
 
   LoadedScene loaded_;
   SceneFaces faces_;

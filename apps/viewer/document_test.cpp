@@ -181,6 +181,64 @@ TEST(Document, UndoAllAndRedoAllGiveTheSameBytes) {
   EXPECT_FALSE(document.redo());
 }
 
+TEST(Document, FieldsAreSculptedPaintedAndUndone) {
+  LoadedScene loaded;
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(loaded.scene.types.add({}));
+  SceneGrid ground;
+  ground.field.add_box({0.0, 0.0, 0.0}, {120.0, 20.0, 120.0}, 1);
+  Instance instance;
+  instance.voxel_size = 0.5;
+  instance.position = {10.0, 0.0, -30.0};
+  const GridHandle handle = instance.grid = loaded.scene.add_grid(std::move(ground));
+  SceneHit hit;
+  hit.instance = loaded.scene.add_instance(instance);
+  hit.in_field = true;
+  hit.position = {10.0 + 30.0, 10.0, -30.0 + 30.0};  // sample (60, 20, 60): across the border of chunks
+  hit.normal = {0.0, 1.0, 0.0};
+  Document document(std::move(loaded), "hill.json");
+  const auto field = [&]() -> const DensityGrid& { return document.scene().grids()[handle].field; };
+  const DensityGrid before = field().snapshot();
+  Brush brush;
+  brush.shape = BrushShape::Sphere;
+  brush.radius = 4;
+  brush.type = 2;
+  const auto stroke = [&](BrushAction action, DVec3 to) {
+    brush.action = action;
+    ASSERT_TRUE(document.begin_stroke(brush, hit));
+    SceneHit there = hit;
+    there.position = to;
+    (void)document.drag_to({to + DVec3(0.0, 20.0, 0.0), {0.0, -1.0, 0.0}}, there);
+    document.end_stroke();
+  };
+  stroke(BrushAction::Place, hit.position + DVec3(8.0, 0.0, 0.0));
+  EXPECT_LT(field().density_at({60.0, 23.0, 60.0}), 0.0F);
+  EXPECT_LT(field().density_at({76.0, 23.0, 60.0}), 0.0F) << "the end of the stroke";
+  EXPECT_LT(field().density_at({68.0, 23.0, 60.0}), 0.0F) << "without gaps";
+  EXPECT_EQ(field().material({60, 23, 60}), 2);
+  stroke(BrushAction::Remove, hit.position);
+  EXPECT_GT(field().density_at({60.0, 22.0, 60.0}), 0.0F);
+  stroke(BrushAction::Paint, hit.position + DVec3(0.0, 0.0, 9.0));
+  EXPECT_EQ(field().material({60, 18, 77}), 2);
+  stroke(BrushAction::Smooth, hit.position);
+  stroke(BrushAction::Flatten, hit.position + DVec3(3.0, 0.0, 0.0));
+  EXPECT_EQ(document.history().steps(), 5U);
+  const DensityGrid after = field().snapshot();
+  const auto expect_same = [&](const DensityGrid& wanted) {
+    ASSERT_EQ(field().chunks(), wanted.chunks());
+    for (const IVec3 chunk : wanted.chunks()) {
+      EXPECT_EQ(field().find_chunk(chunk)->content_hash(), wanted.find_chunk(chunk)->content_hash());
+    }
+  };
+  while (document.undo()) continue;
+  expect_same(before);
+  EXPECT_FALSE(document.is_dirty());
+  while (document.redo()) continue;
+  expect_same(after);
+  hit.in_field = false;
+  brush.action = BrushAction::Smooth;
+  EXPECT_FALSE(document.begin_stroke(brush, hit)) << "blocks are not smoothed";
+}
+
 TEST(Document, AnEditAfterAnUndoForgetsWhatWasUndone) {
   Document document = small_document();
   const Brush brush{BrushAction::Place, BrushShape::Box, 0, 3};

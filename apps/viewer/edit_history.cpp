@@ -14,6 +14,25 @@ Chunk copy_of(const Grid& grid, IVec3 place) {
   return chunk == nullptr ? Chunk(kAir) : *chunk;
 }
 
+DensityChunk copy_of(const DensityGrid& field, IVec3 place) {
+  const DensityChunk* chunk = field.find_chunk(place);
+  return chunk == nullptr ? DensityChunk(field.neighbourhood(place).outside) : *chunk;
+}
+
+const Grid& content_of(const SceneGrid& grid, const Chunk&) {
+  return grid.grid;
+}
+const DensityGrid& content_of(const SceneGrid& grid, const DensityChunk&) {
+  return grid.field;
+}
+
+bool is_same(const Chunk& a, const Chunk& b) {
+  return a == b;
+}
+bool is_same(const DensityChunk& a, const DensityChunk& b) {
+  return a.shares_storage_with(b) || a.content_hash() == b.content_hash();
+}
+
 }  // namespace
 
 void EditHistory::begin(std::string name) {
@@ -24,6 +43,17 @@ void EditHistory::begin(std::string name) {
 
 void EditHistory::touch(GridHandle handle, const Grid& grid, const IBox& box) {
   QUOIN_ASSERT(open_, "a step is under way");
+  touch_chunks(open_->chunks, handle, grid, box);
+}
+
+void EditHistory::touch(GridHandle handle, const DensityGrid& field, const IBox& box) {
+  QUOIN_ASSERT(open_, "a step is under way");
+  touch_chunks(open_->samples, handle, field, box);
+}
+
+template <class Content, class Grid>
+void EditHistory::touch_chunks(std::vector<Changed<Content>>& known, GridHandle handle, const Grid& grid,
+                               const IBox& box) {
   if (box.empty()) return;
   const IVec3 first = chunk_of(box.min);
   const IVec3 last = chunk_of(box.max - 1);
@@ -31,13 +61,30 @@ void EditHistory::touch(GridHandle handle, const Grid& grid, const IBox& box) {
     for (int y = first.y; y <= last.y; ++y) {
       for (int x = first.x; x <= last.x; ++x) {
         const IVec3 place{x, y, z};
-        const bool is_known = std::any_of(open_->chunks.begin(), open_->chunks.end(), [&](const ChangedChunk& chunk) {
+        const bool is_known = std::any_of(known.begin(), known.end(), [&](const Changed<Content>& chunk) {
           return chunk.grid == handle && chunk.place == place;
         });
         if (is_known) continue;
-        open_->chunks.push_back({handle, place, copy_of(grid, place), Chunk(kAir)});
+        Content before = copy_of(grid, place);
+        known.push_back({handle, place, before, before});
       }
     }
+  }
+}
+
+// What was touched and not changed goes.
+template <class Content>
+void EditHistory::finish(const Scene& scene, std::vector<Changed<Content>>& changed, std::size_t& bytes) {
+  std::erase_if(changed, [&](Changed<Content>& chunk) {
+    const SceneGrid* grid = scene.grids().find(chunk.grid);
+    if (grid == nullptr) return true;
+    chunk.after = copy_of(content_of(*grid, chunk.before), chunk.place);
+    return is_same(chunk.before, chunk.after);
+  });
+  for (Changed<Content>& chunk : changed) {
+    chunk.before.compact();
+    chunk.after.compact();
+    bytes += chunk.before.bytes() + chunk.after.bytes();
   }
 }
 
@@ -45,17 +92,9 @@ void EditHistory::end(const Scene& scene) {
   if (!open_) return;
   Step step = std::move(*open_);
   open_.reset();
-  std::erase_if(step.chunks, [&](const ChangedChunk& chunk) {
-    const SceneGrid* grid = scene.grids().find(chunk.grid);
-    return grid == nullptr || chunk.before == copy_of(grid->grid, chunk.place);
-  });
-  if (step.chunks.empty()) return;
-  for (ChangedChunk& chunk : step.chunks) {
-    chunk.after = copy_of(scene.grids()[chunk.grid].grid, chunk.place);
-    chunk.before.compact();
-    chunk.after.compact();
-    step.bytes += chunk.before.bytes() + chunk.after.bytes();
-  }
+  finish(scene, step.chunks, step.bytes);
+  finish(scene, step.samples, step.bytes);
+  if (step.chunks.empty() && step.samples.empty()) return;
   keep(std::move(step));
 }
 
@@ -81,26 +120,29 @@ std::string EditHistory::redo_name() const {
   return can_redo() ? steps_[done_].name : "";
 }
 
-void EditHistory::put(Scene& scene, const ChangedChunk& changed, const Chunk& voxels) {
-  if (scene.grids().find(changed.grid) != nullptr) scene.edit(changed.grid).grid.put_chunk(changed.place, voxels);
+void EditHistory::put(Scene& scene, const Step& step, bool after) {
+  for (const ChangedChunk& chunk : step.chunks) {
+    if (scene.grids().find(chunk.grid) == nullptr) continue;
+    scene.edit(chunk.grid).grid.put_chunk(chunk.place, after ? chunk.after : chunk.before);
+  }
+  for (const ChangedSamples& chunk : step.samples) {
+    if (scene.grids().find(chunk.grid) == nullptr) continue;
+    scene.edit(chunk.grid).field.put_chunk(chunk.place, after ? chunk.after : chunk.before);
+  }
 }
 
 bool EditHistory::undo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_undo()) return false;
   --done_;
-  for (const ChangedChunk& chunk : steps_[done_].chunks) {
-    put(scene, chunk, chunk.before);
-  }
+  put(scene, steps_[done_], false);
   return true;
 }
 
 bool EditHistory::redo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
   if (!can_redo()) return false;
-  for (const ChangedChunk& chunk : steps_[done_].chunks) {
-    put(scene, chunk, chunk.after);
-  }
+  put(scene, steps_[done_], true);
   ++done_;
   return true;
 }

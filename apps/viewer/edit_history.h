@@ -21,6 +21,8 @@ class EditHistory {
   void begin(std::string name);
   /// Says that voxels of a box are about to be changed. Requires: a step is under way, `grid` is the scene's `handle`.
   void touch(GridHandle handle, const Grid& grid, const IBox& box);
+  /// The same of samples of the grid's field.
+  void touch(GridHandle handle, const DensityGrid& field, const IBox& box);
   /// Ends the step; one that changed nothing leaves no trace. Steps that were undone before are forgotten otherwise.
   void end(const Scene& scene);
   [[nodiscard]] bool is_under_way() const { return open_.has_value(); }
@@ -41,21 +43,29 @@ class EditHistory {
   [[nodiscard]] std::uint64_t state() const { return done_ == 0 ? base_state_ : steps_[done_ - 1].state; }
 
  private:
-  struct ChangedChunk {
+  template <class Content>
+  struct Changed {
     GridHandle grid;
     IVec3 place{0};
-    Chunk before{kAir};
-    Chunk after{kAir};
+    Content before;
+    Content after;
   };
+  using ChangedChunk = Changed<Chunk>;
+  using ChangedSamples = Changed<DensityChunk>;
   struct Step {
     std::string name;
     std::uint64_t state = 0;
     std::vector<ChangedChunk> chunks;
+    std::vector<ChangedSamples> samples;
     std::size_t bytes = 0;
   };
 
   void keep(Step step);
-  static void put(Scene& scene, const ChangedChunk& changed, const Chunk& voxels);
+  template <class Content, class Grid>
+  void touch_chunks(std::vector<Changed<Content>>& known, GridHandle handle, const Grid& grid, const IBox& box);
+  template <class Content>
+  void finish(const Scene& scene, std::vector<Changed<Content>>& changed, std::size_t& bytes);
+  static void put(Scene& scene, const Step& step, bool after);
 
   std::size_t max_bytes_;
   std::deque<Step> steps_;

@@ -51,6 +51,10 @@ std::optional<Tool> tool_of(Command command) {
       return Tool::Remove;
     case Command::ToolPaint:
       return Tool::Paint;
+    case Command::ToolSmooth:
+      return Tool::Smooth;
+    case Command::ToolFlatten:
+      return Tool::Flatten;
     default:
       return std::nullopt;
   }

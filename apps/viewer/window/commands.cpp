@@ -18,6 +18,8 @@ constexpr std::array kCommands = {
     CommandInfo{Command::ToolPlace, "Place", "2", SDLK_2, false, false},
     CommandInfo{Command::ToolRemove, "Remove", "3", SDLK_3, false, false},
     CommandInfo{Command::ToolPaint, "Paint", "4", SDLK_4, false, false},
+    CommandInfo{Command::ToolSmooth, "Smooth (fields)", "5", SDLK_5, false, false},
+    CommandInfo{Command::ToolFlatten, "Flatten (fields)", "6", SDLK_6, false, false},
     CommandInfo{Command::BrushSmaller, "Smaller brush", "[", SDLK_LEFTBRACKET, false, false},
     CommandInfo{Command::BrushLarger, "Larger brush", "]", SDLK_RIGHTBRACKET, false, false},
     CommandInfo{Command::BrushShape, "Box or sphere", "B", SDLK_b, false, false},

@@ -21,6 +21,8 @@ enum class Command : std::uint8_t {
   ToolPlace,
   ToolRemove,
   ToolPaint,
+  ToolSmooth,
+  ToolFlatten,
   BrushSmaller,
   BrushLarger,
   BrushShape,

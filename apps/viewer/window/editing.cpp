@@ -24,6 +24,10 @@ std::optional<BrushAction> action_of(Tool tool) {
       return BrushAction::Remove;
     case Tool::Paint:
       return BrushAction::Paint;
+    case Tool::Smooth:
+      return BrushAction::Smooth;
+    case Tool::Flatten:
+      return BrushAction::Flatten;
   }
   return std::nullopt;
 }
@@ -70,7 +74,7 @@ void Editing::advance(ViewState& state) {
     begin(state);
   }
   const Brush* brush = state.open.document->stroke_brush();
-  const bool needs_rays = brush != nullptr && brush->action == BrushAction::Paint;
+  const bool needs_rays = brush != nullptr && follows_surface(brush->action);
   if (is_moved_ && brush != nullptr) {
     if (needs_rays && !state.open.backend->is_up_to_date()) return;
     go_on(state);
@@ -87,14 +91,18 @@ void Editing::begin(ViewState& state) {
   Brush brush = state.brush;
   brush.action = *action;
   edit_paused(state, [&](Document& document) {
-    if (!document.begin_stroke(brush, *hit)) state.tell("there is no type to place yet: choose a colour");
+    if (!document.begin_stroke(brush, *hit)) {
+      const bool is_of_fields = *action == BrushAction::Smooth || *action == BrushAction::Flatten;
+      state.tell(is_of_fields && !hit->in_field ? "these are blocks: only smooth ground can be smoothed or flattened"
+                                                : "there is no type to place yet: choose a colour");
+    }
     return true;
   });
 }
 
 void Editing::go_on(ViewState& state) {
   const double length = std::hypot(to_.x - from_.x, to_.y - from_.y);
-  const bool is_painting = state.open.document->stroke_brush()->action == BrushAction::Paint;
+  const bool is_painting = follows_surface(state.open.document->stroke_brush()->action);
   const int touches = is_painting ? std::clamp(static_cast<int>(length / kPixelsPerTouch), 1, kMaxTouches) : 1;
   std::vector<std::optional<SceneHit>> hits;
   for (int touch = 1; is_painting && touch <= touches; ++touch) {

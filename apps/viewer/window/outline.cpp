@@ -54,6 +54,10 @@ ImU32 colour_of(Tool tool) {
       return IM_COL32(255, 110, 100, 255);
     case Tool::Paint:
       return IM_COL32(255, 210, 90, 255);
+    case Tool::Smooth:
+      return IM_COL32(110, 190, 255, 255);
+    case Tool::Flatten:
+      return IM_COL32(210, 150, 255, 255);
     case Tool::Look:
       break;
   }
@@ -105,7 +109,14 @@ void draw_outline(const ViewState& state) {
   const IVec3 voxel = state.tool == Tool::Place ? target_of(BrushAction::Place, state.hover->voxel, state.hover->face)
                                                 : state.hover->voxel;
   const int radius = is_brush ? state.brush.radius : 0;
-  if (is_brush && state.brush.shape == BrushShape::Sphere && radius > 0) {
+  if (const auto surface = SurfacePlace::of(*state.hover, *instance, *grid)) {
+    const double reach = sculpt_radius(state.brush);
+    if (state.brush.shape == BrushShape::Box) {
+      draw_box(lines, *instance, *grid, {surface->point - reach, surface->point + reach}, colour);
+    } else {
+      draw_sphere(lines, *instance, *grid, surface->point, reach, colour);
+    }
+  } else if (is_brush && state.brush.shape == BrushShape::Sphere && radius > 0) {
     draw_sphere(lines, *instance, *grid, DVec3(voxel) + 0.5, radius + 0.5, colour);
   } else {
     draw_box(lines, *instance, *grid, {DVec3(voxel - radius), DVec3(voxel + radius + 1)}, colour);

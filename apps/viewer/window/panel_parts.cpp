@@ -136,10 +136,14 @@ void draw_sun(LightOptions& light) {
 
 void draw_tool_part(ViewState& state, MenuChoice& choice) {
   if (!heading("Tool")) return;
-  constexpr std::array<std::pair<Tool, const char*>, 4> kTools = {
-      {{Tool::Look, "Look"}, {Tool::Place, "Place"}, {Tool::Remove, "Remove"}, {Tool::Paint, "Paint"}}};
+  constexpr std::array<std::pair<Tool, const char*>, 6> kTools = {{{Tool::Look, "Look"},
+                                                                   {Tool::Place, "Place"},
+                                                                   {Tool::Remove, "Remove"},
+                                                                   {Tool::Paint, "Paint"},
+                                                                   {Tool::Smooth, "Smooth"},
+                                                                   {Tool::Flatten, "Flatten"}}};
   for (const auto& [tool, name] : kTools) {
-    if (tool != Tool::Look) ImGui::SameLine(0.0F, 4.0F);
+    if (tool != Tool::Look && tool != Tool::Smooth) ImGui::SameLine(0.0F, 4.0F);
     const bool is_chosen = state.tool == tool;
     if (is_chosen) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
     if (ImGui::Button(name)) state.tool = tool;

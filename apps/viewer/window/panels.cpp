@@ -49,7 +49,8 @@ void draw_edit_menu(const ViewState& state, MenuChoice& choice) {
   menu_item(Command::Undo, choice, state.can_edit() && history.can_undo());
   menu_item(Command::Redo, choice, state.can_edit() && history.can_redo());
   ImGui::Separator();
-  for (const Command command : {Command::ToolLook, Command::ToolPlace, Command::ToolRemove, Command::ToolPaint}) {
+  for (const Command command : {Command::ToolLook, Command::ToolPlace, Command::ToolRemove, Command::ToolPaint,
+                                Command::ToolSmooth, Command::ToolFlatten}) {
     const int index = static_cast<int>(command) - static_cast<int>(Command::ToolLook);
     menu_item(command, choice, true, static_cast<int>(state.tool) == index);
   }
@@ -91,9 +92,10 @@ std::string hover_text(const ViewState& state) {
   if (instance == nullptr) return "";
   const SceneGrid* grid = state.scene().grids().find(instance->grid);
   if (grid == nullptr) return "";
-  const VoxelType type = grid->grid.get(hit.voxel);
+  const VoxelType type = hit.in_field ? hit.type : grid->grid.get(hit.voxel);
   std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), "voxel %d, %d, %d   type %d", hit.voxel.x, hit.voxel.y, hit.voxel.z, type);
+  std::snprintf(text.data(), text.size(), "%s %d, %d, %d   type %d", hit.in_field ? "sample" : "voxel", hit.voxel.x,
+                hit.voxel.y, hit.voxel.z, type);
   std::string line = text.data();
   if (type < state.scene().types.size() && type != kAir) {
     const VoxelProperties& properties = state.scene().types[type];

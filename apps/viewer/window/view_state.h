@@ -14,7 +14,7 @@
 namespace quoin::viewer {
 
 /// What the left mouse button does.
-enum class Tool : std::uint8_t { Look, Place, Remove, Paint };
+enum class Tool : std::uint8_t { Look, Place, Remove, Paint, Smooth, Flatten };
 
 /// One line that tells the user something, for a while.
 struct Message {

@@ -29,7 +29,7 @@ struct LoadOptions {
   bool show_hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
   int frame = 0;             ///< which animation frame to take
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
-  std::optional<float> iso;
+  std::optional<float> iso = std::nullopt;
 };
 
 /// MagicaVoxel's format, versions 150 and 200.
