@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <quoin/io/formats.h>
+#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "tests/tool_for_tests.h"
@@ -62,6 +63,39 @@ TEST_F(ToolGenerate, SaysWhatItMade) {
   EXPECT_NE(result.out.find("Wrote hills.vox"), std::string::npos) << result.out;
   EXPECT_NE(run("generate terrain --help").out.find("Example: quoin generate terrain"), std::string::npos);
   EXPECT_NE(run("generate --help").out.find("Example: quoin generate terrain"), std::string::npos);
+}
+
+TEST_F(ToolGenerate, SmoothTerrainIsSceneThatAllElseReads) {
+  const ToolRun made = run("generate smooth-terrain cliffs.json --seed 9 --chunks 2x1x1 --no-caves --json");
+  ASSERT_EQ(made.status, 0) << made.err;
+  SmoothTerrainOptions options;
+  options.seed = 9;
+  options.size = {2, 1, 1};
+  options.caves = false;
+  VoxelRegistry registry;
+  const DensityGrid world = generate_smooth_terrain(options, add_terrain_types(registry).value()).value();
+  const Json json = Json::parse(made.out);
+  EXPECT_EQ(json["voxels"], world.solid_count());
+  EXPECT_EQ(json["size"], Json({128, 64, 64}));
+  EXPECT_TRUE(json["faces_visible"].is_null()) << "a field has no faces";
+  const LoadedScene loaded = load_scene(folder_.file("cliffs.json")).value();
+  const SceneGrid& grid = loaded.scene.grids()[loaded.scene.grids().handles().front()];
+  ASSERT_EQ(grid.field.chunks(), world.chunks());
+  for (const IVec3 chunk : world.chunks()) {
+    EXPECT_EQ(grid.field.find_chunk(chunk)->content_hash(), world.find_chunk(chunk)->content_hash());
+  }
+  const ToolRun info = run("info cliffs.json --json");
+  ASSERT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(Json::parse(info.out)["grids"][0]["solid_samples"], world.solid_count());
+  EXPECT_EQ(run("render cliffs.json -o cliffs.png --size 80x60").status, 0);
+  const ToolRun mesh = run("convert cliffs.json cliffs.ply --json");
+  ASSERT_EQ(mesh.status, 0) << mesh.err;
+  EXPECT_GT(Json::parse(mesh.out)["triangles"], 10'000);
+
+  EXPECT_EQ(run("generate smooth-terrain cliffs.vox").status, 2) << "no file of blocks";
+  EXPECT_EQ(run("generate smooth-terrain cliffs.glb").status, 2);
+  EXPECT_EQ(run("generate smooth-terrain a.json --chunks 513x1x1").status, 2);
+  EXPECT_EQ(run("convert cliffs.json cliffs.vox").status, 1) << "a field is not lost in silence";
 }
 
 TEST_F(ToolGenerate, WorldsBeyond256VoxelsKeepEveryVoxel) {

@@ -72,8 +72,8 @@ class VulkanRenderer {
   ///
   /// What changed the journals of the scene and its grids tell; it may be another scene each time.
   /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
-  /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels or hold a field of densities; then the
-  ///         device holds nothing.
+  /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels; then the device holds nothing.
+  /// Memory: of a field 700 bytes for each 4^3 cells at its surface, beside its tree.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
                               Threads threads = {});
   /// Bytes that the last `update` sent to the device.
