@@ -164,12 +164,8 @@ int run_generate(GenerateOptions& options) {
   return print(outcome_text(options, *outcome));
 }
 
-}  // namespace
-
-namespace {
-
 std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, const char* chunks, int& status) {
-  const auto options = std::make_shared<GenerateOptions>();
+  auto options = std::make_shared<GenerateOptions>();
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks);

@@ -26,16 +26,16 @@ ChunkDifference everything() {
   return all;
 }
 
-// Which samples differ; null is far air.
-ChangeReach density_difference(const DensityChunk* before, const DensityChunk* after) {
+// Which samples of the rows of a box differ; null is far air.
+ChangeReach density_difference(const DensityChunk* before, const DensityChunk* after, const IBox& within) {
   static const DensityChunk far_air(DensityNeighbourhood{}.outside);
   const DensityChunk& a = before == nullptr ? far_air : *before;
   const DensityChunk& b = after == nullptr ? far_air : *after;
   ChangeReach found;
   std::array<Half, kChunkEdge> old_row;
   std::array<Half, kChunkEdge> new_row;
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
+  for (int z = within.min.z; z < within.max.z; ++z) {
+    for (int y = within.min.y; y < within.max.y; ++y) {
       a.read_row(y, z, old_row);
       b.read_row(y, z, new_row);
       if (old_row == new_row) continue;
@@ -53,12 +53,8 @@ const Chunk* materials_of(const DensityChunk* chunk) {
 
 }  // namespace
 
-LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, bool only_types)
-    : stamp_(next_stamp()),
-      chunk_(chunk),
-      voxels_(std::move(voxels)),
-      base_(std::move(base)),
-      only_types_(only_types) {}
+LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed)
+    : stamp_(next_stamp()), chunk_(chunk), voxels_(std::move(voxels)), base_(std::move(base)), changed_(changed) {}
 
 void LiveDensity::try_to_make() {
   if (is_made()) return;
@@ -75,15 +71,20 @@ void LiveDensity::make() {
 void LiveDensity::make_locked() {
   const Neighbourhood voxels = voxels_->neighbourhood(chunk_);
   std::unique_ptr<DensityChunk> made;
-  if (only_types_ && base_ != nullptr && base_->densities() != nullptr && voxels.centre() != nullptr) {
+  const IVec3 origin = chunk_ * kChunkEdge;
+  const IBox changed = changed_.empty() ? IBox{} : IBox{changed_.min - origin, changed_.max - origin};
+  if (base_ != nullptr && base_->densities() != nullptr) {
     made = std::make_unique<DensityChunk>(*base_->densities());
-    made->materials() = *voxels.centre();
+    update_density_of_voxels(voxels, changed, *made);
   } else {
     made = std::make_unique<DensityChunk>(density_of_voxels(voxels));
-    if (made->uniform() == DensityNeighbourhood{}.outside) made.reset();
   }
+  if (made->uniform() == DensityNeighbourhood{}.outside) made.reset();
   if (base_ != nullptr) {
-    changed_densities_ = density_difference(base_->densities(), made.get());
+    IBox reached;
+    if (!changed.empty())
+      reached = intersect({changed.min - kVoxelFieldReach, changed.max + kVoxelFieldReach}, kWholeChunk);
+    changed_densities_ = density_difference(base_->densities(), made.get(), reached);
     changed_types_ = difference(materials_of(base_->densities()), materials_of(made.get()), kWholeChunk).types;
     base_stamp_ = base_->stamp();
     has_base_ = true;
@@ -131,6 +132,9 @@ void DensityCache::follow(GridSnapshot grid, const GridChanges& edits, std::vect
 }
 
 void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached) {
+  const IVec3 origin = change.chunk * kChunkEdge;
+  IBox changed = change.difference.solid.change(change.chunk).box;
+  changed = {changed.min + origin, changed.max + origin};
   for (int i = 0; i < 27; ++i) {
     const IVec3 at = change.chunk + Neighbourhood::offset(i);
     const IVec3 offset = at - change.chunk;
@@ -138,9 +142,9 @@ void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached)
       return reach.is_within(samples, offset.x, offset.y, offset.z);
     };
     if (is_within(change.difference.solid, kVoxelFieldReach)) {
-      invalidate(at, true);
+      invalidate(at, true, changed);
     } else if (i == 13 && change.difference.types.samples != 0) {
-      invalidate(at, false);
+      invalidate(at, false, {});
     }
     if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, 1)) {
       reached.push_back(at);
@@ -157,10 +161,11 @@ void DensityCache::drop_what_is_gone(const std::vector<IVec3>& changed) {
   }
 }
 
-void DensityCache::invalidate(IVec3 chunk, bool solid) {
+void DensityCache::invalidate(IVec3 chunk, bool solid, const IBox& changed) {
   Slot& slot = slots_[chunk];
   slot.under_way.reset();
   (solid ? slot.is_solid_stale : slot.is_type_stale) = true;
+  if (solid) slot.changed = unite(slot.changed, changed);
 }
 
 bool DensityCache::has_voxels_near(IVec3 chunk) const {
@@ -182,8 +187,7 @@ std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk) {
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
   if (std::shared_ptr<LiveDensity> under_way = slot.under_way.lock()) return under_way;
-  const bool only_types = slot.kept != nullptr && !slot.is_solid_stale;
-  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, only_types);
+  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, slot.changed);
   slot.under_way = made;
   return made;
 }
@@ -195,7 +199,7 @@ std::uint32_t DensityCache::keep(IVec3 chunk, const LiveDensities& made) {
     if (each == nullptr || !each->is_made()) continue;
     const auto found = slots_.find(chunk + Neighbourhood::offset(i));
     if (found == slots_.end() || found->second.under_way.lock() != each) continue;
-    found->second = Slot{each, {}, false, false};
+    found->second = Slot{each, {}, false, {}, false};
     kept |= std::uint32_t{1} << i;
   }
   return kept;

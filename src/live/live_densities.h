@@ -25,8 +25,9 @@ using GridSnapshot = std::shared_ptr<const Grid>;
 /// Threads: any; the voxels are let go once the densities are made.
 class LiveDensity {
  public:
-  /// `base` are the densities of an earlier state, or null; with `only_types`, the two differ in types alone.
-  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, bool only_types);
+  /// `base` are the densities of an earlier state, or null. `changed` holds the voxels that came or went since, in the
+  /// grid; empty where the two differ in types alone.
+  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed);
 
   /// Tells this state of this chunk from every other; 0 stands for far air, of which there is no object.
   [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
@@ -50,7 +51,7 @@ class LiveDensity {
   std::mutex mutex_;
   GridSnapshot voxels_;                      // until made, as `base_`
   std::shared_ptr<const LiveDensity> base_;  // made
-  const bool only_types_;
+  const IBox changed_;
   std::unique_ptr<const DensityChunk> densities_;
   std::uint64_t base_stamp_ = 0;
   bool has_base_ = false;
@@ -86,6 +87,7 @@ class DensityCache {
     std::shared_ptr<LiveDensity> kept;     // made
     std::weak_ptr<LiveDensity> under_way;  // of the present state; held by jobs
     bool is_solid_stale = true;            // `kept` is of other voxels
+    IBox changed;                          // where these came or went since, as far as that is near
     bool is_type_stale = true;
   };
 
@@ -96,7 +98,7 @@ class DensityCache {
   [[nodiscard]] std::vector<Change> changes_of(const Grid& grid, const GridChanges& edits) const;
   void reach_from(const Change& change, std::vector<IVec3>& reached);
   void drop_what_is_gone(const std::vector<IVec3>& changed);
-  void invalidate(IVec3 chunk, bool solid);
+  void invalidate(IVec3 chunk, bool solid, const IBox& changed);
   [[nodiscard]] bool has_voxels_near(IVec3 chunk) const;
   [[nodiscard]] std::shared_ptr<LiveDensity> density(IVec3 chunk);
 

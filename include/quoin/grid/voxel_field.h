@@ -28,5 +28,9 @@ inline constexpr int kVoxelFieldReach = 10;
 /// One chunk of that field, of the centre's voxels and those around them: what `field_from_grid` puts there, all far
 /// air included. Several threads may make chunks at once.
 [[nodiscard]] DensityChunk density_of_voxels(const Neighbourhood& chunks);
+/// Makes the densities of a chunk, as they were before an edit, those of its voxels as they are now, to the same bits.
+/// `changed`: holds the voxels that came or went, in the chunk's coordinates; beyond the chunk where its neighbours
+/// changed. Cost: of the rows along x that these reach, about 1 ms for one voxel.
+void update_density_of_voxels(const Neighbourhood& chunks, const IBox& changed, DensityChunk& densities);
 
 }  // namespace quoin

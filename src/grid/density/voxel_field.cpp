@@ -54,6 +54,24 @@ struct Scratch {
   std::array<float, kSmoothed * kChunkEdge * kChunkEdge> blurred_y;  // [z][y][x]
 };
 
+/// The rows along x whose densities are wanted, of a chunk; intermediate rows begin at the same numbers.
+struct Window {
+  int first_y = 0;
+  int last_y = kChunkEdge;  // excluded
+  int first_z = 0;
+  int last_z = kChunkEdge;
+
+  [[nodiscard]] bool empty() const { return first_y >= last_y || first_z >= last_z; }
+};
+
+/// Visits (y, z) of a window that is so much larger at its ends.
+template <class Visit>
+void for_each_row(const Window& window, int more_y, int more_z, Visit visit) {
+  for (int z = window.first_z; z < window.last_z + more_z; ++z) {
+    for (int y = window.first_y; y < window.last_y + more_y; ++y) visit(y, z);
+  }
+}
+
 // Which voxels of a row of the neighbourhood's chunks are not air. Requires: -64 <= y, z < 128.
 std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
   const Chunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
@@ -61,20 +79,18 @@ std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
 }
 
 // Returns whether all voxels of the region are solid, none is, or neither.
-std::optional<bool> read_region(const Neighbourhood& chunks, Scratch& scratch) {
+std::optional<bool> read_region(const Neighbourhood& chunks, const Window& window, Scratch& scratch) {
   bool is_all_solid = true;
   bool is_all_air = true;
-  for (int z = 0; z < kRegion; ++z) {
-    for (int y = 0; y < kRegion; ++y) {
-      const auto part = [&](int dx) { return solid_row(chunks, dx, y - kMargin, z - kMargin); };
-      const std::uint64_t middle = part(0);
-      RegionRow& row = scratch.rows[static_cast<std::size_t>(z * kRegion + y)];
-      row.low = part(-1) >> (64 - kMargin) | middle << kMargin;
-      row.high = (middle >> (64 - kMargin) | part(1) << kMargin) & RegionRow::kHighBits;
-      is_all_solid = is_all_solid && row.has_all();
-      is_all_air = is_all_air && row.has_none();
-    }
-  }
+  for_each_row(window, 2 * kMargin, 2 * kMargin, [&](int y, int z) {
+    const auto part = [&](int dx) { return solid_row(chunks, dx, y - kMargin, z - kMargin); };
+    const std::uint64_t middle = part(0);
+    RegionRow& row = scratch.rows[static_cast<std::size_t>(z * kRegion + y)];
+    row.low = part(-1) >> (64 - kMargin) | middle << kMargin;
+    row.high = (middle >> (64 - kMargin) | part(1) << kMargin) & RegionRow::kHighBits;
+    is_all_solid = is_all_solid && row.has_all();
+    is_all_air = is_all_air && row.has_none();
+  });
   if (is_all_solid) return true;
   return is_all_air ? std::optional(false) : std::nullopt;
 }
@@ -115,22 +131,19 @@ void spread(const ByteRow* middle, int stride, ByteRow& out) {
 // The squared distance of every sample to the nearest solid voxel, or the nearest that is air.
 // Source: P. Felzenszwalb, D. Huttenlocher, "Distance Transforms of Sampled Functions" (2012), an axis at a time, with
 //         a short reach in place of envelopes.
-void measure(Scratch& scratch, bool solid, std::array<ByteRow, kSmoothed * kSmoothed>& out) {
-  for (std::size_t row = 0; row < scratch.rows.size(); ++row) {
+void measure(Scratch& scratch, const Window& window, bool solid, std::array<ByteRow, kSmoothed * kSmoothed>& out) {
+  for_each_row(window, 2 * kMargin, 2 * kMargin, [&](int y, int z) {
+    const auto row = static_cast<std::size_t>(z * kRegion + y);
     measure_row(scratch.rows[row], solid, scratch.along_x[row]);
-  }
-  for (int z = 0; z < kRegion; ++z) {
-    for (int y = 0; y < kSmoothed; ++y) {
-      spread(&scratch.along_x[static_cast<std::size_t>(z * kRegion + y + kReach)], 1,
-             scratch.along_xy[static_cast<std::size_t>(z * kSmoothed + y)]);
-    }
-  }
-  for (int z = 0; z < kSmoothed; ++z) {
-    for (int y = 0; y < kSmoothed; ++y) {
-      spread(&scratch.along_xy[static_cast<std::size_t>((z + kReach) * kSmoothed + y)], kSmoothed,
-             out[static_cast<std::size_t>(z * kSmoothed + y)]);
-    }
-  }
+  });
+  for_each_row(window, 2 * kBlur, 2 * kMargin, [&](int y, int z) {
+    spread(&scratch.along_x[static_cast<std::size_t>(z * kRegion + y + kReach)], 1,
+           scratch.along_xy[static_cast<std::size_t>(z * kSmoothed + y)]);
+  });
+  for_each_row(window, 2 * kBlur, 2 * kBlur, [&](int y, int z) {
+    spread(&scratch.along_xy[static_cast<std::size_t>((z + kReach) * kSmoothed + y)], kSmoothed,
+           out[static_cast<std::size_t>(z * kSmoothed + y)]);
+  });
 }
 
 // Distances to the surface by squared distances to the nearest voxel of the other kind.
@@ -143,10 +156,11 @@ std::array<float, kFarSquared + 1> surface_distances() {
 constexpr std::array<float, 5> kKernel = {1.0F / 16.0F, 4.0F / 16.0F, 6.0F / 16.0F, 4.0F / 16.0F, 1.0F / 16.0F};
 
 // Smooths the signed distances along x.
-void blur_along_x(Scratch& scratch) {
+void blur_along_x(Scratch& scratch, const Window& window) {
   static const std::array<float, kFarSquared + 1> distance_of = surface_distances();
   std::array<float, kSmoothed> signed_distances;
-  for (std::size_t row = 0; row < kSmoothed * kSmoothed; ++row) {
+  for_each_row(window, 2 * kBlur, 2 * kBlur, [&](int y, int z) {
+    const auto row = static_cast<std::size_t>(z * kSmoothed + y);
     const ByteRow& to_solid = scratch.to_solid[row];
     const ByteRow& to_air = scratch.to_air[row];
     // One of the two is 0.
@@ -156,7 +170,7 @@ void blur_along_x(Scratch& scratch) {
       const float* d = signed_distances.data() + x;
       out[x] = (kKernel[0] * (d[0] + d[4]) + kKernel[1] * (d[1] + d[3])) + kKernel[2] * d[2];
     }
-  }
+  });
 }
 
 // Smooths a row of 64 with those beside it, `stride` values apart.
@@ -169,31 +183,37 @@ void blur_rows(const float* first, std::size_t stride, float* out) {
   }
 }
 
-void blur_along_y(Scratch& scratch) {
-  for (std::size_t z = 0; z < kSmoothed; ++z) {
-    for (std::size_t y = 0; y < kChunkEdge; ++y) {
-      blur_rows(scratch.blurred_x.data() + (z * kSmoothed + y) * kChunkEdge, kChunkEdge,
-                scratch.blurred_y.data() + (z * kChunkEdge + y) * kChunkEdge);
-    }
-  }
+void blur_along_y(Scratch& scratch, const Window& window) {
+  for_each_row(window, 0, 2 * kBlur, [&](int y, int z) {
+    blur_rows(scratch.blurred_x.data() + static_cast<std::size_t>(z * kSmoothed + y) * kChunkEdge, kChunkEdge,
+              scratch.blurred_y.data() + static_cast<std::size_t>(z * kChunkEdge + y) * kChunkEdge);
+  });
 }
 
 // The last axis; densities keep the signs of their voxels.
-void write_densities(const Scratch& scratch, Half far, DensityChunk& out) {
+void write_densities(const Scratch& scratch, const Window& window, Half far, DensityChunk& out) {
   constexpr std::size_t kPlane = std::size_t{kChunkEdge} * kChunkEdge;
   std::array<float, kChunkEdge> smoothed;
   std::array<Half, kChunkEdge> row;
-  for (std::size_t z = 0; z < kChunkEdge; ++z) {
-    for (std::size_t y = 0; y < kChunkEdge; ++y) {
-      blur_rows(scratch.blurred_y.data() + z * kPlane + y * kChunkEdge, kPlane, smoothed.data());
-      const ByteRow& to_solid = scratch.to_solid[(z + kBlur) * kSmoothed + y + kBlur];
-      for (std::size_t x = 0; x < kChunkEdge; ++x) {
-        const bool is_solid = to_solid[x + kBlur] == 0;
-        row[x] = stored_within(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), far);
-      }
-      out.write_row(static_cast<int>(y), static_cast<int>(z), row);
+  for_each_row(window, 0, 0, [&](int y, int z) {
+    const auto first = static_cast<std::size_t>(z * kChunkEdge + y) * kChunkEdge;
+    blur_rows(scratch.blurred_y.data() + first, kPlane, smoothed.data());
+    const ByteRow& to_solid = scratch.to_solid[static_cast<std::size_t>((z + kBlur) * kSmoothed + y + kBlur)];
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      const bool is_solid = to_solid[x + kBlur] == 0;
+      row[x] = stored_within(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), far);
     }
-  }
+    out.write_row(y, z, row);
+  });
+}
+
+void write_window(Scratch& scratch, const Window& window, Half far, DensityChunk& out) {
+  measure(scratch, window, true, scratch.to_solid);
+  measure(scratch, window, false, scratch.to_air);
+  blur_along_x(scratch, window);
+  blur_along_y(scratch, window);
+  write_densities(scratch, window, far, out);
+  out.unite_slabs();
 }
 
 bool is_one_kind_throughout(const Neighbourhood& chunks) {
@@ -231,19 +251,27 @@ DensityChunk density_of_voxels(const Neighbourhood& chunks) {
     is_solid = voxels != nullptr;
   } else {
     scratch.reset(new Scratch);  // without writing zeros first
-    is_solid = read_region(chunks, *scratch);
+    is_solid = read_region(chunks, {}, *scratch);
   }
   if (is_solid.has_value()) {
     if (*is_solid) made.fill(deep);
     return made;
   }
-  measure(*scratch, true, scratch->to_solid);
-  measure(*scratch, false, scratch->to_air);
-  blur_along_x(*scratch);
-  blur_along_y(*scratch);
-  write_densities(*scratch, far, made);
-  made.unite_slabs();
+  write_window(*scratch, {}, far, made);
   return made;
+}
+
+void update_density_of_voxels(const Neighbourhood& chunks, const IBox& changed, DensityChunk& densities) {
+  const auto first = [](int from) { return std::clamp(from - kVoxelFieldReach, 0, kChunkEdge); };
+  const auto last = [](int to) { return std::clamp(to + kVoxelFieldReach, 0, kChunkEdge); };
+  const Chunk* const voxels = chunks.centre();
+  densities.materials() = voxels == nullptr ? Chunk(kAir) : *voxels;
+  if (changed.empty()) return;
+  const Window window{first(changed.min.y), last(changed.max.y), first(changed.min.z), last(changed.max.z)};
+  if (window.empty()) return;
+  const std::unique_ptr<Scratch> scratch(new Scratch);  // without writing zeros first
+  (void)read_region(chunks, window, *scratch);
+  write_window(*scratch, window, largest_within(kBand), densities);
 }
 
 DensityGrid field_from_grid(const Grid& grid, Threads threads) {

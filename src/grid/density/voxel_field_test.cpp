@@ -130,6 +130,29 @@ TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
   EXPECT_EQ(field_from_grid(Grid()).chunk_count(), 0U);
 }
 
+TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
+  std::mt19937 random(11);
+  const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
+  Grid grid;
+  grid.fill_box({{-64, -64, -64}, {128, 20, 128}}, 1);
+  for (int i = 0; i < 40; ++i) grid.fill_sphere({below(120) - 30, 15 + below(20), below(120) - 30}, below(9), 1);
+  DensityChunk kept = density_of_voxels(grid.neighbourhood({0, 0, 0}));
+  for (int i = 0; i < 60; ++i) {
+    // In the chunk, at its borders, beyond them, and too far for it.
+    const IVec3 at{below(100) - 18, below(100) - 18, below(100) - 18};
+    const IBox box{at, at + IVec3{1 + below(4), 1 + below(4), 1 + below(9)}};
+    grid.fill_box(box, static_cast<VoxelType>(i % 3));
+    update_density_of_voxels(grid.neighbourhood({0, 0, 0}), box, kept);
+    ASSERT_EQ(kept.content_hash(), density_of_voxels(grid.neighbourhood({0, 0, 0})).content_hash()) << i;
+  }
+  for (VoxelType type : {VoxelType{1}, kAir}) {
+    grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, type);
+    update_density_of_voxels(grid.neighbourhood({0, 0, 0}), {{-64, -64, -64}, {128, 128, 128}}, kept);
+    EXPECT_TRUE(kept.uniform().has_value()) << "all of one kind takes no room";
+    EXPECT_EQ(kept.content_hash(), density_of_voxels(grid.neighbourhood({0, 0, 0})).content_hash());
+  }
+}
+
 TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64 * 5, 64 * 5, 64 * 5}}, 3);

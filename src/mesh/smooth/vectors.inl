@@ -6,7 +6,9 @@
 
 #pragma once
 
+// First: what these lanes append with is used by the slices.
 #include "mesh/trilinear_normals.inl"
+
 #include "mesh/smooth/slices.inl"
 
 namespace quoin::smooth {

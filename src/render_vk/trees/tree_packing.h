@@ -36,8 +36,8 @@ struct ChunkRecord {
                                      IVec3 chunk);
 
 /// A field's chunk: as one of voxels, a tree of the cells that touch its solid, with the materials of its samples.
-/// After the words of a brick's cells comes a number for each: where its samples lie (see kFieldBlockEdge), in words from the
-/// header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
+/// After the words of a brick's cells comes a number for each: where its samples lie (see kFieldBlockEdge), in words
+/// from the header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
 /// Requires: `cells` holds some of the chunk.
 [[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
 /// How far beyond a chunk's own samples such a record reads.
