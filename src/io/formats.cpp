@@ -62,10 +62,11 @@ Error unrecognised(std::span<const std::byte> bytes) {
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
 
-// A volume's path may lead to what lies beside it.
-Result<LoadedScene> read_volume_scene(const std::filesystem::path& path, std::span<const std::byte> bytes,
-                                      const LoadOptions& options, const Progress& progress) {
-  auto volume = path.empty() ? read_volume(bytes) : read_volume(path);
+bool is_volume(const std::optional<FileFormat>& format) {
+  return format && format_info(*format).is_volume;
+}
+
+Result<LoadedScene> scene_of_volume(Result<Volume> volume, const LoadOptions& options, const Progress& progress) {
   if (!volume) return volume.error();
   VolumeSceneOptions wanted;
   wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
@@ -83,7 +84,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes);
-  if (format && format_info(*format).is_volume) return read_volume_scene(path, bytes, options, progress);
+  if (is_volume(format)) return scene_of_volume(read_volume(bytes), options, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
@@ -155,6 +156,10 @@ Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptio
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options,
                                const Progress& progress) {
+  // A volume's reader is given the path, which may lead to what lies beside it.
+  const auto format = detect_format(path);
+  if (!format) return format.error();
+  if (is_volume(*format)) return with_path(scene_of_volume(read_volume(path), options, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
   if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, progress);

@@ -17,6 +17,11 @@ IVec3 corner_chunk(IVec3 chunk, int i) {
   return chunk + IVec3{i & 1, i >> 1 & 1, i >> 2};
 }
 
+// Those whose cells have samples of a chunk as corners: it, and those before it.
+IVec3 cell_chunk(IVec3 chunk, int i) {
+  return chunk - IVec3{i & 1, i >> 1 & 1, i >> 2};
+}
+
 bool is_there(const DensityGrid& field, IVec3 chunk) {
   for (int i = 0; i < 8; ++i) {
     if (field.find_chunk(corner_chunk(chunk, i)) != nullptr) return true;
@@ -89,7 +94,7 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
       std::any_of(chunks_.begin(), chunks_.end(), [](const auto& each) { return each.second.was_given; });
   Members all;
   for (const IVec3 chunk : field.chunks()) {
-    for (int i = 0; i < 8; ++i) all.push_back(2 * chunk - corner_chunk(chunk, i));
+    for (int i = 0; i < 8; ++i) all.push_back(cell_chunk(chunk, i));
   }
   for (const auto& [chunk, state] : chunks_) all.push_back(chunk);
   sort_and_unite(all);
@@ -101,7 +106,7 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
 
 void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
   for (const DensityChange& change : changes.items) {
-    for (int i = 0; i < 8; ++i) see_whether_there(field, 2 * change.chunk - corner_chunk(change.chunk, i), true, now);
+    for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), true, now);
   }
   for (const DensityChange& change : changes.items) {
     for (int i = 0; i < 27; ++i) {

@@ -19,21 +19,6 @@ namespace {
 
 using Point = std::tuple<double, double, double>;
 
-/// A scene of one grid with a field, seen once.
-struct OneField {
-  OneField() {
-    scene.types = live_types();
-    instance.grid = handle = scene.add_grid({});
-    placed = scene.add_instance(instance);
-  }
-  DensityGrid& field() { return scene.edit(handle).field; }
-
-  Scene scene;
-  GridHandle handle;
-  Instance instance;
-  InstanceHandle placed;
-};
-
 // How many edges of what is shown have an odd number of triangles: 0 where it is closed.
 std::size_t open_edges(const ShownSurfaces& shown, GridHandle handle) {
   std::map<std::pair<Point, Point>, int> edges;
@@ -142,7 +127,7 @@ LiveMeshOptions options_of(unsigned threads) {
 }
 
 TEST(LiveField, ItsMeshIsThatOfTheWholeField) {
-  OneField one;
+  OneGrid one;
   one.field() = hills(2);
   LiveMeshes meshes(options_of(2));
   ShownSurfaces shown;
@@ -157,7 +142,7 @@ TEST(LiveField, ItsMeshIsThatOfTheWholeField) {
 }
 
 TEST(LiveField, VoxelsBesideItAreSurfacesOfTheirOwn) {
-  OneField one;
+  OneGrid one;
   one.field().add_sphere({32, 32, 32}, 10, 1);
   one.scene.edit(one.handle).grid.fill_box({{40, 40, 40}, {50, 50, 50}}, 3);
   LiveMeshes meshes(options_of(1));
@@ -177,7 +162,7 @@ TEST(LiveField, WhatIsShownIsClosedAtAnyTimeWhileItIsEdited) {
   for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 3U); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
-    OneField one;
+    OneGrid one;
     one.field() = hills(2, seed);
     const LiveMeshOptions options = options_of(1 + seed % 3);
     LiveMeshes meshes(options);
@@ -208,7 +193,7 @@ TEST(LiveField, LevelsFollowTheEyeWithoutASeamAtAnyTime) {
   for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 2U); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
-    OneField one;
+    OneGrid one;
     one.field() = hills(4, seed);
     LiveMeshOptions options = options_of(1 + seed % 3);
     options.detail_distance = 40.0;
@@ -237,7 +222,7 @@ TEST(LiveField, LevelsFollowTheEyeWithoutASeamAtAnyTime) {
 }
 
 TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
-  OneField one;
+  OneGrid one;
   one.field() = hills(4);
   LiveMeshOptions options = options_of(2);
   options.detail_distance = 40.0;
@@ -261,7 +246,7 @@ TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
 }
 
 TEST(LiveField, ColoursOfTypesAreFollowed) {
-  OneField one;
+  OneGrid one;
   one.field().add_sphere({60, 60, 60}, 10, 1);
   LiveMeshes meshes(options_of(1));
   ShownSurfaces shown;
@@ -278,7 +263,7 @@ TEST(LiveField, ColoursOfTypesAreFollowed) {
 }
 
 TEST(LiveField, AnotherFieldTakesThePlaceAtOnce) {
-  OneField one;
+  OneGrid one;
   one.field() = hills(2, 1);
   LiveMeshes meshes(options_of(2));
   ShownSurfaces shown;

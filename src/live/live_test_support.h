@@ -197,6 +197,7 @@ struct OneGrid {
     placed = scene.add_instance(instance);
   }
   Grid& grid() { return scene.edit(handle).grid; }
+  DensityGrid& field() { return scene.edit(handle).field; }
 
   Scene scene;
   GridHandle handle;

@@ -65,17 +65,12 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
   collect();
   const ChangedTypes changed_types = follow_types(scene.types);
   for (const GridHandle handle : follow_scene(scene)) follow_grid(scene, handle, now);
-  for (const GridHandle handle : drawn_) {
-    if (changed_types.visibility.empty() && changed_types.colour.empty()) break;
-    for (const SurfaceContent content : {SurfaceContent::Voxels, SurfaceContent::Field}) {
-      LiveSource* const live = find({handle, content});
-      if (live != nullptr) live->mark_types(scene.grids()[handle], changed_types, now);
-    }
-  }
   choose_levels(scene, now);
   for (auto& [key, live] : sources_) {
     const SceneGrid* const grid = scene.grids().find(key.grid);
-    if (grid != nullptr) live->prepare(*grid);
+    if (grid == nullptr) continue;
+    if (std::binary_search(drawn_.begin(), drawn_.end(), key.grid)) live->mark_types(*grid, changed_types, now);
+    live->prepare(*grid);
   }
   withdraw([&](const LiveJob& job) {
     const LiveSource* live = find(job.source);

@@ -20,6 +20,15 @@ const uint kLamps = 2048;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
+// A direction kept in a word: the octahedron's faces folded into a square.
+// Source: Z. Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors" (2014): octahedral.
+vec3 unit_vector(uint word) {
+  vec2 e = unpackSnorm2x16(word);
+  vec3 v = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+  if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(v.xy, vec2(0.0)));
+  return normalize(v);
+}
+
 const uint kBodies = 16;  // of glass that are kept for a pixel at a time
 
 // A sparse tree whose nodes each have 4^3 places; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of

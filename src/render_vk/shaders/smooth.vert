@@ -10,13 +10,6 @@ layout(location = 4) flat out ivec3 base;      // in the tree's coordinates
 
 invariant gl_Position;
 
-// Source: Z. Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors" (2014): octahedral.
-vec3 unit_vector(uint word) {
-  vec2 e = unpackSnorm2x16(word);
-  vec3 v = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-  if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(v.xy, vec2(0.0)));
-  return normalize(v);
-}
 
 void main() {
   Numbers words = Numbers(push.data);

@@ -6,6 +6,21 @@
 // ordered by t, at ties by axis: the definition of docs/decisions/011, so that the processor's kernels meet the same
 // voxels. `origin` is relative to a multiple of 64 voxels next to the ray's start.
 
+// Where a voxel lies in the node of a level that holds it.
+uint index_in(ivec3 voxel, int level) {
+  ivec3 place = (voxel >> (2 * level)) & 3;
+  return uint(place.x + 4 * place.y + 16 * place.z);
+}
+
+// Whether a place of a node holds something, and which of its children that is.
+bool has_child(uvec4 node, uint index) {
+  return ((index < 32 ? node.x : node.y) & (1u << (index & 31))) != 0;
+}
+uint child_of(uvec4 node, uint index) {
+  uint before = (1u << (index & 31)) - 1;
+  return index < 32 ? bitCount(node.x & before) : bitCount(node.x) + bitCount(node.y & before);
+}
+
 const int kLevels = 15;
 const float kNever = 1e37;
 
@@ -143,18 +158,14 @@ bool leave_block(int shift, float max_t) {
 // Goes on, from where the walk stands, to the first occupied voxel; false when there is none up to max_t.
 bool find_voxel(float max_t) {
   for (;;) {
-    int shift = 2 * walk_level;
-    ivec3 place = (walk_voxel >> shift) & 3;
-    uint index = uint(place.x + 4 * place.y + 16 * place.z);
-    uint bits = index < 32 ? walk_node.x : walk_node.y;
-    uint bit = 1u << (index & 31);
-    if ((bits & bit) == 0) {
-      if (!leave_block(shift, max_t)) return false;
+    uint index = index_in(walk_voxel, walk_level);
+    if (!has_child(walk_node, index)) {
+      if (!leave_block(2 * walk_level, max_t)) return false;
       continue;
     }
     // Words of voxels and what is full have no children.
     if ((walk_node.z & 1) != 0) return true;
-    uint child = bitCount(bits & (bit - 1)) + (index < 32 ? 0 : bitCount(walk_node.x));
+    uint child = child_of(walk_node, index);
     uvec2 children = walk_node.zw;
     walk_stack[walk_level] = walk_node;
     --walk_level;
@@ -207,13 +218,10 @@ bool holds(Tree tree, ivec3 voxel) {
   if (any(lessThan(voxel, tree.low.xyz)) || any(greaterThanEqual(voxel, tree.high.xyz))) return false;
   uvec4 node = tree.root;
   for (int level = tree.low.w;; --level) {
-    ivec3 place = (voxel >> (2 * level)) & 3;
-    uint index = uint(place.x + 4 * place.y + 16 * place.z);
-    uint bits = index < 32 ? node.x : node.y;
-    uint bit = 1u << (index & 31);
-    if ((bits & bit) == 0) return false;
+    uint index = index_in(voxel, level);
+    if (!has_child(node, index)) return false;
     if ((node.z & 1) != 0) return true;
-    uint child = bitCount(bits & (bit - 1)) + (index < 32 ? 0 : bitCount(node.x));
+    uint child = child_of(node, index);
     node = level > 1 ? Nodes(node.zw).at[child] : uvec4(Words(node.zw).at[child], 1, 0);
   }
 }
@@ -240,10 +248,7 @@ float sample_of(Numbers block, ivec3 at) {
 bool block_found(out Numbers block) {
   if (walk_level > 0) return false;
   uvec4 brick = walk_stack[1];
-  ivec3 place = (walk_voxel >> 2) & 3;
-  uint index = uint(place.x + 4 * place.y + 16 * place.z);
-  uint bits = index < 32 ? brick.x : brick.y;
-  uint child = bitCount(bits & ((1u << (index & 31)) - 1)) + (index < 32 ? 0 : bitCount(brick.x));
+  uint child = child_of(brick, index_in(walk_voxel, 1));
   uint words = bitCount(brick.x) + bitCount(brick.y);
   uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
   block = Numbers(address_after(record_found(), 4 * from));
@@ -439,28 +444,24 @@ uint material_found(Tree field, vec3 inside) {
   uvec4 node = field.root;
   for (int level = field.low.w; level > 2; --level) {
     if ((node.z & 1) != 0) break;
-    ivec3 place = (at >> (2 * level)) & 3;
-    uint index = uint(place.x + 4 * place.y + 16 * place.z);
-    uint bits = index < 32 ? node.x : node.y;
-    uint bit = 1u << (index & 31);
-    if ((bits & bit) == 0) return 0;
-    node = Nodes(node.zw).at[bitCount(bits & (bit - 1)) + (index < 32 ? 0 : bitCount(node.x))];
+    uint index = index_in(at, level);
+    if (!has_child(node, index)) return 0;
+    node = Nodes(node.zw).at[child_of(node, index)];
   }
   return type_in(record_of(node), at & 63);
 }
 
-// A unit vector in a word, to 1/20,000: the octahedron's faces folded into a square.
+// No unit vector's word.
+const uint kNoNormal = 0x80008000u;
+
+// A unit vector as `unit_vector` reads it, or 0.
 uint packed_normal(vec3 n) {
   float size = abs(n.x) + abs(n.y) + abs(n.z);
-  if (!(size > 0.0)) return 0x80008000u;
+  if (!(size > 0.0)) return kNoNormal;
   vec2 at = n.xy / size;
   if (n.z < 0.0) at = (1.0 - abs(at.yx)) * vec2(at.x >= 0.0 ? 1.0 : -1.0, at.y >= 0.0 ? 1.0 : -1.0);
   return packSnorm2x16(at);
 }
 vec3 normal_of(uint word) {
-  if (word == 0x80008000u) return vec3(0.0);
-  vec2 at = unpackSnorm2x16(word);
-  vec3 n = vec3(at, 1.0 - abs(at.x) - abs(at.y));
-  if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
-  return normalize(n);
+  return word == kNoNormal ? vec3(0.0) : unit_vector(word);
 }

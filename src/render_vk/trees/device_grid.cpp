@@ -71,21 +71,8 @@ Status DeviceGrid::update_field(DeviceMemory& memory, const DensityTree* field) 
   }
   ChangeCursor now = followed_field_;
   const DensityChanges changes = field->field().changes_since(now);
-  std::map<IVec3, bool, ByPlace> reached;
-  if (changes.all) {
-    drop_all(memory, field_chunks_);
-    for (const IVec3 chunk : field->field().chunks()) {
-      // Cells lie before their samples.
-      for (int i = 0; i < 8; ++i) reached[chunk - IVec3{i & 1, i >> 1 & 1, i >> 2}] = true;
-    }
-  }
-  for (const DensityChange& change : changes.items) {
-    for (int i = 0; i < 27; ++i) {
-      const IVec3 offset = Neighbourhood::offset(i);
-      if (change.affects(offset, kFieldRecordReach)) reached[change.chunk + offset] = true;
-    }
-  }
-  for (const auto& [chunk, is_reached] : reached) {
+  if (changes.all) drop_all(memory, field_chunks_);
+  for (const IVec3 chunk : chunks_to_mesh(field->field(), changes, kFieldRecordReach)) {
     if (Status done = put_field(memory, *field, chunk); !done) return done;
   }
   followed_field_ = now;
