@@ -45,7 +45,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/sky.h", {"render", "render_vk"}},
     {"light/surfaces.h", {"render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
-    {"mesh/smooth/material.h", {"live"}},
+    {"mesh/surface/material.h", {"live"}},
     {"render/camera_rays.h", {"render_vk"}},
     {"render/impostor/faces.h", {"render_vk"}},
     {"render/impostor/far.h", {"render_vk"}},

@@ -119,11 +119,17 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
   }
+  if (is_volume && (options.smoothness || options.colours || options.apart)) {
+    return "--smoothness, --colours and --no-unite are for voxels, and the input is a volume of values";
+  }
   const LoadOptions& load = options.common.load;
   if (is_volume)
     return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
   if (options.iso) return "--iso is for volumes, and the input holds voxels";
-  return options.simplify && options.mesher != "smooth" ? "--simplify needs --mesher smooth" : "";
+  if (options.mesher == "smooth") return "";
+  if (options.simplify) return "--simplify needs --mesher smooth";
+  const bool is_of_smooth = options.smoothness || options.colours || options.apart;
+  return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
 /// Whether the input is read by read_volume. Errors: CannotRead.
@@ -197,6 +203,16 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
   command.add_flag("--no-ao", options.occlusion_off, "Leave ambient occlusion out");
   command.add_flag("--watertight", options.watertight,
                    "No T-junctions: every edge meets its neighbours' corners (smooth meshes always are)");
+  command
+      .add_option("--smoothness", options.smoothness,
+                  "How round smooth surfaces around voxels are, from 0 (blocks) to 1 (default 1)")
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option("--colours", options.colours,
+                  "Colours of smooth surfaces around voxels: sharp as the voxels' (default) or blended")
+      ->check(CLI::IsMember({"sharp", "blended"}));
+  command.add_flag("--no-unite", options.apart,
+                   "Mesh models that touch on one lattice each by itself, not as one body (smooth only)");
   command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
 }

@@ -25,7 +25,18 @@ std::optional<float> simplify_error(const ConvertOptions& options) {
   return static_cast<float>(*options.simplify);
 }
 
-/// The smooth mesher knows neither glass nor light.
+SmoothSceneOptions scene_options(const ConvertOptions& options) {
+  SmoothSceneOptions wanted;
+  if (options.occlusion_off) wanted.mesh.occlusion.form = SmoothOcclusion::None;
+  if (options.smoothness) wanted.mesh.smoothness = static_cast<float>(*options.smoothness);
+  if (options.colours == "blended") wanted.mesh.colours = SurfaceColours::Blended;
+  wanted.unite = !options.apart;
+  wanted.simplify_error = simplify_error(options);
+  wanted.instances = options.common.instances();
+  return wanted;
+}
+
+/// The smooth mesher knows no light.
 void warn_of_looks(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
   std::set<GridHandle> drawn;
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -35,10 +46,10 @@ void warn_of_looks(const Scene& scene, InstanceFilter filter, std::vector<std::s
   bool is_lost = false;
   for (const GridHandle grid : drawn) {
     for (const VoxelType type : scene.grids()[grid].grid.types()) {
-      is_lost |= type != kAir && type < scene.types.size() && surface_class(scene.types[type]) != SurfaceClass::Opaque;
+      is_lost |= type != kAir && type < scene.types.size() && scene.types[type].emission > 0.0F;
     }
   }
-  if (is_lost) warnings.emplace_back("transparent and glowing voxels become plain, opaque surfaces");
+  if (is_lost) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
 Result<Volume> read_input(const ConvertOptions& options) {
@@ -61,8 +72,8 @@ Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outco
   Stopwatch watch;
   ProgressBar bar;
   const InstanceFilter filter = options.common.instances();
-  const auto meshes = mesh_scene_smoothly(scene, {mesh_options(options), simplify_error(options), filter},
-                                          options.common.threads, bar.listener("meshing"));
+  const auto meshes =
+      mesh_scene_smoothly(scene, scene_options(options), options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
   outcome.mesher = "smooth";
   outcome.faces = count_faces(scene, filter, options.common.threads);

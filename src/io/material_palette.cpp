@@ -16,6 +16,10 @@ bool emits(SurfaceClass surface) {
   return surface == SurfaceClass::Emissive || surface == SurfaceClass::EmissiveTransparent;
 }
 
+bool is_transparent(SurfaceClass surface) {
+  return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
+}
+
 /// Appends vertex `from` of `source`; returns its index in `target`.
 std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriangles& target) {
   target.positions.push_back(source.positions[from]);
@@ -73,7 +77,10 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.type
   for (auto& types : used) types.resize(types_.size());
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
-      if (view.has_albedo()) continue;
+      if (view.has_albedo()) {
+        has_smooth_[is_transparent(view.surface) ? 1 : 0] |= !view.indices.empty();
+        continue;
+      }
       for (const VoxelType type : view.types) used[static_cast<std::size_t>(view.surface)][type] = true;
     }
   }
@@ -185,7 +192,9 @@ MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& 
 }
 
 void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette) {
-  if (view.has_albedo()) return surfaces_.push_back({view, palette.materials().size()});
+  if (view.has_albedo()) {
+    return surfaces_.push_back({view, palette.smooth_material(is_transparent(view.surface))});
+  }
   std::map<std::size_t, BlockyTriangles*> by_material;
   if (emits(view.surface)) {
     for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));

@@ -48,6 +48,12 @@ class MaterialPalette {
   /// Requires: the meshes have a triangle of this class and type.
   [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] bool has_emission() const;
+  /// Whether any smooth surface is opaque, or transparent: those have a material each, after all others.
+  [[nodiscard]] bool has_smooth(bool transparent) const { return has_smooth_[transparent ? 1 : 0]; }
+  /// Requires: has_smooth of the same.
+  [[nodiscard]] std::size_t smooth_material(bool transparent) const {
+    return materials_.size() + (transparent && has_smooth_[0] ? 1 : 0);
+  }
 
   /// Rows of every texture, a power of two.
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
@@ -81,11 +87,12 @@ class MaterialPalette {
   std::vector<float> bands_;  ///< strongest of each, descending
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;
+  std::array<bool, 2> has_smooth_{};  // opaque, transparent
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_band_;
 };
 
 /// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied; smooth ones have
-/// the material after the palette's last.
+/// the materials after the palette's last.
 ///
 /// Requires: the part's arrays outlive this.
 class MaterialSurfaces {

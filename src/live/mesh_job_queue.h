@@ -16,7 +16,7 @@
 #include <quoin/mesh/smooth.h>
 
 #include "live/live_densities.h"
-#include "mesh/smooth/material.h"
+#include "mesh/surface/material.h"
 
 namespace quoin {
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <quoin/grid/voxel_field.h>
-#include <quoin/mesh/simplify.h>
 
 #include "scene/instance_axes.h"
+#include "scene/mesh_parts.h"
 
 namespace quoin {
 
@@ -40,46 +40,6 @@ class SharedProgress {
   double done_ = 0;
   bool going_ = true;
 };
-
-/// Errors: InvalidArgument, naming the first drawn instance that has no place.
-Status check_instances(const Scene& scene, InstanceFilter filter) {
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, filter)) continue;
-    if (has_place(instance)) continue;
-    return make_error(
-        ErrorCode::InvalidArgument,
-        "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
-  }
-  return {};
-}
-
-/// The grids that drawn instances place, each once, in the order of their handles.
-std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
-  std::vector<GridHandle> grids;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (is_drawn(scene, instance, filter)) grids.push_back(instance.grid);
-  }
-  std::sort(grids.begin(), grids.end());
-  grids.erase(std::unique(grids.begin(), grids.end()), grids.end());
-  return grids;
-}
-
-/// A placement per drawn instance, in their order; `grids[i]` is part `i`. Of one grid's instances where it is given.
-std::vector<MeshPlacement> placements_of(const Scene& scene, const std::vector<GridHandle>& grids,
-                                         InstanceFilter filter, std::optional<GridHandle> only = {}) {
-  std::vector<MeshPlacement> placements;
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, filter) || (only && instance.grid != *only)) continue;
-    const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    const DQuat rotation = unit_rotation(instance.rotation);
-    const Similarity place{instance.position, rotation, instance.voxel_size, instance.mirrored};
-    placements.push_back({static_cast<std::size_t>(part), instance.name, place});
-  }
-  return placements;
-}
 
 Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const BlockyMeshOptions& options, Threads threads,
                              SharedProgress& progress) {
@@ -125,51 +85,6 @@ void add_stats(const BlockyMesh& mesh, MeshStats& stats) {
   stats.quads += mesh.quads;
   stats.triangles += mesh.triangle_count();
   stats.vertices += mesh.vertex_count();
-}
-
-/// A listener for the stretch from `begin` to `end` of another's work.
-Progress part_of(const Progress& whole, double begin, double end) {
-  if (!whole) return {};
-  return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
-}
-
-struct Surface {
-  const SmoothMeshOptions& mesh;
-  std::optional<float> simplify_error;
-};
-
-/// Meshes, simplifies where that is asked for, and counts.
-Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& types, const Surface& wanted,
-                              MeshStats& stats, Threads threads, const Progress& progress) {
-  auto mesh = build_smooth_mesh(field, types, wanted.mesh, threads, progress);
-  if (!mesh) return mesh;
-  if (wanted.simplify_error) {
-    const auto error = simplify_smooth_mesh(*mesh, *wanted.simplify_error);
-    if (!error) return error.error();
-    stats.simplify_error = std::max(stats.simplify_error, *error);
-  }
-  stats.triangles += static_cast<std::int64_t>(mesh->indices.size() / 3);
-  stats.vertices += static_cast<std::int64_t>(mesh->positions.size());
-  return mesh;
-}
-
-/// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
-/// instances, in their order.
-Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
-                  const Surface& wanted, SceneMeshes& meshes, Threads threads) {
-  for (const GridHandle handle : grids) {
-    const SceneGrid& grid = scene.grids()[handle];
-    if (grid.field.chunk_count() == 0) continue;
-    auto mesh = surface_of(grid.field, scene.types, wanted, meshes.stats, threads, {});
-    if (!mesh) return mesh.error();
-    if (mesh->indices.empty()) continue;
-    for (MeshPlacement& placement : placements_of(scene, {handle}, filter, handle)) {
-      placement.part = meshes.parts.size();
-      meshes.placements.push_back(std::move(placement));
-    }
-    meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
-  }
-  return {};
 }
 
 }  // namespace
@@ -220,39 +135,17 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
       if (!options.mesh.occlusion) view.block_occlusion = {};
     }
   }
-  meshes.placements = placements_of(scene, grids, options.instances);
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (!is_drawn(scene, instance, options.instances)) continue;
+    const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
+    meshes.placements.push_back(placement_of(instance, static_cast<std::size_t>(part)));
+  }
   SmoothMeshOptions smooth;
   if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;
   if (auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, meshes, threads); !done) {
     return done.error();
   }
-  return meshes;
-}
-
-Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options, Threads threads,
-                                        const Progress& progress) {
-  if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
-  SceneMeshes meshes;
-  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
-  std::vector<MeshPlacement> placements = placements_of(scene, grids, options.instances);
-  std::ranges::stable_sort(placements, {}, &MeshPlacement::part);
-  auto placement = placements.begin();
-  for (std::size_t i = 0; i < grids.size(); ++i) {
-    const SceneGrid& grid = scene.grids()[grids[i]];
-    const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(grids.size()); };
-    auto mesh = surface_of(field_from_grid(grid.grid, threads), scene.types, {options.mesh, options.simplify_error},
-                           meshes.stats, threads, part_of(progress, share(i), share(i + 1)));
-    if (!mesh) return mesh.error();
-    const bool is_empty = mesh->indices.empty();
-    for (; placement != placements.end() && placement->part == i; ++placement) {
-      // As a matrix: of two rotations that are the same, files then have the one with a positive w.
-      if (!is_empty) meshes.placements.push_back({meshes.parts.size(), placement->name, placement->matrix()});
-    }
-    // The field's sample is the voxel's centre.
-    if (!is_empty) meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot - 0.5));
-  }
-  const Surface wanted{options.mesh, options.simplify_error};
-  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads); !done) return done.error();
   return meshes;
 }
 

@@ -55,6 +55,9 @@ struct SmoothOptions {
   /// Gives a cell that two sheets of the surface cross a vertex for each, so that the mesh is manifold everywhere.
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
   bool split_sheets = false;
+  /// Where solid samples touch by edges or corners only, the sheets are those of one solid instead of several: what is
+  /// one sample thick and runs at a slant holds together. Of use with `split_sheets` alone.
+  bool join_diagonals = false;
   /// Level of detail of the chunk and its neighbours, indexed as a neighbourhood: cells are 2^level samples wide, and
   /// meshes of different levels meet without a gap. 0 to kMaxSmoothLevel; more counts as that.
   std::array<std::uint8_t, 27> levels{};

@@ -29,9 +29,23 @@ struct SmoothMesh {
   std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from the air
 };
 
+/// How the materials of samples become the colours of a surface.
+enum class SurfaceColours : std::uint8_t {
+  Blended,  ///< each vertex has the mean of those around it
+  Sharp,    ///< each face has that of its solid sample, as a block's; vertices between colours stand there once for each
+};
+
 struct SmoothMeshOptions {
-  SmoothOcclusionOptions occlusion;
+  SmoothOcclusionOptions occlusion{};
   bool split_sheets = true;  ///< as in SmoothOptions, where it is off
+  SurfaceColours colours = SurfaceColours::Blended;
+  /// 1: the surface of the field. Less draws each vertex to the middle of its cell, and each normal to that of its
+  /// face, until at 0 the surface is that of blocks around the solid samples. 0 to 1; others count as the nearest of
+  /// these, NaN as 1.
+  float smoothness = 1.0F;
+  /// Whether what is one sample thick, solid or gap, keeps about that thickness, and what is slanted holds together
+  /// (`join_diagonals`): surfaces of fields shrink it to a third. For fields of voxels. At level 0.
+  bool keep_thin = false;
   /// The level of detail of a chunk, 0 to kMaxSmoothLevel; empty: 0 everywhere. Asked once a chunk, from the calling
   /// thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of;
@@ -39,7 +53,8 @@ struct SmoothMeshOptions {
 
 /// Meshes a whole field, chunk by chunk, and welds the chunks' meshes.
 ///
-/// Closed:  every edge has an even number of triangles (two, with `split_sheets` and one level), whatever the levels.
+/// Closed:  every edge has an even number of triangles (two, with `split_sheets` and one level), whatever the levels;
+///          vertices that stand there several times, for colours or normals, counted as one.
 /// Space:   the field's coordinates; beyond 2^24 samples from the origin floats lose whole samples.
 /// Order:   chunks as in DensityGrid::chunks; the same bytes at any thread count.
 /// Types:   materials that are not registered, and air, count as opaque white.

@@ -84,17 +84,29 @@ struct BlockySceneOptions {
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
+/// How voxels become smooth surfaces unless told otherwise: colours as sharp as the voxels', thin things kept.
+[[nodiscard]] SmoothMeshOptions smooth_voxels();
+
 struct SmoothSceneOptions {
-  SmoothMeshOptions mesh{};
-  std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
+  SmoothMeshOptions mesh = smooth_voxels();  ///< of voxels; of fields occlusion, `split_sheets` and `level_of` alone
+  std::optional<float> simplify_error{};     ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
   InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
+  /// Whether instances whose voxels lie on one lattice and touch are one body: without seams, grooves and slits
+  /// between them. Such instances have a part each then, even of one grid.
+  bool unite = true;
 };
 
-/// Meshes every grid that a drawn instance places, once, with smooth surfaces around the voxels, as field_from_grid and
-/// build_smooth_mesh make them; then the surfaces of the grids' fields. Placements are in the order of their parts;
-/// grids without a surface are left out.
+/// Meshes what drawn instances place with smooth surfaces around the voxels, as field_from_grid and build_smooth_mesh
+/// make them; then the surfaces of the grids' fields.
 ///
-/// Types:  every voxel that is not air is solid and opaque.
+/// Parts:  a grid whose instances are alone is one part, in the order of the grids' handles; then follow the instances
+///         that were united, each with what of the surface is its own voxels', in the order of their groups and of
+///         their handles. Where several have a voxel, it is the last one's. Vertices between two parts are the same in
+///         both. Placements are in the order of their parts; what has no surface is left out.
+/// Bodies: all opaque voxels of a part are one surface, each transparent type is a closed one of its own, all of these
+///         in one view. In a cell that several share, their vertices are the same, but where a body touches itself by
+///         edges and with `simplify_error`: each body is simplified by itself. Transparent voxels occlude no others.
+/// Types:  emission is left out.
 /// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.
 [[nodiscard]] Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options = {},
                                                       Threads threads = {}, const Progress& progress = {});

@@ -114,9 +114,12 @@ Json materials_json(const GltfLayout& layout) {
     if (material.is_transparent()) entry["alphaMode"] = "BLEND";
     materials.push_back(std::move(entry));
   }
-  if (layout.has_smooth) {
-    materials.push_back(
-        {{"name", "smooth"}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
+  for (const bool transparent : {false, true}) {
+    if (!layout.palette.has_smooth(transparent)) continue;
+    Json entry = {{"name", transparent ? "smooth transparent" : "smooth"},
+                  {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
+    if (transparent) entry["alphaMode"] = "BLEND";
+    materials.push_back(std::move(entry));
   }
   return materials;
 }

@@ -161,7 +161,6 @@ class MeshLayout {
     GltfMesh mesh{std::move(name), {glm::dmat4(baked), meshes_.parts[part].pivot}, {}};
     for (const auto& surface : layout_.surfaces[part].surfaces()) {
       mesh.primitives.push_back(lay_out_primitive(mesh.transform, surface, layout_.buffer_bytes));
-      layout_.has_smooth |= surface.view.has_albedo();
     }
     layout_.meshes.push_back(std::move(mesh));
   }

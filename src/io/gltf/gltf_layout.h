@@ -69,7 +69,6 @@ struct GltfLayout {
   std::vector<GltfMesh> meshes;
   std::vector<GltfImage> images;           ///< of blocks: base colour, metallic-roughness, perhaps emissive
   std::vector<MaterialSurfaces> surfaces;  ///< of every part
-  bool has_smooth = false;                 ///< a mesh with the material after the palette's
   std::uint64_t buffer_bytes = 0;
 };
 

@@ -194,7 +194,7 @@ class Splitter {
 
   void split_vertex(std::uint32_t vertex) {
     const LevelCell cell = levels_.cell_of(out_.cells[vertex]);
-    const std::uint32_t solid = solid_corners_of(chunks_, cell);
+    const std::uint32_t solid = parted_corners(cell);
     const int joined = tables().joined_face[solid];
     if (joined == kNoFace && tables().sheets[solid][kNoFace].count < 2) return;
     if (!same_levels_ && levels_.touches_another(cell)) return;
@@ -227,7 +227,12 @@ class Splitter {
       if (!inside) return false;
     }
     other.chunk = chunk_of(other.first);
-    return tables().joined_face[solid_corners_of(chunks_, other)] == (face ^ 1);
+    return tables().joined_face[parted_corners(other)] == (face ^ 1);
+  }
+
+  // The corners of a cell that are kept apart on faces where they alternate.
+  [[nodiscard]] std::uint32_t parted_corners(const LevelCell& cell) const {
+    return solid_corners_of(chunks_, cell) ^ (options_.join_diagonals ? 255U : 0U);
   }
 
   void rewire_quad(std::size_t first_index) {

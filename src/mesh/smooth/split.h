@@ -20,7 +20,8 @@ struct Sheets {
   static constexpr std::uint8_t kUncrossed = 15;
 };
 
-/// The sheets of a cell whose solid corners are `solid` (by x + 2 y + 4 z), numbered by their first edges.
+/// The sheets of a cell whose solid corners are `solid` (by x + 2 y + 4 z), numbered by their first edges. Those of the
+/// complement are the sheets where solid corners hold together instead.
 ///
 /// On a face with four crossings the pairs that each cut off a solid corner belong together; on `flipped_face` those
 /// that cut off an air corner.

@@ -14,7 +14,7 @@
 #include <quoin/render_vk/vulkan_picture.h>
 
 #include "grid/chunk_order.h"
-#include "mesh/smooth/material.h"
+#include "mesh/surface/material.h"
 #include "render_vk/device/vulkan_for_tests.h"
 
 namespace quoin::vulkan_test {

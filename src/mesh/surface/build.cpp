@@ -1,6 +1,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -10,9 +11,13 @@
 
 #include "core/progress_steps.h"
 #include "grid/chunk_order.h"
-#include "mesh/smooth/material.h"
+#include "mesh/surface/build.h"
+#include "mesh/smooth/levels.h"
+#include "mesh/surface/material.h"
+#include "mesh/surface/shape.h"
 
 namespace quoin {
+namespace smooth {
 namespace {
 
 // The place of a chunk in a sorted list; the list's size when it is not there.
@@ -84,6 +89,7 @@ struct Part {
   std::vector<Vec3> normals;
   std::vector<float> occlusion;
   std::vector<SurfaceMaterial> materials;
+  std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only where they are asked for
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one
   std::vector<std::uint32_t> indices;  // into the own vertices, or kForeign plus a place in `foreign`
@@ -125,7 +131,69 @@ void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.indices.resize(mesh.indices.size());
 }
 
-Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials& materials, Workspace& workspace) {
+// The face around a crossed edge of the lattice of samples, from the cells of the quad's corners.
+TriangleFace face_of_quad(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh, const std::uint32_t* quad) {
+  const auto place = [&](std::size_t i) {
+    const SmoothCell cell = mesh.cells[quad[i]];
+    return cell.cell() + cell.chunk_offset() * kChunkEdge;
+  };
+  // The cells around an edge share their extent along it; the last of them begins where the edge does.
+  const IVec3 first = glm::min(glm::min(place(0), place(1)), glm::min(place(2), place(5)));
+  const IVec3 last = glm::max(glm::max(place(0), place(1)), glm::max(place(2), place(5)));
+  int axis = 0;
+  while (axis < 2 && first[axis] != last[axis]) ++axis;
+  TriangleFace face;
+  face.sample = last;
+  const bool is_first_solid = DensityChunk::is_solid(chunks.get(last));
+  if (!is_first_solid) ++face.sample[axis];
+  face.direction = static_cast<Direction>(2 * axis + (is_first_solid ? 0 : 1));
+  const IVec3 chunk = chunk_of(face.sample);
+  const DensityChunk* found = chunks.at(chunk.x, chunk.y, chunk.z);
+  face.type = found == nullptr ? kAir : found->materials().get(local_of(face.sample));
+  return face;
+}
+
+// Where cells are of several sizes: by what lies around the triangle's vertices.
+TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
+                              const std::vector<SurfaceMaterial>& materials) {
+  const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
+  const DVec3 a(mesh.positions[triangle[0]]);
+  const DVec3 b(mesh.positions[triangle[1]]);
+  const DVec3 c(mesh.positions[triangle[2]]);
+  TriangleFace face;
+  face.type = type(1) == type(2) ? type(1) : type(0);
+  const DVec3 normal = glm::cross(b - a, c - a);
+  face.direction = nearest_direction(normal);
+  const DVec3 inside = (a + b + c) / 3.0 - DVec3(normal_of(face.direction)) * 0.5;
+  face.sample = IVec3(glm::floor(inside + 0.5));
+  return face;
+}
+
+SurfaceMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
+                            const ChunkLevels& levels, SmoothCell name) {
+  const LevelCell cell = levels.cell_of(name);
+  return materials.of_cell(chunks, cell.first / cell.size(), cell.level);
+}
+
+void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
+                const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces) {
+  faces.reserve(mesh.indices.size() / 3);
+  const ChunkLevels levels(options.levels);
+  if (levels.all_same() && options.levels[0] == 0) {
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 6) {
+      faces.insert(faces.end(), 2, face_of_quad(chunks, mesh, mesh.indices.data() + i));
+    }
+    return;
+  }
+  std::vector<SurfaceMaterial> of_vertex;
+  of_vertex.reserve(mesh.cells.size());
+  for (const SmoothCell name : mesh.cells) of_vertex.push_back(material_of(chunks, materials, levels, name));
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    faces.push_back(face_of_triangle(mesh, mesh.indices.data() + i, of_vertex));
+  }
+}
+
+Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials* materials, Workspace& workspace) {
   const SmoothChunkMesh& mesh = workspace.mesh;
   const int last = (kChunkEdge >> level) - 1;
   Part part;
@@ -144,7 +212,7 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
     part.positions.push_back(mesh.positions[i]);
     part.normals.push_back(mesh.normals[i]);
     if (!mesh.occlusion.empty()) part.occlusion.push_back(mesh.occlusion[i]);
-    part.materials.push_back(materials.of_cell(chunks, cell, level));
+    if (materials != nullptr) part.materials.push_back(materials->of_cell(chunks, cell, level));
     if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
   }
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) part.indices[i] = workspace.places[mesh.indices[i]];
@@ -154,16 +222,19 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
 
 class Builder {
  public:
-  Builder(const DensityGrid& field, const SmoothMeshOptions& options, Threads threads, const Progress& progress)
+  Builder(const DensityGrid& field, const SmoothMeshOptions& options, const SurfaceRequest& request, Threads threads,
+          const Progress& progress)
       : field_(field),
         options_(options),
+        request_(request),
         threads_(threads),
         // A surface can end in chunks that do not exist: around edges and in cells that start before a solid sample.
         chunks_(with_neighbours(field.chunks(), -1, 0)),
         parts_(chunks_.size()),
         steps_(progress, 2 * chunks_.size()) {}
 
-  Result<SmoothMesh> build(const VoxelRegistry& types) {
+  Result<Surface> build(const VoxelRegistry& types) {
+    types_ = &types;
     if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return levels.error();
     const SurfaceMaterials materials(types);
     Workspaces workspaces;
@@ -183,14 +254,26 @@ class Builder {
     SmoothOptions options;
     options.occlusion = options_.occlusion;
     options.split_sheets = options_.split_sheets;
+    options.join_diagonals = options_.keep_thin;
     options.levels = levels_.around(chunks_[i]);
     const DensityNeighbourhood neighbourhood = field_.neighbourhood(chunks_[i]);
     workspace.mesher.mesh(neighbourhood, options, workspace.mesh);
-    parts_[i] = make_part(neighbourhood, options.levels[13], materials, workspace);
+    Shape shape{smoothness_of(options_), options_.keep_thin, nullptr, types_};
+    DensityNeighbourhood whole;
+    if (request_.whole != nullptr) {
+      whole = request_.whole->neighbourhood(chunks_[i]);
+      shape.whole = &whole;
+    }
+    shape_vertices(neighbourhood, options, shape, workspace.mesh);
+    // Sharp colours are those of the faces.
+    const bool is_blended = options_.colours == SurfaceColours::Blended;
+    parts_[i] = make_part(neighbourhood, options.levels[13], is_blended ? &materials : nullptr, workspace);
+    if (request_.with_faces) find_faces(neighbourhood, options, materials, workspace.mesh, parts_[i].faces);
   }
 
-  Result<SmoothMesh> weld() {
-    SmoothMesh mesh;
+  Result<Surface> weld() {
+    Surface surface;
+    SmoothMesh& mesh = surface.mesh;
     std::size_t vertices = 0;
     std::size_t indices = 0;
     for (const Part& part : parts_) {
@@ -208,14 +291,16 @@ class Builder {
     mesh.albedo.resize(vertices);
     mesh.types.resize(vertices);
     mesh.indices.resize(indices);
+    if (request_.with_faces) surface.faces.resize(indices / 3);
     parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
       if (steps_.cancelled()) return;
       copy_vertices(i, mesh);
       copy_indices(i, mesh);
+      copy_faces(i, surface.faces);
       steps_.step();
     });
     if (steps_.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-    return mesh;
+    return surface;
   }
 
   void copy_vertices(std::size_t i, SmoothMesh& mesh) const {
@@ -224,6 +309,7 @@ class Builder {
     const std::uint32_t first = first_vertex_[i];
     for (std::size_t v = 0; v < part.positions.size(); ++v) {
       mesh.positions[first + v] = Vec3(DVec3(part.positions[v]) + origin);
+      if (part.materials.empty()) continue;
       mesh.albedo[first + v] = part.materials[v].albedo;
       mesh.types[first + v] = part.materials[v].type;
     }
@@ -241,6 +327,15 @@ class Builder {
     }
   }
 
+  void copy_faces(std::size_t i, std::vector<TriangleFace>& faces) const {
+    const IVec3 origin = chunks_[i] * kChunkEdge;
+    TriangleFace* out = faces.data() + first_index_[i] / 3;
+    for (TriangleFace face : parts_[i].faces) {
+      face.sample += origin;
+      *out++ = face;
+    }
+  }
+
   // The vertex of the whole that `chunk` calls so. Every cell of a meshed chunk that has a vertex is in its border.
   [[nodiscard]] std::uint32_t vertex_of(IVec3 chunk, SmoothCell name) const {
     const std::size_t owner = place_in(chunks_, chunk + name.chunk_offset());
@@ -255,6 +350,8 @@ class Builder {
 
   const DensityGrid& field_;
   const SmoothMeshOptions& options_;
+  const SurfaceRequest& request_;
+  const VoxelRegistry* types_ = nullptr;
   Threads threads_;
   std::vector<IVec3> chunks_;
   LevelMap levels_;
@@ -266,9 +363,34 @@ class Builder {
 
 }  // namespace
 
+float smoothness_of(const SmoothMeshOptions& options) {
+  return std::isnan(options.smoothness) ? 1.0F : std::clamp(options.smoothness, 0.0F, 1.0F);
+}
+
+Result<Surface> build_surface(const DensityGrid& field, const VoxelRegistry& types, const SmoothMeshOptions& options,
+                              const SurfaceRequest& request, Threads threads, const Progress& progress) {
+  return Builder(field, options, request, threads, progress).build(types);
+}
+
+std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
+                                          const SmoothMeshOptions& options, std::span<const std::uint32_t> groups) {
+  const bool is_sharp = options.colours == SurfaceColours::Sharp;
+  const float smoothness = smoothness_of(options);
+  if (!is_sharp && smoothness == 1.0F && groups.empty()) return {};
+  const SurfaceMaterials materials(types);
+  return split_by_faces(surface.mesh, surface.faces, {is_sharp ? &materials : nullptr, smoothness, groups});
+}
+
+}  // namespace smooth
+
 Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                      const SmoothMeshOptions& options, Threads threads, const Progress& progress) {
-  return Builder(field, options, threads, progress).build(types);
+  smooth::SurfaceRequest request;
+  request.with_faces = options.colours == SurfaceColours::Sharp || smooth::smoothness_of(options) < 1.0F;
+  auto surface = smooth::build_surface(field, types, options, request, threads, progress);
+  if (!surface) return surface.error();
+  smooth::finish_surface(*surface, types, options);
+  return std::move(surface->mesh);
 }
 
 }  // namespace quoin

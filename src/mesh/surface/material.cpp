@@ -1,4 +1,4 @@
-#include "mesh/smooth/material.h"
+#include "mesh/surface/material.h"
 
 #include <algorithm>
 #include <array>
@@ -129,7 +129,8 @@ SurfaceMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IV
   std::array<VoxelType, 729> solid;
   std::size_t found = 0;
   const DensityChunk* centre = chunks.centre();
-  if (centre != nullptr && std::max({first.x, first.y, first.z}) + size < kChunkEdge) {
+  if (centre != nullptr && std::min({first.x, first.y, first.z}) >= 0 &&
+      std::max({first.x, first.y, first.z}) + size < kChunkEdge) {
     if (const auto only = centre->materials().uniform()) return {albedo(*only), *only};
     if (level == 0) found = materials_of_corners(*centre, first, solid.data());
   }

@@ -1,4 +1,4 @@
-#include "mesh/manifold.h"
+#include "mesh/surface/manifold.h"
 
 #include <algorithm>
 #include <numeric>
@@ -19,7 +19,7 @@ struct Arc {
 /// Which triangles each vertex has.
 class Corners {
  public:
-  explicit Corners(const SmoothMesh& mesh) : first_(mesh.positions.size() + 1), triangles_(mesh.indices.size()) {
+  explicit Corners(const Triangulation& mesh) : first_(mesh.positions.size() + 1), triangles_(mesh.indices.size()) {
     for (const std::uint32_t index : mesh.indices) ++first_[index + std::size_t{1}];
     std::partial_sum(first_.begin(), first_.end(), first_.begin());
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
@@ -38,7 +38,7 @@ class Corners {
 };
 
 /// Replaces `arcs` by those around a vertex, by where they start.
-void arcs_around(const SmoothMesh& mesh, const Corners& corners, std::uint32_t vertex, std::vector<Arc>& arcs) {
+void arcs_around(const Triangulation& mesh, const Corners& corners, std::uint32_t vertex, std::vector<Arc>& arcs) {
   arcs.clear();
   for (const std::uint32_t triangle : corners.of(vertex)) {
     const std::uint32_t* at = mesh.indices.data() + std::size_t{3} * triangle;
@@ -50,7 +50,7 @@ void arcs_around(const SmoothMesh& mesh, const Corners& corners, std::uint32_t v
             [](const Arc& a, const Arc& b) { return a.from != b.from ? a.from < b.from : a.triangle < b.triangle; });
 }
 
-void remove_back_to_back(SmoothMesh& mesh) {
+void remove_back_to_back(Triangulation& mesh) {
   const Corners corners(mesh);
   std::vector<bool> is_removed(mesh.indices.size() / 3);
   std::vector<Arc> arcs;
@@ -68,9 +68,13 @@ void remove_back_to_back(SmoothMesh& mesh) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < is_removed.size(); ++i) {
     if (is_removed[i]) continue;
-    for (std::size_t k = 0; k < 3; ++k) mesh.indices[kept++] = mesh.indices[3 * i + k];
+    for (std::size_t k = 0; k < 3; ++k, ++kept) {
+      mesh.indices[kept] = mesh.indices[3 * i + k];
+      mesh.corners[kept] = mesh.corners[3 * i + k];
+    }
   }
   mesh.indices.resize(kept);
+  mesh.corners.resize(kept);
 }
 
 /// The first of the arcs that start at a neighbour; the number of arcs when none does.
@@ -123,26 +127,29 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
   return ring;
 }
 
-/// Appends a copy of a vertex and returns its number.
-std::uint32_t add_copy(SmoothMesh& mesh, std::uint32_t vertex) {
-  const auto copy = static_cast<std::uint32_t>(mesh.positions.size());
-  const auto append = [vertex](auto& values) {
-    if (values.empty()) return;
-    const auto value = values[vertex];
-    values.push_back(value);
-  };
-  append(mesh.positions);
-  append(mesh.normals);
-  append(mesh.occlusion);
-  append(mesh.albedo);
-  append(mesh.types);
-  return copy;
-}
-
-void split(SmoothMesh& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs) {
+/// One vertex a ring, each drawn towards the middle of its neighbours.
+void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs, float apart) {
   const std::vector<std::uint32_t> ring = rings_of(arcs);
-  std::vector<std::uint32_t> vertex_of(*std::max_element(ring.begin(), ring.end()) + std::size_t{1}, vertex);
-  for (std::size_t i = 1; i < vertex_of.size(); ++i) vertex_of[i] = add_copy(mesh, vertex);
+  const std::size_t rings = *std::max_element(ring.begin(), ring.end()) + std::size_t{1};
+  if (rings == 1) return;
+  const Vec3 place = mesh.positions[vertex];
+  std::vector<std::uint32_t> vertex_of(rings, vertex);
+  std::vector<Vec3> sum(rings, Vec3(0.0F));
+  for (std::size_t i = 0; i < arcs.size(); ++i) {
+    const Vec3 away = mesh.positions[arcs[i].from] - place;
+    const float length = glm::length(away);
+    if (length > 0.0F) sum[ring[i]] += away / length;
+  }
+  for (std::size_t i = 0; i < rings; ++i) {
+    const float length = glm::length(sum[i]);
+    const Vec3 moved = length > 1e-6F ? place + sum[i] * (apart / length) : place;
+    if (i == 0) {
+      mesh.positions[vertex] = moved;
+      continue;
+    }
+    vertex_of[i] = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.push_back(moved);
+  }
   for (std::size_t i = 0; i < arcs.size(); ++i) {
     std::uint32_t* at = mesh.indices.data() + std::size_t{3} * arcs[i].triangle;
     *std::find(at, at + 3, vertex) = vertex_of[ring[i]];
@@ -151,14 +158,14 @@ void split(SmoothMesh& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs)
 
 }  // namespace
 
-void make_manifold(SmoothMesh& mesh) {
+void make_manifold(Triangulation& mesh, float apart) {
   remove_back_to_back(mesh);
   const Corners corners(mesh);
   const auto count = static_cast<std::uint32_t>(mesh.positions.size());
   std::vector<Arc> arcs;
   for (std::uint32_t vertex = 0; vertex < count; ++vertex) {
     arcs_around(mesh, corners, vertex, arcs);
-    if (!are_one_ring(arcs)) split(mesh, vertex, arcs);
+    if (!are_one_ring(arcs)) split(mesh, vertex, arcs, apart);
   }
 }
 

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin::smooth {
+
+/// Which body a material is part of: all opaque ones are one, 0, each transparent one is its own.
+[[nodiscard]] inline std::uint32_t body_of(const VoxelRegistry& types, VoxelType material) {
+  return types.is_transparent(material) ? std::uint32_t{material} + 1U : 0U;
+}
+
+/// The bodies of some materials, sorted, each once.
+[[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types,
+                                                   const std::vector<VoxelType>& materials);
+
+/// The densities of one body of several: those of all, but what is solid of others is as far out as it was in. Shares
+/// the chunks of `whole` in which there are no others; chunks that are not near the body are left out where it is
+/// transparent.
+[[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
+                                        Threads threads);
+
+}  // namespace quoin::smooth

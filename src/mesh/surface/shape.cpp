@@ -1,0 +1,196 @@
+#include "mesh/surface/shape.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "mesh/surface/bodies.h"
+#include "mesh/smooth/levels.h"
+#include "mesh/smooth/split.h"
+#include "mesh/smooth/vertex.h"
+
+namespace quoin::smooth {
+namespace {
+
+/// The share of the way from the middle of its cell that a vertex of something thin keeps: a rail of one voxel becomes
+/// 0.8 voxels wide instead of 0.37.
+constexpr float kThinShare = 1.0F / 3.0F;
+
+/// Bits of samples along x, of a row from -2 to 65: in each word all bits but the first and the last have both
+/// neighbours there.
+struct WideRow {
+  std::uint64_t low = 0;   ///< bit i: sample i - 2
+  std::uint64_t high = 0;  ///< bit i: sample i + 2
+};
+
+/// The words of a row and of those beside it, of one half.
+struct RowsAround {
+  std::uint64_t here;
+  std::array<std::uint64_t, 2> y;                 ///< before, after
+  std::array<std::uint64_t, 2> z;                 ///< likewise
+  std::array<std::array<std::uint64_t, 2>, 2> yz;  ///< [y][z]
+};
+
+/// The set samples that are thin. A side at a slant: the sample there is set, and the one that leads to it is not.
+std::uint64_t thin_of(const RowsAround& rows) {
+  const std::uint64_t s = rows.here;
+  const auto along_x = [](std::uint64_t row) { return row << 1 | row >> 1; };
+  const auto slanted_x = [](std::uint64_t side, std::uint64_t lead) {
+    return ((side << 1) & ~(lead << 1)) | ((side >> 1) & ~(lead >> 1));
+  };
+  std::uint64_t x = s & ~along_x(s);
+  std::uint64_t y = s & ~(rows.y[0] | rows.y[1]);
+  std::uint64_t z = s & ~(rows.z[0] | rows.z[1]);
+  if ((x | y | z) == 0) return 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    x &= ~(along_x(rows.y[i]) & ~rows.y[i]) & ~(along_x(rows.z[i]) & ~rows.z[i]);
+    y &= ~slanted_x(rows.y[i], s);
+    z &= ~slanted_x(rows.z[i], s);
+    for (std::size_t k = 0; k < 2; ++k) {
+      y &= ~(rows.yz[i][k] & ~rows.z[k]);
+      z &= ~(rows.yz[k][i] & ~rows.y[k]);
+    }
+  }
+  return x | y | z;
+}
+
+/// The cells of a chunk, -1 to 63 on each axis, that have a thin corner.
+class ThinCells {
+ public:
+  explicit ThinCells(const DensityNeighbourhood& chunks) : solid_(kRead * kRead), thin_(kFound * kFound) {
+    for (int z = 0; z < kRead; ++z) {
+      for (int y = 0; y < kRead; ++y) solid_[at(y, z)] = read(chunks, y - 2, z - 2);
+    }
+    for (int z = 0; z < kFound; ++z) {
+      for (int y = 0; y < kFound; ++y) {
+        thin_[static_cast<std::size_t>(z * kFound + y)] = {find(y, z, &WideRow::low), find(y, z, &WideRow::high)};
+      }
+    }
+  }
+
+  [[nodiscard]] bool has(IVec3 cell) const {
+    std::uint64_t pair = 0;
+    for (int i = 0; i < 4; ++i) {
+      const WideRow& row = thin_[static_cast<std::size_t>((cell.z + 1 + (i >> 1)) * kFound + cell.y + 1 + (i & 1))];
+      pair |= cell.x < kChunkEdge / 2 ? row.low >> (cell.x + 2) : row.high >> (cell.x - 2);
+    }
+    return (pair & 3U) != 0;
+  }
+
+ private:
+  static constexpr int kRead = kChunkEdge + 4;   // rows from -2 on
+  static constexpr int kFound = kChunkEdge + 2;  // rows from -1 on
+
+  static std::size_t at(int y, int z) { return static_cast<std::size_t>(z * kRead + y); }
+
+  static WideRow read(const DensityNeighbourhood& chunks, int y, int z) {
+    const auto part = [&](int dx) -> std::uint64_t {
+      const DensityChunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
+      if (chunk == nullptr) return DensityChunk::is_solid(chunks.outside) ? ~std::uint64_t{0} : 0;
+      return chunk->solid_row(y & (kChunkEdge - 1), z & (kChunkEdge - 1));
+    };
+    const std::uint64_t middle = part(0);
+    return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
+  }
+
+  [[nodiscard]] std::uint64_t find(int y, int z, std::uint64_t WideRow::* half) const {
+    const auto row = [&](int dy, int dz) { return solid_[at(y + 1 + dy, z + 1 + dz)].*half; };
+    RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
+    solid.yz = {{{row(-1, -1), row(-1, 1)}, {row(1, -1), row(1, 1)}}};
+    RowsAround air{~solid.here, {~solid.y[0], ~solid.y[1]}, {~solid.z[0], ~solid.z[1]}, {}};
+    for (std::size_t i = 0; i < 4; ++i) air.yz[i / 2][i % 2] = ~solid.yz[i / 2][i % 2];
+    return thin_of(solid) | thin_of(air);
+  }
+
+  std::vector<WideRow> solid_;  // [z][y]
+  std::vector<WideRow> thin_;   // [z][y]
+};
+
+IVec3 corner_of(int corner) {
+  return {corner & 1, corner >> 1 & 1, corner >> 2};
+}
+
+/// Whether a cell has one sheet, whichever way they are told apart.
+bool has_one_sheet(std::uint32_t solid) {
+  return sheets_of(solid).count == 1 && sheets_of(solid ^ 255U).count == 1;
+}
+
+/// A vertex that all bodies in a cell share.
+struct SharedVertex {
+  Vec3 fraction{0.0F};
+  std::optional<Vec3> normal;
+};
+
+/// Nothing where a cell has one body, or none.
+std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell& cell) {
+  constexpr std::uint32_t kNone = ~0U;
+  std::array<std::uint32_t, 8> body{};
+  std::uint32_t any = kNone;
+  bool several = false;
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 sample = cell.first + corner_of(i);
+    const IVec3 at = chunk_of(sample);
+    const DensityChunk* chunk = shape.whole->at(at.x, at.y, at.z);
+    const bool solid = DensityChunk::is_solid(shape.whole->get(sample));
+    std::uint32_t& own = body[static_cast<std::size_t>(i)];
+    own = solid && chunk != nullptr ? body_of(*shape.types, chunk->materials().get(local_of(sample))) : kNone;
+    if (own == kNone) continue;
+    several |= any != kNone && any != own;
+    any = own;
+  }
+  if (!several) return std::nullopt;
+  const Corners corners = corners_of(*shape.whole, cell);
+  Vec3 sum{0.0F};
+  float count = 0.0F;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::size_t k = i | std::size_t{1} << axis;
+      if (k == i || body[i] == body[k]) continue;
+      Vec3 crossing(corner_of(static_cast<int>(i)));
+      const bool meets_air = body[i] == kNone || body[k] == kNone;
+      crossing[axis] = meets_air ? corners[i] / (corners[i] - corners[k]) : 0.5F;
+      sum += crossing;
+      count += 1.0F;
+    }
+  }
+  SharedVertex shared{sum / count, std::nullopt};
+  const std::uint32_t solid = solid_corners(corners);
+  if (solid != 0 && solid != 255) shared.normal = unit_normal(trilinear_gradient(corners, shared.fraction));
+  return shared;
+}
+
+}  // namespace
+
+void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
+                    SmoothChunkMesh& mesh) {
+  if (!shape.moves() || mesh.positions.empty()) return;
+  const ChunkLevels levels(options.levels);
+  std::unique_ptr<const ThinCells> thin;
+  if (shape.keep_thin) thin = std::make_unique<const ThinCells>(chunks);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const LevelCell cell = levels.cell_of(mesh.cells[i]);
+    const Vec3 first(cell.first);
+    const auto size = static_cast<float>(cell.size());
+    Vec3 fraction = (mesh.positions[i] - first) / size;
+    float share = shape.smoothness;
+    const bool may_move = cell.level == 0 && (shape.whole != nullptr || (thin && thin->has(cell.first))) &&
+                          has_one_sheet(solid_corners_of(chunks, cell));
+    std::optional<SharedVertex> shared;
+    if (may_move && shape.whole != nullptr) shared = vertex_of_bodies(shape, cell);
+    if (shared) {
+      fraction = shared->fraction;
+      if (shared->normal) mesh.normals[i] = *shared->normal;
+    }
+    if (may_move && shape.keep_thin && (shared || thin->has(cell.first))) share *= kThinShare;
+    if (share == 1.0F && !shared) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float moved = snap(0.5F + (fraction[axis] - 0.5F) * share);
+      mesh.positions[i][axis] = first[axis] + moved * size;
+    }
+  }
+}
+
+}  // namespace quoin::smooth

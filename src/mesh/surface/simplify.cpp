@@ -1,0 +1,236 @@
+#include <quoin/mesh/simplify.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/assert.h>
+
+#include "mesh/surface/simplify_tagged.h"
+
+#ifdef QUOIN_HAVE_MESHOPTIMIZER
+#include <meshoptimizer.h>
+
+#include "mesh/surface/manifold.h"
+#include "mesh/surface/triangle_tree.h"
+#endif
+
+namespace quoin {
+
+#ifdef QUOIN_HAVE_MESHOPTIMIZER
+
+namespace {
+
+#if QUOIN_ASSERT_ENABLED
+bool has_arrays_of_one_length(const SmoothMesh& mesh) {
+  const std::size_t count = mesh.positions.size();
+  return mesh.normals.size() == count && mesh.albedo.size() == count && mesh.types.size() == count &&
+         (mesh.occlusion.empty() || mesh.occlusion.size() == count);
+}
+
+bool names_vertices(const SmoothMesh& mesh) {
+  return std::all_of(mesh.indices.begin(), mesh.indices.end(),
+                     [&](std::uint32_t index) { return index < mesh.positions.size(); });
+}
+
+bool has_finite_positions(const SmoothMesh& mesh) {
+  return std::all_of(mesh.positions.begin(), mesh.positions.end(),
+                     [](Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); });
+}
+#endif
+
+/// How far apart vertices of one place are drawn that have to be several.
+constexpr float kApart = 1.0F / 1024.0F;
+/// Each try allows this much of the last one's error at most.
+constexpr float kLessError = 0.8F;
+constexpr float kMuchLessError = 0.25F;
+constexpr int kMaxTries = 12;
+
+/// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
+std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
+  std::vector<std::uint32_t> place(mesh.positions.size());
+  meshopt_generateVertexRemap(place.data(), nullptr, place.size(), mesh.positions.data(), place.size(), sizeof(Vec3));
+  std::vector<std::uint32_t> first(place.size(), ~0U);
+  for (std::uint32_t i = 0; i < place.size(); ++i) {
+    std::uint32_t& of_place = first[place[i]];
+    if (of_place == ~0U) of_place = i;
+    place[i] = of_place;
+  }
+  return place;
+}
+
+/// Fewer triangles, in the vertices of the mesh.
+std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale) {
+  const float* positions = &mesh.positions[0].x;
+  const std::size_t count = mesh.positions.size();
+  std::vector<std::uint32_t> left(mesh.indices.size());
+  left.resize(meshopt_simplify(left.data(), mesh.indices.data(), mesh.indices.size(), positions, count, sizeof(Vec3), 0,
+                               error_in_samples / scale, 0, nullptr));
+  return left;
+}
+
+/// Triangles of the places, whose corners are vertices of the mesh.
+Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t> left,
+                               const std::vector<std::uint32_t>& place) {
+  Triangulation result{mesh.positions, std::move(left), {}};
+  result.corners = result.indices;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < result.indices.size(); i += 3) {
+    std::array<std::uint32_t, 3> at{};
+    for (std::size_t k = 0; k < 3; ++k) at[k] = place[result.indices[i + k]];
+    // Of what was cut for colours, triangles may be left whose corners lie in two places.
+    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+    for (std::size_t k = 0; k < 3; ++k, ++kept) {
+      result.corners[kept] = result.corners[i + k];
+      result.indices[kept] = at[k];
+    }
+  }
+  result.indices.resize(kept);
+  result.corners.resize(kept);
+  return result;
+}
+
+/// The farthest that a vertex of the mesh lies from simpler triangles; `most` where that is nearer.
+float farthest_from(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place, const Triangulation& simple,
+                    float most) {
+  const TriangleTree tree(simple.positions, simple.indices);
+  std::vector<bool> is_used(mesh.positions.size());
+  for (const std::uint32_t index : mesh.indices) is_used[place[index]] = true;
+  std::vector<bool> is_left(mesh.positions.size());
+  for (const std::uint32_t index : simple.indices) {
+    if (index < is_left.size() && simple.positions[index] == mesh.positions[index]) is_left[index] = true;
+  }
+  float farthest = 0.0F;
+  for (std::size_t i = 0; i < mesh.positions.size() && farthest < most; ++i) {
+    if (!is_used[i] || is_left[i]) continue;
+    farthest = std::max(farthest, tree.distance(mesh.positions[i], most));
+  }
+  return farthest;
+}
+
+/// Puts simpler triangles in place of the mesh's: a vertex for each corner and place that is in use.
+void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::uint32_t>& tags) {
+  const auto before = static_cast<std::uint32_t>(mesh.positions.size());
+  // What was drawn apart is appended; the first such copy of a corner by its place.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;
+  std::vector<std::uint32_t> indices;
+  indices.reserve(simple.indices.size());
+  const auto append = [](auto& values, std::uint32_t from) {
+    if (values.empty()) return;
+    const auto value = values[from];
+    values.push_back(value);
+  };
+  for (std::size_t i = 0; i < simple.indices.size(); ++i) {
+    const std::uint32_t vertex = simple.indices[i];
+    const std::uint32_t corner = simple.corners[i];
+    if (vertex < before && simple.positions[vertex] == mesh.positions[corner]) {
+      indices.push_back(corner);
+      continue;
+    }
+    const auto [copy, is_new] = copies.try_emplace({vertex, corner}, static_cast<std::uint32_t>(mesh.positions.size()));
+    if (is_new) {
+      mesh.positions.push_back(simple.positions[vertex]);
+      append(mesh.normals, corner);
+      append(mesh.occlusion, corner);
+      append(mesh.albedo, corner);
+      append(mesh.types, corner);
+      append(tags, corner);
+    }
+    indices.push_back(copy->second);
+  }
+  mesh.indices = std::move(indices);
+}
+
+/// Returns the error reached, in samples.
+float remove_triangles(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
+  const float scale = meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
+  if (!(scale > 0.0F)) return 0.0F;
+  const std::vector<std::uint32_t> place = places_of(mesh);
+  // The library bounds a mean of squares; single vertices may be farther off, and are looked at.
+  const float most = std::max(error_in_samples, 2.0F * kApart) * 4.0F;
+  float allowed = error_in_samples;
+  for (int tries = 0; tries < kMaxTries && allowed > 0.0F; ++tries) {
+    Triangulation simple = triangulation_of(mesh, remove_triangles(mesh, allowed, scale), place);
+    // A neck three edges round, say, is drawn together to one edge.
+    make_manifold(simple, std::min(kApart, 0.25F * error_in_samples));
+    const float farthest = farthest_from(mesh, place, simple, most);
+    if (farthest <= error_in_samples && !simple.indices.empty()) {
+      take_over(mesh, simple, tags);
+      return farthest;
+    }
+    const float share = farthest > 0.0F ? error_in_samples / farthest : kMuchLessError;
+    allowed *= std::clamp(0.9F * share, kMuchLessError, kLessError);
+  }
+  return 0.0F;
+}
+
+template <class T>
+void keep_used(std::vector<T>& values, const std::vector<std::uint32_t>& place_of, std::size_t used) {
+  if (values.empty()) return;
+  std::vector<T> kept(used);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (place_of[i] != ~0U) kept[place_of[i]] = values[i];
+  }
+  values = std::move(kept);
+}
+
+void order_for_caches(SmoothMesh& mesh, std::vector<std::uint32_t>& tags) {
+  const std::size_t count = mesh.positions.size();
+  meshopt_optimizeVertexCache(mesh.indices.data(), mesh.indices.data(), mesh.indices.size(), count);
+  std::vector<std::uint32_t> place_of(count);
+  const std::size_t used =
+      meshopt_optimizeVertexFetchRemap(place_of.data(), mesh.indices.data(), mesh.indices.size(), count);
+  for (std::uint32_t& index : mesh.indices) index = place_of[index];
+  keep_used(mesh.positions, place_of, used);
+  keep_used(mesh.normals, place_of, used);
+  keep_used(mesh.occlusion, place_of, used);
+  keep_used(mesh.albedo, place_of, used);
+  keep_used(mesh.types, place_of, used);
+  keep_used(tags, place_of, used);
+}
+
+}  // namespace
+
+bool can_simplify() {
+  return true;
+}
+
+Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
+  if (!(error_in_samples >= 0.0F))
+    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+#if QUOIN_ASSERT_ENABLED
+  QUOIN_ASSERT(has_arrays_of_one_length(mesh));
+  QUOIN_ASSERT(names_vertices(mesh));
+  QUOIN_ASSERT(has_finite_positions(mesh));
+#endif
+  if (mesh.indices.empty()) return 0.0F;
+  const float reached = remove_triangles(mesh, error_in_samples, tags);
+  order_for_caches(mesh, tags);
+  return reached;
+}
+
+#else
+
+bool can_simplify() {
+  return false;
+}
+
+Result<float> simplify_tagged(SmoothMesh&, float error_in_samples, std::vector<std::uint32_t>&) {
+  if (!(error_in_samples >= 0.0F))
+    return make_error(ErrorCode::InvalidArgument, "the error must be a number of at least 0");
+  return make_error(
+      ErrorCode::Unsupported,
+      "this build cannot simplify meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
+}
+
+#endif
+
+Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples) {
+  std::vector<std::uint32_t> none;
+  return simplify_tagged(mesh, error_in_samples, none);
+}
+
+}  // namespace quoin

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/mesh/smooth_mesh.h>
+
+namespace quoin {
+
+/// `simplify_smooth_mesh`, with a number for each vertex that goes with it; or none.
+[[nodiscard]] Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags);
+
+}  // namespace quoin

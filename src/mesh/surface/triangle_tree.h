@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/vec.h>
+
+namespace quoin {
+
+/// Triangles in a tree of boxes, for the distances of points from them.
+///
+/// Lifetime: the arrays must outlive it. Threads: any number may ask.
+class TriangleTree {
+ public:
+  /// `indices`: three a triangle.
+  TriangleTree(std::span<const Vec3> positions, std::span<const std::uint32_t> indices);
+
+  /// The distance of a point from the nearest triangle, or `most` if none is nearer.
+  [[nodiscard]] float distance(Vec3 point, float most) const;
+
+ private:
+  struct Node {
+    Vec3 min;
+    Vec3 max;
+    std::uint32_t first;  // of a leaf its first triangle in `order_`, else the first of its two children
+    std::uint32_t count;  // of a leaf its triangles, else 0
+  };
+  struct Item {
+    Vec3 min;
+    Vec3 max;
+    std::uint32_t triangle;
+  };
+
+  void build(std::size_t node, std::span<Item> items, std::size_t first);
+  [[nodiscard]] float squared_distance(Vec3 point, std::uint32_t triangle) const;
+
+  std::span<const Vec3> positions_;
+  std::span<const std::uint32_t> indices_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace quoin

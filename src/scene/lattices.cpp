@@ -1,0 +1,184 @@
+#include "scene/lattices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+
+namespace quoin {
+
+namespace {
+
+/// How far a voxel's corner may be from the lattice's, in voxels.
+constexpr double kTolerance = 1e-3;
+/// Coordinates beyond this are left alone: sums of them would not fit.
+constexpr double kFarthest = 1 << 29;
+
+DVec3 corner_of(const IBox& box, int corner) {
+  return {(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+          (corner & 4) != 0 ? box.max.z : box.min.z};
+}
+
+DBox world_box(const SceneGrid& grid, const Instance& instance) {
+  DBox box;
+  const IBox bounds = grid.grid.bounds();
+  for (int corner = 0; corner < 8; ++corner) box.extend(world_from_grid(instance, grid, corner_of(bounds, corner)));
+  return box;
+}
+
+/// Which numbers are connected.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
+
+  std::size_t find(std::size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  /// The least number of a set stands for it.
+  void unite(std::size_t a, std::size_t b) {
+    a = find(a);
+    b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::size_t> parent_;
+};
+
+class Grouping {
+ public:
+  Grouping(const Scene& scene, const std::vector<InstanceHandle>& instances)
+      : scene_(scene), instances_(instances), sets_(instances.size()) {
+    for (const InstanceHandle handle : instances) boxes_.push_back(world_box(grid_of(handle), instance_of(handle)));
+  }
+
+  std::vector<std::vector<LatticeMember>> find() {
+    unite_those_that_touch();
+    std::vector<std::vector<LatticeMember>> groups;
+    std::vector<std::size_t> group_of(instances_.size());
+    for (std::size_t i = 0; i < instances_.size(); ++i) {
+      const std::size_t first = sets_.find(i);
+      if (first != i) {
+        // Of the first member; what is off by more than between neighbours, over many of them, is alone.
+        const auto place = place_in_lattice(scene_, instance_of(instances_[first]), instance_of(instances_[i]));
+        if (place) {
+          groups[group_of[first]].push_back({instances_[i], *place});
+          continue;
+        }
+      }
+      group_of[i] = groups.size();
+      groups.push_back({{instances_[i], {}}});
+    }
+    return groups;
+  }
+
+ private:
+  [[nodiscard]] const Instance& instance_of(InstanceHandle handle) const { return scene_.instances()[handle]; }
+  [[nodiscard]] const SceneGrid& grid_of(InstanceHandle handle) const {
+    return scene_.grids()[instance_of(handle).grid];
+  }
+
+  /// Along the axis on which the boxes are spread the farthest.
+  void unite_those_that_touch() {
+    DBox all;
+    for (const DBox& box : boxes_) {
+      all.extend(box.min);
+      all.extend(box.max);
+    }
+    int axis = 0;
+    for (int other = 1; other < 3; ++other) {
+      if (all.max[other] - all.min[other] > all.max[axis] - all.min[axis]) axis = other;
+    }
+    std::vector<std::size_t> order(instances_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return boxes_[i].min[axis]; });
+    std::vector<std::size_t> open;
+    for (const std::size_t i : order) {
+      const double begin = boxes_[i].min[axis];
+      std::erase_if(open, [&](std::size_t k) { return boxes_[k].max[axis] + margin(k) < begin; });
+      for (const std::size_t k : open) {
+        if (sets_.find(i) != sets_.find(k) && touch(std::min(i, k), std::max(i, k))) sets_.unite(i, k);
+      }
+      open.push_back(i);
+    }
+  }
+
+  /// Half a voxel: more than rounding, less than a gap.
+  [[nodiscard]] double margin(std::size_t i) const { return 0.5 * instance_of(instances_[i]).voxel_size; }
+
+  [[nodiscard]] bool touch(std::size_t a, std::size_t b) const {
+    const double more = margin(a);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (boxes_[a].max[axis] + more < boxes_[b].min[axis] || boxes_[b].max[axis] + more < boxes_[a].min[axis]) {
+        return false;
+      }
+    }
+    const auto place = place_in_lattice(scene_, instance_of(instances_[a]), instance_of(instances_[b]));
+    if (!place) return false;
+    IBox near = grid_of(instances_[a]).grid.bounds();
+    near.min -= 1;
+    near.max += 1;
+    return !intersect(near, place->apply(grid_of(instances_[b]).grid.bounds())).empty();
+  }
+
+  const Scene& scene_;
+  const std::vector<InstanceHandle>& instances_;
+  std::vector<DBox> boxes_;  // in the world
+  Sets sets_;
+};
+
+}  // namespace
+
+IBox LatticePlace::apply(const IBox& box) const {
+  const IVec3 a = orientation.apply(box.min) + offset;
+  const IVec3 b = orientation.apply(box.max) + offset;
+  return {glm::min(a, b), glm::max(a, b)};
+}
+
+LatticePlace LatticePlace::inverse() const {
+  const AxisOrientation back = orientation.inverse();
+  return {back, -back.apply(offset)};
+}
+
+std::optional<LatticePlace> place_in_lattice(const Scene& scene, const Instance& lattice, const Instance& instance) {
+  const SceneGrid& own = scene.grids()[lattice.grid];
+  const SceneGrid& other = scene.grids()[instance.grid];
+  if (!(std::abs(lattice.voxel_size - instance.voxel_size) <= kTolerance * lattice.voxel_size)) return std::nullopt;
+  const auto moved = [&](DVec3 point) {
+    return grid_from_world(lattice, own, world_from_grid(instance, other, point));
+  };
+  const IBox box = other.grid.bounds();
+  const DVec3 origin = moved(DVec3(box.min));
+  LatticePlace place;
+  bool is_found = false;
+  for (int i = 0; i < AxisOrientation::kCount && !is_found; ++i) {
+    place.orientation = AxisOrientation::at(i);
+    is_found = true;
+    for (int axis = 0; axis < 3 && is_found; ++axis) {
+      DVec3 unit(0.0);
+      unit[axis] = 1.0;
+      const DVec3 turned = moved(DVec3(box.min) + unit) - origin;
+      is_found = glm::length(turned - place.orientation.apply(unit)) < 0.1;
+    }
+  }
+  if (!is_found) return std::nullopt;
+  const DVec3 whole = glm::round(origin - place.orientation.apply(DVec3(box.min)));
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(whole[axis]) < kFarthest) || !(std::abs(origin[axis]) < kFarthest)) return std::nullopt;
+  }
+  place.offset = IVec3(whole);
+  for (int corner = 0; corner < 8; ++corner) {
+    const DVec3 at = corner_of(box, corner);
+    const DVec3 off = moved(at) - (place.orientation.apply(at) + DVec3(place.offset));
+    if (!(std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}) < kTolerance)) return std::nullopt;
+  }
+  return place;
+}
+
+std::vector<std::vector<LatticeMember>> lattice_groups(const Scene& scene,
+                                                       const std::vector<InstanceHandle>& instances) {
+  return Grouping(scene, instances).find();
+}
+
+}  // namespace quoin

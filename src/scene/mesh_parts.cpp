@@ -1,0 +1,81 @@
+#include "scene/mesh_parts.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <quoin/mesh/simplify.h>
+
+#include "scene/instance_axes.h"
+
+namespace quoin {
+
+Status check_instances(const Scene& scene, InstanceFilter filter) {
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (!is_drawn(scene, instance, filter)) continue;
+    if (has_place(instance)) continue;
+    return make_error(
+        ErrorCode::InvalidArgument,
+        "instance \"" + instance.name + "\" has a transform that is not finite or a size that is not positive");
+  }
+  return {};
+}
+
+std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
+  std::vector<GridHandle> grids;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (is_drawn(scene, instance, filter)) grids.push_back(instance.grid);
+  }
+  std::sort(grids.begin(), grids.end());
+  grids.erase(std::unique(grids.begin(), grids.end()), grids.end());
+  return grids;
+}
+
+MeshPlacement placement_of(const Instance& instance, std::size_t part) {
+  const DQuat rotation = unit_rotation(instance.rotation);
+  return {part, instance.name, Similarity{instance.position, rotation, instance.voxel_size, instance.mirrored}};
+}
+
+Progress part_of(const Progress& whole, double begin, double end) {
+  if (!whole) return {};
+  return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
+}
+
+void add_stats(const SmoothMesh& mesh, MeshStats& stats) {
+  stats.triangles += static_cast<std::int64_t>(mesh.indices.size() / 3);
+  stats.vertices += static_cast<std::int64_t>(mesh.positions.size());
+}
+
+Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& types, const SurfaceOptions& wanted,
+                              MeshStats& stats, Threads threads, const Progress& progress) {
+  auto mesh = build_smooth_mesh(field, types, wanted.mesh, threads, progress);
+  if (!mesh) return mesh;
+  if (wanted.simplify_error) {
+    const auto error = simplify_smooth_mesh(*mesh, *wanted.simplify_error);
+    if (!error) return error.error();
+    stats.simplify_error = std::max(stats.simplify_error, *error);
+  }
+  add_stats(*mesh, stats);
+  return mesh;
+}
+
+Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
+                  const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads) {
+  for (const GridHandle handle : grids) {
+    const SceneGrid& grid = scene.grids()[handle];
+    if (grid.field.chunk_count() == 0) continue;
+    auto mesh = surface_of(grid.field, scene.types, wanted, meshes.stats, threads, {});
+    if (!mesh) return mesh.error();
+    if (mesh->indices.empty()) continue;
+    for (const InstanceHandle placed : scene.instances().handles()) {
+      const Instance& instance = scene.instances()[placed];
+      if (instance.grid != handle || !is_drawn(scene, instance, filter)) continue;
+      meshes.placements.push_back(placement_of(instance, meshes.parts.size()));
+    }
+    meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
+  }
+  return {};
+}
+
+}  // namespace quoin

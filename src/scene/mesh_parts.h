@@ -1,0 +1,42 @@
+#pragma once
+
+// What blocky and smooth meshes of scenes are put together from.
+
+#include <optional>
+#include <vector>
+
+#include <quoin/scene/scene_meshes.h>
+
+namespace quoin {
+
+/// Errors: InvalidArgument, naming the first drawn instance that has no place.
+[[nodiscard]] Status check_instances(const Scene& scene, InstanceFilter filter);
+
+/// The grids that drawn instances place, each once, in the order of their handles.
+[[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
+
+/// Where an instance stands, of a part.
+[[nodiscard]] MeshPlacement placement_of(const Instance& instance, std::size_t part);
+
+/// A listener for the stretch from `begin` to `end` of another's work. Lifetime: `whole` must outlive it.
+[[nodiscard]] Progress part_of(const Progress& whole, double begin, double end);
+
+struct SurfaceOptions {
+  const SmoothMeshOptions& mesh;
+  std::optional<float> simplify_error;
+};
+
+/// Meshes, simplifies where that is asked for, and counts.
+[[nodiscard]] Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& types,
+                                            const SurfaceOptions& wanted, MeshStats& stats, Threads threads,
+                                            const Progress& progress);
+
+/// Adds triangles and vertices.
+void add_stats(const SmoothMesh& mesh, MeshStats& stats);
+
+/// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
+/// instances, in their order.
+[[nodiscard]] Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
+                                const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads);
+
+}  // namespace quoin

@@ -1,0 +1,299 @@
+#include <quoin/scene/scene_meshes.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <quoin/grid/copy_box.h>
+#include <quoin/grid/voxel_field.h>
+
+#include "grid/coordinate_hash.h"
+#include "mesh/surface/simplify_tagged.h"
+#include "mesh/surface/bodies.h"
+#include "mesh/surface/build.h"
+#include "scene/lattices.h"
+#include "scene/mesh_parts.h"
+
+namespace quoin {
+
+namespace {
+
+using smooth::TriangleFace;
+
+/// The instances of one group as one grid, in the lattice of the first.
+class UnitedGrid {
+ public:
+  UnitedGrid(const Scene& scene, std::vector<LatticeMember> members) : members_(std::move(members)) {
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      grids_.push_back(&scene.grids()[scene.instances()[members_[i].instance].grid].grid);
+      back_.push_back(members_[i].place.inverse());
+      const IBox box = grids_[i]->bounds();
+      const IBox arrived = members_[i].place.apply(box);
+      copy_box(*grids_[i], box, voxels_, arrived.min, members_[i].place.orientation, {.copy_air = false, .type_map = {}});
+      note_chunks(arrived, i);
+    }
+  }
+
+  [[nodiscard]] const std::vector<LatticeMember>& members() const { return members_; }
+  [[nodiscard]] const Grid& voxels() const { return voxels_; }
+  /// From the lattice to a member's own grid.
+  [[nodiscard]] const LatticePlace& way_back(std::size_t member) const { return back_[member]; }
+
+  /// Whose voxel it is: the last member's that has one there. Where none has one, the first whose chunk it is, or 0.
+  [[nodiscard]] std::uint32_t owner_of(IVec3 voxel) const {
+    const auto found = by_chunk_.find(chunk_of(voxel));
+    if (found == by_chunk_.end()) return 0;
+    for (auto member = found->second.rbegin(); member != found->second.rend(); ++member) {
+      const IVec3 own = back_[*member].apply(IBox{voxel, voxel + 1}).min;
+      if (grids_[*member]->get(own) != kAir) return *member;
+    }
+    return found->second.front();
+  }
+
+ private:
+  void note_chunks(const IBox& box, std::size_t member) {
+    if (box.empty()) return;
+    const IVec3 first = chunk_of(box.min);
+    const IVec3 last = chunk_of(box.max - 1);
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+          if (voxels_.find_chunk({x, y, z}) == nullptr) continue;
+          by_chunk_[{x, y, z}].push_back(static_cast<std::uint32_t>(member));
+        }
+      }
+    }
+  }
+
+  std::vector<LatticeMember> members_;
+  std::vector<const Grid*> grids_;    // by member
+  std::vector<LatticePlace> back_;    // likewise
+  Grid voxels_;
+  std::unordered_map<IVec3, std::vector<std::uint32_t>, CoordinateHash> by_chunk_;  // members in their order
+};
+
+/// The surface of one body, and whose each vertex is, where there are several owners.
+struct Body {
+  SmoothMesh mesh;
+  std::vector<std::uint32_t> owners;
+};
+
+std::vector<std::uint32_t> owners_of(const UnitedGrid& united, const std::vector<TriangleFace>& faces) {
+  std::vector<std::uint32_t> owners;
+  owners.reserve(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const bool is_as_before = i > 0 && faces[i].sample == faces[i - 1].sample;
+    owners.push_back(is_as_before ? owners.back() : united.owner_of(faces[i].sample));
+  }
+  return owners;
+}
+
+void append(SmoothMesh& all, const SmoothMesh& more) {
+  const auto first = static_cast<std::uint32_t>(all.positions.size());
+  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  add(all.positions, more.positions);
+  add(all.normals, more.normals);
+  add(all.occlusion, more.occlusion);
+  add(all.albedo, more.albedo);
+  add(all.types, more.types);
+  for (const std::uint32_t index : more.indices) all.indices.push_back(first + index);
+}
+
+/// Meshes what is united or stands for itself.
+class Mesher {
+ public:
+  Mesher(const Scene& scene, const SmoothSceneOptions& options, Threads threads, MeshStats& stats)
+      : scene_(scene), options_(options), threads_(threads), stats_(stats) {}
+
+  /// The opaque body, then all that are transparent as one. `united`: null where all has one owner.
+  Result<std::array<Body, 2>> mesh(const Grid& voxels, const UnitedGrid* united, const Progress& progress) const {
+    const DensityGrid whole = field_from_grid(voxels, threads_);
+    const std::vector<std::uint32_t> bodies = smooth::bodies_of(scene_.types, voxels.types());
+    std::array<Body, 2> made;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const auto share = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(bodies.size()); };
+      const Progress part = part_of(progress, share(i), share(i + 1));
+      const bool is_alone = bodies.size() == 1;
+      auto body = is_alone ? mesh_body(whole, nullptr, united, part)
+                           : mesh_body(smooth::field_of_body(whole, scene_.types, bodies[i], threads_), &whole, united,
+                                       part);
+      if (!body) return body.error();
+      Body& out = made[bodies[i] == 0 ? 0 : 1];
+      append(out.mesh, body->mesh);
+      out.owners.insert(out.owners.end(), body->owners.begin(), body->owners.end());
+    }
+    return made;
+  }
+
+ private:
+  Result<Body> mesh_body(const DensityGrid& field, const DensityGrid* whole, const UnitedGrid* united,
+                         const Progress& progress) const {
+    auto surface = smooth::build_surface(field, scene_.types, options_.mesh, {whole, true}, threads_, progress);
+    if (!surface) return surface.error();
+    std::vector<std::uint32_t> owners;
+    if (united != nullptr) owners = owners_of(*united, surface->faces);
+    Body body;
+    body.owners = smooth::finish_surface(*surface, scene_.types, options_.mesh, owners);
+    body.mesh = std::move(surface->mesh);
+    if (options_.simplify_error) {
+      const auto error = simplify_tagged(body.mesh, *options_.simplify_error, body.owners);
+      if (!error) return error.error();
+      stats_.simplify_error = std::max(stats_.simplify_error, *error);
+    }
+    add_stats(body.mesh, stats_);
+    return body;
+  }
+
+  const Scene& scene_;
+  const SmoothSceneOptions& options_;
+  Threads threads_;
+  MeshStats& stats_;
+};
+
+/// A part of a grid; field samples are the voxels' centres.
+MeshPart part_of_bodies(const SceneGrid& grid, std::array<SmoothMesh, 2> bodies) {
+  const auto owner = std::make_shared<const std::array<SmoothMesh, 2>>(std::move(bodies));
+  MeshPart part{grid.name, {}, grid.pivot - 0.5, owner};
+  for (const SmoothMesh& mesh : *owner) {
+    if (mesh.indices.empty()) continue;
+    part.surfaces.push_back(view_of(mesh));
+    part.surfaces.back().surface = &mesh == owner->data() ? SurfaceClass::Opaque : SurfaceClass::Transparent;
+  }
+  return part;
+}
+
+/// What of a body is each member's, in its own grid's samples.
+std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
+  std::vector<SmoothMesh> parts(united.members().size());
+  std::vector<std::uint32_t> places(body.owners.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    SmoothMesh& part = parts[body.owners[i]];
+    const LatticePlace& back = united.way_back(body.owners[i]);
+    const DVec3 point(body.mesh.positions[i]);
+    places[i] = static_cast<std::uint32_t>(part.positions.size());
+    // Samples are half a voxel from the corners that the places speak of.
+    part.positions.emplace_back(back.orientation.apply(point + 0.5) + DVec3(back.offset) - 0.5);
+    part.normals.emplace_back(back.orientation.apply(DVec3(body.mesh.normals[i])));
+    if (!body.mesh.occlusion.empty()) part.occlusion.push_back(body.mesh.occlusion[i]);
+    part.albedo.push_back(body.mesh.albedo[i]);
+    part.types.push_back(body.mesh.types[i]);
+  }
+  for (std::size_t i = 0; i < body.mesh.indices.size(); i += 3) {
+    const std::uint32_t* triangle = body.mesh.indices.data() + i;
+    const std::uint32_t owner = body.owners[triangle[0]];
+    const bool turns = united.way_back(owner).orientation.is_mirrored();
+    for (const std::size_t k : {0, turns ? 2 : 1, turns ? 1 : 2}) {
+      parts[owner].indices.push_back(places[triangle[k]]);
+    }
+  }
+  return parts;
+}
+
+/// What is meshed together: a grid by itself, for all of these instances, or a group of them.
+struct Unit {
+  std::vector<LatticeMember> members;
+  bool is_united = false;
+};
+
+std::vector<Unit> units_of(const Scene& scene, const SmoothSceneOptions& options) {
+  std::vector<InstanceHandle> drawn;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const bool counts = is_drawn(scene, instance, options.instances);
+    if (counts && !scene.grids()[instance.grid].grid.bounds().empty()) drawn.push_back(handle);
+  }
+  std::vector<std::vector<LatticeMember>> groups;
+  if (options.unite) {
+    groups = lattice_groups(scene, drawn);
+  } else {
+    for (const InstanceHandle handle : drawn) groups.push_back({{handle, {}}});
+  }
+  std::map<GridHandle, Unit> alone;
+  std::vector<Unit> united;
+  for (auto& group : groups) {
+    if (group.size() == 1) {
+      alone[scene.instances()[group[0].instance].grid].members.push_back(group[0]);
+    } else {
+      united.push_back({std::move(group), true});
+    }
+  }
+  std::vector<Unit> units;
+  for (auto& [grid, unit] : alone) units.push_back(std::move(unit));
+  std::move(united.begin(), united.end(), std::back_inserter(units));
+  return units;
+}
+
+/// Adds a part, unless it is empty, and its placements.
+void add_part(const Scene& scene, MeshPart part, std::span<const LatticeMember> members, SceneMeshes& meshes) {
+  if (part.surfaces.empty()) return;
+  for (const LatticeMember& member : members) {
+    MeshPlacement placement = placement_of(scene.instances()[member.instance], meshes.parts.size());
+    // As a matrix: of two rotations that are the same, files then have the one with a positive w.
+    placement.world_from_part = placement.matrix();
+    meshes.placements.push_back(std::move(placement));
+  }
+  meshes.parts.push_back(std::move(part));
+}
+
+Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progress& progress, SceneMeshes& meshes) {
+  const auto grid_of = [&](const LatticeMember& member) -> const SceneGrid& {
+    return scene.grids()[scene.instances()[member.instance].grid];
+  };
+  if (!unit.is_united) {
+    const SceneGrid& grid = grid_of(unit.members[0]);
+    auto bodies = mesher.mesh(grid.grid, nullptr, progress);
+    if (!bodies) return bodies.error();
+    MeshPart part = part_of_bodies(grid, {std::move((*bodies)[0].mesh), std::move((*bodies)[1].mesh)});
+    add_part(scene, std::move(part), unit.members, meshes);
+    return {};
+  }
+  const UnitedGrid united(scene, std::move(unit.members));
+  auto bodies = mesher.mesh(united.voxels(), &united, progress);
+  if (!bodies) return bodies.error();
+  std::vector<SmoothMesh> opaque = divide((*bodies)[0], united);
+  std::vector<SmoothMesh> transparent = divide((*bodies)[1], united);
+  for (std::size_t i = 0; i < united.members().size(); ++i) {
+    const LatticeMember& member = united.members()[i];
+    MeshPart part = part_of_bodies(grid_of(member), {std::move(opaque[i]), std::move(transparent[i])});
+    add_part(scene, std::move(part), {&member, 1}, meshes);
+  }
+  return {};
+}
+
+}  // namespace
+
+SmoothMeshOptions smooth_voxels() {
+  SmoothMeshOptions options;
+  options.colours = SurfaceColours::Sharp;
+  options.keep_thin = true;
+  return options;
+}
+
+Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options, Threads threads,
+                                        const Progress& progress) {
+  if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
+  SceneMeshes meshes;
+  const Mesher mesher(scene, options, threads, meshes.stats);
+  std::vector<Unit> units = units_of(scene, options);
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(units.size()); };
+    const Progress part = part_of(progress, share(i), share(i + 1));
+    if (auto done = add_unit(scene, std::move(units[i]), mesher, part, meshes); !done) return done.error();
+  }
+  SmoothMeshOptions of_fields;
+  of_fields.occlusion = options.mesh.occlusion;
+  of_fields.split_sheets = options.mesh.split_sheets;
+  of_fields.level_of = options.mesh.level_of;
+  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
+  const SurfaceOptions wanted{of_fields, options.simplify_error};
+  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads); !done) return done.error();
+  return meshes;
+}
+
+}  // namespace quoin
