@@ -1,5 +1,6 @@
 // `quoin convert` to smooth meshes, of voxels and of volumes.
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -50,13 +51,18 @@ std::vector<double> ball(IVec3 size, DVec3 centre, double radius) {
   return values;
 }
 
-/// Edges without exactly one triangle on each side.
+/// Edges without exactly one triangle on each side; vertices of one place, which colours tell apart, count as one.
 std::size_t open_edges(const WorldMesh& mesh) {
+  std::map<std::array<double, 3>, std::size_t> places;
+  const auto place = [&](std::size_t i) {
+    const DVec3& p = mesh.positions[mesh.indices[i]];
+    return places.try_emplace({p.x, p.y, p.z}, places.size()).first->second;
+  };
   std::map<std::pair<std::size_t, std::size_t>, int> balance;
   std::map<std::pair<std::size_t, std::size_t>, int> uses;
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
-    const std::size_t a = mesh.indices[i];
-    const std::size_t b = mesh.indices[i / 3 * 3 + (i + 1) % 3];
+    const std::size_t a = place(i);
+    const std::size_t b = place(i / 3 * 3 + (i + 1) % 3);
     balance[std::minmax(a, b)] += a < b ? 1 : -1;
     ++uses[std::minmax(a, b)];
   }

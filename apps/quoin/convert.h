@@ -26,7 +26,7 @@ struct ConvertOptions {
   std::optional<double> simplify;
   std::optional<double> smoothness;  ///< of smooth surfaces around voxels
   std::optional<std::string> colours;
-  bool apart = false;                ///< instances are not united
+  bool apart = false;            ///< instances are not united
   std::optional<RawVolume> raw;  ///< the input is a file of values alone
   bool mesh_only = false;        ///< any option that only meshes heed was given
 };

@@ -14,9 +14,9 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "grid/coordinate_hash.h"
-#include "mesh/surface/simplify_tagged.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
+#include "mesh/surface/simplify_tagged.h"
 #include "scene/lattices.h"
 #include "scene/mesh_parts.h"
 
@@ -35,7 +35,8 @@ class UnitedGrid {
       back_.push_back(members_[i].place.inverse());
       const IBox box = grids_[i]->bounds();
       const IBox arrived = members_[i].place.apply(box);
-      copy_box(*grids_[i], box, voxels_, arrived.min, members_[i].place.orientation, {.copy_air = false, .type_map = {}});
+      copy_box(*grids_[i], box, voxels_, arrived.min, members_[i].place.orientation,
+               {.copy_air = false, .type_map = {}});
       note_chunks(arrived, i);
     }
   }
@@ -72,8 +73,8 @@ class UnitedGrid {
   }
 
   std::vector<LatticeMember> members_;
-  std::vector<const Grid*> grids_;    // by member
-  std::vector<LatticePlace> back_;    // likewise
+  std::vector<const Grid*> grids_;  // by member
+  std::vector<LatticePlace> back_;  // likewise
   Grid voxels_;
   std::unordered_map<IVec3, std::vector<std::uint32_t>, CoordinateHash> by_chunk_;  // members in their order
 };
@@ -120,9 +121,9 @@ class Mesher {
       const auto share = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(bodies.size()); };
       const Progress part = part_of(progress, share(i), share(i + 1));
       const bool is_alone = bodies.size() == 1;
-      auto body = is_alone ? mesh_body(whole, nullptr, united, part)
-                           : mesh_body(smooth::field_of_body(whole, scene_.types, bodies[i], threads_), &whole, united,
-                                       part);
+      auto body =
+          is_alone ? mesh_body(whole, nullptr, united, part)
+                   : mesh_body(smooth::field_of_body(whole, scene_.types, bodies[i], threads_), &whole, united, part);
       if (!body) return body.error();
       Body& out = made[bodies[i] == 0 ? 0 : 1];
       append(out.mesh, body->mesh);

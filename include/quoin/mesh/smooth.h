@@ -55,8 +55,8 @@ struct SmoothOptions {
   /// Gives a cell that two sheets of the surface cross a vertex for each, so that the mesh is manifold everywhere.
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
   bool split_sheets = false;
-  /// Where solid samples touch by edges or corners only, the sheets are those of one solid instead of several: what is
-  /// one sample thick and runs at a slant holds together. Of use with `split_sheets` alone.
+  /// Where solid samples touch by an edge only, the sheets are those of one solid instead of two: what is one sample
+  /// thick and runs at a slant holds together. Of use with `split_sheets` alone.
   bool join_diagonals = false;
   /// Level of detail of the chunk and its neighbours, indexed as a neighbourhood: cells are 2^level samples wide, and
   /// meshes of different levels meet without a gap. 0 to kMaxSmoothLevel; more counts as that.
@@ -66,17 +66,22 @@ struct SmoothOptions {
 /// The cell of a vertex, for welding the meshes of chunks and for finding what lies around it.
 ///
 /// bits 0-5 x, 6-11 y, 12-17 z of the cell in its chunk, in cells of that chunk's level; 18, 19, 20: the cell lies in
-/// the previous chunk along x, y, z; 21-22 which of the cell's sheets; the rest 0.
+/// the previous chunk along x, y, z; 21-22 which of the cell's sheets, or which side of a bridge; 23-24: 0, or 1 + the
+/// axis along which the vertex lies between this cell and the next, in a bridge of what is joined by an edge; the rest
+/// 0.
 struct SmoothCell {
   std::uint32_t bits = 0;
 
   static constexpr int kPreviousShift = 18;
   static constexpr int kSheetShift = 21;
+  static constexpr int kBridgeShift = 23;
 
   [[nodiscard]] IVec3 cell() const { return {field(0, 63), field(6, 63), field(12, 63)}; }
   /// The cell's chunk relative to the mesh's: 0 or -1 on each axis.
   [[nodiscard]] IVec3 chunk_offset() const { return {-field(18, 1), -field(19, 1), -field(20, 1)}; }
   [[nodiscard]] int sheet() const { return field(kSheetShift, 3); }
+  /// 0, 1 or 2: the axis across which the vertex lies between two cells; -1 where it lies in its own.
+  [[nodiscard]] int bridge_axis() const { return field(kBridgeShift, 3) - 1; }
 
   bool operator==(const SmoothCell&) const = default;
 

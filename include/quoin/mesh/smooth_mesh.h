@@ -32,7 +32,7 @@ struct SmoothMesh {
 /// How the materials of samples become the colours of a surface.
 enum class SurfaceColours : std::uint8_t {
   Blended,  ///< each vertex has the mean of those around it
-  Sharp,    ///< each face has that of its solid sample, as a block's; vertices between colours stand there once for each
+  Sharp,  ///< each face has that of its solid sample, as a block's; vertices between colours stand there once for each
 };
 
 struct SmoothMeshOptions {

@@ -89,7 +89,7 @@ struct BlockySceneOptions {
 
 struct SmoothSceneOptions {
   SmoothMeshOptions mesh = smooth_voxels();  ///< of voxels; of fields occlusion, `split_sheets` and `level_of` alone
-  std::optional<float> simplify_error{};     ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
+  std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
   InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
   /// Whether instances whose voxels lie on one lattice and touch are one body: without seams, grooves and slits
   /// between them. Such instances have a part each then, even of one grid.

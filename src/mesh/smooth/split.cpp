@@ -1,7 +1,9 @@
 #include "mesh/smooth/split.h"
 
 #include <algorithm>
+#include <optional>
 #include <unordered_map>
+#include <vector>
 
 #include <quoin/core/assert.h>
 
@@ -177,13 +179,22 @@ class Splitter {
   void run(std::size_t quad_indices) {
     const std::size_t vertices = out_.cells.size();
     for (std::size_t i = 0; i < vertices; ++i) split_vertex(static_cast<std::uint32_t>(i));
-    if (split_.empty()) return;
+    if (split_.empty() && bridges_.empty()) return;
     is_split_.assign(vertices, false);
     for (const auto& [vertex, split] : split_) is_split_[vertex] = true;
+    for (const auto& [vertex, bridge] : bridges_) is_split_[vertex] = true;
+    std::size_t kept = 0;
     for (std::size_t i = 0; i < quad_indices; i += 6) {
       const std::uint32_t* quad = out_.indices.data() + i;
-      if (is_split_[quad[0]] || is_split_[quad[1]] || is_split_[quad[2]] || is_split_[quad[5]]) rewire_quad(i);
+      const bool is_other = is_split_[quad[0]] || is_split_[quad[1]] || is_split_[quad[2]] || is_split_[quad[5]];
+      if (is_other && rewire_quad(i)) continue;
+      if (kept != i) std::copy_n(out_.indices.begin() + i, 6, out_.indices.begin() + kept);
+      kept += 6;
     }
+    if (kept == quad_indices) return;
+    std::copy(out_.indices.begin() + quad_indices, out_.indices.end(), out_.indices.begin() + kept);
+    out_.indices.resize(out_.indices.size() - (quad_indices - kept));
+    for (const std::uint32_t index : polygons_) out_.indices.push_back(index);
   }
 
  private:
@@ -192,13 +203,22 @@ class Splitter {
     std::uint32_t second;  // the vertices of sheets 1, 2, ... follow each other from here
   };
 
+  // The two vertices between a cell and the next along an axis, one for each air corner of their common face.
+  struct Bridge {
+    int axis;
+    std::uint32_t first;  // of the lesser corner; the other's follows
+  };
+
   void split_vertex(std::uint32_t vertex) {
     const LevelCell cell = levels_.cell_of(out_.cells[vertex]);
     const std::uint32_t solid = parted_corners(cell);
     const int joined = tables().joined_face[solid];
     if (joined == kNoFace && tables().sheets[solid][kNoFace].count < 2) return;
     if (!same_levels_ && levels_.touches_another(cell)) return;
-    const bool flipped = joined != kNoFace && joins_as_well(cell, joined);
+    const bool joins = joined != kNoFace && joins_as_well(cell, joined);
+    // Where solids are to hold together there is a bridge instead, which the lower of both cells makes.
+    const bool flipped = joins && !options_.join_diagonals;
+    if (joins && !flipped && joined % 2 == 1) add_bridge(vertex, cell, joined);
     const Sheets& sheets = tables().sheets[solid][static_cast<std::size_t>(flipped ? joined : kNoFace)];
     if (sheets.count < 2) return;
     split_.emplace(vertex, Split{sheets, static_cast<std::uint32_t>(out_.positions.size())});
@@ -213,6 +233,57 @@ class Splitter {
         append_vertex(chunks_, options_.occlusion, cell, placed, name, out_);
       }
     }
+  }
+
+  void add_bridge(std::uint32_t vertex, const LevelCell& cell, int face) {
+    const int axis = face / 2;
+    bridges_.emplace(vertex, Bridge{axis, static_cast<std::uint32_t>(out_.positions.size())});
+    const Corners corners = corners_of(chunks_, cell);
+    const std::uint32_t air = parted_corners(cell);
+    const std::array<int, 4> around = face_corners(face);
+    std::uint32_t side = 0;
+    for (const int corner : sorted(around)) {
+      if (!is_solid_corner(air, corner)) continue;
+      const auto at = static_cast<std::size_t>(std::find(around.begin(), around.end(), corner) - around.begin());
+      const Vec3 fraction =
+          (crossing(corners, corner, around[(at + 1) % 4]) + crossing(corners, corner, around[(at + 3) % 4])) * 0.5F;
+      const SmoothCell name{out_.cells[vertex].bits | side << SmoothCell::kSheetShift |
+                            static_cast<std::uint32_t>(axis + 1) << SmoothCell::kBridgeShift};
+      append_vertex(chunks_, options_.occlusion, cell, vertex_at(fraction, trilinear_gradient(corners, fraction)), name,
+                    out_);
+      ++side;
+    }
+  }
+
+  static std::array<int, 4> sorted(std::array<int, 4> corners) {
+    std::sort(corners.begin(), corners.end());
+    return corners;
+  }
+
+  // Where the surface crosses the edge between two corners.
+  static Vec3 crossing(const Corners& corners, int a, int b) {
+    const float from = corners[static_cast<std::size_t>(a)];
+    const float to = corners[static_cast<std::size_t>(b)];
+    const Vec3 first(corner_place(a));
+    return first + (Vec3(corner_place(b)) - first) * (from / (from - to));
+  }
+
+  // The vertex of a bridge on the side of a quad's edge from one cell to the next; nothing where there is no bridge.
+  [[nodiscard]] std::optional<std::uint32_t> bridge_between(std::uint32_t vertex, const LevelCell& cell,
+                                                            std::uint32_t next, const LevelCell& next_cell, IVec3 start,
+                                                            int axis) const {
+    if (bridges_.empty()) return std::nullopt;
+    const IVec3 step = next_cell.first - cell.first;
+    const bool is_lower = step.x + step.y + step.z > 0;
+    const auto found = bridges_.find(is_lower ? vertex : next);
+    if (found == bridges_.end() || step[found->second.axis] == 0) return std::nullopt;
+    const LevelCell& lower = is_lower ? cell : next_cell;
+    const std::uint32_t air = parted_corners(lower);
+    int corner = corner_at((start - lower.first) / lower.size());
+    if (!is_solid_corner(air, corner)) corner += corner_at(unit_axis(axis));
+    // The other air corner of the face is across from it.
+    const int other = corner ^ 7 ^ corner_at(unit_axis(found->second.axis));
+    return found->second.first + (corner < other ? 0U : 1U);
   }
 
   // Whether the cell on the other side of a face also has all four crossings of that face in one sheet.
@@ -235,7 +306,8 @@ class Splitter {
     return solid_corners_of(chunks_, cell) ^ (options_.join_diagonals ? 255U : 0U);
   }
 
-  void rewire_quad(std::size_t first_index) {
+  // False where a quad remains; else its triangles are among the polygons.
+  bool rewire_quad(std::size_t first_index) {
     std::uint32_t* quad = out_.indices.data() + first_index;
     std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, out_);
     std::array<LevelCell, 4> cells{};
@@ -249,14 +321,35 @@ class Splitter {
       const std::uint32_t vertex = sheet_vertex(cycle[i], cells[i], start, axis);
       corners[i] = quad_corner(vertex, out_.positions[vertex], cells[i].first, cells[i].level);
     }
+    std::array<std::uint32_t, 8> polygon{};
+    std::size_t count = 0;
+    std::size_t first_bridge = polygon.size();
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t next = (i + 1) % 4;
+      polygon[count++] = corners[i].vertex;
+      const auto bridge = bridge_between(cycle[i], cells[i], cycle[next], cells[next], start, axis);
+      if (!bridge) continue;
+      first_bridge = std::min(first_bridge, count);
+      polygon[count++] = *bridge;
+    }
+    if (count > 4) {
+      for (std::size_t i = 1; i + 1 < count; ++i) {
+        polygons_.push_back(polygon[first_bridge]);
+        polygons_.push_back(polygon[(first_bridge + i) % count]);
+        polygons_.push_back(polygon[(first_bridge + i + 1) % count]);
+      }
+      return true;
+    }
     const std::array<std::uint32_t, 6> triangles = triangles_of(corners);
     std::copy(triangles.begin(), triangles.end(), quad);
+    return false;
   }
 
   // The vertex of the sheet that an edge crosses, of those that `vertex` was split into.
   [[nodiscard]] std::uint32_t sheet_vertex(std::uint32_t vertex, const LevelCell& cell, IVec3 start, int axis) const {
-    if (!is_split_[vertex]) return vertex;
-    const Split& split = split_.find(vertex)->second;
+    const auto found = split_.find(vertex);
+    if (found == split_.end()) return vertex;
+    const Split& split = found->second;
     const IVec3 place = (start - cell.first) / cell.size();
     const auto edge = static_cast<std::size_t>(4 * axis + place[(axis + 1) % 3] + 2 * place[(axis + 2) % 3]);
     const std::uint8_t sheet = split.sheets.of_edge[edge];
@@ -269,8 +362,10 @@ class Splitter {
   ChunkLevels levels_;
   bool same_levels_;
   SmoothChunkMesh& out_;
-  std::unordered_map<std::uint32_t, Split> split_;  // by vertex
-  std::vector<bool> is_split_;                      // by vertex, of those before
+  std::unordered_map<std::uint32_t, Split> split_;     // by vertex
+  std::unordered_map<std::uint32_t, Bridge> bridges_;  // by vertex of the lower cell
+  std::vector<bool> is_split_;                         // by vertex, of those before: split or with a bridge
+  std::vector<std::uint32_t> polygons_;                // triangles in place of quads with more corners
 };
 
 }  // namespace

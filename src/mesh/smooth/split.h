@@ -35,6 +35,9 @@ int joined_face(std::uint32_t solid);
 /// crossings, its normal the gradient there.
 ///
 /// Quads:    the first `quad_indices` of the indices, six a quad.
+/// Bridges:  with `join_diagonals`, two cells that both have all crossings of their common face in one sheet get two
+///           vertices on that face, one for each of its air corners, on the edge that joins the two cells: each has two
+///           triangles then instead of four. Quads that run along such an edge become polygons, which come last.
 /// Order:    a cell's first sheet keeps the cell's place, the others come last.
 /// Proof:    docs/decisions/021-two-sheets.md.
 void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,

@@ -15,8 +15,7 @@ namespace quoin::smooth {
 }
 
 /// The bodies of some materials, sorted, each once.
-[[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types,
-                                                   const std::vector<VoxelType>& materials);
+[[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials);
 
 /// The densities of one body of several: those of all, but what is solid of others is as far out as it was in. Shares
 /// the chunks of `whole` in which there are no others; chunks that are not near the body are left out where it is

@@ -11,8 +11,8 @@
 
 #include "core/progress_steps.h"
 #include "grid/chunk_order.h"
-#include "mesh/surface/build.h"
 #include "mesh/smooth/levels.h"
+#include "mesh/surface/build.h"
 #include "mesh/surface/material.h"
 #include "mesh/surface/shape.h"
 
@@ -131,15 +131,20 @@ void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.indices.resize(mesh.indices.size());
 }
 
-// The face around a crossed edge of the lattice of samples, from the cells of the quad's corners.
-TriangleFace face_of_quad(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh, const std::uint32_t* quad) {
-  const auto place = [&](std::size_t i) {
-    const SmoothCell cell = mesh.cells[quad[i]];
-    return cell.cell() + cell.chunk_offset() * kChunkEdge;
-  };
-  // The cells around an edge share their extent along it; the last of them begins where the edge does.
-  const IVec3 first = glm::min(glm::min(place(0), place(1)), glm::min(place(2), place(5)));
-  const IVec3 last = glm::max(glm::max(place(0), place(1)), glm::max(place(2), place(5)));
+// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or between,
+// which are three or four of those around the edge.
+TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
+                              const std::uint32_t* triangle) {
+  IVec3 first{std::numeric_limits<int>::max()};
+  IVec3 last{std::numeric_limits<int>::min()};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const SmoothCell name = mesh.cells[triangle[i]];
+    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
+    first = glm::min(first, place);
+    last = glm::max(last, place);
+    if (const int axis = name.bridge_axis(); axis >= 0) last = glm::max(last, place + unit_axis(axis));
+  }
+  // These cells share their extent along the edge; the last of them begins where the edge does.
   int axis = 0;
   while (axis < 2 && first[axis] != last[axis]) ++axis;
   TriangleFace face;
@@ -180,8 +185,8 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
   faces.reserve(mesh.indices.size() / 3);
   const ChunkLevels levels(options.levels);
   if (levels.all_same() && options.levels[0] == 0) {
-    for (std::size_t i = 0; i < mesh.indices.size(); i += 6) {
-      faces.insert(faces.end(), 2, face_of_quad(chunks, mesh, mesh.indices.data() + i));
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
     }
     return;
   }

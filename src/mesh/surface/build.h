@@ -29,8 +29,7 @@ struct SurfaceRequest {
 /// Splits the vertices as the options have it; returns the group of each vertex where the triangles' are given.
 /// Requires: with sharp colours, or a smoothness below 1, the surface has its faces.
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
-                                          const SmoothMeshOptions& options,
-                                          std::span<const std::uint32_t> groups = {});
+                                          const SmoothMeshOptions& options, std::span<const std::uint32_t> groups = {});
 
 /// The smoothness that options mean.
 [[nodiscard]] float smoothness_of(const SmoothMeshOptions& options);

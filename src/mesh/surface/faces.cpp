@@ -96,8 +96,8 @@ std::vector<std::uint32_t> split_by_faces(SmoothMesh& mesh, std::span<const Tria
   copies.for_each([&](std::size_t vertex, const Look& look) {
     const Vec3 normal = mesh.normals[vertex];
     split.positions.push_back(mesh.positions[vertex]);
-    split.normals.push_back(
-        looks.smoothness < 1.0F ? normal_between(look.direction, normal, looks.smoothness) : normal);
+    split.normals.push_back(looks.smoothness < 1.0F ? normal_between(look.direction, normal, looks.smoothness)
+                                                    : normal);
     if (!mesh.occlusion.empty()) split.occlusion.push_back(mesh.occlusion[vertex]);
     split.albedo.push_back(looks.sharp != nullptr ? looks.sharp->albedo(look.type) : mesh.albedo[vertex]);
     split.types.push_back(looks.sharp != nullptr ? look.type : mesh.types[vertex]);

@@ -21,8 +21,8 @@ struct TriangleFace {
 /// How triangles that share a vertex may need vertices of their own.
 struct FaceLooks {
   const SurfaceMaterials* sharp = nullptr;  ///< where faces have the colours of their samples
-  float smoothness = 1.0F;                  ///< below 1, normals are drawn to those of the faces by as much as is missing
-  std::span<const std::uint32_t> groups;    ///< by triangle; empty: all are one
+  float smoothness = 1.0F;                ///< below 1, normals are drawn to those of the faces by as much as is missing
+  std::span<const std::uint32_t> groups;  ///< by triangle; empty: all are one
 };
 
 /// Gives each vertex as many copies as its triangles' faces have looks, next to each other, in the order in which

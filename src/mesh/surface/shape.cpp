@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "mesh/surface/bodies.h"
 #include "mesh/smooth/levels.h"
 #include "mesh/smooth/split.h"
 #include "mesh/smooth/vertex.h"
+#include "mesh/surface/bodies.h"
 
 namespace quoin::smooth {
 namespace {
@@ -29,8 +29,8 @@ struct WideRow {
 /// The words of a row and of those beside it, of one half.
 struct RowsAround {
   std::uint64_t here;
-  std::array<std::uint64_t, 2> y;                 ///< before, after
-  std::array<std::uint64_t, 2> z;                 ///< likewise
+  std::array<std::uint64_t, 2> y;                  ///< before, after
+  std::array<std::uint64_t, 2> z;                  ///< likewise
   std::array<std::array<std::uint64_t, 2>, 2> yz;  ///< [y][z]
 };
 
@@ -96,7 +96,7 @@ class ThinCells {
     return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
   }
 
-  [[nodiscard]] std::uint64_t find(int y, int z, std::uint64_t WideRow::* half) const {
+  [[nodiscard]] std::uint64_t find(int y, int z, std::uint64_t WideRow::*half) const {
     const auto row = [&](int dy, int dz) { return solid_[at(y + 1 + dy, z + 1 + dz)].*half; };
     RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
     solid.yz = {{{row(-1, -1), row(-1, 1)}, {row(1, -1), row(1, 1)}}};
@@ -162,6 +162,25 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
   return shared;
 }
 
+/// Splits quads along the diagonals that are shorter now: each body chose its own before its vertices were moved.
+void split_quads_again(const ChunkLevels& levels, SmoothChunkMesh& mesh) {
+  for (std::size_t i = 0; i + 6 <= mesh.indices.size(); i += 6) {
+    std::uint32_t* quad = mesh.indices.data() + i;
+    // Triangles that come after the quads have a vertex in a bridge each.
+    const bool is_quad =
+        std::none_of(quad, quad + 6, [&](std::uint32_t v) { return mesh.cells[v].bridge_axis() >= 0; });
+    if (!is_quad) return;
+    const std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, mesh);
+    std::array<QuadCorner, 4> corners;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const LevelCell cell = levels.cell_of(mesh.cells[cycle[k]]);
+      corners[k] = quad_corner(cycle[k], mesh.positions[cycle[k]], cell.first, cell.level);
+    }
+    const std::array<std::uint32_t, 6> triangles = triangles_of(corners);
+    std::copy(triangles.begin(), triangles.end(), quad);
+  }
+}
+
 }  // namespace
 
 void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
@@ -187,10 +206,13 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
     if (may_move && shape.keep_thin && (shared || thin->has(cell.first))) share *= kThinShare;
     if (share == 1.0F && !shared) continue;
     for (int axis = 0; axis < 3; ++axis) {
-      const float moved = snap(0.5F + (fraction[axis] - 0.5F) * share);
+      // In a bridge: from the middle of the face between two cells.
+      const float middle = axis == mesh.cells[i].bridge_axis() ? 1.0F : 0.5F;
+      const float moved = snap(middle + (fraction[axis] - middle) * share);
       mesh.positions[i][axis] = first[axis] + moved * size;
     }
   }
+  if (shape.whole != nullptr && levels.all_same()) split_quads_again(levels, mesh);
 }
 
 }  // namespace quoin::smooth

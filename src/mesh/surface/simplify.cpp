@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -44,10 +45,10 @@ bool has_finite_positions(const SmoothMesh& mesh) {
 
 /// How far apart vertices of one place are drawn that have to be several.
 constexpr float kApart = 1.0F / 1024.0F;
-/// Each try allows this much of the last one's error at most.
-constexpr float kLessError = 0.8F;
-constexpr float kMuchLessError = 0.25F;
-constexpr int kMaxTries = 12;
+/// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
+/// surfaces are up to twice as far off.
+constexpr float kMeanShare = 0.6F;
+constexpr int kMaxTries = 8;
 
 /// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
 std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
@@ -62,13 +63,17 @@ std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
   return place;
 }
 
-/// Fewer triangles, in the vertices of the mesh.
-std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale) {
-  const float* positions = &mesh.positions[0].x;
-  const std::size_t count = mesh.positions.size();
-  std::vector<std::uint32_t> left(mesh.indices.size());
-  left.resize(meshopt_simplify(left.data(), mesh.indices.data(), mesh.indices.size(), positions, count, sizeof(Vec3), 0,
-                               error_in_samples / scale, 0, nullptr));
+/// Fewer triangles, in the vertices of the mesh; those that are to stay do, and what they border on too.
+std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale,
+                                            const std::vector<bool>& stays) {
+  std::vector<std::uint32_t> kept;
+  std::vector<std::uint32_t> others;
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) (stays[i / 3] ? kept : others).push_back(mesh.indices[i]);
+  const unsigned options = kept.empty() ? 0 : meshopt_SimplifyLockBorder;
+  std::vector<std::uint32_t> left(others.size());
+  left.resize(meshopt_simplify(left.data(), others.data(), others.size(), &mesh.positions[0].x, mesh.positions.size(),
+                               sizeof(Vec3), 0, error_in_samples / scale, options, nullptr));
+  left.insert(left.end(), kept.begin(), kept.end());
   return left;
 }
 
@@ -93,22 +98,46 @@ Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t
   return result;
 }
 
-/// The farthest that a vertex of the mesh lies from simpler triangles; `most` where that is nearer.
-float farthest_from(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place, const Triangulation& simple,
-                    float most) {
+/// How far the vertices of the mesh lie from simpler triangles.
+struct Deviation {
+  float most = 0.0F;
+  std::vector<bool> is_beyond;  // by place: farther off than allowed
+};
+
+Deviation deviation_of(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place, const Triangulation& simple,
+                       float allowed) {
   const TriangleTree tree(simple.positions, simple.indices);
-  std::vector<bool> is_used(mesh.positions.size());
-  for (const std::uint32_t index : mesh.indices) is_used[place[index]] = true;
-  std::vector<bool> is_left(mesh.positions.size());
+  std::vector<bool> is_done(mesh.positions.size());
   for (const std::uint32_t index : simple.indices) {
-    if (index < is_left.size() && simple.positions[index] == mesh.positions[index]) is_left[index] = true;
+    if (index < is_done.size() && simple.positions[index] == mesh.positions[index]) is_done[index] = true;
   }
-  float farthest = 0.0F;
-  for (std::size_t i = 0; i < mesh.positions.size() && farthest < most; ++i) {
-    if (!is_used[i] || is_left[i]) continue;
-    farthest = std::max(farthest, tree.distance(mesh.positions[i], most));
+  Deviation found;
+  found.is_beyond.resize(mesh.positions.size());
+  for (const std::uint32_t index : mesh.indices) {
+    const std::uint32_t vertex = place[index];
+    if (is_done[vertex]) continue;
+    is_done[vertex] = true;
+    const float distance = tree.distance(mesh.positions[vertex], std::numeric_limits<float>::max());
+    found.most = std::max(found.most, distance);
+    found.is_beyond[vertex] = distance > allowed;
   }
-  return farthest;
+  return found;
+}
+
+/// Adds the triangles that touch one of these places, and their neighbours.
+void keep_around(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place, std::vector<bool> is_near,
+                 std::vector<bool>& stays) {
+  for (int ring = 0; ring < 2; ++ring) {
+    std::vector<bool> is_next = is_near;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const std::array<std::uint32_t, 3> at = {place[mesh.indices[i]], place[mesh.indices[i + 1]],
+                                               place[mesh.indices[i + 2]]};
+      if (std::ranges::none_of(at, [&](std::uint32_t vertex) { return is_near[vertex]; })) continue;
+      stays[i / 3] = true;
+      for (const std::uint32_t vertex : at) is_next[vertex] = true;
+    }
+    is_near = std::move(is_next);
+  }
 }
 
 /// Puts simpler triangles in place of the mesh's: a vertex for each corner and place that is in use.
@@ -149,20 +178,18 @@ float remove_triangles(SmoothMesh& mesh, float error_in_samples, std::vector<std
   const float scale = meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
   if (!(scale > 0.0F)) return 0.0F;
   const std::vector<std::uint32_t> place = places_of(mesh);
-  // The library bounds a mean of squares; single vertices may be farther off, and are looked at.
-  const float most = std::max(error_in_samples, 2.0F * kApart) * 4.0F;
-  float allowed = error_in_samples;
-  for (int tries = 0; tries < kMaxTries && allowed > 0.0F; ++tries) {
-    Triangulation simple = triangulation_of(mesh, remove_triangles(mesh, allowed, scale), place);
+  std::vector<bool> stays(mesh.indices.size() / 3);
+  for (int tries = 0; tries < kMaxTries; ++tries) {
+    const float allowed = kMeanShare * error_in_samples;
+    Triangulation simple = triangulation_of(mesh, remove_triangles(mesh, allowed, scale, stays), place);
     // A neck three edges round, say, is drawn together to one edge.
     make_manifold(simple, std::min(kApart, 0.25F * error_in_samples));
-    const float farthest = farthest_from(mesh, place, simple, most);
-    if (farthest <= error_in_samples && !simple.indices.empty()) {
+    Deviation found = deviation_of(mesh, place, simple, error_in_samples);
+    if (found.most <= error_in_samples && !simple.indices.empty()) {
       take_over(mesh, simple, tags);
-      return farthest;
+      return found.most;
     }
-    const float share = farthest > 0.0F ? error_in_samples / farthest : kMuchLessError;
-    allowed *= std::clamp(0.9F * share, kMuchLessError, kLessError);
+    keep_around(mesh, place, std::move(found.is_beyond), stays);
   }
   return 0.0F;
 }

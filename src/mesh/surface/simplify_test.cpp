@@ -10,10 +10,13 @@
 #include <random>
 #include <string>
 
+#include <quoin/grid/voxel_field.h>
+
 #include "core/death_for_tests.h"
-#include "mesh/surface/manifold.h"
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/surface_check_for_tests.h"
+#include "mesh/surface/manifold.h"
+#include "mesh/surface/triangle_tree.h"
 
 namespace quoin {
 
@@ -127,7 +130,7 @@ TEST_F(Simplify, ASphereStaysClosedAndWithinTheError) {
     EXPECT_LE(*reached, error);
     EXPECT_GT(*reached, 0.0F);
     EXPECT_EQ(open_edges(mesh), 0U) << error;
-    EXPECT_LT(mesh.indices.size(), error > 0.02F ? before / 2 : before) << error;
+    EXPECT_LT(mesh.indices.size(), error > 0.05F ? before / 2 : before) << error;
     float farthest = 0.0F;
     for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
       const Vec3 centre = (mesh.positions[mesh.indices[i]] + mesh.positions[mesh.indices[i + 1]] +
@@ -155,6 +158,111 @@ TEST_F(Simplify, RandomBlobsStayClosed) {
     }
   }
   EXPECT_GT(tried, 5);
+}
+
+/// The vertices of each place as one.
+SmoothMesh welded(const SmoothMesh& mesh) {
+  SmoothMesh whole;
+  std::map<std::array<float, 3>, std::uint32_t> known;
+  for (const std::uint32_t index : mesh.indices) {
+    const Vec3 p = mesh.positions[index];
+    const auto [found, is_new] = known.try_emplace({p.x, p.y, p.z}, static_cast<std::uint32_t>(whole.positions.size()));
+    if (is_new) whole.positions.push_back(p);
+    whole.indices.push_back(found->second);
+  }
+  return whole;
+}
+
+/// By looking at every triangle.
+float distance_from(const SmoothMesh& mesh, Vec3 p) {
+  float nearest = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    // As a tree of one triangle, which looks at that alone.
+    const TriangleTree one(mesh.positions, std::span(mesh.indices).subspan(i, 3));
+    nearest = std::min(nearest, one.distance(p, 1e6F));
+  }
+  return nearest;
+}
+
+TEST(TriangleTree, DistancesAreThoseOfPointsOnTriangles) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> any(-1.0F, 1.0F);
+  const auto point = [&] { return Vec3(any(random), any(random), any(random)); };
+  for (int round = 0; round < 200; ++round) {
+    const std::vector<Vec3> corners = {point(), point(), point()};
+    const std::vector<std::uint32_t> indices = {0, 1, 2};
+    const Vec3 p = point() * 2.0F;
+    float expected = std::numeric_limits<float>::infinity();
+    for (int i = 0; i <= 100; ++i) {
+      for (int k = 0; i + k <= 100; ++k) {
+        const float u = static_cast<float>(i) / 100.0F;
+        const float v = static_cast<float>(k) / 100.0F;
+        expected = std::min(expected, glm::length(corners[0] * (1.0F - u - v) + corners[1] * u + corners[2] * v - p));
+      }
+    }
+    const float found = TriangleTree(corners, indices).distance(p, 100.0F);
+    EXPECT_LE(found, expected + 1e-5F);
+    EXPECT_GE(found, expected - 0.03F);
+    EXPECT_EQ(TriangleTree(corners, indices).distance(p, found * 0.5F), found * 0.5F) << "no farther than asked";
+  }
+  EXPECT_EQ(TriangleTree({}, {}).distance(Vec3(1.0F), 4.0F), 4.0F);
+}
+
+TEST_F(Simplify, NoVertexIsFartherOffThanTheError) {
+  std::mt19937 random(21);
+  for (int i = 0; i < 3; ++i) {
+    const SmoothMesh whole = surface_of(blob(random), 41);
+    if (open_edges(whole) != 0) continue;
+    for (const float error : {0.05F, 0.3F, 1.5F}) {
+      SmoothMesh mesh = whole;
+      const auto reached = simplify_smooth_mesh(mesh, error);
+      ASSERT_TRUE(reached);
+      float farthest = 0.0F;
+      for (std::size_t v = 0; v < whole.positions.size(); v += 3) {
+        farthest = std::max(farthest, distance_from(mesh, whole.positions[v]));
+      }
+      EXPECT_LE(farthest, *reached + 1e-5F);
+      EXPECT_LE(*reached, error);
+      EXPECT_LT(mesh.indices.size(), whole.indices.size());
+    }
+  }
+}
+
+TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
+  // A ball of voxels in two halves, the lesser with a checkerboard of small fields.
+  Grid grid;
+  grid.edit({{-16, -16, -16}, {17, 17, 17}}, [](IVec3 p, VoxelType) -> VoxelType {
+    if (glm::length(DVec3(p)) > 14.3) return kAir;
+    if (p.x >= 0) return 1;
+    return ((p.y + 32) / 8 + (p.z + 32) / 8) % 2 == 0 ? 2 : 3;
+  });
+  VoxelRegistry types;
+  for (int i = 1; i <= 3; ++i) {
+    VoxelProperties look;
+    look.colour = {static_cast<std::uint8_t>(60 * i), 9, 9, 255};
+    ASSERT_TRUE(types.add(look).has_value());
+  }
+  SmoothMeshOptions options;
+  options.colours = SurfaceColours::Sharp;
+  auto whole = build_smooth_mesh(field_from_grid(grid), types, options);
+  ASSERT_TRUE(whole);
+  for (const float error : {0.1F, 0.4F, 1.0F}) {
+    SmoothMesh mesh = *whole;
+    ASSERT_TRUE(simplify_smooth_mesh(mesh, error));
+    EXPECT_LT(mesh.indices.size(), whole->indices.size());
+    EXPECT_EQ(open_edges(welded(mesh)), 0U) << error;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const VoxelType type = mesh.types[mesh.indices[i]];
+      ASSERT_EQ(mesh.types[mesh.indices[i + 1]], type);
+      ASSERT_EQ(mesh.types[mesh.indices[i + 2]], type);
+      const Vec3 middle = (mesh.positions[mesh.indices[i]] + mesh.positions[mesh.indices[i + 1]] +
+                           mesh.positions[mesh.indices[i + 2]]) /
+                          3.0F;
+      if (std::abs(middle.x) > 1.0F + 2.0F * error) {
+        EXPECT_EQ(type == 1, middle.x > 0.0F);
+      }
+    }
+  }
 }
 
 TEST_F(Simplify, WhatStaysKeepsAllThatItHad) {

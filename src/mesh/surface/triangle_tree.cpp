@@ -76,7 +76,9 @@ float TriangleTree::squared_distance(Vec3 point, std::uint32_t triangle) const {
   const Vec3 b = positions_[at[1]];
   const Vec3 c = positions_[at[2]];
   const Vec3 normal = glm::cross(b - a, c - a);
-  const auto is_within = [&](Vec3 from, Vec3 to) { return glm::dot(glm::cross(to - from, point - from), normal) >= 0.0F; };
+  const auto is_within = [&](Vec3 from, Vec3 to) {
+    return glm::dot(glm::cross(to - from, point - from), normal) >= 0.0F;
+  };
   const float area = squared(normal);
   if (area > 0.0F && is_within(a, b) && is_within(b, c) && is_within(c, a)) {
     const float height = glm::dot(point - a, normal);
