@@ -1,6 +1,8 @@
 #include <algorithm>
 
 #include "live/mesh_job_queue.h"
+#include "mesh/surface/faces.h"
+#include "mesh/surface/shape.h"
 
 namespace quoin {
 namespace {
@@ -51,6 +53,41 @@ int level_at(const std::array<std::uint8_t, 27>& levels, std::size_t previous) {
   return levels[13 - (previous & 1) - 3 * (previous >> 1 & 1) - 9 * (previous >> 2)];
 }
 
+void copy_exactly(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
+  copy_exactly(from.positions, to.positions);
+  copy_exactly(from.normals, to.normals);
+  copy_exactly(from.occlusion, to.occlusion);
+  copy_exactly(from.cells, to.cells);
+  copy_exactly(from.indices, to.indices);
+}
+
+// Each face in the colour of its sample.
+void copy_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
+                   const SmoothChunkMesh& mesh, ChunkSurface& surface) {
+  std::vector<smooth::TriangleFace> faces;
+  smooth::find_faces(chunks, options, materials, mesh, faces);
+  SmoothChunkMesh& out = surface.smooth;
+  copy_exactly(mesh.indices, out.indices);
+  const std::vector<smooth::VertexCopy> copies =
+      smooth::split_by_faces({out.indices.begin(), out.indices.end()}, mesh.positions.size(), faces,
+                             {.types = true, .directions = false, .groups = {}});
+  out.positions.resize(copies.size());
+  out.normals.resize(copies.size());
+  if (!mesh.occlusion.empty()) out.occlusion.resize(copies.size());
+  out.cells.resize(copies.size());
+  surface.albedo.reserve(copies.size());
+  surface.types.reserve(copies.size());
+  for (std::size_t i = 0; i < copies.size(); ++i) {
+    const std::uint32_t vertex = copies[i].vertex;
+    out.positions[i] = mesh.positions[vertex];
+    out.normals[i] = mesh.normals[vertex];
+    if (!mesh.occlusion.empty()) out.occlusion[i] = mesh.occlusion[vertex];
+    out.cells[i] = mesh.cells[vertex];
+    surface.albedo.push_back(materials.albedo(copies[i].look.type));
+    surface.types.push_back(copies[i].look.type);
+  }
+}
+
 // A vertex of a cell before the chunk's own looks as it does in that cell's chunk.
 void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
                    const std::array<std::uint8_t, 27>& levels, ChunkSurface& surface) {
@@ -99,17 +136,24 @@ void mesh_smooth(const LiveMeshOptions& options, const DensityNeighbourhood& chu
   wanted.occlusion = options.occlusion;
   wanted.split_sheets = true;
   wanted.levels = job.levels;
+  const bool is_of_voxels = job.source.content == SurfaceContent::Voxels;
+  wanted.join_diagonals = is_of_voxels;
   workspace.smooth->mesh(chunks, wanted, workspace.mesh);
   if (workspace.mesh.indices.empty()) return;
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Smooth;
   surface->level = job.levels[13];
-  copy_exactly(workspace.mesh.positions, surface->smooth.positions);
-  copy_exactly(workspace.mesh.normals, surface->smooth.normals);
-  copy_exactly(workspace.mesh.occlusion, surface->smooth.occlusion);
-  copy_exactly(workspace.mesh.cells, surface->smooth.cells);
-  copy_exactly(workspace.mesh.indices, surface->smooth.indices);
-  add_materials(chunks, *job.materials, job.levels, *surface);
+  if (is_of_voxels) {
+    smooth::Shape shape;
+    shape.keep_thin = true;
+    smooth::shape_vertices(chunks, wanted, shape, workspace.mesh);
+  }
+  if (is_of_voxels && options.colours == SurfaceColours::Sharp) {
+    copy_by_faces(chunks, wanted, *job.materials, workspace.mesh, *surface);
+  } else {
+    copy_exactly(workspace.mesh, surface->smooth);
+    add_materials(chunks, *job.materials, job.levels, *surface);
+  }
   job.surface = std::move(surface);
 }
 

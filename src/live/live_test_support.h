@@ -164,6 +164,8 @@ inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const 
   for (const GridHandle handle : drawn) {
     SmoothMeshOptions wanted;
     wanted.occlusion = options.occlusion;
+    wanted.colours = options.colours;
+    wanted.keep_thin = true;
     const auto whole = build_smooth_mesh(field_from_grid(scene.grids()[handle].grid), scene.types, wanted);
     ASSERT_TRUE(whole.has_value());
     SmoothTriangles expected = triangles_of(*whole);

@@ -105,7 +105,7 @@ TEST(Lattices, GroupsAreWhatTouches) {
 using Corner = std::array<std::int64_t, 3>;
 using Triangle = std::array<Corner, 3>;
 
-/// The triangles of all placements in the world, to 1/512 (nothing lies between two of these), turned so that the
+/// The triangles of all placements in the world, to 1/512, which floats are sure of, turned so that the
 /// least corner comes first.
 std::map<Triangle, int> triangles_of(const SceneMeshes& meshes) {
   std::map<Triangle, int> all;

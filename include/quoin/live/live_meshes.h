@@ -31,7 +31,8 @@ struct ChunkSurface {
   /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
-  /// Smooth: point p of the mesh is point p + 0.5 + 64 * chunk of the grid; a colour (linear) and a type a vertex.
+  /// Smooth: point p of the mesh is point p + 0.5 + 64 * chunk of the grid; a colour (linear) and a type a vertex. Of
+  /// voxels thin things are kept (SmoothMeshOptions::keep_thin).
   SmoothChunkMesh smooth;
   std::vector<LinearRgba16> albedo;
   std::vector<VoxelType> types;
@@ -50,9 +51,10 @@ struct SurfaceUpdate {
 };
 
 struct LiveMeshOptions {
-  SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
-  bool merge = true;                          ///< blocky: neighbouring faces become one quad
-  SmoothOcclusionOptions occlusion;           ///< of smooth surfaces, those of fields too
+  SurfaceStyle style = SurfaceStyle::Blocky;       ///< of voxels
+  bool merge = true;                               ///< blocky: neighbouring faces become one quad
+  SmoothOcclusionOptions occlusion;                ///< of smooth surfaces, those of fields too
+  SurfaceColours colours = SurfaceColours::Sharp;  ///< of smooth surfaces of voxels; those of fields are blended
   /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
   /// detail 1, at twice that 2, and so on to kMaxSmoothLevel. A level is left only a tenth beyond where it ends. 0 and
   /// less count as 1, NaN as infinity: level 0 everywhere.

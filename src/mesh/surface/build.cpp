@@ -131,73 +131,6 @@ void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.indices.resize(mesh.indices.size());
 }
 
-// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or between,
-// which are three or four of those around the edge.
-TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
-                              const std::uint32_t* triangle) {
-  IVec3 first{std::numeric_limits<int>::max()};
-  IVec3 last{std::numeric_limits<int>::min()};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const SmoothCell name = mesh.cells[triangle[i]];
-    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
-    first = glm::min(first, place);
-    last = glm::max(last, place);
-    if (const int axis = name.bridge_axis(); axis >= 0) last = glm::max(last, place + unit_axis(axis));
-  }
-  // These cells share their extent along the edge; the last of them begins where the edge does.
-  int axis = 0;
-  while (axis < 2 && first[axis] != last[axis]) ++axis;
-  TriangleFace face;
-  face.sample = last;
-  const bool is_first_solid = DensityChunk::is_solid(chunks.get(last));
-  if (!is_first_solid) ++face.sample[axis];
-  face.direction = static_cast<Direction>(2 * axis + (is_first_solid ? 0 : 1));
-  const IVec3 chunk = chunk_of(face.sample);
-  const DensityChunk* found = chunks.at(chunk.x, chunk.y, chunk.z);
-  face.type = found == nullptr ? kAir : found->materials().get(local_of(face.sample));
-  return face;
-}
-
-// Where cells are of several sizes: by what lies around the triangle's vertices.
-TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
-                              const std::vector<SurfaceMaterial>& materials) {
-  const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
-  const DVec3 a(mesh.positions[triangle[0]]);
-  const DVec3 b(mesh.positions[triangle[1]]);
-  const DVec3 c(mesh.positions[triangle[2]]);
-  TriangleFace face;
-  face.type = type(1) == type(2) ? type(1) : type(0);
-  const DVec3 normal = glm::cross(b - a, c - a);
-  face.direction = nearest_direction(normal);
-  const DVec3 inside = (a + b + c) / 3.0 - DVec3(normal_of(face.direction)) * 0.5;
-  face.sample = IVec3(glm::floor(inside + 0.5));
-  return face;
-}
-
-SurfaceMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
-                            const ChunkLevels& levels, SmoothCell name) {
-  const LevelCell cell = levels.cell_of(name);
-  return materials.of_cell(chunks, cell.first / cell.size(), cell.level);
-}
-
-void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
-                const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces) {
-  faces.reserve(mesh.indices.size() / 3);
-  const ChunkLevels levels(options.levels);
-  if (levels.all_same() && options.levels[0] == 0) {
-    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-      faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
-    }
-    return;
-  }
-  std::vector<SurfaceMaterial> of_vertex;
-  of_vertex.reserve(mesh.cells.size());
-  for (const SmoothCell name : mesh.cells) of_vertex.push_back(material_of(chunks, materials, levels, name));
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    faces.push_back(face_of_triangle(mesh, mesh.indices.data() + i, of_vertex));
-  }
-}
-
 Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMaterials* materials, Workspace& workspace) {
   const SmoothChunkMesh& mesh = workspace.mesh;
   const int last = (kChunkEdge >> level) - 1;
@@ -377,13 +310,45 @@ Result<Surface> build_surface(const DensityGrid& field, const VoxelRegistry& typ
   return Builder(field, options, request, threads, progress).build(types);
 }
 
+namespace {
+
+/// Between a face's normal and the surface's; the face's where they cancel out.
+Vec3 normal_between(Direction direction, Vec3 normal, float smoothness) {
+  const Vec3 flat(normal_of(direction));
+  const Vec3 sum = flat * (1.0F - smoothness) + normal * smoothness;
+  const float length = glm::length(sum);
+  return length > 1e-6F ? sum / length : flat;
+}
+
+}  // namespace
+
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
                                           const SmoothMeshOptions& options, std::span<const std::uint32_t> groups) {
   const bool is_sharp = options.colours == SurfaceColours::Sharp;
   const float smoothness = smoothness_of(options);
   if (!is_sharp && smoothness == 1.0F && groups.empty()) return {};
   const SurfaceMaterials materials(types);
-  return split_by_faces(surface.mesh, surface.faces, {is_sharp ? &materials : nullptr, smoothness, groups});
+  SmoothMesh& whole = surface.mesh;
+  SmoothMesh split;
+  const std::vector<VertexCopy> copies =
+      split_by_faces(whole.indices, whole.positions.size(), surface.faces, {is_sharp, smoothness < 1.0F, groups});
+  split.indices = std::move(whole.indices);
+  split.positions.reserve(copies.size());
+  split.normals.reserve(copies.size());
+  split.albedo.reserve(copies.size());
+  split.types.reserve(copies.size());
+  std::vector<std::uint32_t> group_of;
+  for (const VertexCopy& copy : copies) {
+    const Vec3 normal = whole.normals[copy.vertex];
+    split.positions.push_back(whole.positions[copy.vertex]);
+    split.normals.push_back(smoothness < 1.0F ? normal_between(copy.look.direction, normal, smoothness) : normal);
+    if (!whole.occlusion.empty()) split.occlusion.push_back(whole.occlusion[copy.vertex]);
+    split.albedo.push_back(is_sharp ? materials.albedo(copy.look.type) : whole.albedo[copy.vertex]);
+    split.types.push_back(is_sharp ? copy.look.type : whole.types[copy.vertex]);
+    if (!groups.empty()) group_of.push_back(copy.look.group);
+  }
+  whole = std::move(split);
+  return group_of;
 }
 
 }  // namespace smooth

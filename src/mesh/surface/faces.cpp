@@ -1,34 +1,28 @@
 #include "mesh/surface/faces.h"
 
+#include <limits>
 #include <numeric>
 
 #include <quoin/core/assert.h>
 
+#include "mesh/smooth/levels.h"
+
 namespace quoin::smooth {
 namespace {
 
-/// What tells the copies of a vertex apart.
-struct Look {
-  VoxelType type = kAir;
-  Direction direction = Direction::PosX;
-  std::uint32_t group = 0;
-
-  bool operator==(const Look&) const = default;
-};
-
 /// A copy of a vertex, in the list of those of its vertex.
-struct Copy {
-  Look look;
-  std::uint32_t next = 0;  // 0: none, else the place of another, less one
+struct ListedCopy {
+  FaceLook look;
+  std::uint32_t next = 0;  // 0: none, else the place of another, plus one
 };
 
-/// The copies that each vertex needs, and which of them each corner of a triangle takes.
+/// The copies that each vertex needs.
 class Copies {
  public:
   explicit Copies(std::size_t vertices) : first_(vertices), count_(vertices + 1) {}
 
   /// The number, among the copies of the vertex, of that with the look.
-  std::uint32_t find_or_add(std::uint32_t vertex, const Look& look) {
+  std::uint32_t find_or_add(std::uint32_t vertex, const FaceLook& look) {
     std::uint32_t number = 0;
     std::uint32_t* link = &first_[vertex];
     for (; *link != 0; link = &all_[*link - 1].next, ++number) {
@@ -48,63 +42,108 @@ class Copies {
   }
 
   /// In the order of the vertices, those of one in the order in which they were added.
-  template <class Visit>
-  void for_each(Visit&& visit) const {
-    for (std::size_t vertex = 0; vertex < first_.size(); ++vertex) {
-      for (std::uint32_t at = first_[vertex]; at != 0; at = all_[at - 1].next) visit(vertex, all_[at - 1].look);
+  [[nodiscard]] std::vector<VertexCopy> list() const {
+    std::vector<VertexCopy> copies;
+    copies.reserve(all_.size());
+    for (std::uint32_t vertex = 0; vertex < first_.size(); ++vertex) {
+      for (std::uint32_t at = first_[vertex]; at != 0; at = all_[at - 1].next) {
+        copies.push_back({vertex, all_[at - 1].look});
+      }
     }
+    return copies;
   }
 
  private:
-  std::vector<std::uint32_t> first_;  // by vertex, as Copy::next
+  std::vector<std::uint32_t> first_;  // by vertex, as ListedCopy::next
   std::vector<std::uint32_t> count_;  // by vertex plus one
-  std::vector<Copy> all_;
+  std::vector<ListedCopy> all_;
 };
 
-/// Between a face's normal and the surface's; the face's where they cancel out.
-Vec3 normal_between(Direction direction, Vec3 normal, float smoothness) {
-  const Vec3 flat(normal_of(direction));
-  const Vec3 sum = flat * (1.0F - smoothness) + normal * smoothness;
-  const float length = glm::length(sum);
-  return length > 1e-6F ? sum / length : flat;
+// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or between,
+// which are three or four of those around the edge.
+TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
+                              const std::uint32_t* triangle) {
+  IVec3 first{std::numeric_limits<int>::max()};
+  IVec3 last{std::numeric_limits<int>::min()};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const SmoothCell name = mesh.cells[triangle[i]];
+    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
+    first = glm::min(first, place);
+    last = glm::max(last, place);
+    if (const int axis = name.bridge_axis(); axis >= 0) last = glm::max(last, place + unit_axis(axis));
+  }
+  // These cells share their extent along the edge; the last of them begins where the edge does.
+  int axis = 0;
+  while (axis < 2 && first[axis] != last[axis]) ++axis;
+  TriangleFace face;
+  face.sample = last;
+  const bool is_first_solid = DensityChunk::is_solid(chunks.get(last));
+  if (!is_first_solid) ++face.sample[axis];
+  face.direction = static_cast<Direction>(2 * axis + (is_first_solid ? 0 : 1));
+  const IVec3 chunk = chunk_of(face.sample);
+  const DensityChunk* found = chunks.at(chunk.x, chunk.y, chunk.z);
+  face.type = found == nullptr ? kAir : found->materials().get(local_of(face.sample));
+  return face;
+}
+
+// Where cells are of several sizes: by what lies around the triangle's vertices.
+TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
+                              const std::vector<SurfaceMaterial>& materials) {
+  const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
+  const DVec3 a(mesh.positions[triangle[0]]);
+  const DVec3 b(mesh.positions[triangle[1]]);
+  const DVec3 c(mesh.positions[triangle[2]]);
+  TriangleFace face;
+  face.type = type(1) == type(2) ? type(1) : type(0);
+  const DVec3 normal = glm::cross(b - a, c - a);
+  face.direction = nearest_direction(normal);
+  const DVec3 inside = (a + b + c) / 3.0 - DVec3(normal_of(face.direction)) * 0.5;
+  face.sample = IVec3(glm::floor(inside + 0.5));
+  return face;
+}
+
+SurfaceMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
+                            const ChunkLevels& levels, SmoothCell name) {
+  const LevelCell cell = levels.cell_of(name);
+  return materials.of_cell(chunks, cell.first / cell.size(), cell.level);
 }
 
 }  // namespace
 
-std::vector<std::uint32_t> split_by_faces(SmoothMesh& mesh, std::span<const TriangleFace> faces,
-                                          const FaceLooks& looks) {
-  QUOIN_ASSERT(faces.size() == mesh.indices.size() / 3);
-  Copies copies(mesh.positions.size());
-  std::vector<std::uint32_t> numbers(mesh.indices.size());
-  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
+                const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces) {
+  faces.reserve(mesh.indices.size() / 3);
+  const ChunkLevels levels(options.levels);
+  if (levels.all_same() && options.levels[0] == 0) {
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
+    }
+    return;
+  }
+  std::vector<SurfaceMaterial> of_vertex;
+  of_vertex.reserve(mesh.cells.size());
+  for (const SmoothCell name : mesh.cells) of_vertex.push_back(material_of(chunks, materials, levels, name));
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    faces.push_back(face_of_triangle(mesh, mesh.indices.data() + i, of_vertex));
+  }
+}
+
+std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
+                                       std::span<const TriangleFace> faces, const FaceDifferences& differences) {
+  QUOIN_ASSERT(faces.size() == indices.size() / 3);
+  Copies copies(vertices);
+  std::vector<std::uint32_t> numbers(indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
     const TriangleFace& face = faces[i / 3];
-    Look look;
-    if (looks.sharp != nullptr) look.type = face.type;
-    if (looks.smoothness < 1.0F) look.direction = face.direction;
-    if (!looks.groups.empty()) look.group = looks.groups[i / 3];
-    numbers[i] = copies.find_or_add(mesh.indices[i], look);
+    FaceLook look;
+    if (differences.types) look.type = face.type;
+    if (differences.directions) look.direction = face.direction;
+    if (!differences.groups.empty()) look.group = differences.groups[i / 3];
+    numbers[i] = copies.find_or_add(indices[i], look);
   }
   const std::vector<std::uint32_t> places = copies.places();
-  for (std::size_t i = 0; i < mesh.indices.size(); ++i) mesh.indices[i] = places[mesh.indices[i]] + numbers[i];
-  SmoothMesh split;
-  split.indices = std::move(mesh.indices);
-  std::vector<std::uint32_t> groups;
-  split.positions.reserve(places.back());
-  split.normals.reserve(places.back());
-  split.albedo.reserve(places.back());
-  split.types.reserve(places.back());
-  copies.for_each([&](std::size_t vertex, const Look& look) {
-    const Vec3 normal = mesh.normals[vertex];
-    split.positions.push_back(mesh.positions[vertex]);
-    split.normals.push_back(looks.smoothness < 1.0F ? normal_between(look.direction, normal, looks.smoothness)
-                                                    : normal);
-    if (!mesh.occlusion.empty()) split.occlusion.push_back(mesh.occlusion[vertex]);
-    split.albedo.push_back(looks.sharp != nullptr ? looks.sharp->albedo(look.type) : mesh.albedo[vertex]);
-    split.types.push_back(looks.sharp != nullptr ? look.type : mesh.types[vertex]);
-    if (!looks.groups.empty()) groups.push_back(look.group);
-  });
-  mesh = std::move(split);
-  return groups;
+  for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = places[indices[i]] + numbers[i];
+  return copies.list();
 }
 
 }  // namespace quoin::smooth

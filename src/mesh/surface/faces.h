@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include <quoin/core/direction.h>
-#include <quoin/mesh/smooth_mesh.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/mesh/smooth.h>
 
 #include "mesh/surface/material.h"
 
@@ -18,17 +20,36 @@ struct TriangleFace {
   Direction direction = Direction::PosX;  ///< from it into the air
 };
 
-/// How triangles that share a vertex may need vertices of their own.
-struct FaceLooks {
-  const SurfaceMaterials* sharp = nullptr;  ///< where faces have the colours of their samples
-  float smoothness = 1.0F;                ///< below 1, normals are drawn to those of the faces by as much as is missing
+/// The faces of the triangles of a chunk's mesh, in the chunk's coordinates.
+void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
+                const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces);
+
+/// What tells the copies of a vertex apart, as far as that is asked for.
+struct FaceLook {
+  VoxelType type = kAir;
+  Direction direction = Direction::PosX;
+  std::uint32_t group = 0;
+
+  bool operator==(const FaceLook&) const = default;
+};
+
+/// What of their faces tells triangles apart that share a vertex.
+struct FaceDifferences {
+  bool types = false;
+  bool directions = false;
   std::span<const std::uint32_t> groups;  ///< by triangle; empty: all are one
 };
 
-/// Gives each vertex as many copies as its triangles' faces have looks, next to each other, in the order in which
-/// triangles need them; positions and occlusion are the same in all. Returns the group of each vertex, if there are any.
-/// `faces`: by triangle.
-std::vector<std::uint32_t> split_by_faces(SmoothMesh& mesh, std::span<const TriangleFace> faces,
-                                          const FaceLooks& looks);
+/// A copy of a vertex, for the triangles whose faces look alike.
+struct VertexCopy {
+  std::uint32_t vertex = 0;
+  FaceLook look;
+};
+
+/// Gives each of `vertices` vertices as many copies as its triangles' faces have looks: returns them, those of a vertex
+/// next to each other in the order in which triangles need them, and makes `indices` name them. Vertices that no
+/// triangle has get none. `faces`: by triangle.
+std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
+                                       std::span<const TriangleFace> faces, const FaceDifferences& differences);
 
 }  // namespace quoin::smooth
