@@ -47,6 +47,7 @@
 #include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/mesh/smooth_occlusion.h>
 #include <quoin/mesh/vertex_writer.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
