@@ -11,18 +11,6 @@ namespace quoin::smooth {
 
 namespace {
 
-// Whole part and fraction, without a call to the library. Requires: within the int32 range.
-struct Split {
-  std::int64_t whole;
-  float snapped;
-};
-
-Split split(double at) {
-  auto whole = static_cast<std::int64_t>(at);
-  whole -= static_cast<double>(whole) > at ? 1 : 0;
-  return {whole, snap(static_cast<float>(at - static_cast<double>(whole)))};
-}
-
 auto pick_kernel() {
 #ifdef QUOIN_X86_KERNELS
   if (has_instruction_set(InstructionSet::Avx512Bytes)) return occlude_avx512;
@@ -33,23 +21,7 @@ auto pick_kernel() {
 
 }  // namespace
 
-std::optional<CellPlace> place_at(DVec3 position, int level) {
-  constexpr double kLimit = 2'147'483'648.0;
-  const double cells = 1.0 / static_cast<double>(1 << level);
-  CellPlace place{};
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(position[axis] >= -kLimit && position[axis] < kLimit)) return std::nullopt;
-    const Split at = split(position[axis] * cells);
-    place.cell[axis] = static_cast<int>(at.whole);
-    place.snapped[axis] = at.snapped;
-  }
-  return place;
-}
-
-Vec3 sound_normal(Vec3 normal) {
-  constexpr float kTolerance = 1e-3F;
-  const float square = (normal.x * normal.x + normal.y * normal.y) + normal.z * normal.z;
-  if (std::abs(square - 1.0F) <= kTolerance) return normal;
+Vec3 unit_or_up(Vec3 normal) {
   // In double, no length of floats is too small or too large.
   const DVec3 n(normal);
   const double length = std::sqrt((n.x * n.x + n.y * n.y) + n.z * n.z);

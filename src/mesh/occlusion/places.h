@@ -3,6 +3,7 @@
 // Occlusion at places that nobody meshed: where each lies, and the places of one chunk, slice by slice.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,6 +11,7 @@
 
 #include <quoin/mesh/smooth_occlusion.h>
 
+#include "mesh/smooth/cell.h"
 #include "mesh/smooth/scratch.h"
 
 namespace quoin::smooth {
@@ -20,11 +22,40 @@ struct CellPlace {
   Vec3 snapped;  ///< 0 to 1 within it
 };
 
+/// The whole number below. Requires: within the range of int64. Without a call to the library, as the standard's is.
+inline std::int64_t whole_below(double at) {
+  const auto whole = static_cast<std::int64_t>(at);
+  return whole - (static_cast<double>(whole) > at ? 1 : 0);
+}
+
+/// False for NaN too.
+inline bool is_in_int32(DVec3 position) {
+  constexpr double kLimit = 2'147'483'648.0;
+  const auto is_in = [](double at) { return at >= -kLimit && at < kLimit; };
+  return is_in(position.x) && is_in(position.y) && is_in(position.z);
+}
+
 /// None where the position is NaN or outside the int32 range. The position is in samples of level 0.
-[[nodiscard]] std::optional<CellPlace> place_at(DVec3 position, int level);
+inline std::optional<CellPlace> place_at(DVec3 position, int level) {
+  if (!is_in_int32(position)) return std::nullopt;
+  const DVec3 at = position * double{depth_unit(level)};
+  CellPlace place{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t whole = whole_below(at[axis]);
+    place.cell[axis] = static_cast<int>(whole);
+    place.snapped[axis] = snap(static_cast<float>(at[axis] - static_cast<double>(whole)));
+  }
+  return place;
+}
+
+[[nodiscard]] Vec3 unit_or_up(Vec3 normal);
 
 /// What occlusion reads a normal as.
-[[nodiscard]] Vec3 sound_normal(Vec3 normal);
+inline Vec3 sound_normal(Vec3 normal) {
+  constexpr float kTolerance = 1e-3F;
+  const float square = (normal.x * normal.x + normal.y * normal.y) + normal.z * normal.z;
+  return std::abs(square - 1.0F) <= kTolerance ? normal : unit_or_up(normal);
+}
 
 /// The occlusion of far air.
 [[nodiscard]] float open_occlusion(const SmoothOcclusionOptions& options);

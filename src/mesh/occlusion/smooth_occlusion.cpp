@@ -30,8 +30,10 @@ void check_places(const SmoothPlaces& places, std::span<float> out) {
   QUOIN_ASSERT(places.positions.size() < std::numeric_limits<std::uint32_t>::max(), "less than 2^32 places");
 }
 
-IVec3 chunk_of_cell(IVec3 cell, int level) {
-  return cell >> IVec3(kChunkShift - level);
+// Requires: within the int32 range.
+IVec3 chunk_at(DVec3 position) {
+  const auto chunk = [](double at) { return static_cast<int>(smooth::whole_below(at) >> kChunkShift); };
+  return {chunk(position.x), chunk(position.y), chunk(position.z)};
 }
 
 // A place's chunk, and its cell from the chunk's first on.
@@ -44,12 +46,17 @@ class PlacesByChunk {
  public:
   PlacesByChunk(const SmoothPlaces& places, const Sampling& sampling, std::span<float> out) {
     const std::size_t count = places.positions.size();
+    const float open = smooth::open_occlusion(sampling.occlusion);
     constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> chunk_of_place(count);
     for (std::size_t i = 0; i < count; ++i) {
-      const auto place = smooth::place_at(DVec3(places.positions[i]) + DVec3(places.origin), sampling.level);
-      if (!place) out[i] = smooth::open_occlusion(sampling.occlusion);
-      chunk_of_place[i] = place ? index_of(chunk_of_cell(place->cell, sampling.level)) : kNowhere;
+      const DVec3 position = DVec3(places.positions[i]) + DVec3(places.origin);
+      if (smooth::is_in_int32(position)) {
+        chunk_of_place[i] = index_of(chunk_at(position));
+      } else {
+        chunk_of_place[i] = kNowhere;
+        out[i] = open;
+      }
     }
     for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
     numbers_.resize(first_.back());
@@ -96,7 +103,7 @@ float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, co
   if (sampling.occlusion.form == SmoothOcclusion::None) return 0.0F;
   const auto place = smooth::place_at(position, sampling.level);
   if (!place) return smooth::open_occlusion(sampling.occlusion);
-  const IVec3 chunk = chunk_of_cell(place->cell, sampling.level);
+  const IVec3 chunk = chunk_at(position);
   return smooth::occlusion_of_place(field.neighbourhood(chunk), in_chunk(*place, chunk, sampling.level), normal,
                                     sampling);
 }
