@@ -213,7 +213,7 @@ void draw_picture_part(ViewState& state) {
 // Of smooth surfaces: 27 samples of the densities around a place.
 void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
   int form = static_cast<int>(options.form);
-  if (ImGui::Combo("smooth form", &form, "none\0share of samples\0weighted\0weighted, published\0")) {
+  if (ImGui::Combo("smooth form", &form, "none\0share solid\0weighted\0weighted, published\0")) {
     options.form = static_cast<SmoothOcclusion>(form);
   }
   ImGui::BeginDisabled(options.form == SmoothOcclusion::None);
