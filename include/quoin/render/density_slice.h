@@ -27,8 +27,8 @@ struct DensitySlice {
 
 /// Draws the densities on a plane through a scene's fields as colours, without light: solid from light orange at the
 /// surface to brown at the band's end, air from light blue to dark; a dark line at the surface, and where a sample
-/// spans more than four pixels faint ones at each whole sample of distance. Of several fields that overlap, the least density
-/// in samples counts, which is their union.
+/// spans more than four pixels faint ones at each whole sample of distance. Of several fields that overlap, the least
+/// density in samples counts, which is their union.
 ///
 /// View:    the whole of the fields' bounds, from the positive end of the axis: x to the right and z down for y, x
 ///          right and y up for z, -z right and y up for x.
