@@ -31,7 +31,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/packed_row.h", {"mesh", "trace"}},
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "trace"}},
-    {"grid/coordinate_hash.h", {"live", "scene", "trace"}},
+    {"grid/coordinate_hash.h", {"live", "mesh", "scene", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/density/trilinear.h", {"scene", "trace"}},

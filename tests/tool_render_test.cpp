@@ -147,6 +147,35 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
+TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
+  ASSERT_EQ(run("generate smooth-terrain hills.json --chunks 2x1x2").status, 0);
+  const std::string base = "hills.json -o out.png --size 64x48 --preset ";
+  const auto picture = [&](const std::string& flags) {
+    drawn(base + flags);
+    return bytes("out.png");
+  };
+  const std::string smooth = picture("ao --ao smooth");
+  EXPECT_NE(smooth, picture("ao"));
+  EXPECT_EQ(smooth, picture("ao --ao smooth --ao-form share --ao-spread 2"));
+  for (const std::string flags : {"--ao-form none", "--ao-spread 4", "--ao-form weighted",
+                                  "--ao-form weighted-published --ao-offset 0.2", "--ao-form weighted --ao-power 5"}) {
+    EXPECT_NE(picture("ao --ao smooth " + flags), smooth) << flags;
+  }
+  EXPECT_NE(picture("full --ao smooth"), picture("full"));
+  const std::string middle = picture("density");
+  EXPECT_EQ(picture("density --slice y:0.5 --threads 2"), middle);
+  EXPECT_NE(picture("density --slice y:0.9"), middle);
+  EXPECT_NE(picture("density --slice x:0.5"), picture("density --slice z:0.5"));
+  const Json said = drawn(base + "density --slice z:0.25");
+  EXPECT_EQ(said["camera"], nullptr);
+  EXPECT_EQ(said["slice"]["axis"], "z");
+  EXPECT_GT(said["pixels_hit"], 100);
+  const ToolRun blocks = run("render tiny.vox -o out2.png --preset density");
+  EXPECT_EQ(blocks.status, 1);
+  expect_one_error_line(blocks);
+  EXPECT_FALSE(exists("out2.png"));
+}
+
 TEST_F(ToolRender, APictureOfTheSkyComesWithAWarning) {
   std::ofstream(folder_.file("none.vox"), std::ios::binary) << vox_file({1, 1, 1}, "");
   EXPECT_EQ(drawn("none.vox -o a.png --size 9x9")["warnings"], Json({"nothing to draw: a picture of the sky"}));
@@ -227,6 +256,17 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--samples 0", "--samples: "},
       {out + "--samples 4097", "--samples: "},
       {out + "--samples 2.5", "--samples: "},
+      {out + "--ao-form weighted", "--ao-form needs --ao smooth"},
+      {out + "--ao smooth --ao-form deep", "--ao-form: must be none, share, weighted or weighted-published, not"},
+      {out + "--ao smooth --ao-spread 5", "--ao-spread: must be 0.0625 to 4, not \"5\""},
+      {out + "--ao smooth --ao-power 3", "--ao-power needs --ao-form weighted"},
+      {out + "--ao smooth --backend vulkan", "--ao smooth: the backend vulkan has none"},
+      {out + "--preset no-ao --ao-spread 1", "--ao-spread: the preset no-ao has no ambient occlusion"},
+      {out + "--slice y:0.5", "--slice needs --preset density"},
+      {out + "--preset density --slice y:2", "--slice: must be x, y or z, and a place from 0 to 1"},
+      {out + "--preset density --slice w:0.5", "--slice: must be"},
+      {out + "--preset density --slice 0.5", "--slice: must be"},
+      {out + "--preset density --samples 4", "--samples: the preset density is a flat slice"},
       {out + "--backend gpu", "--backend: "},
       {out + "--device 0", "--device needs --backend vulkan"},
       {out + "--backend vulkan --device ''", "--device: must be a number or a name"}};

@@ -1,5 +1,6 @@
 // `quoin convert` to smooth meshes, of voxels and of volumes.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -147,6 +148,59 @@ TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
   const double plain = darkest("--no-ao");
   EXPECT_LT(darkest(""), plain * 0.8);
   EXPECT_NEAR(plain, 0.6038, 1e-3) << "0xCC in linear light";
+}
+
+TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
+  std::string voxels;  // a floor and a wall
+  for (int x = 0; x < 16; ++x) {
+    for (int y = 0; y < 16; ++y) {
+      for (int z = 0; z < (x < 4 ? 12 : 4); ++z) {
+        for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
+      }
+    }
+  }
+  std::ofstream(folder_.file("corner.vox"), std::ios::binary) << vox_file({16, 16, 16}, voxels);
+  const auto glb = [&](const std::string& flags) {
+    converted("corner.vox out.glb --mesher smooth " + flags);
+    return read_file(folder_.file("out.glb")).value();
+  };
+  const auto plain = glb("");
+  EXPECT_EQ(glb("--ao-form share --ao-spread 2"), plain);
+  EXPECT_EQ(glb("--ao-form none"), glb("--no-ao"));
+  for (const std::string flags : {"--ao-form weighted", "--ao-form weighted-published", "--ao-spread 0.5",
+                                  "--ao-form weighted --ao-offset 0.1", "--ao-form weighted --ao-power 4"}) {
+    EXPECT_NE(glb(flags), plain) << flags;
+  }
+  const ParsedGlb apart = parse_glb(glb("--ao-attribute"));
+  const auto& attributes = apart.document["meshes"][0]["primitives"][0]["attributes"];
+  const auto open = apart.array<float>(attributes["_AO"]);
+  EXPECT_LT(*std::ranges::min_element(open), 0.8F);
+  for (const auto& colour : apart.array<LinearRgba16>(attributes["COLOR_0"])) {
+    ASSERT_NEAR(colour[0] / 65535.0, 0.6038, 1e-3) << "albedo alone";
+  }
+  EXPECT_EQ(run("convert corner.vox out.ply --ao-attribute").status, 0) << "of blocks too";
+}
+
+TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
+  const std::vector<std::pair<std::string, std::string>> errors = {
+      {"out.glb --ao-form share", "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth"},
+      {"out.glb --mesher smooth --ao-form rays", "--ao-form: must be none, share, weighted or weighted-published"},
+      {"out.glb --mesher smooth --ao-spread 0", "--ao-spread: must be 0.0625 to 4, not \"0\""},
+      {"out.glb --mesher smooth --ao-spread nan", "--ao-spread: must be 0.0625 to 4"},
+      {"out.glb --mesher smooth --ao-form weighted --ao-offset 1", "--ao-offset: must be 0 to 0.99, not \"1\""},
+      {"out.glb --mesher smooth --ao-form weighted --ao-power 65", "--ao-power: must be 0.0625 to 64"},
+      {"out.glb --mesher smooth --ao-offset 0.2", "--ao-offset needs --ao-form weighted"},
+      {"out.glb --mesher smooth --ao-form none --ao-spread 1", "--ao-spread: the form none has no samples"},
+      {"out.glb --mesher smooth --no-ao --ao-form share", "--ao-form: --no-ao leaves occlusion out"},
+      {"out.glb --no-ao --ao-attribute", "--ao-attribute: --no-ao leaves occlusion out"},
+      {"out.obj --ao-attribute", "--ao-attribute: .obj has no place for it"},
+      {"out.vox --ao-attribute", "--mesher, --no-ao, --ao-..., --watertight, --iso and --simplify are for mesh"}};
+  for (const auto& [arguments, error] : errors) {
+    const ToolRun result = run("convert tiny.vox " + arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with("quoin: " + error)) << arguments << ": " << result.err;
+  }
 }
 
 TEST_F(ToolSmooth, HiddenInstancesAndNothingToDrawAreSaid) {

@@ -6,6 +6,7 @@
 
 #include <quoin/io/mesh_file.h>
 
+#include "field_occlusion.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -49,7 +50,9 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
 
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
-  auto loaded = load_scene(options.common.input, options.common.load);
+  LoadOptions load = options.common.load;
+  load.threads = options.common.threads;
+  auto loaded = load_scene(options.common.input, load);
   if (!loaded) return loaded.error();
   Outcome outcome;
   outcome.voxels = loaded->scene.voxel_count();
@@ -127,6 +130,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
     return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
   if (options.iso) return "--iso is for volumes, and the input holds voxels";
   if (options.mesher == "smooth") return "";
+  if (options.has_field_occlusion) return "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth";
   if (options.simplify) return "--simplify needs --mesher smooth";
   const bool is_of_smooth = options.smoothness || options.colours || options.apart;
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
@@ -187,8 +191,13 @@ int run_convert(const ConvertOptions& options) {
     return kWrongUsage;
   }
   if (!format->is_mesh && options.mesh_only) {
-    print_error("--mesher, --no-ao, --watertight, --iso and --simplify are for mesh formats; " +
+    print_error("--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are for "
+                "mesh formats; " +
                 options.output.string() + " is none");
+    return kWrongUsage;
+  }
+  if (options.occlusion_apart && format->format == FileFormat::Obj) {
+    print_error("--ao-attribute: .obj has no place for it; .glb, .gltf and .ply have");
     return kWrongUsage;
   }
   return run_checked(options, *format);
@@ -201,6 +210,10 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
                   "smooth, which is all they can be)")
       ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
   command.add_flag("--no-ao", options.occlusion_off, "Leave ambient occlusion out");
+  command.add_flag(
+      "--ao-attribute", options.occlusion_apart,
+      "Occlusion as a float a vertex, 1 open to 0 dark, instead of in the colours: _AO in glTF, ao in PLY");
+  add_field_occlusion_options(command);
   command.add_flag("--watertight", options.watertight,
                    "No T-junctions: every edge meets its neighbours' corners (smooth meshes always are)");
   command
@@ -233,6 +246,15 @@ void add_volume_options(CLI::App& command, VolumeTexts& texts) {
   command.add_option("--raw-type", texts.raw_type, "Of its values: uint8 to int64, float32 or float64 (default uint8)");
   command.add_option("--raw-order", texts.raw_order, "Byte order of its values: little or big (default little)")
       ->check(CLI::IsMember({"little", "big"}));
+}
+
+/// Reads the options of smooth occlusion; returns what is wrong with them, or with others beside them, or "".
+std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
+  if (options.occlusion_off) {
+    const char* const given = options.occlusion_apart ? "--ao-attribute" : given_field_occlusion(command);
+    if (given != nullptr) return std::string(given) + ": --no-ao leaves occlusion out";
+  }
+  return read_field_occlusion(command, options.field_occlusion);
 }
 
 std::optional<ScalarType> scalar_type(const std::string& name) {
@@ -276,7 +298,9 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   if (!files) return files.error();
   outcome.files = *files;
   if (auto sound = check_companions(outcome.files, options); !sound) return sound;
-  const auto bytes = write_mesh(meshes, options.output, {}, bar.listener("writing"));
+  MeshFileOptions file;
+  if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
+  const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
@@ -302,14 +326,19 @@ void add_convert_command(CLI::App& app, int& status) {
       "Example: quoin convert castle.vox castle.glb\n"
       "Example: quoin convert fleet.json whole_fleet.json\n"
       "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
-      "Example: quoin convert scan.nii.gz scan.glb --iso 300");
+      "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
+      "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute");
   command->callback([command, options, texts, &status] {
     std::size_t given = 0;
-    for (const char* name : {"--mesher", "--no-ao", "--watertight", "--iso", "--simplify"}) {
+    for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
+                             "--no-unite", "--iso", "--simplify"}) {
       given += command->count(name);
     }
-    options->mesh_only = given > 0;
-    if (const std::string fault = read_texts(*command, *texts, *options); !fault.empty()) {
+    options->has_field_occlusion = given_field_occlusion(*command) != nullptr;
+    options->mesh_only = given > 0 || options->has_field_occlusion;
+    std::string fault = read_texts(*command, *texts, *options);
+    if (fault.empty()) fault = read_occlusion(*command, *options);
+    if (!fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;

@@ -21,6 +21,9 @@ struct ConvertOptions {
   std::filesystem::path output;
   std::string mesher;  ///< empty: greedy for voxels, smooth for volumes
   bool occlusion_off = false;
+  bool occlusion_apart = false;  ///< as an attribute, not in the colours
+  SmoothOcclusionOptions field_occlusion;
+  bool has_field_occlusion = false;  ///< one of its options was given
   bool watertight = false;
   std::optional<double> iso;
   std::optional<double> simplify;

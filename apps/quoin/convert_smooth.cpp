@@ -16,6 +16,7 @@ namespace {
 
 SmoothMeshOptions mesh_options(const ConvertOptions& options) {
   SmoothMeshOptions mesh;
+  mesh.occlusion = options.field_occlusion;
   if (options.occlusion_off) mesh.occlusion.form = SmoothOcclusion::None;
   return mesh;
 }
@@ -27,7 +28,7 @@ std::optional<float> simplify_error(const ConvertOptions& options) {
 
 SmoothSceneOptions scene_options(const ConvertOptions& options) {
   SmoothSceneOptions wanted;
-  if (options.occlusion_off) wanted.mesh.occlusion.form = SmoothOcclusion::None;
+  wanted.mesh.occlusion = mesh_options(options).occlusion;
   if (options.smoothness) wanted.mesh.smoothness = static_cast<float>(*options.smoothness);
   if (options.colours == "blended") wanted.mesh.colours = SurfaceColours::Blended;
   wanted.unite = !options.apart;

@@ -26,6 +26,7 @@ namespace {
 struct Outcome {
   Picture picture;
   Camera camera;
+  std::optional<double> slice;  ///< where it lies on its axis, instead of a camera
   FaceCounts faces;
   bool is_volume = false;
   std::uint64_t bytes = 0;
@@ -70,6 +71,7 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 
 Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume) {
   LoadOptions options = arguments.common.load;
+  options.threads = arguments.common.threads;
   if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
   ProgressBar bar;
   auto loaded = load_scene(arguments.common.input, options, bar.listener("reading"));
@@ -110,6 +112,27 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
   return take_picture(*renderer, options, watch, outcome);
 }
 
+/// Draws what the camera sees.
+Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
+  const auto camera = camera_for(loaded, arguments);
+  if (!camera) return camera.error();
+  outcome.camera = *camera;
+  RenderOptions options = arguments.render;
+  if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
+  const bool is_vulkan = arguments.backend == "vulkan";
+  return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, watch, outcome);
+}
+
+Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
+  auto slice = draw_density_slice(scene, arguments.slice);
+  if (!slice) return slice.error();
+  outcome.slice = slice->place;
+  outcome.picture.colour = std::move(slice->colour);
+  outcome.picture.pixels_hit = slice->pixels_solid;
+  outcome.trace = watch.lap();
+  return {};
+}
+
 Result<Outcome> render(const RenderArguments& arguments) {
   const InstanceFilter filter = arguments.common.instances();
   Stopwatch watch;
@@ -124,17 +147,12 @@ Result<Outcome> render(const RenderArguments& arguments) {
   outcome.is_volume = is_volume;
   catch_interrupts();
   outcome.faces = count_faces(scene, filter, arguments.common.threads);
-  const auto camera = camera_for(*loaded, arguments);
-  if (!camera) return camera.error();
-  outcome.camera = *camera;
-  RenderOptions options = arguments.render;
-  if (loaded->sun && !arguments.has_sun) options.light.sun = *loaded->sun;
-  const bool is_vulkan = arguments.backend == "vulkan";
-  if (auto drawn = (is_vulkan ? draw_by_vulkan : draw_by_cpu)(scene, arguments, options, watch, outcome); !drawn) {
-    return drawn.error();
-  }
+  const bool is_slice = arguments.preset == "density";
+  Status drawn =
+      is_slice ? draw_slice(scene, arguments, watch, outcome) : draw_view(*loaded, arguments, watch, outcome);
+  if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
-  warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
+  if (!is_slice) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
   if (auto written = write_outputs(arguments, outcome); !written) return written.error();
   outcome.write = watch.lap();
   return outcome;
@@ -144,8 +162,14 @@ Json triple(DVec3 v) {
   return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
 }
 
+Json camera_json(const Camera& camera) {
+  return {{"position", triple(camera.position)},
+          {"forward", triple(camera.forward)},
+          {"up", triple(camera.up)},
+          {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}};
+}
+
 Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
-  const Camera& camera = outcome.camera;
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
   Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
@@ -155,17 +179,14 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
                {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
                {"backend", arguments.backend},
                {"threads", thread_count(arguments.common.threads)},
-               {"camera",
-                {{"position", triple(camera.position)},
-                 {"forward", triple(camera.forward)},
-                 {"up", triple(camera.up)},
-                 {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}}},
+               {"camera", outcome.slice ? Json() : camera_json(outcome.camera)},
                {"bytes", outcome.bytes},
                {"files", files},
                {"seconds",
                 {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
                {"warnings", outcome.warnings}};
   if (!outcome.device.empty()) json["device"] = outcome.device;
+  if (outcome.slice) json["slice"] = {{"axis", std::string(1, "xyz"[arguments.slice.axis])}, {"at", *outcome.slice}};
   return json;
 }
 
@@ -174,10 +195,13 @@ std::string outcome_text(const Outcome& outcome) {
   const double per_second = static_cast<double>(picture.rays) / std::max(outcome.trace, 1e-9);
   std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
                      std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
-                     (outcome.is_volume ? " pixels show its surface\n" : " pixels show voxels\n");
-  if (!outcome.is_volume) text += to_string(outcome.faces) + "\n";
-  text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
-          with_thousands(std::llround(per_second)) + " a second\n";
+                     (outcome.slice       ? " pixels lie in the solid\n"
+                      : outcome.is_volume ? " pixels show its surface\n"
+                                          : " pixels show voxels\n");
+  if (!outcome.is_volume && !outcome.slice) text += to_string(outcome.faces) + "\n";
+  if (!outcome.slice)
+    text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
+            with_thousands(std::llround(per_second)) + " a second\n";
   if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";
   text += "Wrote ";
   for (const auto& file : outcome.files) text += file.string() + ", ";
@@ -206,7 +230,9 @@ void add_render_command(CLI::App& app, int& status) {
   command->footer("Reads " + readable_extensions() +
                   ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 4\n"
-                  "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40");
+                  "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
+                  "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
+                  "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5");
   command->callback([command, arguments, &status] {
     if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
       print_error(fault + " (try --help)");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "field_occlusion.h"
 #include "parse.h"
 
 namespace quoin::tool {
@@ -81,12 +82,14 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option("--preset", arguments.preset,
                   "Light: full, no-shadows, no-ao, unlit (own colours, with --ao times occlusion), or ao (occlusion "
-                  "alone, in grey) (default full)")
-      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao"}));
+                  "alone, in grey); or density: a slice through fields and volumes, in colours (default full)")
+      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao", "density"}));
   command
       .add_option("--ao", arguments.occlusion,
-                  "Ambient occlusion by rays, or that of the vertices of blocky meshes (default rays)")
-      ->check(CLI::IsMember({"rays", "vertex"}));
+                  "Ambient occlusion by rays; vertex: that of the vertices of blocky meshes; smooth: of fields and "
+                  "volumes that of their smooth meshes, see --ao-form (default rays)")
+      ->check(CLI::IsMember({"rays", "vertex", "smooth"}));
+  add_field_occlusion_options(command);
   command.add_option("--ao-rays", arguments.render.light.occlusion_rays, "Rays a point for --ao rays (default 9)")
       ->check(CLI::Range(1, kMaxSamples));
   command
@@ -130,6 +133,7 @@ void add_backend_options(CLI::App& command, RenderArguments& arguments) {
 std::string fault_of_backend(const CLI::App& command, const RenderArguments& arguments) {
   const bool is_vulkan = arguments.backend == "vulkan";
   if (command.count("--device") > 0 && !is_vulkan) return "--device needs --backend vulkan";
+  if (is_vulkan && arguments.occlusion == "smooth") return "--ao smooth: the backend vulkan has none; cpu has";
   if (command.count("--device") > 0 && arguments.device.empty()) return "--device: must be a number or a name";
   return "";
 }
@@ -182,7 +186,8 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   const std::string& preset = arguments.preset;
   const bool is_lit = preset == "full" || preset == "no-shadows";
   const bool has_occlusion = is_lit || preset == "ao" || (preset == "unlit" && command.count("--ao") > 0);
-  for (const char* option : {"--ao", "--ao-rays", "--ao-distance", "--ao-affects"}) {
+  for (const char* option : {"--ao", "--ao-rays", "--ao-distance", "--ao-affects", "--ao-form", "--ao-spread",
+                             "--ao-offset", "--ao-power"}) {
     if (command.count(option) > 0 && !has_occlusion) {
       return std::string(option) + ": the preset " + preset + " has no ambient occlusion" +
              (preset == "unlit" ? " without --ao" : "");
@@ -191,6 +196,9 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   if (command.count("--ao-affects") > 0 && !is_lit) return "--ao-affects: the preset " + preset + " has no light";
   for (const char* option : {"--ao-rays", "--ao-distance"}) {
     if (command.count(option) > 0 && arguments.occlusion != "rays") return std::string(option) + " needs --ao rays";
+  }
+  if (const char* given = given_field_occlusion(command); given != nullptr && arguments.occlusion != "smooth") {
+    return std::string(given) + " needs --ao smooth";
   }
   for (const char* option : {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness"}) {
     if (command.count(option) > 0 && (preset == "unlit" || preset == "ao")) {
@@ -207,8 +215,38 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   return "";
 }
 
+/// A slice has no camera, no light and no rays.
+std::string fault_of_slice(const CLI::App& command, const RenderArguments& arguments) {
+  if (arguments.preset != "density") {
+    return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
+  }
+  for (const char* option : {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
+                             "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
+                             "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
+                             "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
+                             "--detail",         "--lod-colours",     "--backend",         "--device"}) {
+    if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
+  }
+  return "";
+}
+
 bool is_sun_off(const CLI::App& command) {
   return command.count("--sun") > 0 && command.get_option("--sun")->results().back() == "off";
+}
+
+struct SlicePlace {
+  int axis = 1;
+  double at = 0.5;
+};
+
+/// "y:0.5".
+std::optional<SlicePlace> read_slice(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const std::size_t axis = std::string("xyz").find(text.substr(0, colon));
+  if (colon != 1 || axis == std::string::npos) return std::nullopt;
+  const auto at = parse_number(std::string_view(text).substr(2));
+  if (!at || *at < 0.0 || *at > 1.0) return std::nullopt;
+  return SlicePlace{static_cast<int>(axis), *at};
 }
 
 /// Reads the options that are texts to CLI11; returns what is wrong with the first wrong one, or "".
@@ -217,6 +255,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   const std::string at_least_0 = "a number of at least 0";
   LightOptions& light = arguments.render.light;
   PictureSize size{arguments.render.width, arguments.render.height};
+  SlicePlace slice;
   const std::array faults = {
       read_option(command, "--size", read_size,
                   "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side, as in 1280x720", size),
@@ -231,7 +270,11 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
       read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
+      read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
+      read_field_occlusion(command, light.smooth),
       read_option(command, "--iso", read_float, "a number", arguments.iso)};
+  arguments.slice.axis = slice.axis;
+  arguments.slice.at = slice.at;
   arguments.render.width = size.width;
   arguments.render.height = size.height;
   const auto* const wrong =
@@ -252,6 +295,8 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::Range(1, kMaxSamples));
   add_text_option(command, "--iso", "VALUE",
                   "Surface value of a volume; what is above is solid (default: between its two groups of values)");
+  add_text_option(command, "--slice", "AXIS:PLACE",
+                  "Of --preset density: where it cuts, x, y or z, from 0 to 1 of the fields' bounds (default y:0.5)");
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
   add_detail_options(command, arguments);
   add_backend_options(command, arguments);
@@ -260,7 +305,7 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
   for (const std::string& fault :
        {read_texts(command, arguments), fault_of_files(arguments), fault_of_camera(command, arguments),
-        fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
+        fault_of_slice(command, arguments), fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
     if (!fault.empty()) return fault;
   }
   if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";
@@ -273,7 +318,8 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
   if (is_sun_off(command)) light.sun_brightness = 0.0;
-  light.occlusion = arguments.occlusion == "vertex" ? OcclusionMode::Vertex : OcclusionMode::Rays;
+  if (arguments.occlusion == "vertex") light.occlusion = OcclusionMode::Vertex;
+  if (arguments.occlusion == "smooth") light.occlusion = OcclusionMode::Smooth;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;
   if (arguments.preset == "no-ao") light.occlusion = OcclusionMode::Off;
   if (arguments.preset == "no-shadows") light.shadows = false;
@@ -283,6 +329,10 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   }
   arguments.render.depth = !arguments.depth.empty();
   arguments.render.threads = arguments.common.threads;
+  arguments.slice.width = arguments.render.width;
+  arguments.slice.height = arguments.render.height;
+  arguments.slice.instances = arguments.common.instances();
+  arguments.slice.threads = arguments.common.threads;
   return "";
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/density_slice.h>
 #include <quoin/scene/camera.h>
 
 #include "commands.h"
@@ -31,6 +32,7 @@ struct RenderArguments {
   std::string device;  ///< as VulkanOptions::device
   std::string detail = "near";
   std::optional<double> iso;  ///< of a volume
+  DensitySliceOptions slice;  ///< of the preset density
 };
 
 /// Adds the command's options, which fill in what CLI11 can read by itself.

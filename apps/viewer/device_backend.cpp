@@ -35,7 +35,8 @@ struct DeviceBackend::Impl {
   /// Meshes of one style, and what draws them.
   struct Meshes {
     SurfaceStyle style;
-    LiveMeshes live;
+    SmoothOcclusionOptions occlusion;
+    std::unique_ptr<LiveMeshes> live;
     VulkanMeshRenderer renderer;
     bool is_scene_new = true;
   };
@@ -49,7 +50,8 @@ struct DeviceBackend::Impl {
 
   [[nodiscard]] bool uses_device() const {
     if (!request || request->mode != DrawMode::Rays) return request.has_value();
-    return options.rays_on_device && !is_device_gone;
+    // Smooth occlusion of fields is the processor's.
+    return options.rays_on_device && !is_device_gone && request->light.occlusion != OcclusionMode::Smooth;
   }
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
@@ -57,6 +59,9 @@ struct DeviceBackend::Impl {
   Status prepare();
   Result<bool> draw();
   Status prepare_meshes(SurfaceStyle style);
+  [[nodiscard]] std::unique_ptr<LiveMeshes> live_meshes(SurfaceStyle style,
+                                                        const SmoothOcclusionOptions& occlusion) const;
+  void renew_occlusion();
   Result<bool> take_surfaces();
   [[nodiscard]] MeshPictureOptions mesh_picture(bool waits);
   Result<bool> update_renderer();
@@ -110,19 +115,40 @@ Status DeviceBackend::Impl::prepare() {
 }
 
 Status DeviceBackend::Impl::prepare_meshes(SurfaceStyle style) {
-  if (meshes && meshes->style == style) return {};
+  if (meshes && meshes->style == style) {
+    renew_occlusion();
+    return {};
+  }
   meshes.reset();
   auto drawer = VulkanMeshRenderer::create(*renderer);
   if (!drawer) return drawer.error();
+  const SmoothOcclusionOptions occlusion = request->light.smooth;
+  meshes.reset(new Meshes{style, occlusion, live_meshes(style, occlusion), std::move(*drawer)});
+  is_request_new = true;
+  return {};
+}
+
+std::unique_ptr<LiveMeshes> DeviceBackend::Impl::live_meshes(SurfaceStyle style,
+                                                             const SmoothOcclusionOptions& occlusion) const {
   LiveMeshOptions live;
   live.style = style;
   live.instances = options.cpu.instances;
   live.threads = options.cpu.threads;
   live.on_ready = on_frame;
   live.detail_distance = kDetailDistance;
-  meshes.reset(new Meshes{style, LiveMeshes(live), std::move(*drawer)});
+  live.occlusion = occlusion;
+  return std::make_unique<LiveMeshes>(live);
+}
+
+// Has all chunks meshed with another occlusion, once those that are under way are done: surfaces stay until the new
+// ones come, and none is left of a chunk that an edit emptied.
+void DeviceBackend::Impl::renew_occlusion() {
+  if (meshes->occlusion == request->light.smooth || meshes->is_scene_new) return;
+  meshes->live->update(*scene, request->camera.position);
+  if (meshes->live->pending() > 0) return;
+  meshes->occlusion = request->light.smooth;
+  meshes->live = live_meshes(meshes->style, meshes->occlusion);
   is_request_new = true;
-  return {};
 }
 
 // Has the renderer know the scene; returns whether it was another.
@@ -145,9 +171,9 @@ Result<bool> DeviceBackend::Impl::take_surfaces() {
     if (Status taken = meshes->renderer.update(*scene, options.cpu.instances); !taken) return taken.error();
   }
   // The levels of detail of fields follow the camera.
-  if (is_scene_changed || is_request_new || meshes->live.pending() > 0)
-    meshes->live.update(*scene, request->camera.position);
-  const std::vector<SurfaceUpdate> surfaces = meshes->live.take();
+  if (is_scene_changed || is_request_new || meshes->live->pending() > 0)
+    meshes->live->update(*scene, request->camera.position);
+  const std::vector<SurfaceUpdate> surfaces = meshes->live->take();
   if (surfaces.empty()) return *updated || is_scene_changed;
   if (Status put = meshes->renderer.put(surfaces); !put) return put.error();
   return true;
@@ -181,7 +207,7 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
   if (!has_changed) return has_changed.error();
   const bool is_new = std::exchange(is_request_new, false) || *has_changed;
   // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
-  const bool is_last = !is_new && meshes->live.pending() == 0;
+  const bool is_last = !is_new && meshes->live->pending() == 0;
   if (is_new) is_settled = false;
   if (is_settled || (!is_new && !is_last)) return false;
   divisor = 1;
@@ -189,7 +215,8 @@ Result<bool> DeviceBackend::Impl::draw_meshes() {
     return drawn.error();
   }
   // Otherwise the next picture is a better one.
-  is_settled = is_last || (meshes->live.pending() == 0 && !request->detail_by_pixels);
+  is_settled = (is_last || (meshes->live->pending() == 0 && !request->detail_by_pixels)) &&
+               meshes->occlusion == request->light.smooth;
   return true;
 }
 
@@ -329,7 +356,7 @@ bool DeviceBackend::wants_frames() const {
   const bool is_rays = me.request->mode == DrawMode::Rays;
   const bool is_stale =
       is_rays ? me.is_scene_new || !me.is_settled
-              : !me.meshes || me.meshes->is_scene_new || (!me.is_settled && me.meshes->live.pending() == 0);
+              : !me.meshes || me.meshes->is_scene_new || (!me.is_settled && me.meshes->live->pending() == 0);
   return me.is_request_new || is_stale;
 }
 
@@ -337,11 +364,11 @@ std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   const Impl& me = *impl_;
   if (!me.uses_device() || !me.meshes || me.request->mode == DrawMode::Rays) return {};
   const VulkanMeshRenderer::Stats drawn = me.meshes->renderer.stats();
-  const LiveMeshes::Stats live = me.meshes->live.stats();
+  const LiveMeshes::Stats live = me.meshes->live->stats();
   return {{"triangles, each once", text("%.0f", static_cast<double>(drawn.triangles))},
           {"triangles drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
           {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},
-          {"still to mesh", text("%.0f", static_cast<double>(me.meshes->live.pending()))},
+          {"still to mesh", text("%.0f", static_cast<double>(me.meshes->live->pending()))},
           {"meshes", text("%.1f MB", static_cast<double>(drawn.bytes) / 1e6)},
           {"last chunk took", text("%.2f ms", live.last_mesh_seconds * 1e3)},
           {"edit to mesh", text("%.2f ms", live.last_latency_seconds * 1e3)}};

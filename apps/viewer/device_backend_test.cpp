@@ -176,6 +176,51 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   EXPECT_EQ(all.size(), 17U);
 }
 
+TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
+  Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Smooth);
+  request.light.shading = Shading::Occlusion;
+  const auto shown = [&](const SmoothOcclusionOptions& smooth) {
+    request.light.smooth = smooth;
+    backend->show(request);
+    const auto pictures = settle(*backend);
+    return pictures.empty() ? Image{} : pictures.back();
+  };
+  const Image plain = shown({});
+  ASSERT_FALSE(plain.rgb.empty());
+  const Image weighted = shown({SmoothOcclusion::Weighted, 3.0F, 0.4F, 2.0F});
+  EXPECT_GT(differing(plain, weighted, 6), 0.005);
+  EXPECT_EQ(shown({}).rgb, plain.rgb);
+  // Several changes in a row, and an edit among them: the last counts.
+  request.light.smooth.spread = 1.0F;
+  backend->show(request);
+  (void)backend->take();
+  edit(document, *backend, {30, 12, 20});
+  request.light.smooth.spread = 4.0F;
+  backend->show(request);
+  (void)backend->take();
+  const Image edited = shown({SmoothOcclusion::Weighted, 3.0F, 0.4F, 2.0F});
+  const auto fresh = backend_of(document);
+  fresh->show(request);
+  const auto pictures = settle(*fresh);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_EQ(edited.rgb, pictures.back().rgb);
+}
+
+TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
+  const Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Rays);
+  backend->show(request);
+  ASSERT_FALSE(settle(*backend).empty());
+  request.light.occlusion = OcclusionMode::Smooth;
+  backend->show(request);
+  const auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_EQ(pictures.back().rgb, by_processor(document, request).rgb);
+}
+
 TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWhereThatIsFaster) {
   const Document document = small_document();
   const auto backend = backend_of(document, false);

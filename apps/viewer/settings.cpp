@@ -55,7 +55,8 @@ void read_sun(const Json& object, DVec3& sun) {
 }
 
 constexpr std::array kShadings = {"lit", "unlit", "unlit with occlusion", "occlusion", "normals"};
-constexpr std::array kOcclusionModes = {"off", "rays", "vertex"};
+constexpr std::array kOcclusionModes = {"off", "rays", "vertex", "smooth"};
+constexpr std::array kForms = {"none", "share", "weighted", "weighted-published"};
 constexpr std::array kModes = {"rays", "blocks", "smooth"};
 
 // One of an enumeration's names, in their order.
@@ -66,6 +67,18 @@ void read_name(const Json& object, const char* key, const Names& names, Value& v
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (*found == names[i]) value = static_cast<Value>(i);
   }
+}
+
+void read_smooth_occlusion(const Json& object, SmoothOcclusionOptions& options) {
+  const auto read = [&](const char* key, double least, double most, float& value) {
+    double number = double{value};
+    read_number(object, key, least, most, number);
+    value = static_cast<float>(number);
+  };
+  read_name(object, "form", kForms, options.form);
+  read("spread", 0.0625, 4.0, options.spread);
+  read("offset", 0.0, 0.99, options.offset);
+  read("power", 0.0625, 64.0, options.power);
 }
 
 void read_light(const Json& object, LightOptions& light) {
@@ -84,6 +97,9 @@ void read_light(const Json& object, LightOptions& light) {
   read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
   if (!has_occlusion) light.occlusion = OcclusionMode::Off;
   read_name(object, "occlusion", kOcclusionModes, light.occlusion);
+  if (const Json* smooth = find(object, "smooth_occlusion"); smooth != nullptr && smooth->is_object()) {
+    read_smooth_occlusion(*smooth, light.smooth);
+  }
   read_number(object, "occlusion_distance", 0.0, 4096.0, light.occlusion_distance);
   read_number(object, "shadow_distance", 0.0, 4096.0, light.shadow_distance);
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
@@ -164,6 +180,11 @@ std::string to_json(const Settings& settings) {
                    {"shading", kShadings[static_cast<std::size_t>(light.shading)]},
                    {"shadows", light.shadows},
                    {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion)]},
+                   {"smooth_occlusion",
+                    {{"form", kForms[static_cast<std::size_t>(light.smooth.form)]},
+                     {"spread", light.smooth.spread},
+                     {"offset", light.smooth.offset},
+                     {"power", light.smooth.power}}},
                    {"occlusion_distance", light.occlusion_distance},
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
                    {"sun_brightness", light.sun_brightness},

@@ -25,6 +25,7 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.shadows = false;
   settings.light.occlusion = OcclusionMode::Off;
   settings.light.occlusion_affects = OcclusionAffects::All;
+  settings.light.smooth = {SmoothOcclusion::WeightedPublished, 0.4F, 0.25F, 3.5F};
   settings.light.exposure = 1.25;
   settings.light.shading = Shading::UnlitWithOcclusion;
   settings.light.occlusion_distance = 12.5;
@@ -78,6 +79,8 @@ TEST(Settings, NonsenseIsLeftOut) {
                            "{\"recent\": [1, \"\"]}",
                            "{\"light\": {\"shading\": \"dark\"}}",
                            "{\"light\": {\"occlusion_distance\": -1}}",
+                           "{\"light\": {\"smooth_occlusion\": 3}}",
+                           "{\"light\": {\"smooth_occlusion\": {\"form\": \"soft\", \"spread\": 9, \"power\": 0}}}",
                            "{\"fly\": 1}",
                            "{\"ui_scale\": 0}"}) {
     EXPECT_EQ(to_json(parse_settings(text)), defaults) << text;

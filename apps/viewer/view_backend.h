@@ -34,7 +34,7 @@ struct ViewRequest {
   Camera camera;
   int width = 0;  ///< pixels; nothing is drawn unless both are positive
   int height = 0;
-  LightOptions light;
+  LightOptions light;             ///< `smooth` is of meshes of fields and smooth ones too
   bool detail_by_pixels = false;  ///< far models in coarser cells
   bool detail_colours = false;    ///< rays: instances in colours that tell their detail
   int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted

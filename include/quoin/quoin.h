@@ -47,9 +47,11 @@
 #include <quoin/mesh/simplify.h>
 #include <quoin/mesh/smooth.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/mesh/smooth_occlusion.h>
 #include <quoin/mesh/vertex_writer.h>
 #include <quoin/mesh/visible_faces.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/density_slice.h>
 #include <quoin/render/impostor.h>
 #include <quoin/render/impostor_cache.h>
 #include <quoin/render_vk/vulkan_device.h>

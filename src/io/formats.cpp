@@ -70,7 +70,7 @@ Result<LoadedScene> scene_of_volume(Result<Volume> volume, const LoadOptions& op
   if (!volume) return volume.error();
   VolumeSceneOptions wanted;
   wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
-  auto scene = scene_from_volume(*volume, wanted, {}, progress);
+  auto scene = scene_from_volume(*volume, wanted, options.threads, progress);
   if (!scene) return scene.error();
   LoadedScene loaded;
   loaded.scene = std::move(*scene);

@@ -17,17 +17,22 @@ Result<FileFormat> format_of(const std::filesystem::path& path, const MeshFileOp
 }
 
 /// The files, of sound meshes. Errors: Unsupported, and those of the formats.
-Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path) {
+Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path,
+                                   OcclusionIn occlusion) {
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
   switch (format) {
     case FileFormat::Glb:
-      return plan_glb(meshes, path);
+      return plan_glb(meshes, path, occlusion);
     case FileFormat::Gltf:
-      return plan_gltf(meshes, path);
+      return plan_gltf(meshes, path, occlusion);
     case FileFormat::Obj:
+      if (occlusion == OcclusionIn::Attribute) {
+        return make_error(ErrorCode::Unsupported,
+                          "OBJ has no place for occlusion beside colours; .glb, .gltf and .ply have");
+      }
       return plan_obj(meshes, path);
     case FileFormat::Ply:
-      return plan_ply(meshes, path);
+      return plan_ply(meshes, path, occlusion);
     case FileFormat::Vox:
     case FileFormat::Scene:
     case FileFormat::Nifti:
@@ -40,10 +45,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
 /// The same meshes without occlusion.
 SceneMeshes without_occlusion(SceneMeshes meshes) {
   for (MeshPart& part : meshes.parts) {
-    for (MeshView& view : part.surfaces) {
-      view.block_occlusion = {};
-      view.occlusion = {};
-    }
+    for (MeshView& view : part.surfaces) view = without_occlusion(view);
   }
   return meshes;
 }
@@ -80,7 +82,7 @@ Result<std::uint64_t> write_checked(const SceneMeshes& meshes, const std::filesy
                                     const MeshFileOptions& options, const Progress& progress) {
   const auto format = format_of(path, options);
   if (!format) return format.error();
-  const auto files = plan(meshes, *format, path);
+  const auto files = plan(meshes, *format, path, options.occlusion_in);
   if (!files) return files.error();
   return write_files(*files, progress);
 }
@@ -95,8 +97,12 @@ Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesyste
 
 Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options,
                                           const Progress& progress) {
-  if (!options.occlusion) return write_mesh(without_occlusion(meshes), format, {}, progress);
-  const auto files = plan(meshes, format, "");
+  if (!options.occlusion) {
+    MeshFileOptions plain = options;
+    plain.occlusion = true;
+    return write_mesh(without_occlusion(meshes), format, plain, progress);
+  }
+  const auto files = plan(meshes, format, "", options.occlusion_in);
   if (!files) return files.error();
   if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
   std::vector<std::byte> bytes;

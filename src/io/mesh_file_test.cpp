@@ -355,6 +355,71 @@ TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
   EXPECT_EQ(folder.count(), 3U) << "palette and materials of the blocks";
 }
 
+/// The floats of a PLY file's vertices after their 27 bytes of position, normal and colour.
+std::vector<float> ply_occlusion(const std::vector<std::byte>& bytes, std::size_t vertices) {
+  const std::string text = bytes_as_text(bytes);
+  const std::string end = "property uchar blue\nproperty float ao\nelement face";
+  EXPECT_NE(text.find(end), std::string::npos);
+  const std::size_t data = text.find("end_header\n") + 11;
+  std::vector<float> found(vertices);
+  for (std::size_t i = 0; i < vertices && data + 31 * (i + 1) <= text.size(); ++i) {
+    std::memcpy(&found[i], text.data() + data + 31 * i + 27, 4);
+  }
+  return found;
+}
+
+TEST(MeshFiles, OcclusionIsAnAttributeOfItsOwnWhereThatIsWanted) {
+  Scene scene;
+  const VoxelType grey = add_type(scene, "grey", {120, 120, 120, 255});
+  SceneGrid grid;
+  grid.grid.fill_box({{0, 0, 0}, {3, 1, 3}}, grey);
+  grid.grid.set({1, 1, 1}, grey);
+  place(scene, scene.add_grid(std::move(grid)), {});
+  auto meshes = mesh_scene(scene);
+  ASSERT_TRUE(meshes);
+  meshes->parts.push_back(mesh_part("smooth", test_mesh()));
+  meshes->placements.push_back({1, "smooth", {}});
+  const MeshView& blocks = meshes->parts[0].surfaces[0];
+  const MeshView& smooth = meshes->parts[1].surfaces[0];
+  std::vector<float> of_blocks;
+  for (const std::uint8_t occlusion : blocks.block_occlusion) of_blocks.push_back(1.0F - 0.25F * occlusion);
+  std::vector<float> of_smooth;
+  for (const float occlusion : smooth.occlusion) of_smooth.push_back(1.0F - occlusion);
+  ASSERT_LT(*std::ranges::min_element(of_blocks), 1.0F);
+
+  MeshFileOptions options;
+  options.occlusion_in = OcclusionIn::Attribute;
+  const auto bytes = write_mesh(*meshes, FileFormat::Glb, options);
+  ASSERT_TRUE(bytes);
+  const ParsedGlb glb = parse_glb(*bytes);
+  const auto attributes = [&](std::size_t mesh) { return glb.document["meshes"][mesh]["primitives"][0]["attributes"]; };
+  EXPECT_FALSE(attributes(0).contains("COLOR_0"));
+  EXPECT_EQ(glb.array<float>(attributes(0)["_AO"]), of_blocks);
+  EXPECT_EQ(glb.array<float>(attributes(1)["_AO"]), of_smooth);
+  const auto& accessor = glb.document["accessors"][attributes(1)["_AO"].get<std::size_t>()];
+  EXPECT_EQ(accessor["type"], "SCALAR");
+  EXPECT_EQ(accessor["componentType"], 5126);
+  const auto colours = glb.array<LinearRgba16>(attributes(1)["COLOR_0"]);
+  EXPECT_TRUE(std::ranges::equal(colours, smooth.albedo));
+
+  const auto ply = write_mesh(*meshes, FileFormat::Ply, options);
+  ASSERT_TRUE(ply);
+  std::vector<float> both = of_blocks;
+  both.insert(both.end(), of_smooth.begin(), of_smooth.end());
+  EXPECT_EQ(ply_occlusion(*ply, both.size()), both);
+
+  const auto obj = write_mesh(*meshes, FileFormat::Obj, options);
+  ASSERT_FALSE(obj);
+  EXPECT_EQ(obj.error().code, ErrorCode::Unsupported);
+
+  // Without occlusion there is none to write; PLY has one kind of vertex for all.
+  options.occlusion = false;
+  const ParsedGlb plain = parse_glb(*write_mesh(*meshes, FileFormat::Glb, options));
+  EXPECT_FALSE(plain.document["meshes"][1]["primitives"][0]["attributes"].contains("_AO"));
+  EXPECT_EQ(ply_occlusion(*write_mesh(*meshes, FileFormat::Ply, options), both.size()),
+            std::vector<float>(both.size(), 1.0F));
+}
+
 TEST(MeshFiles, BlocksThatDoNotHangTogetherAreRefused) {
   Scene scene;
   const GridHandle grid = add_asymmetric_grid(scene, "L");

@@ -9,6 +9,8 @@
 
 #include <glm/matrix.hpp>
 
+#include <quoin/mesh/occlusion.h>
+
 #include "core/srgb.h"
 
 namespace quoin {
@@ -189,6 +191,18 @@ std::array<Vec3, 6> VertexTransform::face_normals() const {
     normals[static_cast<std::size_t>(direction)] = Vec3(normal(Vec3(normal_of(direction))));
   }
   return normals;
+}
+
+float openness_at(const MeshView& view, std::size_t vertex) {
+  if (!view.block_occlusion.empty()) return occlusion_brightness(view.block_occlusion[vertex]);
+  return view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
+}
+
+MeshView without_occlusion(const MeshView& view) {
+  MeshView plain = view;
+  plain.block_occlusion = {};
+  plain.occlusion = {};
+  return plain;
 }
 
 LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {

@@ -12,6 +12,7 @@
 #include <quoin/core/direction.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/io/mesh_file.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "io/block_writer.h"
@@ -26,12 +27,14 @@ struct MeshFile {
 };
 
 /// The files of a mesh, or why it cannot be written. Requires: the meshes are sound, and outlive the files.
-using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path);
+using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                                    OcclusionIn occlusion);
 
 [[nodiscard]] PlanMeshFiles plan_glb;
 [[nodiscard]] PlanMeshFiles plan_gltf;
-[[nodiscard]] PlanMeshFiles plan_obj;
 [[nodiscard]] PlanMeshFiles plan_ply;
+/// Which has no place for occlusion but colours.
+[[nodiscard]] Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path);
 
 /// What goes beside `path`.
 [[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
@@ -81,6 +84,12 @@ class VertexTransform {
   const std::uint32_t* at = view.indices.data() + i;
   return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};
 }
+
+/// What occlusion leaves of ambient light at a vertex: 1 open to 0 dark; 1 without any.
+[[nodiscard]] float openness_at(const MeshView& view, std::size_t vertex);
+
+/// The same mesh without occlusion.
+[[nodiscard]] MeshView without_occlusion(const MeshView& view);
 
 /// The colour of a vertex of a smooth mesh, darkened by its occlusion: linear light, opaque; sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/mesh/smooth_occlusion.h>
 
 #include "core/srgb.h"
 #include "light/corner_light.h"
@@ -271,10 +272,18 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   if (group.unknown == 0) return 0;
   // A field has no faces with corners.
   std::uint32_t traced = options_.occlusion == OcclusionMode::Rays ? group.unknown : 0;
+  std::uint32_t found = 0;
   for (std::size_t i = 0; i < group.size; ++i) {
-    if ((group.unknown >> i & 1U) != 0 && group.points[i]->in_field) traced |= 1U << i;
+    if ((group.unknown >> i & 1U) == 0 || !group.points[i]->in_field) continue;
+    if (options_.occlusion == OcclusionMode::Smooth) {
+      openness[i] = smooth_openness(*group.points[i]);
+      found |= 1U << i;
+    } else {
+      traced |= 1U << i;
+    }
   }
   const std::int64_t rays = traced == 0 ? 0 : trace_openness(group, traced, openness);
+  traced |= found;
   if (traced == group.unknown) return rays;
   GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
   FaceOcclusion corners{};
@@ -289,6 +298,11 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
     openness[i] = 1.0F - occlusion_at(corners, point.voxel, point.face, point.position) / 3.0F;
   }
   return rays;
+}
+
+float Lighting::smooth_openness(const SurfacePoint& point) const {
+  const SceneGrid& grid = *view_->tracer().placed()[static_cast<std::size_t>(point.placed)].grid;
+  return 1.0F - smooth_occlusion(grid.field, point.position, point.normal, options_.smooth);
 }
 
 std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const {

@@ -80,6 +80,7 @@ class Lighting {
   std::int64_t add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
                         std::span<Vec3> lamplight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
+  [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
   [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;

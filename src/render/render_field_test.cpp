@@ -5,6 +5,8 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include <quoin/mesh/smooth_occlusion.h>
+
 #include "light/occlusion_directions.h"
 #include "render/render_test_support.h"
 
@@ -127,6 +129,37 @@ TEST(RenderField, AFlatFloorIsLitAsOneOfBlocks) {
       }
     }
   }
+}
+
+TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
+  Scene scene;
+  DensityGrid field;
+  field.add_box({0, 0, 0}, {40, 10, 40}, kAir);
+  field.add_sphere({20, 14, 20}, 8.0, kAir);
+  const DensityGrid same = field.snapshot();
+  place_field(scene, std::move(field));
+  RenderOptions options = sized(40, 40);
+  options.light.shading = Shading::Occlusion;
+  options.light.occlusion = OcclusionMode::Smooth;
+  options.light.smooth.form = SmoothOcclusion::Weighted;
+  options.depth = true;
+  const Camera camera = from_above(20, 60, 20, 40);
+  const Picture picture = taken(scene, camera, options);
+  int darker = 0;
+  for (int y = 4; y < 36; ++y) {
+    for (int x = 4; x < 36; ++x) {
+      const float depth = picture.depth.values[static_cast<std::size_t>(40 * y + x)];
+      const DVec3 point(x + 0.5, 60.0 - static_cast<double>(depth), y + 0.5);
+      const DVec3 up = glm::normalize(same.gradient_at(point));
+      const float open = 1.0F - smooth_occlusion(same, point, Vec3(up), options.light.smooth);
+      darker += open < 0.9F ? 1 : 0;
+      // The picture's normals are those of light, smoother than the exact ones.
+      EXPECT_NEAR(pixel_at(picture, x, y)[0], 255.0 * open, 30.0) << x << ' ' << y;
+    }
+  }
+  EXPECT_GT(darker, 30);
+  EXPECT_EQ(pixel_at(picture, 6, 6), (Pixel{255, 255, 255})) << "flat";
+  EXPECT_EQ(pixel_at(picture, 20, 20), (Pixel{255, 255, 255})) << "convex";
 }
 
 TEST(RenderField, MaterialsColourIt) {

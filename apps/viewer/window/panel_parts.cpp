@@ -210,9 +210,27 @@ void draw_picture_part(ViewState& state) {
   }
 }
 
+// Of smooth surfaces: 27 samples of the densities around a place.
+void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
+  int form = static_cast<int>(options.form);
+  if (ImGui::Combo("smooth form", &form, "none\0share solid\0weighted\0weighted, published\0")) {
+    options.form = static_cast<SmoothOcclusion>(form);
+  }
+  ImGui::BeginDisabled(options.form == SmoothOcclusion::None);
+  const ImGuiSliderFlags flags = ImGuiSliderFlags_AlwaysClamp;
+  ImGui::SliderFloat("spread", &options.spread, 0.25F, 4.0F, "%.2f samples", flags);
+  ImGui::EndDisabled();
+  const bool is_weighted =
+      options.form == SmoothOcclusion::Weighted || options.form == SmoothOcclusion::WeightedPublished;
+  ImGui::BeginDisabled(!is_weighted);
+  ImGui::SliderFloat("offset", &options.offset, 0.0F, 0.99F, "%.2f", flags);
+  ImGui::SliderFloat("power", &options.power, 0.25F, 8.0F, "%.2f", flags | ImGuiSliderFlags_Logarithmic);
+  ImGui::EndDisabled();
+}
+
 void draw_occlusion(LightOptions& light, bool has_rays) {
   int mode = static_cast<int>(light.occlusion);
-  if (ImGui::Combo("occlusion", &mode, "off\0by rays\0of vertices\0"))
+  if (ImGui::Combo("occlusion", &mode, "off\0by rays\0of vertices\0of smooth surfaces\0"))
     light.occlusion = static_cast<OcclusionMode>(mode);
   if (!has_rays && ImGui::IsItemHovered()) ImGui::SetTooltip("meshes carry that of their vertices");
   ImGui::BeginDisabled(!has_rays || light.occlusion != OcclusionMode::Rays);
@@ -221,6 +239,9 @@ void draw_occlusion(LightOptions& light, bool has_rays) {
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
     light.occlusion_distance = reach;
   }
+  ImGui::EndDisabled();
+  ImGui::BeginDisabled(has_rays ? light.occlusion != OcclusionMode::Smooth : light.occlusion == OcclusionMode::Off);
+  draw_smooth_occlusion(light.smooth);
   ImGui::EndDisabled();
 }
 

@@ -13,9 +13,17 @@
 
 namespace quoin {
 
+/// Where a file of meshes has their occlusion.
+enum class OcclusionIn : std::uint8_t {
+  Colour,     ///< multiplied into the colours of vertices: everybody reads it, but it dims the sun as well
+  Attribute,  ///< as a float a vertex of its own, beside colours without it: what of ambient light arrives, 1 open to 0
+              ///< dark, as in glTF's occlusion textures; for a shader that dims ambient light alone
+};
+
 struct MeshFileOptions {
   std::optional<FileFormat> format{};  ///< of the mesh formats; without, that of the path's extension
   bool occlusion = true;               ///< without, the meshes' occlusion is left out
+  OcclusionIn occlusion_in = OcclusionIn::Colour;
 };
 
 /// Writes meshes as a file; returns the size of all that was written.
@@ -35,22 +43,25 @@ struct MeshFileOptions {
 ///            texture, so that its 8 bits cost them at most one more bit.
 ///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
 ///            and one rough, opaque material.
+///            OcclusionIn::Attribute: a scalar _AO (blocks have 1 - occlusion / 4: 1, 0.75, 0.5 or 0.25) of every
+///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
 ///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Smooth meshes: nine
-///            digits, sRGB colours after the coordinates, no materials.
+///            digits, sRGB colours after the coordinates, no materials. Has no place for OcclusionIn::Attribute.
 /// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
-///            emission are lost.
+///            emission are lost. OcclusionIn::Attribute: a float ao after these, 1 where a mesh has no occlusion.
 /// Left out:  parts without a triangle (their placements are glTF nodes without a mesh) or a placement.
 /// Order:     the same bytes on every run.
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
 ///            copy of surfaces whose emission takes several materials.
-/// Errors:    Unsupported for a format that is none of meshes; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of
-///            GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine
-///            or singular, when a vertex comes to lie beyond the range of floats, or when a mesh contradicts itself
-///            (arrays of different lengths, indices of no vertex, types that are not registered, numbers that are not
-///            finite). Each file appears whole or not at all; of several, those before one that fails stay.
+/// Errors:    Unsupported for a format that is none of meshes, and for OcclusionIn::Attribute in OBJ; CannotWrite;
+///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
+///            when a transform is not finite, not affine or singular, when a vertex comes to lie beyond the range of
+///            floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
+///            are not registered, numbers that are not finite). Each file appears whole or not at all; of several,
+///            those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength; Alias/Wavefront's
 ///            OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/scene/camera.h>
@@ -30,6 +31,7 @@ struct LoadOptions {
   int frame = 0;             ///< which animation frame to take
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
   std::optional<float> iso = std::nullopt;
+  Threads threads = {};  ///< for the field of a volume
 };
 
 /// MagicaVoxel's format, versions 150 and 200.

@@ -5,6 +5,7 @@
 
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/mesh/smooth.h>
 
 namespace quoin {
 
@@ -14,6 +15,8 @@ enum class OcclusionMode : std::uint8_t {
   Rays,    ///< short rays over the face's hemisphere
   Vertex,  ///< the occlusion of the face's four corners, interpolated over its triangles, as blocky meshes carry it:
            ///< it knows of the face's own grid only. Fields, which have no such corners, have Rays
+  Smooth,  ///< of fields as their smooth meshes carry it (smooth_occlusion), at every point: it knows of the own field
+           ///< only, and costs half of what rays do. Blocks have Vertex. Drawn by the processor; meshes as with Vertex
 };
 
 /// What ambient occlusion darkens.
@@ -41,6 +44,7 @@ struct LightOptions {
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
   int occlusion_rays = 9;           ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
   double occlusion_distance = 6.0;  ///< voxels
+  SmoothOcclusionOptions smooth;    ///< of OcclusionMode::Smooth
   double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels
   double exposure = 1.0;
   double sun_brightness = 1.0;  ///< times the sun's light; 0: night

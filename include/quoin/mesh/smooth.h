@@ -30,9 +30,12 @@ enum class SmoothOcclusion : std::uint8_t {
 /// default.
 struct SmoothOcclusionOptions {
   SmoothOcclusion form = SmoothOcclusion::SolidShare;
-  float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2; 1 and 2 are several times faster than others
+  float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2, rounded to 1/65,536; 1 and 2 are several times
+                        ///< faster than others
   float offset = 0.4F;  ///< of the weighted forms: 0 to 0.99
   float power = 2.0F;   ///< of the weighted forms: 1/16 to 64
+
+  bool operator==(const SmoothOcclusionOptions&) const = default;
 };
 
 /// How far, in samples of level 0, a vertex may read: an edit that is farther than this from a chunk leaves its mesh as

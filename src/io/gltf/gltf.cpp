@@ -67,7 +67,12 @@ void write_primitive(const GltfLayout& layout, const VertexTransform& transform,
   if (!view.has_albedo()) {
     for (const VoxelType type : view.types) out.put(layout.palette.texel_centre(type));
   }
-  write_colours(view, out);
+  if (primitive.occlusion.bytes == 0) {
+    write_colours(view, out);
+  } else {
+    write_colours(without_occlusion(view), out);
+    for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(openness_at(view, i));
+  }
   if (primitive.wide_indices) {
     write_indices<std::uint32_t>(view, transform.mirrors(), out);
   } else {
@@ -118,8 +123,8 @@ std::string percent_encoded(std::string_view name) {
 
 using SharedLayout = std::shared_ptr<const GltfLayout>;
 
-Result<SharedLayout> shared_layout(const SceneMeshes& meshes) {
-  auto layout = lay_out_gltf(meshes);
+Result<SharedLayout> shared_layout(const SceneMeshes& meshes, OcclusionIn occlusion) {
+  auto layout = lay_out_gltf(meshes, occlusion);
   if (!layout) return layout.error();
   return std::make_shared<const GltfLayout>(std::move(*layout));
 }
@@ -138,8 +143,9 @@ Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buf
   return total;
 }
 
-Result<std::vector<MeshFile>> plan_glb(const SceneMeshes& meshes, const std::filesystem::path& path) {
-  const auto shared = shared_layout(meshes);
+Result<std::vector<MeshFile>> plan_glb(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                       OcclusionIn occlusion) {
+  const auto shared = shared_layout(meshes, occlusion);
   if (!shared) return shared.error();
   std::string json = gltf_json(**shared, "");
   json.append((4 - json.size() % 4) % 4, ' ');
@@ -156,8 +162,9 @@ Result<std::vector<MeshFile>> plan_glb(const SceneMeshes& meshes, const std::fil
   return std::vector<MeshFile>{{path, *total, write}};
 }
 
-Result<std::vector<MeshFile>> plan_gltf(const SceneMeshes& meshes, const std::filesystem::path& path) {
-  const auto shared = shared_layout(meshes);
+Result<std::vector<MeshFile>> plan_gltf(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                        OcclusionIn occlusion) {
+  const auto shared = shared_layout(meshes, occlusion);
   if (!shared) return shared.error();
   std::vector<MeshFile> files;
   const std::filesystem::path beside = buffer_path(path);

@@ -70,6 +70,9 @@ Json attributes_json(const GltfPrimitive& primitive, Arrays& arrays) {
     attributes["COLOR_0"] = arrays.add(primitive.colours, kArrayBuffer, component, "VEC4", vertices);
     arrays.accessors.back()["normalized"] = true;
   }
+  if (primitive.occlusion.bytes > 0) {
+    attributes["_AO"] = arrays.add(primitive.occlusion, kArrayBuffer, kFloat, "SCALAR", vertices);
+  }
   return attributes;
 }
 

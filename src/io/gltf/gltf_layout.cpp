@@ -84,7 +84,7 @@ void measure(const VertexTransform& transform, GltfPrimitive& primitive) {
 }
 
 GltfPrimitive lay_out_primitive(const VertexTransform& transform, const MaterialSurfaces::Surface& surface,
-                                std::uint64_t& end) {
+                                OcclusionIn occlusion, std::uint64_t& end) {
   GltfPrimitive primitive;
   primitive.view = surface.view;
   primitive.material = surface.material;
@@ -95,7 +95,11 @@ GltfPrimitive lay_out_primitive(const VertexTransform& transform, const Material
   primitive.positions = reserve_view(vertices * 12, end);
   primitive.normals = reserve_view(vertices * 12, end);
   if (!view.has_albedo()) primitive.texture_coordinates = reserve_view(vertices * 8, end);
-  primitive.colours = reserve_view(view.has_albedo() ? vertices * 8 : view.block_occlusion.size() * 4, end);
+  const bool is_apart = occlusion == OcclusionIn::Attribute;
+  const std::uint64_t greys = is_apart ? 0 : view.block_occlusion.size() * 4;
+  primitive.colours = reserve_view(view.has_albedo() ? vertices * 8 : greys, end);
+  const bool has_occlusion = !view.block_occlusion.empty() || !view.occlusion.empty();
+  if (is_apart && has_occlusion) primitive.occlusion = reserve_view(vertices * 4, end);
   primitive.indices = reserve_view(view.indices.size() * (primitive.wide_indices ? 4 : 2), end);
   return primitive;
 }
@@ -117,7 +121,8 @@ Status add_images(GltfLayout& layout) {
 /// Lays out the meshes that nodes ask for: a part's one after the other, those of blocks as they are before reflected.
 class MeshLayout {
  public:
-  MeshLayout(const SceneMeshes& meshes, GltfLayout& layout) : meshes_(meshes), layout_(layout) {}
+  MeshLayout(const SceneMeshes& meshes, OcclusionIn occlusion, GltfLayout& layout)
+      : meshes_(meshes), occlusion_(occlusion), layout_(layout) {}
 
   void lay_out() {
     std::vector<std::size_t> order(meshes_.placements.size());
@@ -160,12 +165,13 @@ class MeshLayout {
     }
     GltfMesh mesh{std::move(name), {glm::dmat4(baked), meshes_.parts[part].pivot}, {}};
     for (const auto& surface : layout_.surfaces[part].surfaces()) {
-      mesh.primitives.push_back(lay_out_primitive(mesh.transform, surface, layout_.buffer_bytes));
+      mesh.primitives.push_back(lay_out_primitive(mesh.transform, surface, occlusion_, layout_.buffer_bytes));
     }
     layout_.meshes.push_back(std::move(mesh));
   }
 
   const SceneMeshes& meshes_;
+  OcclusionIn occlusion_;
   GltfLayout& layout_;
   std::map<Key, std::size_t> mesh_of_;  ///< by part and what is baked
   std::optional<std::size_t> part_;     ///< of the last mesh
@@ -174,7 +180,7 @@ class MeshLayout {
 
 }  // namespace
 
-Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes) {
+Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion) {
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
   GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
@@ -183,7 +189,7 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes) {
     layout.nodes.push_back(
         {name_of(meshes, placement), std::nullopt, std::visit(transform, placement.world_from_part)});
   }
-  MeshLayout(meshes, layout).lay_out();
+  MeshLayout(meshes, occlusion, layout).lay_out();
   if (!layout.palette.materials().empty() && !layout.meshes.empty()) {
     if (auto added = add_images(layout); !added) return added.error();
   }

@@ -31,7 +31,8 @@ struct GltfPrimitive {
   GltfView positions;
   GltfView normals;
   GltfView texture_coordinates;  ///< 0 bytes for smooth ones
-  GltfView colours;              ///< 0 bytes for blocks without occlusion
+  GltfView colours;              ///< 0 bytes for blocks without occlusion, or with that of its own
+  GltfView occlusion;            ///< of its own: 0 bytes where it is in the colours, or there is none
   GltfView indices;
 };
 
@@ -73,7 +74,7 @@ struct GltfLayout {
 };
 
 /// Requires: sound meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder.
-[[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes);
+[[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion = OcclusionIn::Colour);
 
 /// The JSON of a glTF file: compact, in a fixed order, names made valid UTF-8. `buffer_uri` names the file that holds
 /// the buffer, percent-encoded; empty for the GLB's own.

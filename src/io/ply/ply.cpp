@@ -27,11 +27,12 @@ struct Counts {
   std::uint64_t faces = 0;
 };
 
-std::string header_of(const Counts& counts) {
+std::string header_of(const Counts& counts, OcclusionIn occlusion) {
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin " QUOIN_VERSION "\n";
   text += "element vertex " + std::to_string(counts.vertices) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) text += "property float " + std::string(name) + "\n";
   for (const char* name : {"red", "green", "blue"}) text += "property uchar " + std::string(name) + "\n";
+  if (occlusion == OcclusionIn::Attribute) text += "property float ao\n";
   text += "element face " + std::to_string(counts.faces) + "\n";
   return text + "property list uchar int vertex_indices\nend_header\n";
 }
@@ -64,19 +65,23 @@ void put_vertex(const Vec3& position, const Vec3& normal, const Srgb& colour, Bl
 }
 
 void write_vertices(const MeshView& view, const VertexTransform& transform, const std::vector<Srgb>& colours,
-                    BlockWriter& out) {
+                    OcclusionIn occlusion, BlockWriter& out) {
+  const bool is_apart = occlusion == OcclusionIn::Attribute;
+  const MeshView coloured = is_apart ? without_occlusion(view) : view;
   if (view.has_albedo()) {
     for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
       put_vertex(Vec3(transform.position(view.positions[i])), Vec3(transform.normal(view.normals[i])),
-                 srgb_colour(view, i), out);
+                 srgb_colour(coloured, i), out);
+      if (is_apart) out.put(openness_at(view, i));
     }
     return;
   }
   const auto normals = transform.face_normals();
-  const bool has_occlusion = !view.block_occlusion.empty();
+  const bool is_darkened = !coloured.block_occlusion.empty();
   for (std::size_t i = 0; i < view.positions.size() && !out.failed(); ++i) {
     put_vertex(Vec3(transform.position(view.positions[i])), normals[static_cast<std::size_t>(view.directions[i])],
-               colours[view.types[i] * kOcclusions + (has_occlusion ? view.block_occlusion[i] : 0)], out);
+               colours[view.types[i] * kOcclusions + (is_darkened ? view.block_occlusion[i] : 0)], out);
+    if (is_apart) out.put(openness_at(view, i));
   }
 }
 
@@ -104,11 +109,11 @@ void for_each_surface(const SceneMeshes& meshes, Use use) {
   }
 }
 
-void write_content(const SceneMeshes& meshes, const std::string& header, BlockWriter& out) {
+void write_content(const SceneMeshes& meshes, OcclusionIn occlusion, const std::string& header, BlockWriter& out) {
   const std::vector<Srgb> colours = colours_of(meshes.types);
   out.put_text(header);
   for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
-    write_vertices(view, transform, colours, out);
+    write_vertices(view, transform, colours, occlusion, out);
   });
   std::uint64_t first = 0;
   for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
@@ -119,7 +124,8 @@ void write_content(const SceneMeshes& meshes, const std::string& header, BlockWr
 
 }  // namespace
 
-Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path) {
+Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path,
+                                       OcclusionIn occlusion) {
   Counts counts;
   for_each_surface(meshes, [&](const MeshView& view, const VertexTransform&) {
     counts.vertices += view.positions.size();
@@ -131,10 +137,12 @@ Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::fil
                                                     " vertices and " + std::to_string(counts.faces) +
                                                     " triangles, and a PLY file holds 2147483647 of each");
   }
-  std::string header = header_of(counts);
-  const std::uint64_t bytes = header.size() + counts.vertices * kVertexBytes + counts.faces * kFaceBytes;
-  return std::vector<MeshFile>{
-      {path, bytes, [&meshes, text = std::move(header)](BlockWriter& out) { write_content(meshes, text, out); }}};
+  std::string header = header_of(counts, occlusion);
+  const std::size_t of_vertex = kVertexBytes + (occlusion == OcclusionIn::Attribute ? sizeof(float) : 0);
+  const std::uint64_t bytes = header.size() + counts.vertices * of_vertex + counts.faces * kFaceBytes;
+  return std::vector<MeshFile>{{path, bytes, [&meshes, occlusion, text = std::move(header)](BlockWriter& out) {
+                                  write_content(meshes, occlusion, text, out);
+                                }}};
 }
 
 }  // namespace quoin

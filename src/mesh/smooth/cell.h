@@ -16,8 +16,8 @@ namespace quoin::smooth {
 
 /// A vertex as the arithmetic of its cell gives it.
 struct CellVertex {
-  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded: normals and occlusion are computed with it
-  Vec3 snapped;   ///< rounded to 1/65,536, so that it can be added to whole numbers exactly: positions
+  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded: normals are computed with it
+  Vec3 snapped;   ///< rounded to 1/65,536, so that it can be added to whole numbers exactly: positions, occlusion
   Vec3 normal;    ///< unit, into the air
 };
 
@@ -92,6 +92,9 @@ inline float snap(float f) {
   return (f + 128.0F) - 128.0F;
 }
 
+/// What is added to numbers of -8 to 8, and taken away again, to round them to 1/524,288.
+inline constexpr float kSnapOffset = 24.0F;
+
 /// The vertex of a cell that the surface crosses: the mean of the crossings of its edges.
 inline CellVertex cell_vertex(const Corners& d) {
   const float x_low[4] = {d[0], d[2], d[4], d[6]};
@@ -126,10 +129,12 @@ inline constexpr float kLeastDepth = 0.001F;
   return 1.0F / static_cast<float>(1 << level);
 }
 
-/// Where a vertex is sampled about, relative to its cell's lowest corner.
-[[gnu::always_inline]] inline Vec3 occlusion_centre(Vec3 fraction, Vec3 n, float spread) {
+/// Where a vertex is sampled about, relative to its cell's lowest corner: rounded, so that sums with whole numbers and
+/// spreads are exact, and whoever knows a vertex' position and normal finds the same, by whatever cell.
+[[gnu::always_inline]] inline Vec3 occlusion_centre(Vec3 snapped, Vec3 n, float spread) {
   const float lift = spread * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z)) + kLift;
-  return {fraction.x + n.x * lift, fraction.y + n.y * lift, fraction.z + n.z * lift};
+  const auto at = [lift](float place, float along) { return place + ((along * lift + kSnapOffset) - kSnapOffset); };
+  return {at(snapped.x, n.x), at(snapped.y, n.y), at(snapped.z, n.z)};
 }
 
 /// The lattice points around the three samples of one axis, and where between them they lie.
@@ -193,12 +198,12 @@ struct SampleAxis {
   return weighted_occlusion(sum, least, options);
 }
 
-/// The occlusion of a vertex; `density(x, y, z)` is the lattice point at that offset from the cell's lowest corner, in
-/// samples of the level.
+/// The occlusion of a vertex at a place in its cell; `density(x, y, z)` is the lattice point at that offset from the
+/// cell's lowest corner, in samples of the level.
 template <class Density>
-[[gnu::always_inline]] inline float occlusion_at_vertex(Vec3 fraction, Vec3 normal,
+[[gnu::always_inline]] inline float occlusion_at_vertex(Vec3 snapped, Vec3 normal,
                                                         const SmoothOcclusionOptions& options, Density density) {
-  const Vec3 centre = occlusion_centre(fraction, normal, options.spread);
+  const Vec3 centre = occlusion_centre(snapped, normal, options.spread);
   const std::array<SampleAxis, 3> axes = {sample_axis(centre.x, options.spread), sample_axis(centre.y, options.spread),
                                           sample_axis(centre.z, options.spread)};
   std::array<float, 27> samples{};

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "grid/density/density_storage.h"
+#include "mesh/smooth/cell.h"
 #include "mesh/smooth/scratch.h"
 
 namespace quoin::smooth {
@@ -125,6 +126,7 @@ SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level
     value = std::isnan(value) ? otherwise : std::clamp(value, least, most);
   };
   limit(occlusion.spread, 1.0F / 16.0F, level == kMaxSmoothLevel ? 2.0F : 4.0F, defaults.spread);
+  occlusion.spread = snap(occlusion.spread);
   limit(occlusion.offset, 0.0F, 0.99F, defaults.offset);
   limit(occlusion.power, 1.0F / 16.0F, 64.0F, defaults.power);
   return occlusion;
@@ -160,6 +162,17 @@ void gather_row(const Work& work, int y, int z, Half* row) {
   std::copy_n(before.data() + work.n - side, side, row - side);
   copy_thinned(parts[1], work.level, row);
   copy_thinned(parts[2], work.level, row + work.n);
+}
+
+void add_occlusion_rows(Work& work, RowSet rows, int z) {
+  for (int i = 0; i < work.apron; ++i) {
+    const RowSet raised = rows.raised();
+    rows.unite(rows.lowered());
+    rows.unite(raised);
+  }
+  for (int dz = -work.apron; dz <= work.apron + 1; ++dz) {
+    work.occlusion_rows[static_cast<std::size_t>(z + dz + kWidestApron)].unite(rows);
+  }
 }
 
 void begin_occlusion(Work& work) {

@@ -12,6 +12,12 @@ void mesh_avx2(Work& work, SmoothChunkMesh& out) {
   mesh_slices(work, out);
 }
 
+void occlude_avx2(Work& work, int z, std::size_t count, float* occlusion) {
+  Slice slice;
+  slice.z = z;
+  add_occlusion(work, slice, count, occlusion);
+}
+
 }  // namespace quoin::smooth
 
 #endif

@@ -47,13 +47,16 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
     out.normals.data()[at] = vertex.normal;
     out.cells.data()[at] = cell_code(x, y, slice.z, work.n);
     work.vertices[slice.z & 1][place] = remembered(static_cast<std::uint32_t>(i), vertex.snapped);
-    for (int axis = 0; axis < 3; ++axis) work.fractions[axis][i] = vertex.fraction[axis];
+    for (int axis = 0; axis < 3; ++axis) {
+      work.fractions[axis][i] = vertex.snapped[axis];
+      work.normals[axis][i] = vertex.normal[axis];
+    }
   }
 }
 
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion) {
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   decode_around(work, slice.z);
-  occlusion_one_by_one(work, slice, count, out, occlusion);
+  occlusion_one_by_one(work, slice, count, occlusion);
 }
 
 // The squared length of a diagonal, in 64ths of a cell.
@@ -90,6 +93,12 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
 
 void mesh_plain(Work& work, SmoothChunkMesh& out) {
   mesh_slices(work, out);
+}
+
+void occlude_plain(Work& work, int z, std::size_t count, float* occlusion) {
+  Slice slice;
+  slice.z = z;
+  add_occlusion(work, slice, count, occlusion);
 }
 
 }  // namespace quoin::smooth

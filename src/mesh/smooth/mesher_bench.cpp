@@ -10,6 +10,7 @@
 
 #include <benchmark/benchmark.h>
 #include <quoin/mesh/smooth_mesh.h>
+#include <quoin/mesh/smooth_occlusion.h>
 #include <quoin/terrain/smooth_terrain.h>
 
 #include "bench/smooth_workload.h"
@@ -67,6 +68,39 @@ void run(benchmark::State& state, const Case& what) {
     next = next + 1 == chunks.size() ? 0 : next + 1;
   }
 }
+
+// The occlusion of another's vertices, as the mesher finds it while it meshes.
+void places(benchmark::State& state) {
+  const DensityChunk chunk = workloads::density_chunk(workloads::smooth_field(Smooth::S1, 0, 0));
+  DensityGrid field;
+  field.put_chunk(IVec3{0}, chunk);
+  SmoothOptions options;
+  options.border = SmoothBorder::Open;
+  SmoothMesher mesher;
+  SmoothChunkMesh mesh;
+  mesher.mesh(field.neighbourhood(IVec3{0}), options, mesh);
+  const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
+  const SmoothPlaces all{{mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}};
+  std::vector<float> found(expected.size());
+  SmoothOccluder occluder;
+  const std::int64_t how = state.range(0);
+  for (auto _ : state) {
+    if (how == 0) {
+      occluder.occlude(field.neighbourhood(IVec3{0}), all, options.occlusion, found);
+    } else if (how == 1) {
+      smooth_occlusion(field, all, options.occlusion, found, Threads{1});
+    } else {
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        found[i] = smooth_occlusion(field, DVec3(all.positions[i]), all.normals[i], options.occlusion);
+      }
+    }
+    benchmark::DoNotOptimize(found.data());
+  }
+  if (found != expected) std::exit(1);
+  state.counters["places"] = static_cast<double>(found.size());
+}
+// Of a chunk; of a field, all at once; of a field, one by one.
+BENCHMARK(places)->Name("smooth/places")->ArgName("how")->DenseRange(0, 2)->Unit(benchmark::kMicrosecond);
 
 // A whole generated world, welded, with occlusion and materials.
 void world(benchmark::State& state) {

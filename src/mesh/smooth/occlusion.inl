@@ -29,7 +29,7 @@ inline Centres find_centres(const Work& work, const Slice& slice, std::size_t fi
   I base[3];
   F fraction[3];
   for (int i = 0; i < 3; ++i) {
-    const F centre = load(work.fractions[i] + first) + n[i] * lift;
+    const F centre = load(work.fractions[i] + first) + ((n[i] * lift + all(kSnapOffset)) - all(kSnapOffset));
     const F below = floor(centre);
     fraction[i] = centre - below;
     base[i] = to_int(below) - all(whole);
@@ -122,7 +122,7 @@ inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions&
 }
 
 template <int kSpread>
-void add_occlusion(const Work& work, const Slice& slice, std::size_t count, float* occlusion) {
+void add_occlusion_of_spread(const Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   const Thirds low_lanes(kSpread, 0);
   const Thirds high_lanes(kSpread, 1);
   const bool is_counted = work.occlusion.form == SmoothOcclusion::SolidShare;
@@ -141,14 +141,14 @@ void add_occlusion(const Work& work, const Slice& slice, std::size_t count, floa
   }
 }
 
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion) {
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   if (count == 0) return;
   decode_around(work, slice.z);
-  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, out, occlusion);
+  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, occlusion);
   if (work.occlusion.spread == 1.0F) {
-    add_occlusion<1>(work, slice, count, occlusion);
+    add_occlusion_of_spread<1>(work, slice, count, occlusion);
   } else {
-    add_occlusion<2>(work, slice, count, occlusion);
+    add_occlusion_of_spread<2>(work, slice, count, occlusion);
   }
 }
 

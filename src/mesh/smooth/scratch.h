@@ -56,6 +56,14 @@ struct RowSet {
   static RowSet of(bool has_first, std::uint64_t rows) {
     return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
   }
+  // The rows of points of a row of cells, which is given from -1 on: 0 is row -1.
+  static RowSet of_cells(int row) {
+    RowSet rows;
+    const int bit = row + 15;
+    (bit < 64 ? rows.low : rows.high) = std::uint64_t{1} << (bit & 63);
+    rows.unite(rows.raised());
+    return rows;
+  }
   [[nodiscard]] bool has(int y) const {
     const int bit = y + 16;
     return ((bit < 64 ? low : high) >> (bit & 63) & 1U) != 0;
@@ -99,7 +107,7 @@ struct Work {
   // What a place of the two last slices holds: the vertex, counted from the slice's first, in 13 bits, and its
   // fractions in 64ths, 6 bits each.
   alignas(64) std::uint32_t vertices[2][kSlicePlaces + 64];
-  // Of the slice's vertices, for occlusion.
+  // Of the slice's vertices, for occlusion: where in their cells they lie, in whole 1/65,536.
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
@@ -145,11 +153,23 @@ struct RowPart {
 // Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
 // where x = 0 is.
 void gather_row(const Work& work, int y, int z, Half* row);
+// Adds to what occlusion reads the rows of points within the apron of those of slice z of cells.
+void add_occlusion_rows(Work& work, RowSet rows, int z);
 // Makes room for the slices that occlusion reads, from that of the first cells on.
 void begin_occlusion(Work& work);
 
 void mesh_plain(Work& work, SmoothChunkMesh& out);
 void mesh_avx2(Work& work, SmoothChunkMesh& out);
 void mesh_avx512(Work& work, SmoothChunkMesh& out);
+
+// How many places one call takes.
+inline constexpr std::size_t kPlacesAtOnce = 4096;
+// The occlusion of `count` places in slice z of cells, which `places`, `fractions` and `normals` of the work hold.
+// Writes up to 64 numbers more.
+// Requires: `chunks`, `apron` and `occlusion_rows` are set, `begin_occlusion` was called, slices come in their order;
+// 0 < count <= kPlacesAtOnce, and 64 more places than that can be read.
+void occlude_plain(Work& work, int z, std::size_t count, float* occlusion);
+void occlude_avx2(Work& work, int z, std::size_t count, float* occlusion);
+void occlude_avx512(Work& work, int z, std::size_t count, float* occlusion);
 
 }  // namespace quoin::smooth

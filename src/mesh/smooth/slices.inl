@@ -81,7 +81,7 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
 // What each kernel has of its own, beside finding the places of bits: halves as floats, vertices and quads.
 void decode_row(const Half* from, float* to, int count);
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
-void add_occlusion(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out, float* occlusion);
+void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion);
 template <Axis kAxis>
 void make_quads(const Work& work, const Slice& slice, std::size_t count, std::uint32_t* out);
 
@@ -147,17 +147,9 @@ bool find_needed(Work& work) {
     if (rows.empty()) continue;
     is_any = true;
     rows.unite(rows.raised());
-    const auto slice = [z](auto& sets, int dz) -> RowSet& {
-      return sets[static_cast<std::size_t>(z + dz + kWidestApron)];
-    };
-    for (int dz = 0; dz <= 1; ++dz) slice(work.corner_rows, dz).unite(rows);
+    for (int dz = 0; dz <= 1; ++dz) work.corner_rows[static_cast<std::size_t>(z + dz + kWidestApron)].unite(rows);
     if (work.occlusion.form == SmoothOcclusion::None) continue;
-    for (int i = 0; i < work.apron; ++i) {
-      const RowSet raised = rows.raised();
-      rows.unite(rows.lowered());
-      rows.unite(raised);
-    }
-    for (int dz = -work.apron; dz <= work.apron + 1; ++dz) slice(work.occlusion_rows, dz).unite(rows);
+    add_occlusion_rows(work, rows, z);
   }
   return is_any;
 }
@@ -200,7 +192,7 @@ void decode_slice(Work& work, int z) {
   if (needed.empty()) return;
   const int slices = work.decoded_mask + 1;
   const bool is_repeated = (z & work.decoded_mask) < kRepeatedSlices;
-  for (int y = -work.apron - 1; y <= work.n + work.apron; ++y) {
+  for (int y = work.cells.first - work.apron; y <= work.cells.last + work.apron; ++y) {
     if (!needed.has(y)) continue;
     float* const row = work.decoded_row(y, z);
     decode_points(work, y, z, row);
@@ -216,14 +208,14 @@ void decode_around(Work& work, int z) {
   work.next_decoded = last + 1;
 }
 
-void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, const SmoothChunkMesh& out,
-                          float* occlusion) {
+void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   for (std::size_t i = 0; i < count; ++i) {
     const int place = work.places[i];
-    const Vec3 fraction(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
-    occlusion[i] = occlusion_at_vertex(
-        fraction, out.normals.data()[slice.first_vertex + i], work.occlusion,
-        [&](int x, int y, int z) { return work.decoded_row(row_of(place) + y, slice.z + z)[column_of(place) + x]; });
+    const Vec3 snapped(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
+    const Vec3 normal(work.normals[0][i], work.normals[1][i], work.normals[2][i]);
+    occlusion[i] = occlusion_at_vertex(snapped, normal, work.occlusion, [&](int x, int y, int z) {
+      return work.decoded_row(row_of(place) + y, slice.z + z)[column_of(place) + x];
+    });
   }
 }
 
@@ -308,7 +300,7 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
     out.cells.resize(vertices);
     if (has_occlusion) {
       out.occlusion.reserve(vertices + kSlack);
-      add_occlusion(work, slice, count, out, out.occlusion.data() + slice.first_vertex);
+      add_occlusion(work, slice, count, out.occlusion.data() + slice.first_vertex);
       out.occlusion.resize(vertices);
     }
     quads_of_slice<Axis::X>(work, slice, out);

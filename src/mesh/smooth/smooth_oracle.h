@@ -85,7 +85,7 @@ class SmoothOracle {
     // In samples of the level, as the spread is.
     const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}) / size; };
     const SmoothOcclusionOptions occlusion = smooth::within_limits(part_.occlusion, part_.level);
-    out.occlusion.push_back(smooth::occlusion_at_vertex(vertex.fraction, vertex.normal, occlusion, from_cell));
+    out.occlusion.push_back(smooth::occlusion_at_vertex(vertex.snapped, vertex.normal, occlusion, from_cell));
   }
 
   [[nodiscard]] std::optional<smooth::QuadCorner> corner(IVec3 cell, const SmoothChunkMesh& out) const {

@@ -123,8 +123,8 @@ inline void remember(Work& work, const Slice& slice, std::size_t first, std::siz
   scatter(work.vertices[slice.z & 1], place, index | fractions, count - first);
 }
 
-inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3 fraction, Lanes3 normal) {
-  const F parts[6] = {fraction.x, fraction.y, fraction.z, normal.x, normal.y, normal.z};
+inline void keep_for_occlusion(Work& work, std::size_t first, Lanes3 at, Lanes3 normal) {
+  const F parts[6] = {at.x, at.y, at.z, normal.x, normal.y, normal.z};
   for (int i = 0; i < 3; ++i) {
     store(work.fractions[i] + first, parts[i]);
     store(work.normals[i] + first, parts[3 + i]);
@@ -150,7 +150,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
     store_vectors(out.normals.data() + vertex, normal.x, normal.y, normal.z);
     store(out.cells.data() + vertex, cell_codes(x, y, slice.z, work.n));
     remember(work, slice, first, count, place, at);
-    if (has_occlusion) keep_for_occlusion(work, first, fraction, normal);
+    if (has_occlusion) keep_for_occlusion(work, first, at, normal);
   }
 }
 

@@ -21,7 +21,7 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
     return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
   };
   out.occlusion[index] =
-      occlusion_at_vertex(vertex.fraction, vertex.normal, within_limits(occlusion, cell.level), density);
+      occlusion_at_vertex(vertex.snapped, vertex.normal, within_limits(occlusion, cell.level), density);
 }
 
 /// The index of a new vertex.

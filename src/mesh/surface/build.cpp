@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <mutex>
 #include <string>
 
 #include <quoin/core/assert.h>
 
+#include "core/lender.h"
 #include "core/progress_steps.h"
 #include "grid/chunk_order.h"
 #include "mesh/smooth/levels.h"
@@ -103,26 +102,6 @@ struct Workspace {
   std::vector<std::uint32_t> places;  // by the mesh's vertex: as in Part::indices
 };
 
-// Lends workspaces to as many threads as ask.
-class Workspaces {
- public:
-  std::unique_ptr<Workspace> take() {
-    const std::lock_guard lock(mutex_);
-    if (free_.empty()) return std::make_unique<Workspace>();
-    std::unique_ptr<Workspace> workspace = std::move(free_.back());
-    free_.pop_back();
-    return workspace;
-  }
-  void give_back(std::unique_ptr<Workspace> workspace) {
-    const std::lock_guard lock(mutex_);
-    free_.push_back(std::move(workspace));
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<Workspace>> free_;
-};
-
 void reserve(const SmoothChunkMesh& mesh, Part& part) {
   part.positions.reserve(mesh.positions.size());
   part.normals.reserve(mesh.normals.size());
@@ -175,12 +154,10 @@ class Builder {
     types_ = &types;
     if (Status levels = levels_.ask(chunks_, options_.level_of); !levels) return levels.error();
     const SurfaceMaterials materials(types);
-    Workspaces workspaces;
+    Lender<Workspace> workspaces;
     parallel_for(chunks_.size(), threads_, [&](std::size_t i) {
       if (steps_.cancelled()) return;
-      std::unique_ptr<Workspace> workspace = workspaces.take();
-      mesh_chunk(i, materials, *workspace);
-      workspaces.give_back(std::move(workspace));
+      workspaces.with([&](Workspace& workspace) { mesh_chunk(i, materials, workspace); });
       steps_.step();
     });
     if (steps_.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");

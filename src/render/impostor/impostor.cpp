@@ -89,7 +89,8 @@ std::size_t ImpostorFaces::bytes() const {
 }
 
 float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position) {
-  if (mode != OcclusionMode::Vertex) return static_cast<float>(face.open_rays) / ImpostorFaces::Face::kRays;
+  if (mode != OcclusionMode::Vertex && mode != OcclusionMode::Smooth)
+    return static_cast<float>(face.open_rays) / ImpostorFaces::Face::kRays;
   if (face.occlusion == 0) return 1.0F;
   return 1.0F - occlusion_at(unpacked_corners(face.occlusion), face.voxel, face.direction, position) / 3.0F;
 }

@@ -208,7 +208,9 @@ std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
   if (light.shading == Shading::Normals) flags |= kShowNormals;
   if (light.shadows) flags |= kShadows;
   if (light.occlusion == OcclusionMode::Rays) flags |= kOcclusionRays;
-  if (light.occlusion == OcclusionMode::Vertex) flags |= kOcclusionVertex;
+  // Meshes carry the smooth occlusion of fields, and marched rays do not come here with it.
+  const bool is_of_vertices = light.occlusion == OcclusionMode::Vertex || light.occlusion == OcclusionMode::Smooth;
+  if (is_of_vertices) flags |= kOcclusionVertex;
   if (light.occlusion_affects == OcclusionAffects::All) flags |= kAffectsAll;
   if (options.detail_colours) flags |= kDetailColours;
   return flags;

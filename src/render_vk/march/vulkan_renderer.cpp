@@ -9,6 +9,17 @@
 
 namespace quoin {
 
+namespace {
+
+Status check_request(const Camera& camera, const RenderOptions& options) {
+  if (options.light.occlusion == OcclusionMode::Smooth) {
+    return make_error(ErrorCode::Unsupported, "vulkan: smooth occlusion of marched fields is the processor's");
+  }
+  return check(camera, options);
+}
+
+}  // namespace
+
 Result<vulkan::Subject> vulkan::Subject::of(RendererImpl& impl, const Camera& camera, const RenderOptions& options) {
   Subject subject(impl.scene.placement());
   if (!options.detail || impl.voxels == nullptr) return subject;
@@ -68,7 +79,7 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
 }
 
 Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
-  if (const Status status = check(camera, options); !status) return status.error();
+  if (const Status status = check_request(camera, options); !status) return status.error();
   const auto subject = vulkan::Subject::of(*impl_, camera, options);
   if (!subject) return subject.error();
   auto lamps = impl_->lamp_table(options);
@@ -81,7 +92,7 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
 Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
                             Accumulation accumulation, const Progress& progress) {
   constexpr int kMaxSamples = 4096;
-  if (Status status = check(camera, options); !status) return status;
+  if (Status status = check_request(camera, options); !status) return status;
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
   if (target.device != impl_->device.get()) {
     return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");

@@ -1,0 +1,111 @@
+#pragma once
+
+// Occlusion at places that nobody meshed: where each lies, and the places of one chunk, slice by slice.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <quoin/mesh/smooth_occlusion.h>
+
+#include "mesh/smooth/cell.h"
+#include "mesh/smooth/scratch.h"
+
+namespace quoin::smooth {
+
+/// A place as a vertex: in whole 1/65,536 of a cell of the level.
+struct CellPlace {
+  IVec3 cell;    ///< of the whole field, at the level
+  Vec3 snapped;  ///< 0 to 1 within it
+};
+
+/// The whole number below. Requires: within the range of int64. Without a call to the library, as the standard's is.
+inline std::int64_t whole_below(double at) {
+  const auto whole = static_cast<std::int64_t>(at);
+  return whole - (static_cast<double>(whole) > at ? 1 : 0);
+}
+
+/// False for NaN too.
+inline bool is_in_int32(DVec3 position) {
+  constexpr double kLimit = 2'147'483'648.0;
+  const auto is_in = [](double at) { return at >= -kLimit && at < kLimit; };
+  return is_in(position.x) && is_in(position.y) && is_in(position.z);
+}
+
+/// None where the position is NaN or outside the int32 range. The position is in samples of level 0.
+inline std::optional<CellPlace> place_at(DVec3 position, int level) {
+  if (!is_in_int32(position)) return std::nullopt;
+  const DVec3 at = position * double{depth_unit(level)};
+  CellPlace place{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t whole = whole_below(at[axis]);
+    place.cell[axis] = static_cast<int>(whole);
+    place.snapped[axis] = snap(static_cast<float>(at[axis] - static_cast<double>(whole)));
+  }
+  return place;
+}
+
+[[nodiscard]] Vec3 unit_or_up(Vec3 normal);
+
+/// What occlusion reads a normal as.
+inline Vec3 sound_normal(Vec3 normal) {
+  constexpr float kTolerance = 1e-3F;
+  const float square = (normal.x * normal.x + normal.y * normal.y) + normal.z * normal.z;
+  return std::abs(square - 1.0F) <= kTolerance ? normal : unit_or_up(normal);
+}
+
+/// The occlusion of far air.
+[[nodiscard]] float open_occlusion(const SmoothOcclusionOptions& options);
+
+/// The settings as they count, at the level at which they do.
+struct Sampling {
+  SmoothOcclusionOptions occlusion;
+  int level = 0;
+
+  Sampling(const SmoothOcclusionOptions& wanted, int wanted_level);
+};
+
+/// Of one place, sample by sample. `place.cell` is relative to the centre chunk's first.
+[[nodiscard]] float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& place, Vec3 normal,
+                                       const Sampling& sampling);
+
+/// Places of one chunk.
+struct ChunkPlaces {
+  const SmoothPlaces& places;
+  IVec3 chunk{0};                          ///< its coordinates, where `places` has the field's
+  std::span<const std::uint32_t> numbers;  ///< of those that lie in the chunk or a cell around it; others are far air
+};
+
+/// The mesher's kernels for occlusion, with whatever the places of a chunk read.
+class PlaceKernel {
+ public:
+  PlaceKernel();
+
+  void occlude(const DensityNeighbourhood& chunks, const ChunkPlaces& places, const Sampling& sampling,
+               std::span<float> out);
+
+ private:
+  using Kernel = void (*)(Work&, int z, std::size_t count, float* occlusion);
+
+  void sort_by_slice(const ChunkPlaces& places, const Sampling& sampling, std::span<float> out);
+  void occlude_some(const SmoothPlaces& places, int z, std::size_t first, std::size_t count, std::span<float> out);
+
+  struct Entry {
+    std::uint32_t number;
+    std::uint16_t place;
+    std::int16_t z;
+    Vec3 snapped;
+  };
+
+  Kernel kernel_;
+  Work work_;
+  std::vector<Entry> entries_;                                  // those in reach, as they came
+  std::vector<Entry> sorted_;                                   // by slice
+  std::array<std::uint32_t, kChunkEdge + 3> first_of_slice_{};  // [z + 1], from cell -1 on
+  std::array<float, kPlacesAtOnce + 64> occlusion_{};
+};
+
+}  // namespace quoin::smooth

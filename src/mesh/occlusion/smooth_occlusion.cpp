@@ -1,0 +1,159 @@
+#include <quoin/mesh/smooth_occlusion.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include <quoin/core/assert.h>
+
+#include <tsl/robin_map.h>
+
+#include "core/lender.h"
+#include "grid/coordinate_hash.h"
+#include "mesh/occlusion/places.h"
+
+namespace quoin {
+
+namespace {
+
+using smooth::CellPlace;
+using smooth::PlaceKernel;
+using smooth::Sampling;
+
+// Fewer places in a chunk than these are done one by one: the kernels' rows are read for nothing.
+constexpr std::size_t kFewPlaces = 24;
+
+void check_places(const SmoothPlaces& places, std::span<float> out) {
+  QUOIN_ASSERT(places.normals.size() == places.positions.size(), "as many normals as positions");
+  QUOIN_ASSERT(out.size() >= places.positions.size(), "room for every place");
+  QUOIN_ASSERT(places.positions.size() < std::numeric_limits<std::uint32_t>::max(), "less than 2^32 places");
+}
+
+// Requires: within the int32 range.
+IVec3 chunk_at(DVec3 position) {
+  const auto chunk = [](double at) { return static_cast<int>(smooth::whole_below(at) >> kChunkShift); };
+  return {chunk(position.x), chunk(position.y), chunk(position.z)};
+}
+
+// A place's chunk, and its cell from the chunk's first on.
+CellPlace in_chunk(const CellPlace& place, IVec3 chunk, int level) {
+  return {place.cell - chunk * (kChunkEdge >> level), place.snapped};
+}
+
+// The places of a field, chunk by chunk.
+class PlacesByChunk {
+ public:
+  PlacesByChunk(const SmoothPlaces& places, const Sampling& sampling, std::span<float> out) {
+    const std::size_t count = places.positions.size();
+    const float open = smooth::open_occlusion(sampling.occlusion);
+    constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::uint32_t> chunk_of_place(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const DVec3 position = DVec3(places.positions[i]) + DVec3(places.origin);
+      if (smooth::is_in_int32(position)) {
+        chunk_of_place[i] = index_of(chunk_at(position));
+      } else {
+        chunk_of_place[i] = kNowhere;
+        out[i] = open;
+      }
+    }
+    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    numbers_.resize(first_.back());
+    std::vector<std::uint32_t> next = first_;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (chunk_of_place[i] != kNowhere) numbers_[next[chunk_of_place[i]]++] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const { return chunks_.size(); }
+  [[nodiscard]] IVec3 chunk(std::size_t i) const { return chunks_[i]; }
+  [[nodiscard]] std::span<const std::uint32_t> numbers(std::size_t i) const {
+    return std::span(numbers_).subspan(first_[i], first_[i + 1] - first_[i]);
+  }
+
+ private:
+  // Counts one more place of the chunk.
+  std::uint32_t index_of(IVec3 chunk) {
+    if (chunks_.empty() || chunk != chunks_[last_]) {
+      const auto [found, is_new] = indices_.try_emplace(chunk, static_cast<std::uint32_t>(chunks_.size()));
+      last_ = found->second;
+      if (is_new) {
+        chunks_.push_back(chunk);
+        first_.push_back(0);
+      }
+    }
+    ++first_[last_ + 1];
+    return last_;
+  }
+
+  tsl::robin_map<IVec3, std::uint32_t, CoordinateHash> indices_;
+  std::vector<IVec3> chunks_;
+  std::uint32_t last_ = 0;
+  std::vector<std::uint32_t> first_{
+      0};  // of each chunk, in `numbers_`; while places are counted, how many the one before has
+  std::vector<std::uint32_t> numbers_;
+};
+
+}  // namespace
+
+float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, const SmoothOcclusionOptions& options,
+                       int level) {
+  const Sampling sampling(options, level);
+  if (sampling.occlusion.form == SmoothOcclusion::None) return 0.0F;
+  const auto place = smooth::place_at(position, sampling.level);
+  if (!place) return smooth::open_occlusion(sampling.occlusion);
+  const IVec3 chunk = chunk_at(position);
+  return smooth::occlusion_of_place(field.neighbourhood(chunk), in_chunk(*place, chunk, sampling.level), normal,
+                                    sampling);
+}
+
+void smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
+                      std::span<float> out, Threads threads) {
+  check_places(places, out);
+  const Sampling sampling(options, places.level);
+  if (sampling.occlusion.form == SmoothOcclusion::None)
+    return void(std::fill_n(out.begin(), places.positions.size(), 0.0F));
+  const PlacesByChunk chunks(places, sampling, out);
+  Lender<PlaceKernel> kernels;
+  parallel_for(chunks.size(), threads, [&](std::size_t i) {
+    const IVec3 chunk = chunks.chunk(i);
+    const DensityNeighbourhood neighbourhood = field.neighbourhood(chunk);
+    const auto numbers = chunks.numbers(i);
+    if (numbers.size() >= kFewPlaces) {
+      kernels.with([&](PlaceKernel& kernel) {
+        kernel.occlude(neighbourhood, {places, chunk, numbers}, sampling, out);
+      });
+      return;
+    }
+    for (const std::uint32_t number : numbers) {
+      const auto place = smooth::place_at(DVec3(places.positions[number]) + DVec3(places.origin), sampling.level);
+      out[number] = smooth::occlusion_of_place(neighbourhood, in_chunk(*place, chunk, sampling.level),
+                                               places.normals[number], sampling);
+    }
+  });
+}
+
+struct SmoothOccluder::Scratch {
+  PlaceKernel kernel;
+  std::vector<std::uint32_t> numbers;
+};
+
+SmoothOccluder::SmoothOccluder() : scratch_(std::make_unique<Scratch>()) {}
+SmoothOccluder::SmoothOccluder(SmoothOccluder&&) noexcept = default;
+SmoothOccluder& SmoothOccluder::operator=(SmoothOccluder&&) noexcept = default;
+SmoothOccluder::~SmoothOccluder() = default;
+
+void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothPlaces& places,
+                             const SmoothOcclusionOptions& options, std::span<float> out) {
+  check_places(places, out);
+  const Sampling sampling(options, places.level);
+  const std::size_t count = places.positions.size();
+  if (sampling.occlusion.form == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
+  for (std::size_t i = scratch_->numbers.size(); i < count; ++i) {
+    scratch_->numbers.push_back(static_cast<std::uint32_t>(i));
+  }
+  scratch_->kernel.occlude(chunks, {places, IVec3{0}, std::span(scratch_->numbers).first(count)}, sampling, out);
+}
+
+}  // namespace quoin

@@ -1,0 +1,187 @@
+#include <quoin/mesh/smooth_occlusion.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <quoin/mesh/smooth_mesh.h>
+#include <quoin/terrain/smooth_terrain.h>
+
+#include "core/instruction_sets_for_tests.h"
+#include "mesh/smooth/test_support.h"
+
+namespace quoin {
+namespace {
+
+constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
+                                      SmoothOcclusion::WeightedPublished};
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// Hills with caves in chunks on both sides of the origin, with a material each.
+DensityGrid hilly_field() {
+  DensityGrid grid(kBand);
+  const auto field = [](IVec3 p) {
+    return 0.8 * p.y + 9.0 * std::sin(0.11 * p.x) * std::cos(0.13 * p.z) + 3.0 * std::sin(0.5 * p.x + 0.4 * p.y) -
+           2.0 * std::cos(0.61 * p.z - 0.3 * p.y);
+  };
+  for (int i = 0; i < 8; ++i) {
+    const IVec3 chunk(-(i & 1), -(i >> 1 & 1), -(i >> 2));
+    grid.put_chunk(chunk, chunk_of_field(field, chunk));
+  }
+  return grid;
+}
+
+std::vector<float> occlusion_of(const DensityGrid& field, const SmoothPlaces& places,
+                                const SmoothOcclusionOptions& options, Threads threads = {}) {
+  std::vector<float> out(places.positions.size(), -1.0F);
+  smooth_occlusion(field, places, options, out, threads);
+  return out;
+}
+
+TEST(SmoothOcclusionOfPlaces, IsToTheBitWhatTheMesherStores) {
+  const DensityGrid field = hilly_field();
+  for (const SmoothOcclusion form : kForms) {
+    for (const float spread : {0.0625F, 0.4F, 1.0F, 1.7F, 2.0F, 4.0F}) {
+      SCOPED_TRACE(testing::Message() << "form " << static_cast<int>(form) << ", spread " << spread);
+      SmoothMeshOptions options;
+      options.occlusion = {form, spread, 0.3F, spread == 1.0F ? 1.5F : 2.0F};
+      const auto mesh = build_smooth_mesh(field, {}, options);
+      ASSERT_TRUE(mesh);
+      ASSERT_GT(mesh->positions.size(), 20'000U);
+      EXPECT_GT(*std::ranges::max_element(mesh->occlusion), 0.2F);
+      const std::vector<float> found = occlusion_of(field, {mesh->positions, mesh->normals}, options.occlusion);
+      ASSERT_EQ(found, mesh->occlusion);
+      for (std::size_t i = 0; i < found.size(); i += 37) {
+        ASSERT_EQ(smooth_occlusion(field, DVec3(mesh->positions[i]), mesh->normals[i], options.occlusion), found[i]);
+      }
+    }
+  }
+}
+
+TEST(SmoothOcclusionOfPlaces, IsThatOfTheChunksMeshWithAnyInstructionsAtAnyLevel) {
+  const DensityGrid field = hilly_field();
+  const IVec3 chunk(-1, -1, -1);
+  for (int level = 0; level <= kMaxSmoothLevel; ++level) {
+    for (const SmoothOcclusion form : kForms) {
+      for (const float spread : {0.7F, 1.0F, 2.0F, 4.0F}) {
+        const SmoothOptions options = with(form, level, spread);
+        SmoothMesher mesher;
+        SmoothChunkMesh mesh;
+        mesher.mesh(field.neighbourhood(chunk), options, mesh);
+        ASSERT_GT(mesh.positions.size(), 60U);
+        SmoothPlaces places{{mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}};
+        places.level = level;
+        const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
+        std::vector<float> found(expected.size());
+        for (const InstructionSet set : sets_of_this_machine()) {
+          const InstructionSetOverride over(set);
+          SmoothOccluder().occlude(field.neighbourhood(chunk), places, options.occlusion, found);
+          ASSERT_EQ(found, expected) << "level " << level << ", spread " << spread;
+        }
+        places.origin = chunk * kChunkEdge;
+        ASSERT_EQ(occlusion_of(field, places, options.occlusion), expected);
+      }
+    }
+  }
+}
+
+TEST(SmoothOcclusionOfPlaces, IsTheSameFarFromTheOrigin) {
+  const IVec3 far_chunk(30'000'000, -33'000'000, 20'000'000);
+  DensityGrid near(kBand);
+  DensityGrid far(kBand);
+  const DensityChunk ball = chunk_of_field([](IVec3 p) { return 20.0 - glm::length(DVec3(p) - 31.3); });
+  near.put_chunk(IVec3(0), ball);
+  far.put_chunk(far_chunk, ball);
+  SmoothMesher mesher;
+  SmoothChunkMesh mesh;
+  mesher.mesh(near.neighbourhood(IVec3(0)), with(SmoothOcclusion::Weighted), mesh);
+  const SmoothPlaces places{
+      {mesh.positions.data(), mesh.positions.size()}, {mesh.normals.data(), mesh.normals.size()}, far_chunk * 64, 0};
+  const std::vector<float> expected(mesh.occlusion.begin(), mesh.occlusion.end());
+  EXPECT_EQ(occlusion_of(far, places, with(SmoothOcclusion::Weighted).occlusion), expected);
+}
+
+TEST(SmoothOcclusionOfPlaces, IsTheSameInAnyOrderAndCompany) {
+  const DensityGrid field = hilly_field();
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> at(-90.0F, 80.0F);
+  std::normal_distribution<float> normal;
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;
+  // So many in one slice that they take several calls of a kernel.
+  for (int i = 0; i < 30'000; ++i) {
+    const float z = i % 2 == 0 ? at(random) : -3.0F + 0.5F * std::sin(static_cast<float>(i));
+    positions.emplace_back(at(random), at(random), z);
+    normals.push_back(glm::normalize(Vec3(normal(random), normal(random), normal(random))));
+  }
+  for (const SmoothOcclusion form : kForms) {
+    const SmoothOcclusionOptions options{form, 2.0F, 0.4F, 2.0F};
+    const std::vector<float> all = occlusion_of(field, {positions, normals}, options, Threads{1});
+    ASSERT_EQ(occlusion_of(field, {positions, normals}, options, Threads{4}), all);
+    for (std::size_t i = 0; i < positions.size(); i += 101) {
+      ASSERT_EQ(smooth_occlusion(field, DVec3(positions[i]), normals[i], options), all[i]);
+      ASSERT_GE(all[i], 0.0F);
+      ASSERT_LE(all[i], 1.0F);
+    }
+    const std::vector<float> some =
+        occlusion_of(field, {std::span(positions).subspan(500, 40), std::span(normals).subspan(500, 40)}, options);
+    EXPECT_TRUE(std::ranges::equal(some, std::span(all).subspan(500, 40)));
+  }
+}
+
+TEST(SmoothOcclusionOfPlaces, FarAirIsOpenWhereverItIsAsked) {
+  const DensityGrid field = hilly_field();
+  const std::vector<Vec3> positions = {{kNaN, 0, 0}, {0, kInfinity, 0}, {0, 0, -kInfinity},
+                                       {3e9F, 0, 0}, {0, -4e37F, 0},    {1e6F, 5, 5},
+                                       {0, 500, 0},  {2.1e9F, 0, 0},    {-2.147e9F, 0, 0}};
+  const std::vector<Vec3> normals(positions.size(), Vec3(0, 1, 0));
+  for (const SmoothOcclusion form : kForms) {
+    const SmoothOcclusionOptions options{form, 2.0F, 0.4F, 2.0F};
+    const float open = form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;
+    for (const float found : occlusion_of(field, {positions, normals}, options)) EXPECT_EQ(found, open);
+    for (const Vec3& position : positions) {
+      EXPECT_EQ(smooth_occlusion(field, DVec3(position), {0, 1, 0}, options), open);
+    }
+    EXPECT_EQ(smooth_occlusion(DensityGrid(), {1, 2, 3}, {0, 1, 0}, options), open);
+    std::vector<float> of_chunk(positions.size(), -1.0F);
+    SmoothOccluder().occlude(field.neighbourhood({0, 9, 0}), {positions, normals}, options, of_chunk);
+    for (const float found : of_chunk) EXPECT_EQ(found, open);
+  }
+  EXPECT_EQ(smooth_occlusion(field, {0, -30, 0}, {0, 1, 0}, {SmoothOcclusion::None, 2.0F, 0.4F, 2.0F}), 0.0F);
+  EXPECT_EQ(smooth_occlusion(field, {-20, -50, -20}, {0, 1, 0}), 1.0F) << "deep in the rock";
+}
+
+TEST(SmoothOcclusionOfPlaces, NormalsAreMadeUnitAndUpWithoutADirection) {
+  const DensityGrid field = hilly_field();
+  const DVec3 position(-7.3, -4.2, -11.9);
+  const SmoothOcclusionOptions options{SmoothOcclusion::Weighted, 2.0F, 0.4F, 2.0F};
+  const float up = smooth_occlusion(field, position, {0, 1, 0}, options);
+  for (const Vec3 normal : {Vec3(0), Vec3(kNaN, 0, 1), Vec3(kInfinity, 0, 0), Vec3(0, 7, 0), Vec3(0, 1e-30F, 0),
+                            Vec3(0, 3e38F, 0), Vec3(0, 0.99F, 0)}) {
+    EXPECT_EQ(smooth_occlusion(field, position, normal, options), up) << normal.x << " " << normal.y;
+  }
+  EXPECT_NE(smooth_occlusion(field, position, {0, -1, 0}, options), up);
+}
+
+TEST(SmoothOcclusionOfPlaces, NumbersOutOfRangeCountAsForTheMesher) {
+  const DensityGrid field = hilly_field();
+  const DVec3 position(-7.3, -4.2, -11.9);
+  const auto at = [&](SmoothOcclusionOptions options, int level = 0) {
+    return smooth_occlusion(field, position, {0.6F, 0.8F, 0}, options, level);
+  };
+  EXPECT_EQ(at({SmoothOcclusion::Weighted, 99.0F, 0.4F, 2.0F}), at({SmoothOcclusion::Weighted, 4.0F, 0.4F, 2.0F}));
+  EXPECT_EQ(at({SmoothOcclusion::Weighted, kNaN, kNaN, kNaN}), at({SmoothOcclusion::Weighted, 2.0F, 0.4F, 2.0F}));
+  EXPECT_EQ(at({}, 99), at({}, kMaxSmoothLevel));
+  EXPECT_EQ(at({}, -1), at({}, 0));
+}
+
+TEST(SmoothOcclusionOfPlaces, OfNoPlacesIsNothing) {
+  EXPECT_TRUE(occlusion_of(hilly_field(), {}, {}).empty());
+}
+
+}  // namespace
+}  // namespace quoin
