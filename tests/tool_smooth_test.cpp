@@ -194,7 +194,7 @@ TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
       {"out.glb --mesher smooth --no-ao --ao-form share", "--ao-form: --no-ao leaves occlusion out"},
       {"out.glb --no-ao --ao-attribute", "--ao-attribute: --no-ao leaves occlusion out"},
       {"out.obj --ao-attribute", "--ao-attribute: .obj has no place for it"},
-      {"out.vox --ao-attribute", "--mesher, --no-ao, --ao-..., --watertight, --iso and --simplify are for mesh"}};
+      {"out.vox --ao-attribute", "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite"}};
   for (const auto& [arguments, error] : errors) {
     const ToolRun result = run("convert tiny.vox " + arguments);
     EXPECT_EQ(result.status, 2) << arguments;
