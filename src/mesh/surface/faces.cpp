@@ -19,7 +19,7 @@ struct ListedCopy {
 /// The copies that each vertex needs.
 class Copies {
  public:
-  explicit Copies(std::size_t vertices) : first_(vertices), count_(vertices + 1) {}
+  explicit Copies(std::size_t vertices) : first_(vertices), count_(vertices + 1) { all_.reserve(vertices); }
 
   /// The number, among the copies of the vertex, of that with the look.
   std::uint32_t find_or_add(std::uint32_t vertex, const FaceLook& look) {
@@ -115,7 +115,15 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
   faces.reserve(mesh.indices.size() / 3);
   const ChunkLevels levels(options.levels);
   if (levels.all_same() && options.levels[0] == 0) {
-    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    std::size_t i = 0;
+    // Quads, whose two triangles are one face; then triangles, which all have a vertex in a bridge.
+    const auto is_bridge = [&](std::uint32_t vertex) { return mesh.cells[vertex].bridge_axis() >= 0; };
+    for (; i + 6 <= mesh.indices.size(); i += 6) {
+      const std::uint32_t* quad = mesh.indices.data() + i;
+      if (is_bridge(quad[0]) || is_bridge(quad[1]) || is_bridge(quad[2]) || is_bridge(quad[5])) break;
+      faces.insert(faces.end(), 2, face_around_edge(chunks, mesh, quad));
+    }
+    for (; i < mesh.indices.size(); i += 3) {
       faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
     }
     return;
