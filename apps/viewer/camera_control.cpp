@@ -48,6 +48,25 @@ void CameraControl::set_pivot(DVec3 pivot) {
   if (is_finite(pivot)) pivot_ = pivot;
 }
 
+void CameraControl::look_level(double vertical_fov) {
+  pitch_ = 0.0;
+  camera_.projection = Camera::Projection::Perspective;
+  set_vertical_fov(vertical_fov);
+  apply_angles();
+}
+
+void CameraControl::set_vertical_fov(double radians) {
+  if (radians > 0.0 && radians < std::numbers::pi) camera_.vertical_fov = radians;
+}
+
+void CameraControl::move_to(DVec3 position) {
+  if (!is_finite(position)) return;
+  pivot_ += position - camera_.position;
+  camera_.position = position;
+  velocity_ = DVec3{0.0};
+  zoom_left_ = 0.0;
+}
+
 void CameraControl::face(DVec3 point) {
   const DVec3 way = point - camera_.position;
   const double level = std::hypot(way.x, way.z);

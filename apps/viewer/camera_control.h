@@ -11,6 +11,7 @@ namespace quoin::viewer {
 enum class CameraMode : std::uint8_t {
   Fly,    ///< turns the head
   Orbit,  ///< turns about the pivot
+  Walk,   ///< turns the head; a Walker moves the camera
 };
 
 /// Where the keys push, in the camera's own axes, each -1 to 1: right, up (of the world) and forward.
@@ -42,6 +43,11 @@ class CameraControl {
   /// The point that orbiting and zooming keep in its place in the picture.
   void set_pivot(DVec3 pivot);
 
+  /// Looks to the horizon, in perspective, through an angle of view (radians).
+  void look_level(double vertical_fov);
+  void set_vertical_fov(double radians);
+  /// Moves the camera, and the pivot as far. It glides no further.
+  void move_to(DVec3 position);
   /// Turns the head to a point, which becomes the pivot.
   void face(DVec3 point);
 

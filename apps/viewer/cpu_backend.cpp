@@ -57,8 +57,8 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
 }  // namespace
 
 struct CpuBackend::Impl {
-  Impl(const Scene& scene, const CpuBackendOptions& given, std::function<void()> listener)
-      : options(given), on_frame(std::move(listener)), renderer(scene, given.instances, given.threads) {
+  Impl(const Scene& shown, const CpuBackendOptions& given, std::function<void()> listener)
+      : scene(shown), options(given), on_frame(std::move(listener)), renderer(shown, given.instances, given.threads) {
     worker = std::thread([this] { work(); });
   }
 
@@ -85,6 +85,7 @@ struct CpuBackend::Impl {
     if (on_frame) on_frame();
   }
 
+  const Scene& scene;
   CpuBackendOptions options;
   std::function<void()> on_frame;
   CpuRenderer renderer;
@@ -251,6 +252,11 @@ std::optional<SceneHit> CpuBackend::pick(const Camera& camera, double x, double 
   // Only `resume`, on this thread, asks for an update of the tracer: without one under way it stays as it is.
   if (width <= 0 || height <= 0 || !is_up_to_date()) return std::nullopt;
   return quoin::pick(impl_->renderer.tracer(), camera, x, y, width, height);
+}
+
+std::optional<SlideResult> CpuBackend::slide(const OrientedBox& box, DVec3 displacement, const SlideOptions& options) {
+  if (!is_up_to_date()) return std::nullopt;
+  return move_and_slide(impl_->renderer.tracer(), impl_->scene.types, box, displacement, options);
 }
 
 bool CpuBackend::is_up_to_date() {

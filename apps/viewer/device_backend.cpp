@@ -392,6 +392,11 @@ void DeviceBackend::resume(bool changed) {
   impl_->cpu.resume(changed);
 }
 
+std::optional<SlideResult> DeviceBackend::slide(const OrientedBox& box, DVec3 displacement,
+                                                const SlideOptions& options) {
+  return impl_->cpu.slide(box, displacement, options);
+}
+
 std::optional<SceneHit> DeviceBackend::pick(const Camera& camera, double x, double y, int width, int height) {
   return impl_->cpu.pick(camera, x, y, width, height);
 }

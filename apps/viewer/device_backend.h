@@ -43,6 +43,8 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::optional<Error> fault() override;
   double pause() override;
   void resume(bool changed) override;
+  [[nodiscard]] std::optional<SlideResult> slide(const OrientedBox& box, DVec3 displacement,
+                                                 const SlideOptions& options) override;
   [[nodiscard]] std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width, int height) override;
   [[nodiscard]] bool is_up_to_date() override;
 

@@ -171,7 +171,7 @@ std::string to_json(const Settings& settings) {
   Json object = {{"width", settings.width},
                  {"height", settings.height},
                  {"panel", settings.is_panel_shown},
-                 {"fly", settings.camera_mode == CameraMode::Fly},
+                 {"fly", settings.camera_mode != CameraMode::Orbit},
                  {"samples", settings.samples},
                  {"detail_by_pixels", settings.detail_by_pixels},
                  {"mode", kModes[static_cast<std::size_t>(settings.mode)]},

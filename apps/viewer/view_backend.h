@@ -15,6 +15,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
+#include <quoin/scene/sweep.h>
 
 namespace quoin::viewer {
 
@@ -103,6 +104,9 @@ class ViewBackend {
   [[nodiscard]] virtual std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width,
                                                      int height) = 0;
   [[nodiscard]] virtual bool is_up_to_date() = 0;
+  /// `move_and_slide` in the scene; nothing while an edit is being taken over.
+  [[nodiscard]] virtual std::optional<SlideResult> slide(const OrientedBox& box, DVec3 displacement,
+                                                         const SlideOptions& options) = 0;
 
   /// Lets go of its graphics device, if it has one: for one that was lost.
   virtual void forget_device() {}

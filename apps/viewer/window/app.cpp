@@ -113,7 +113,8 @@ void App::note_size() {
 // Whether the next frame cannot come too soon.
 bool App::is_moving() const {
   const bool is_drawing = state_.open.backend && state_.open.backend->wants_frames();
-  return is_drawing || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
+  const bool is_falling = state_.camera.mode == CameraMode::Walk && state_.walker.is_moving();
+  return is_drawing || is_falling || state_.camera.is_gliding() || !input_.push().is_zero() || input_.editing.is_busy();
 }
 
 bool App::is_animating() const {
@@ -179,7 +180,14 @@ void App::frame() {
   take_loaded();
   take_saved();
   if (screen_->is_minimised()) return;
-  state_.camera.advance(step, input_.push(), input_.boost());
+  if (state_.camera.mode == CameraMode::Walk) {
+    state_.walker.advance(step, input_.push(), input_.boost(), state_.camera,
+                          [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
+                            return state_.open.backend ? state_.open.backend->slide(box, way, options) : std::nullopt;
+                          });
+  } else {
+    state_.camera.advance(step, input_.push(), input_.boost());
+  }
   input_.editing.advance(state_);
   state_.pixels_per_unit = screen_->pixels_per_unit();
   gui_->begin_frame();
@@ -332,8 +340,14 @@ void App::run_command(Command command) {
     case Command::PickType:
       return pick_type();
     case Command::CameraMode:
-      state_.camera.mode = state_.camera.mode == CameraMode::Fly ? CameraMode::Orbit : CameraMode::Fly;
-      state_.settings.camera_mode = state_.camera.mode;
+      switch (state_.camera.mode) {
+        case CameraMode::Orbit:
+          return state_.set_camera_mode(CameraMode::Fly);
+        case CameraMode::Fly:
+          return state_.set_camera_mode(CameraMode::Walk);
+        case CameraMode::Walk:
+          return state_.set_camera_mode(CameraMode::Orbit);
+      }
       return;
     case Command::Focus:
       if (state_.hover) state_.camera.face(state_.hover->position);
@@ -353,6 +367,7 @@ void App::show_from(View view) {
   if (!state_.open.backend || !state_.has_picture_place()) return;
   const double aspect = static_cast<double>(state_.picture_place.w) / state_.picture_place.h;
   const InstanceFilter filter = options_.instances();
+  if (state_.camera.mode == CameraMode::Walk) state_.set_camera_mode(CameraMode::Orbit);
   state_.camera.set(frame_scene(state_.scene(), view, aspect, filter), state_.scene().bounds(filter));
 }
 

@@ -112,6 +112,7 @@ void App::adopt(OpenDocument opened) {
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
+  if (state_.camera.mode == CameraMode::Walk) state_.set_camera_mode(CameraMode::Orbit);
   if (loaded.camera) {
     state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.instances()));
   } else {

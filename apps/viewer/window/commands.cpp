@@ -24,7 +24,7 @@ constexpr std::array kCommands = {
     CommandInfo{Command::BrushLarger, "Larger brush", "]", SDLK_RIGHTBRACKET, false, false},
     CommandInfo{Command::BrushShape, "Box or sphere", "B", SDLK_b, false, false},
     CommandInfo{Command::PickType, "Take the type under the mouse", "I", SDLK_i, false, false},
-    CommandInfo{Command::CameraMode, "Orbit or fly", "C", SDLK_c, false, false},
+    CommandInfo{Command::CameraMode, "Orbit, fly or walk", "C", SDLK_c, false, false},
     CommandInfo{Command::Focus, "Look at what is under the mouse", "F", SDLK_f, false, false},
     CommandInfo{Command::ViewIso, "Show all", "Home", SDLK_HOME, false, false},
     CommandInfo{Command::ViewFront, "From the front", "Shift+1", SDLK_1, false, true},

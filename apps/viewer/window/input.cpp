@@ -20,8 +20,9 @@ struct PushKey {
 constexpr std::array kPushKeys = {PushKey{SDL_SCANCODE_W, {0, 0, 1}},     PushKey{SDL_SCANCODE_S, {0, 0, -1}},
                                   PushKey{SDL_SCANCODE_D, {1, 0, 0}},     PushKey{SDL_SCANCODE_A, {-1, 0, 0}},
                                   PushKey{SDL_SCANCODE_E, {0, 1, 0}},     PushKey{SDL_SCANCODE_Q, {0, -1, 0}},
-                                  PushKey{SDL_SCANCODE_UP, {0, 0, 1}},    PushKey{SDL_SCANCODE_DOWN, {0, 0, -1}},
-                                  PushKey{SDL_SCANCODE_RIGHT, {1, 0, 0}}, PushKey{SDL_SCANCODE_LEFT, {-1, 0, 0}}};
+                                  PushKey{SDL_SCANCODE_SPACE, {0, 1, 0}}, PushKey{SDL_SCANCODE_UP, {0, 0, 1}},
+                                  PushKey{SDL_SCANCODE_DOWN, {0, 0, -1}}, PushKey{SDL_SCANCODE_RIGHT, {1, 0, 0}},
+                                  PushKey{SDL_SCANCODE_LEFT, {-1, 0, 0}}};
 
 }  // namespace
 
@@ -123,6 +124,10 @@ void Input::wheel(const SDL_MouseWheelEvent& wheel, ViewState& state) {
   const double notches = wheel.preciseY != 0.0F ? static_cast<double>(wheel.preciseY) : wheel.y;
   if (state.camera.mode == CameraMode::Fly) {
     state.camera.change_speed(notches);
+    return;
+  }
+  if (state.camera.mode == CameraMode::Walk) {
+    state.walker.grow(notches);
     return;
   }
   state.camera.zoom(notches, state.hover ? std::optional(state.hover->position) : std::nullopt);

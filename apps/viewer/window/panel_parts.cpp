@@ -166,9 +166,12 @@ void draw_tool_part(ViewState& state, MenuChoice& choice) {
 
 void draw_camera_part(ViewState& state, MenuChoice& choice) {
   if (!heading("Camera")) return;
-  if (ImGui::RadioButton("orbit", state.camera.mode == CameraMode::Orbit)) state.camera.mode = CameraMode::Orbit;
-  ImGui::SameLine();
-  if (ImGui::RadioButton("fly", state.camera.mode == CameraMode::Fly)) state.camera.mode = CameraMode::Fly;
+  constexpr std::array<std::pair<CameraMode, const char*>, 3> kModes = {
+      {{CameraMode::Orbit, "orbit"}, {CameraMode::Fly, "fly"}, {CameraMode::Walk, "walk"}}};
+  for (const auto& [mode, name] : kModes) {
+    if (mode != CameraMode::Orbit) ImGui::SameLine();
+    if (ImGui::RadioButton(name, state.camera.mode == mode)) state.set_camera_mode(mode);
+  }
   constexpr std::array<std::pair<Command, const char*>, 6> kViews = {{{Command::ViewIso, "All"},
                                                                       {Command::ViewFront, "Front"},
                                                                       {Command::ViewBack, "Back"},
@@ -344,9 +347,9 @@ void draw_help_table(float scale) {
        {"Right button", "turns: about what is under the mouse, or the head"},
        {"Middle button", "moves sideways"},
        {"Shift + right button", "moves the sun"},
-       {"Wheel", "orbit: nearer and farther; fly: faster and slower"},
+       {"Wheel", "orbit: nearer and farther; fly: faster and slower; walk: larger and smaller"},
        {"W A S D or arrows", "forward, left, back, right"},
-       {"Q E", "down, up"},
+       {"Q E, space", "down, up; walking, space jumps"},
        {"Shift", "four times as fast"},
        {"Drop a file", "opens it"},
        {"Torch (F2)", "chooses a voxel that lights what is around it"},

@@ -154,6 +154,11 @@ float draw_status(const ViewState& state) {
     std::snprintf(speed.data(), speed.size(), "   fly, %.3g voxels a second", state.camera.speed());
     right = picture_text(state) + speed.data();
   }
+  if (state.camera.mode == CameraMode::Walk) {
+    std::array<char, 64> body{};
+    std::snprintf(body.data(), body.size(), "   walk, %.3g voxels tall", state.walker.height());
+    right = picture_text(state) + body.data();
+  }
   const std::string faces = to_string(state.open.document->faces()) + "   ";
   const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
   if (width(hover_text(state)) + width(faces + right) + 48.0F < room.x) right.insert(0, faces);

@@ -10,6 +10,7 @@
 
 #include "viewer/loader.h"
 #include "viewer/settings.h"
+#include "viewer/walker.h"
 
 namespace quoin::viewer {
 
@@ -49,6 +50,8 @@ struct MousePlace {
 struct ViewState {
   Settings settings;
   CameraControl camera;
+  Walker walker;  ///< whose eyes the camera is while its mode says so
+  double fov_before_walk = 0.0;
   Tool tool = Tool::Look;
   Brush brush;
   VoxelType palette_shows = kAir;                            ///< the type that the palette has scrolled to
@@ -74,6 +77,9 @@ struct ViewState {
   [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
   /// Whether the document may be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
+  /// Changes what dragging does. One walks from the place under the mouse, or from the middle of the scene, and sees
+  /// with the angle of view of a person meanwhile.
+  void set_camera_mode(CameraMode mode);
   void tell(std::string text) { message = Message{std::move(text), false}; }
   void tell(const Error& error) { message = Message{to_string(error), true}; }
 };
