@@ -8,7 +8,7 @@
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
 
-#include "camera_control.h"
+#include "camera/camera_control.h"
 #include "view_backend.h"
 
 namespace quoin::viewer {

@@ -24,7 +24,27 @@ constexpr std::array kPushKeys = {PushKey{SDL_SCANCODE_W, {0, 0, 1}},     PushKe
                                   PushKey{SDL_SCANCODE_DOWN, {0, 0, -1}}, PushKey{SDL_SCANCODE_RIGHT, {1, 0, 0}},
                                   PushKey{SDL_SCANCODE_LEFT, {-1, 0, 0}}};
 
+constexpr double kWalkersFov = 1.15;  // radians
+
 }  // namespace
+
+void ViewState::set_camera_mode(CameraMode mode) {
+  if (mode == CameraMode::Walk && camera.mode != mode) {
+    const DBox bounds = scene().bounds();
+    DVec3 feet(0.0);
+    if (!bounds.empty()) {
+      const DVec3 middle = 0.5 * bounds.min + 0.5 * bounds.max;
+      feet = {middle.x, bounds.max.y, middle.z};
+    }
+    if (hover) feet = hover->position;
+    walker.stand(feet, bounds);
+    fov_before_walk = camera.camera().vertical_fov;
+    camera.look_level(kWalkersFov);
+  }
+  if (mode != CameraMode::Walk && camera.mode == CameraMode::Walk) camera.set_vertical_fov(fov_before_walk);
+  camera.mode = mode;
+  settings.camera_mode = mode;
+}
 
 void Input::note_mouse(int x, int y, ViewState& state, bool gui_has_mouse) {
   mouse_ = {x, y};

@@ -10,7 +10,7 @@
 
 #include "viewer/loader.h"
 #include "viewer/settings.h"
-#include "viewer/walker.h"
+#include "viewer/camera/walker.h"
 
 namespace quoin::viewer {
 
