@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -40,7 +42,6 @@ struct RegionRow {
   static constexpr std::uint64_t kHighBits = (std::uint64_t{1} << (kRegion - 64)) - 1;
   [[nodiscard]] bool has_none() const { return (low | high) == 0; }
   [[nodiscard]] bool has_all() const { return ~low == 0 && high == kHighBits; }
-  [[nodiscard]] bool has(int i) const { return ((i < 64 ? low >> i : high >> (i - 64)) & 1) != 0; }
 };
 
 struct Scratch {
@@ -95,22 +96,38 @@ std::optional<bool> read_region(const Neighbourhood& chunks, const Window& windo
   return is_all_air ? std::optional(false) : std::nullopt;
 }
 
-// Squared distances along a row to the nearest voxel that is solid, or is not.
+// By the bits of a byte: a byte each, 0 or 1.
+constexpr std::array<std::uint64_t, 256> make_spread_bits() {
+  std::array<std::uint64_t, 256> table{};
+  for (std::size_t bits = 0; bits < 256; ++bits) {
+    for (std::size_t i = 0; i < 8; ++i) table[bits] |= std::uint64_t{bits >> i & 1U} << (8 * i);
+  }
+  return table;
+}
+constexpr std::array<std::uint64_t, 256> kSpreadBits = make_spread_bits();
+
+// Squared distances along a row to the nearest voxel that is solid, or is not: in how many of the rows that are wider
+// by 0, 1, ... a voxel is counts down from the reach, eight voxels in a word.
 void measure_row(const RegionRow& row, bool solid, ByteRow& out) {
   if (solid ? row.has_none() : row.has_all()) return out.fill(kFarSquared);
   if (solid ? row.has_all() : row.has_none()) return out.fill(0);
-  std::array<int, kRegion> distances;
-  int distance = kReach + 1;
-  for (int i = 0; i < kRegion; ++i) {
-    distance = row.has(i) == solid ? 0 : std::min(distance + 1, kReach + 1);
-    distances[static_cast<std::size_t>(i)] = distance;
+  RegionRow wide = row;
+  if (!solid) wide = {~row.low, ~row.high & RegionRow::kHighBits};
+  std::array<std::uint64_t, kPitch / 8> within{};
+  constexpr std::uint64_t kLastBits = (std::uint64_t{1} << (kSmoothed - 64)) - 1;
+  for (int distance = 0; distance <= kReach; ++distance) {
+    const std::uint64_t first = wide.low >> kReach | wide.high << (64 - kReach);
+    const std::uint64_t last = wide.high >> kReach & kLastBits;
+    for (std::size_t i = 0; i < 8; ++i) within[i] += kSpreadBits[first >> (8 * i) & 0xFFU];
+    within[8] += kSpreadBits[last];
+    const RegionRow before = wide;
+    wide.low |= before.low << 1 | before.low >> 1 | before.high << 63;
+    wide.high |= (before.high << 1 | before.low >> 63 | before.high >> 1) & RegionRow::kHighBits;
   }
-  distance = kReach + 1;
-  out.fill(kFarSquared);
-  for (int i = kRegion - 1; i >= kReach; --i) {
-    distance = row.has(i) == solid ? 0 : std::min(distance + 1, kReach + 1);
-    const int least = std::min(distance, distances[static_cast<std::size_t>(i)]);
-    if (i < kReach + kSmoothed) out[static_cast<std::size_t>(i - kReach)] = static_cast<std::uint8_t>(least * least);
+  std::memcpy(out.data(), within.data(), sizeof out);
+  for (std::uint8_t& count : out) {
+    const auto distance = static_cast<std::uint8_t>(kReach + 1 - count);
+    count = static_cast<std::uint8_t>(distance * distance);
   }
 }
 
@@ -190,18 +207,29 @@ void blur_along_y(Scratch& scratch, const Window& window) {
   });
 }
 
+// `stored_within` for lengths that are neither 0 nor subnormal as halves, without a branch: loops of it are vectors.
+Half stored_distance(float distance, float band) {
+  const auto bits = std::bit_cast<std::uint32_t>(std::clamp(distance, -band, band));
+  const std::uint32_t magnitude = bits & 0x7FFF'FFFFU;
+  // As half_from_float rounds.
+  const std::uint32_t rounded = (magnitude + 0xC800'0FFFU + (magnitude >> 13 & 1U)) >> 13;
+  return static_cast<Half>((bits >> 16 & 0x8000U) | rounded);
+}
+static_assert(kLeastAir > 1e-3F && kLeastSolid > 1e-3F);
+
 // The last axis; densities keep the signs of their voxels.
 void write_densities(const Scratch& scratch, const Window& window, Half far, DensityChunk& out) {
   constexpr std::size_t kPlane = std::size_t{kChunkEdge} * kChunkEdge;
   std::array<float, kChunkEdge> smoothed;
   std::array<Half, kChunkEdge> row;
+  const float band = float_from_half(far);
   for_each_row(window, 0, 0, [&](int y, int z) {
     const auto first = static_cast<std::size_t>(z * kChunkEdge + y) * kChunkEdge;
     blur_rows(scratch.blurred_y.data() + first, kPlane, smoothed.data());
     const ByteRow& to_solid = scratch.to_solid[static_cast<std::size_t>((z + kBlur) * kSmoothed + y + kBlur)];
     for (std::size_t x = 0; x < kChunkEdge; ++x) {
       const bool is_solid = to_solid[x + kBlur] == 0;
-      row[x] = stored_within(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), far);
+      row[x] = stored_distance(is_solid ? std::min(smoothed[x], -kLeastSolid) : std::max(smoothed[x], kLeastAir), band);
     }
     out.write_row(y, z, row);
   });
