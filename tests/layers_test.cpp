@@ -30,7 +30,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "trace"}},
     {"grid/chunk/packed_row.h", {"mesh", "trace"}},
     {"grid/chunk_boxes.h", {"trace"}},
-    {"grid/chunk_order.h", {"light", "live", "mesh", "trace"}},
+    {"grid/chunk_order.h", {"light", "live", "mesh", "scene", "trace"}},
     {"grid/coordinate_hash.h", {"live", "mesh", "scene", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},

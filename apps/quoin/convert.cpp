@@ -191,9 +191,10 @@ int run_convert(const ConvertOptions& options) {
     return kWrongUsage;
   }
   if (!format->is_mesh && options.mesh_only) {
-    print_error("--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are for "
-                "mesh formats; " +
-                options.output.string() + " is none");
+    print_error(
+        "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are for "
+        "mesh formats; " +
+        options.output.string() + " is none");
     return kWrongUsage;
   }
   if (options.occlusion_apart && format->format == FileFormat::Obj) {
@@ -219,6 +220,7 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
   command
       .add_option("--smoothness", options.smoothness,
                   "How round smooth surfaces around voxels are, from 0 (blocks) to 1 (default 1)")
+      ->check(not_negative())
       ->check(CLI::Range(0.0, 1.0));
   command
       .add_option("--colours", options.colours,
@@ -254,7 +256,11 @@ std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
     const char* const given = options.occlusion_apart ? "--ao-attribute" : given_field_occlusion(command);
     if (given != nullptr) return std::string(given) + ": --no-ao leaves occlusion out";
   }
-  return read_field_occlusion(command, options.field_occlusion);
+  std::string fault = read_field_occlusion(command, options.field_occlusion);
+  const bool has_none = options.has_field_occlusion && options.field_occlusion.form == SmoothOcclusion::None;
+  if (fault.empty() && has_none && options.occlusion_apart)
+    fault = "--ao-attribute: --ao-form none leaves occlusion out";
+  return fault;
 }
 
 std::optional<ScalarType> scalar_type(const std::string& name) {

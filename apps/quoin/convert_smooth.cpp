@@ -37,19 +37,25 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   return wanted;
 }
 
-/// The smooth mesher knows no light.
-void warn_of_looks(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
+/// The smooth mesher knows no light, and the colours of vertices in .obj and .ply have no alpha.
+void warn_of_looks(const Scene& scene, InstanceFilter filter, const std::filesystem::path& output,
+                   std::vector<std::string>& warnings) {
   std::set<GridHandle> drawn;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     if (is_drawn(scene, instance, filter)) drawn.insert(instance.grid);
   }
   bool is_lost = false;
+  bool is_transparent = false;
   for (const GridHandle grid : drawn) {
     for (const VoxelType type : scene.grids()[grid].grid.types()) {
       is_lost |= type != kAir && type < scene.types.size() && scene.types[type].emission > 0.0F;
+      is_transparent |= scene.types.is_transparent(type);
     }
   }
+  const std::string extension = output.extension().string();
+  const bool has_alpha = extension != ".obj" && extension != ".ply";
+  if (is_transparent && !has_alpha) warnings.push_back("transparent voxels look opaque in " + extension);
   if (is_lost) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
@@ -81,7 +87,7 @@ Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outco
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
   warn_of_lamps(scene, outcome.warnings);
-  warn_of_looks(scene, filter, outcome.warnings);
+  warn_of_looks(scene, filter, options.output, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 

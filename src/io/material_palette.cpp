@@ -8,16 +8,14 @@
 #include <functional>
 #include <limits>
 
+#include "io/mesh_parts.h"
+
 namespace quoin {
 
 namespace {
 
 bool emits(SurfaceClass surface) {
   return surface == SurfaceClass::Emissive || surface == SurfaceClass::EmissiveTransparent;
-}
-
-bool is_transparent(SurfaceClass surface) {
-  return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
 }
 
 /// Appends vertex `from` of `source`; returns its index in `target`.

@@ -208,7 +208,7 @@ MeshView without_occlusion(const MeshView& view) {
 LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
   const float open = view.occlusion.empty() ? 1.0F : 1.0F - view.occlusion[vertex];
   LinearRgba16 colour{0, 0, 0, 65'535};
-  if (view.surface == SurfaceClass::Transparent) colour[3] = view.albedo[vertex][3];
+  if (is_transparent(view.surface)) colour[3] = view.albedo[vertex][3];
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const float light = static_cast<float>(view.albedo[vertex][channel]) * open;
     colour[channel] = static_cast<std::uint16_t>(std::lround(light));

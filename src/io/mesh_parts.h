@@ -91,7 +91,13 @@ class VertexTransform {
 /// The same mesh without occlusion.
 [[nodiscard]] MeshView without_occlusion(const MeshView& view);
 
-/// The colour of a vertex of a smooth mesh, darkened by its occlusion: linear light, opaque; sRGB.
+/// Whether what lies behind surfaces of a class shows.
+[[nodiscard]] inline bool is_transparent(SurfaceClass surface) {
+  return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
+}
+
+/// The colour of a vertex of a smooth mesh, darkened by its occlusion: linear light, opaque but for transparent
+/// surfaces; sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
 [[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);
 

@@ -97,7 +97,7 @@ void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& m
   surface.types.reserve(surface.smooth.cells.size());
   for (const SmoothCell cell : surface.smooth.cells) {
     const std::size_t previous = cell.bits >> SmoothCell::kPreviousShift & 7U;
-    const SurfaceMaterial material = materials.of_cell(around[previous], cell.cell(), level_at(levels, previous));
+    const CellMaterial material = materials.of_cell(around[previous], cell.cell(), level_at(levels, previous));
     surface.albedo.push_back(material.albedo);
     surface.types.push_back(material.type);
   }

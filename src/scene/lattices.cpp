@@ -164,8 +164,13 @@ std::optional<LatticePlace> place_in_lattice(const Scene& scene, const Instance&
   }
   if (!is_found) return std::nullopt;
   const DVec3 whole = glm::round(origin - place.orientation.apply(DVec3(box.min)));
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(std::abs(whole[axis]) < kFarthest) || !(std::abs(origin[axis]) < kFarthest)) return std::nullopt;
+  const IBox lattice_box = own.grid.bounds();
+  const auto is_near = [](DVec3 point) {
+    return std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)}) < kFarthest;
+  };
+  for (const DVec3 point : {whole, origin, moved(DVec3(box.max)), DVec3(lattice_box.min), DVec3(lattice_box.max),
+                            DVec3(box.min), DVec3(box.max)}) {
+    if (!is_near(point)) return std::nullopt;
   }
   place.offset = IVec3(whole);
   for (int corner = 0; corner < 8; ++corner) {

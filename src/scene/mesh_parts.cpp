@@ -61,11 +61,14 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
 }
 
 Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
-                  const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads) {
-  for (const GridHandle handle : grids) {
+                  const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads, const Progress& progress) {
+  const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(grids.size()); };
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    const GridHandle handle = grids[i];
     const SceneGrid& grid = scene.grids()[handle];
     if (grid.field.chunk_count() == 0) continue;
-    auto mesh = surface_of(grid.field, scene.types, wanted, meshes.stats, threads, {});
+    auto mesh =
+        surface_of(grid.field, scene.types, wanted, meshes.stats, threads, part_of(progress, share(i), share(i + 1)));
     if (!mesh) return mesh.error();
     if (mesh->indices.empty()) continue;
     for (const InstanceHandle placed : scene.instances().handles()) {

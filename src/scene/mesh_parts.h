@@ -37,6 +37,7 @@ void add_stats(const SmoothMesh& mesh, MeshStats& stats);
 /// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
 /// instances, in their order.
 [[nodiscard]] Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
-                                const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads);
+                                const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads,
+                                const Progress& progress);
 
 }  // namespace quoin

@@ -143,7 +143,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   }
   SmoothMeshOptions smooth;
   if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;
-  if (auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, meshes, threads); !done) {
+  if (auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, meshes, threads, {}); !done) {
     return done.error();
   }
   return meshes;

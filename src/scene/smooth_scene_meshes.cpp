@@ -5,14 +5,17 @@
 #include <iterator>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/copy_box.h>
 #include <quoin/grid/voxel_field.h>
 
+#include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
@@ -37,7 +40,7 @@ class UnitedGrid {
       const IBox arrived = members_[i].place.apply(box);
       copy_box(*grids_[i], box, voxels_, arrived.min, members_[i].place.orientation,
                {.copy_air = false, .type_map = {}});
-      note_chunks(arrived, i);
+      note_chunks(i);
     }
   }
 
@@ -47,9 +50,10 @@ class UnitedGrid {
   [[nodiscard]] const LatticePlace& way_back(std::size_t member) const { return back_[member]; }
 
   /// Whose voxel it is: the last member's that has one there. Where none has one, the first whose chunk it is, or 0.
-  [[nodiscard]] std::uint32_t owner_of(IVec3 voxel) const {
+  [[nodiscard]] std::uint32_t owner_of(IVec3 voxel) {
     const auto found = by_chunk_.find(chunk_of(voxel));
     if (found == by_chunk_.end()) return 0;
+    if (found->second.size() > kFewMembers) return owners_in(found->first, found->second)[index_of(local_of(voxel))];
     for (auto member = found->second.rbegin(); member != found->second.rend(); ++member) {
       const IVec3 own = back_[*member].apply(IBox{voxel, voxel + 1}).min;
       if (grids_[*member]->get(own) != kAir) return *member;
@@ -58,18 +62,49 @@ class UnitedGrid {
   }
 
  private:
-  void note_chunks(const IBox& box, std::size_t member) {
-    if (box.empty()) return;
-    const IVec3 first = chunk_of(box.min);
-    const IVec3 last = chunk_of(box.max - 1);
-    for (int z = first.z; z <= last.z; ++z) {
-      for (int y = first.y; y <= last.y; ++y) {
-        for (int x = first.x; x <= last.x; ++x) {
-          if (voxels_.find_chunk({x, y, z}) == nullptr) continue;
-          by_chunk_[{x, y, z}].push_back(static_cast<std::uint32_t>(member));
+  static constexpr std::size_t kFewMembers = 16;
+  using Owners = std::vector<std::uint32_t>;
+
+  static std::size_t index_of(IVec3 local) {
+    return static_cast<std::size_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
+  }
+
+  /// Whose each voxel of a chunk is that many members share; of the last such chunk that was asked for it is kept.
+  const Owners& owners_in(IVec3 chunk, const std::vector<std::uint32_t>& members) {
+    if (dense_chunk_ == chunk) return dense_;
+    dense_chunk_ = chunk;
+    dense_.assign(std::size_t{kChunkEdge} * kChunkEdge * kChunkEdge, members.front());
+    const IBox whole{chunk * kChunkEdge, (chunk + 1) * kChunkEdge};
+    for (const std::uint32_t member : members) {
+      const IBox box = intersect(whole, members_[member].place.apply(grids_[member]->bounds()));
+      for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+          for (int x = box.min.x; x < box.max.x; ++x) {
+            const IVec3 own = back_[member].apply(IBox{{x, y, z}, {x + 1, y + 1, z + 1}}).min;
+            if (grids_[member]->get(own) != kAir) dense_[index_of(local_of({x, y, z}))] = member;
+          }
         }
       }
     }
+    return dense_;
+  }
+
+  /// Notes a member for the chunks of the whole in which it may have voxels; by its own chunks, since its box may be
+  /// far larger than what is in it.
+  void note_chunks(std::size_t member) {
+    std::vector<IVec3> reached;
+    for (const IVec3 chunk : grids_[member]->chunks()) {
+      const IBox arrived = members_[member].place.apply(IBox{chunk * kChunkEdge, (chunk + 1) * kChunkEdge});
+      const IVec3 first = chunk_of(arrived.min);
+      const IVec3 last = chunk_of(arrived.max - 1);
+      for (int z = first.z; z <= last.z; ++z) {
+        for (int y = first.y; y <= last.y; ++y) {
+          for (int x = first.x; x <= last.x; ++x) reached.emplace_back(x, y, z);
+        }
+      }
+    }
+    sort_and_unite(reached);
+    for (const IVec3 chunk : reached) by_chunk_[chunk].push_back(static_cast<std::uint32_t>(member));
   }
 
   std::vector<LatticeMember> members_;
@@ -77,6 +112,8 @@ class UnitedGrid {
   std::vector<LatticePlace> back_;  // likewise
   Grid voxels_;
   std::unordered_map<IVec3, std::vector<std::uint32_t>, CoordinateHash> by_chunk_;  // members in their order
+  std::optional<IVec3> dense_chunk_;
+  Owners dense_;
 };
 
 /// The surface of one body, and whose each vertex is, where there are several owners.
@@ -85,7 +122,7 @@ struct Body {
   std::vector<std::uint32_t> owners;
 };
 
-std::vector<std::uint32_t> owners_of(const UnitedGrid& united, const std::vector<TriangleFace>& faces) {
+std::vector<std::uint32_t> owners_of(UnitedGrid& united, const std::vector<TriangleFace>& faces) {
   std::vector<std::uint32_t> owners;
   owners.reserve(faces.size());
   for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -113,8 +150,9 @@ class Mesher {
       : scene_(scene), options_(options), threads_(threads), stats_(stats) {}
 
   /// The opaque body, then all that are transparent as one. `united`: null where all has one owner.
-  Result<std::array<Body, 2>> mesh(const Grid& voxels, const UnitedGrid* united, const Progress& progress) const {
+  Result<std::array<Body, 2>> mesh(const Grid& voxels, UnitedGrid* united, const Progress& progress) const {
     const DensityGrid whole = field_from_grid(voxels, threads_);
+    if (progress && !progress(0.0)) return make_error(ErrorCode::Cancelled, "cancelled");
     const std::vector<std::uint32_t> bodies = smooth::bodies_of(scene_.types, voxels.types());
     std::array<Body, 2> made;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -133,9 +171,12 @@ class Mesher {
   }
 
  private:
-  Result<Body> mesh_body(const DensityGrid& field, const DensityGrid* whole, const UnitedGrid* united,
+  Result<Body> mesh_body(const DensityGrid& field, const DensityGrid* whole, UnitedGrid* united,
                          const Progress& progress) const {
-    auto surface = smooth::build_surface(field, scene_.types, options_.mesh, {whole, true}, threads_, progress);
+    SmoothMeshOptions wanted = options_.mesh;
+    // Bodies meet at level 0 only, and of several grids' chunks nobody could ask.
+    if (whole != nullptr || united != nullptr) wanted.level_of = nullptr;
+    auto surface = smooth::build_surface(field, scene_.types, wanted, {whole, true}, threads_, progress);
     if (!surface) return surface.error();
     std::vector<std::uint32_t> owners;
     if (united != nullptr) owners = owners_of(*united, surface->faces);
@@ -188,6 +229,7 @@ std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
   for (std::size_t i = 0; i < body.mesh.indices.size(); i += 3) {
     const std::uint32_t* triangle = body.mesh.indices.data() + i;
     const std::uint32_t owner = body.owners[triangle[0]];
+    QUOIN_ASSERT(body.owners[triangle[1]] == owner && body.owners[triangle[2]] == owner);
     const bool turns = united.way_back(owner).orientation.is_mirrored();
     for (const std::size_t k : {0, turns ? 2 : 1, turns ? 1 : 2}) {
       parts[owner].indices.push_back(places[triangle[k]]);
@@ -213,6 +255,7 @@ std::vector<Unit> units_of(const Scene& scene, const SmoothSceneOptions& options
   if (options.unite) {
     groups = lattice_groups(scene, drawn);
   } else {
+    groups.reserve(drawn.size());
     for (const InstanceHandle handle : drawn) groups.push_back({{handle, {}}});
   }
   std::map<GridHandle, Unit> alone;
@@ -254,7 +297,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
     add_part(scene, std::move(part), unit.members, meshes);
     return {};
   }
-  const UnitedGrid united(scene, std::move(unit.members));
+  UnitedGrid united(scene, std::move(unit.members));
   auto bodies = mesher.mesh(united.voxels(), &united, progress);
   if (!bodies) return bodies.error();
   std::vector<SmoothMesh> opaque = divide((*bodies)[0], united);
@@ -282,8 +325,14 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
   SceneMeshes meshes;
   const Mesher mesher(scene, options, threads, meshes.stats);
   std::vector<Unit> units = units_of(scene, options);
+  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
+  const bool has_fields = std::any_of(grids.begin(), grids.end(),
+                                      [&](GridHandle handle) { return scene.grids()[handle].field.chunk_count() > 0; });
+  const double share_of_voxels = !has_fields ? 1.0 : units.empty() ? 0.0 : 0.5;
   for (std::size_t i = 0; i < units.size(); ++i) {
-    const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(units.size()); };
+    const auto share = [&](std::size_t done) {
+      return share_of_voxels * static_cast<double>(done) / static_cast<double>(units.size());
+    };
     const Progress part = part_of(progress, share(i), share(i + 1));
     if (auto done = add_unit(scene, std::move(units[i]), mesher, part, meshes); !done) return done.error();
   }
@@ -291,9 +340,11 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
   of_fields.occlusion = options.mesh.occlusion;
   of_fields.split_sheets = options.mesh.split_sheets;
   of_fields.level_of = options.mesh.level_of;
-  const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
   const SurfaceOptions wanted{of_fields, options.simplify_error};
-  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads); !done) return done.error();
+  const Progress left = part_of(progress, share_of_voxels, 1.0);
+  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads, left); !done) {
+    return done.error();
+  }
   return meshes;
 }
 

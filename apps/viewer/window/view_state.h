@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "viewer/camera/walker.h"
 #include "viewer/loader.h"
 #include "viewer/settings.h"
-#include "viewer/camera/walker.h"
 
 namespace quoin::viewer {
 

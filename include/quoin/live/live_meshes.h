@@ -32,7 +32,8 @@ struct ChunkSurface {
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
   /// Smooth: point p of the mesh is point p + 0.5 + 64 * chunk of the grid; a colour (linear) and a type a vertex. Of
-  /// voxels thin things are kept (SmoothMeshOptions::keep_thin).
+  /// voxels thin things are kept (SmoothMeshOptions::keep_thin); unlike mesh_scene_smoothly has it, glass is an opaque
+  /// part of the one surface, and instances are not united.
   SmoothChunkMesh smooth;
   std::vector<LinearRgba16> albedo;
   std::vector<VoxelType> types;

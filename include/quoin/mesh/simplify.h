@@ -10,12 +10,12 @@ namespace quoin {
 /// allowed.
 ///
 /// Error:    the greatest distance, in samples, of a vertex of the mesh before from the surface after. It is measured;
-///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed.
+///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed, or nothing at all.
 /// Kept:     vertices that stay keep normal, occlusion, albedo and type, and their position, but for those below.
 ///           Vertices of one place that differ in these count as one: lines between colours stay where they are, to the
 ///           error. A closed mesh stays closed.
-/// Manifold: every edge of what was closed has two triangles, by places too. Where removing brings parts of the surface
-///           together, the vertices there are drawn a thousandth of a sample apart.
+/// Manifold: every edge of what was closed has two triangles, by places too if the error is above 0. Where removing
+///           brings parts of the surface together, the vertices there are drawn a thousandth of a sample apart.
 /// Order:    the same bytes on every run.
 /// Requires: arrays of one length (but for empty occlusion), indices that name vertices, finite positions.
 /// Errors:   InvalidArgument when the error is not a number of at least 0; Unsupported in builds without meshoptimizer.

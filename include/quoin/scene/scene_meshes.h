@@ -88,7 +88,9 @@ struct BlockySceneOptions {
 [[nodiscard]] SmoothMeshOptions smooth_voxels();
 
 struct SmoothSceneOptions {
-  SmoothMeshOptions mesh = smooth_voxels();  ///< of voxels; of fields occlusion, `split_sheets` and `level_of` alone
+  /// Of voxels; of fields occlusion, `split_sheets` and `level_of` alone. Where voxels have transparent types, or
+  /// instances are united, all is of level 0.
+  SmoothMeshOptions mesh = smooth_voxels();
   std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
   InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
   /// Whether instances whose voxels lie on one lattice and touch are one body: without seams, grooves and slits
@@ -107,6 +109,8 @@ struct SmoothSceneOptions {
 ///         in one view. In a cell that several share, their vertices are the same, but where a body touches itself by
 ///         edges and with `simplify_error`: each body is simplified by itself. Transparent voxels occlude no others.
 /// Types:  emission is left out.
+/// Cost:   what touches is found by boxes: O(n log n + pairs that overlap along one axis) of instances. Each
+///         transparent type is meshed for itself, in the chunks that have it and those around them.
 /// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.
 [[nodiscard]] Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options = {},
                                                       Threads threads = {}, const Progress& progress = {});

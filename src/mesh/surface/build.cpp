@@ -87,7 +87,7 @@ struct Part {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
   std::vector<float> occlusion;
-  std::vector<SurfaceMaterial> materials;
+  std::vector<CellMaterial> materials;
   std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only where they are asked for
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one

@@ -59,8 +59,8 @@ class Copies {
   std::vector<ListedCopy> all_;
 };
 
-// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or between,
-// which are three or four of those around the edge.
+// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or
+// between, which are three or four of those around the edge.
 TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
                               const std::uint32_t* triangle) {
   IVec3 first{std::numeric_limits<int>::max()};
@@ -88,7 +88,7 @@ TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothCh
 
 // Where cells are of several sizes: by what lies around the triangle's vertices.
 TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
-                              const std::vector<SurfaceMaterial>& materials) {
+                              const std::vector<CellMaterial>& materials) {
   const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
   const DVec3 a(mesh.positions[triangle[0]]);
   const DVec3 b(mesh.positions[triangle[1]]);
@@ -102,8 +102,8 @@ TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* 
   return face;
 }
 
-SurfaceMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
-                            const ChunkLevels& levels, SmoothCell name) {
+CellMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
+                         const ChunkLevels& levels, SmoothCell name) {
   const LevelCell cell = levels.cell_of(name);
   return materials.of_cell(chunks, cell.first / cell.size(), cell.level);
 }
@@ -128,7 +128,7 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
     }
     return;
   }
-  std::vector<SurfaceMaterial> of_vertex;
+  std::vector<CellMaterial> of_vertex;
   of_vertex.reserve(mesh.cells.size());
   for (const SmoothCell name : mesh.cells) of_vertex.push_back(material_of(chunks, materials, levels, name));
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {

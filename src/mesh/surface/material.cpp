@@ -99,13 +99,13 @@ LinearRgba16 SurfaceMaterials::albedo(VoxelType type) const {
   return type < albedo_.size() ? albedo_[type] : kWhite;
 }
 
-SurfaceMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
+CellMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
   if (std::all_of(solid.begin(), solid.end(), [&](VoxelType type) { return type == solid[0]; })) {
     return {albedo(solid[0]), solid[0]};
   }
   std::sort(solid.begin(), solid.end());
   std::array<std::uint32_t, 4> sum{};
-  SurfaceMaterial blended;
+  CellMaterial blended;
   std::size_t most = 0;
   for (auto first = solid.begin(); first != solid.end();) {
     const auto end = std::upper_bound(first, solid.end(), *first);
@@ -123,7 +123,7 @@ SurfaceMaterial SurfaceMaterials::blend(std::span<VoxelType> solid) const {
   return blended;
 }
 
-SurfaceMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const {
+CellMaterial SurfaceMaterials::of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const {
   const int size = 1 << level;
   const IVec3 first = cell * size;
   std::array<VoxelType, 729> solid;

@@ -9,7 +9,7 @@
 
 namespace quoin {
 
-struct SurfaceMaterial {
+struct CellMaterial {
   LinearRgba16 albedo{};
   VoxelType type = kAir;
 };
@@ -19,15 +19,16 @@ class SurfaceMaterials {
  public:
   explicit SurfaceMaterials(const VoxelRegistry& types);
 
-  /// Of a cell of the centre chunk or of one before it, in cells of `level`. Level 0: by its solid corners. Coarser: by the solid samples
-  /// next to the surface along its crossed edges, since corners may lie well below it; when no edge of its own is
-  /// crossed, by the solid samples of the coarsest lattice within the cell that has any. All air gives air, white.
-  [[nodiscard]] SurfaceMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
+  /// Of a cell of the centre chunk or of one before it, in cells of `level`. Level 0: by its solid corners. Coarser: by
+  /// the solid samples next to the surface along its crossed edges, since corners may lie well below it; when no edge
+  /// of its own is crossed, by the solid samples of the coarsest lattice within the cell that has any. All air gives
+  /// air, white.
+  [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
   /// White of what is not registered.
   [[nodiscard]] LinearRgba16 albedo(VoxelType type) const;
 
  private:
-  [[nodiscard]] SurfaceMaterial blend(std::span<VoxelType> solid) const;
+  [[nodiscard]] CellMaterial blend(std::span<VoxelType> solid) const;
 
   std::vector<LinearRgba16> albedo_;  // by type
 };

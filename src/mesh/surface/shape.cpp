@@ -18,6 +18,8 @@ namespace {
 /// The share of the way from the middle of its cell that a vertex of something thin keeps: a rail of one voxel becomes
 /// 0.8 voxels wide instead of 0.37.
 constexpr float kThinShare = 1.0F / 3.0F;
+/// What vertices of cells with several sheets keep of it at least.
+constexpr float kLeastShare = 1.0F / 256.0F;
 
 /// Bits of samples along x, of a row from -2 to 65: in each word all bits but the first and the last have both
 /// neighbours there.
@@ -204,6 +206,9 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
       if (shared->normal) mesh.normals[i] = *shared->normal;
     }
     if (may_move && shape.keep_thin && (shared || thin->has(cell.first))) share *= kThinShare;
+    // Else sheets of one cell would come to lie in one place, and have edges of four triangles there.
+    const bool may_meet_others = share < kLeastShare && !has_one_sheet(solid_corners_of(chunks, cell));
+    if (may_meet_others || mesh.cells[i].bridge_axis() >= 0) share = std::max(share, kLeastShare);
     if (share == 1.0F && !shared) continue;
     for (int axis = 0; axis < 3; ++axis) {
       // In a bridge: from the middle of the face between two cells.

@@ -20,7 +20,8 @@ struct Shape {
 
 /// Moves the vertices of a chunk's mesh, those of cells before the chunk too, to the same bits as in the chunk before.
 ///
-/// Smoothness: the share of the way from the middle of the cell to the vertex that is left.
+/// Smoothness: the share of the way from the middle of the cell to the vertex that is left; where a cell has several
+///             sheets 1/256 at least, so that these do not meet.
 /// Thin:       a sample is thin when both neighbours along an axis are of the other sign, and it does not go on at a
 ///             slant on either side; so that a wall at 45 degrees, which is smooth and thick enough, is not. Vertices
 ///             of level-0 cells with a thin corner keep a third of that way. Cells of several sheets stay.

@@ -48,7 +48,10 @@ constexpr float kApart = 1.0F / 1024.0F;
 /// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
 /// surfaces are up to twice as far off.
 constexpr float kMeanShare = 0.6F;
-constexpr int kMaxTries = 8;
+/// Where no more than one of so many places is too far off, the mesh stays as it was around those; else less error is
+/// allowed everywhere.
+constexpr std::size_t kFewPlaces = 50;
+constexpr int kMaxTries = 16;
 
 /// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
 std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
@@ -101,6 +104,8 @@ Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t
 /// How far the vertices of the mesh lie from simpler triangles.
 struct Deviation {
   float most = 0.0F;
+  std::size_t places = 0;
+  std::size_t beyond = 0;
   std::vector<bool> is_beyond;  // by place: farther off than allowed
 };
 
@@ -117,9 +122,11 @@ Deviation deviation_of(const SmoothMesh& mesh, const std::vector<std::uint32_t>&
     const std::uint32_t vertex = place[index];
     if (is_done[vertex]) continue;
     is_done[vertex] = true;
+    ++found.places;
     const float distance = tree.distance(mesh.positions[vertex], std::numeric_limits<float>::max());
     found.most = std::max(found.most, distance);
     found.is_beyond[vertex] = distance > allowed;
+    found.beyond += distance > allowed ? 1 : 0;
   }
   return found;
 }
@@ -174,22 +181,33 @@ void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::u
 }
 
 /// Returns the error reached, in samples.
-float remove_triangles(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
+float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
   const float scale = meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
   if (!(scale > 0.0F)) return 0.0F;
   const std::vector<std::uint32_t> place = places_of(mesh);
+  float allowed = kMeanShare * error_in_samples;
   std::vector<bool> stays(mesh.indices.size() / 3);
   for (int tries = 0; tries < kMaxTries; ++tries) {
-    const float allowed = kMeanShare * error_in_samples;
     Triangulation simple = triangulation_of(mesh, remove_triangles(mesh, allowed, scale, stays), place);
     // A neck three edges round, say, is drawn together to one edge.
     make_manifold(simple, std::min(kApart, 0.25F * error_in_samples));
     Deviation found = deviation_of(mesh, place, simple, error_in_samples);
-    if (found.most <= error_in_samples && !simple.indices.empty()) {
+    if (found.beyond == 0 && !simple.indices.empty()) {
       take_over(mesh, simple, tags);
       return found.most;
     }
-    keep_around(mesh, place, std::move(found.is_beyond), stays);
+    const bool are_many = found.beyond > found.places / kFewPlaces || simple.indices.empty();
+    if (tries + 1 == kMaxTries / 2) {
+      // Less error did not help: a mesh that is round everywhere, say, and hardly to be made simpler.
+      allowed = kMeanShare * error_in_samples;
+      stays.assign(stays.size(), false);
+    } else if (are_many && tries < kMaxTries / 2) {
+      // What had to stay for more error need not for less.
+      allowed *= 0.5F;
+      stays.assign(stays.size(), false);
+    } else {
+      keep_around(mesh, place, std::move(found.is_beyond), stays);
+    }
   }
   return 0.0F;
 }
@@ -234,7 +252,7 @@ Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vec
   QUOIN_ASSERT(has_finite_positions(mesh));
 #endif
   if (mesh.indices.empty()) return 0.0F;
-  const float reached = remove_triangles(mesh, error_in_samples, tags);
+  const float reached = simplify_within(mesh, error_in_samples, tags);
   order_for_caches(mesh, tags);
   return reached;
 }

@@ -228,6 +228,18 @@ TEST_F(Simplify, NoVertexIsFartherOffThanTheError) {
   }
 }
 
+TEST_F(Simplify, MoreErrorLeavesFewerTriangles) {
+  std::mt19937 random(4);
+  const SmoothMesh whole = surface_of(blob(random), 41);
+  std::size_t last = whole.indices.size();
+  for (const float error : {0.1F, 0.5F, 2.0F, 8.0F}) {
+    SmoothMesh mesh = whole;
+    ASSERT_TRUE(simplify_smooth_mesh(mesh, error));
+    EXPECT_LT(mesh.indices.size(), last) << error;
+    last = mesh.indices.size();
+  }
+}
+
 TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
   // A ball of voxels in two halves, the lesser with a checkerboard of small fields.
   Grid grid;

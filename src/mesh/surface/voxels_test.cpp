@@ -243,9 +243,9 @@ TEST(SmoothVoxels, WithoutSmoothnessTheyAreBlocks) {
     const Vec3 normal = glm::cross(b - a, c - a);
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 p = mesh.positions[mesh.indices[i + k]] * 2.0F;
-      EXPECT_EQ(p, glm::round(p)) << "corners of voxels, or middles of edges where bridges are";
-      if (glm::length(normal) > 0.0F) {
-        EXPECT_EQ(mesh.normals[mesh.indices[i + k]], glm::normalize(normal)) << "of the face";
+      EXPECT_LT(glm::length(p - glm::round(p)), 0.01F) << "corners of voxels, or middles of edges where bridges are";
+      if (glm::length(normal) > 0.1F) {
+        EXPECT_GT(glm::dot(mesh.normals[mesh.indices[i + k]], glm::normalize(normal)), 0.99F) << "of the face";
       }
     }
   }
@@ -254,7 +254,11 @@ TEST(SmoothVoxels, WithoutSmoothnessTheyAreBlocks) {
     const Chunk& voxels_of_chunk = *grid.find_chunk(chunk);
     solid += kChunkEdge * kChunkEdge * kChunkEdge - static_cast<std::int64_t>(voxels_of_chunk.count(kAir));
   }
-  EXPECT_NEAR(signed_volume(mesh), static_cast<double>(solid), 1e-3);
+  EXPECT_NEAR(signed_volume(mesh), static_cast<double>(solid), 1e-2 * static_cast<double>(solid));
+  const SmoothMesh whole = welded(mesh);
+  oracle::SurfaceCount count = count_surface(whole);
+  EXPECT_EQ(count.crowded_edges, 0) << "no two sheets lie in one place";
+  oracle::expect_closed(count);
 }
 
 TEST(SmoothVoxels, MoreSmoothnessIsRounder) {

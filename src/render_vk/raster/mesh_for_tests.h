@@ -50,7 +50,7 @@ inline std::shared_ptr<ChunkSurface> smooth_surface(const DensityGrid& field, co
   const SurfaceMaterials materials(types);
   for (const SmoothCell cell : surface->smooth.cells) {
     const DensityNeighbourhood around = field.neighbourhood(chunk + cell.chunk_offset());
-    const SurfaceMaterial material = materials.of_cell(around, cell.cell(), 0);
+    const CellMaterial material = materials.of_cell(around, cell.cell(), 0);
     surface->albedo.push_back(material.albedo);
     surface->types.push_back(material.type);
   }
