@@ -36,30 +36,31 @@ struct RowsAround {
   std::array<std::array<std::uint64_t, 2>, 2> yz;  ///< [y][z]
 };
 
-/// The set samples that are thin. A side at a slant: the sample there is set, and the one that leads to it is not.
-std::uint64_t thin_of(const RowsAround& rows) {
+/// By axis: the set samples that are thin along it. A side at a slant: the sample there is set, and the one that leads
+/// to it is not.
+using ThinRows = std::array<std::uint64_t, 3>;
+
+ThinRows thin_of(const RowsAround& rows) {
   const std::uint64_t s = rows.here;
   const auto along_x = [](std::uint64_t row) { return row << 1 | row >> 1; };
   const auto slanted_x = [](std::uint64_t side, std::uint64_t lead) {
     return ((side << 1) & ~(lead << 1)) | ((side >> 1) & ~(lead >> 1));
   };
-  std::uint64_t x = s & ~along_x(s);
-  std::uint64_t y = s & ~(rows.y[0] | rows.y[1]);
-  std::uint64_t z = s & ~(rows.z[0] | rows.z[1]);
-  if ((x | y | z) == 0) return 0;
+  ThinRows thin = {s & ~along_x(s), s & ~(rows.y[0] | rows.y[1]), s & ~(rows.z[0] | rows.z[1])};
+  if ((thin[0] | thin[1] | thin[2]) == 0) return thin;
   for (std::size_t i = 0; i < 2; ++i) {
-    x &= ~(along_x(rows.y[i]) & ~rows.y[i]) & ~(along_x(rows.z[i]) & ~rows.z[i]);
-    y &= ~slanted_x(rows.y[i], s);
-    z &= ~slanted_x(rows.z[i], s);
+    thin[0] &= ~(along_x(rows.y[i]) & ~rows.y[i]) & ~(along_x(rows.z[i]) & ~rows.z[i]);
+    thin[1] &= ~slanted_x(rows.y[i], s);
+    thin[2] &= ~slanted_x(rows.z[i], s);
     for (std::size_t k = 0; k < 2; ++k) {
-      y &= ~(rows.yz[i][k] & ~rows.z[k]);
-      z &= ~(rows.yz[k][i] & ~rows.y[k]);
+      thin[1] &= ~(rows.yz[i][k] & ~rows.z[k]);
+      thin[2] &= ~(rows.yz[k][i] & ~rows.y[k]);
     }
   }
-  return x | y | z;
+  return thin;
 }
 
-/// The cells of a chunk, -1 to 63 on each axis, that have a thin corner.
+/// Along which axes the cells of a chunk, -1 to 63 on each axis, have a thin corner.
 class ThinCells {
  public:
   explicit ThinCells(const DensityNeighbourhood& chunks) : solid_(kRead * kRead), thin_(kFound * kFound) {
@@ -68,15 +69,19 @@ class ThinCells {
     }
     for (int z = 0; z < kFound; ++z) {
       for (int y = 0; y < kFound; ++y) {
-        thin_[static_cast<std::size_t>(z * kFound + y)] = {find(y, z, &WideRow::low), find(y, z, &WideRow::high)};
+        const ThinRows low = find(y, z, &WideRow::low);
+        const ThinRows high = find(y, z, &WideRow::high);
+        const std::size_t row = static_cast<std::size_t>(z * kFound + y);
+        for (std::size_t axis = 0; axis < 3; ++axis) thin_[row][axis] = {low[axis], high[axis]};
       }
     }
   }
 
-  [[nodiscard]] bool has(IVec3 cell) const {
+  [[nodiscard]] bool has(IVec3 cell, int axis) const {
     std::uint64_t pair = 0;
     for (int i = 0; i < 4; ++i) {
-      const WideRow& row = thin_[static_cast<std::size_t>((cell.z + 1 + (i >> 1)) * kFound + cell.y + 1 + (i & 1))];
+      const auto at = static_cast<std::size_t>((cell.z + 1 + (i >> 1)) * kFound + cell.y + 1 + (i & 1));
+      const WideRow& row = thin_[at][static_cast<std::size_t>(axis)];
       pair |= cell.x < kChunkEdge / 2 ? row.low >> (cell.x + 2) : row.high >> (cell.x - 2);
     }
     return (pair & 3U) != 0;
@@ -98,17 +103,19 @@ class ThinCells {
     return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
   }
 
-  [[nodiscard]] std::uint64_t find(int y, int z, std::uint64_t WideRow::*half) const {
+  [[nodiscard]] ThinRows find(int y, int z, std::uint64_t WideRow::*half) const {
     const auto row = [&](int dy, int dz) { return solid_[at(y + 1 + dy, z + 1 + dz)].*half; };
     RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
     solid.yz = {{{row(-1, -1), row(-1, 1)}, {row(1, -1), row(1, 1)}}};
     RowsAround air{~solid.here, {~solid.y[0], ~solid.y[1]}, {~solid.z[0], ~solid.z[1]}, {}};
     for (std::size_t i = 0; i < 4; ++i) air.yz[i / 2][i % 2] = ~solid.yz[i / 2][i % 2];
-    return thin_of(solid) | thin_of(air);
+    const ThinRows thin = thin_of(solid);
+    const ThinRows gaps = thin_of(air);
+    return {thin[0] | gaps[0], thin[1] | gaps[1], thin[2] | gaps[2]};
   }
 
-  std::vector<WideRow> solid_;  // [z][y]
-  std::vector<WideRow> thin_;   // [z][y]
+  std::vector<WideRow> solid_;                // [z][y]
+  std::vector<std::array<WideRow, 3>> thin_;  // [z][y], by axis
 };
 
 IVec3 corner_of(int corner) {
@@ -196,24 +203,25 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
     const Vec3 first(cell.first);
     const auto size = static_cast<float>(cell.size());
     Vec3 fraction = (mesh.positions[i] - first) / size;
-    float share = shape.smoothness;
-    const bool may_move = cell.level == 0 && (shape.whole != nullptr || (thin && thin->has(cell.first))) &&
-                          has_one_sheet(solid_corners_of(chunks, cell));
     std::optional<SharedVertex> shared;
-    if (may_move && shape.whole != nullptr) shared = vertex_of_bodies(shape, cell);
+    if (shape.whole != nullptr && cell.level == 0 && has_one_sheet(solid_corners_of(chunks, cell))) {
+      shared = vertex_of_bodies(shape, cell);
+    }
     if (shared) {
       fraction = shared->fraction;
       if (shared->normal) mesh.normals[i] = *shared->normal;
     }
-    if (may_move && shape.keep_thin && (shared || thin->has(cell.first))) share *= kThinShare;
-    // Else sheets of one cell would come to lie in one place, and have edges of four triangles there.
-    const bool may_meet_others = share < kLeastShare && !has_one_sheet(solid_corners_of(chunks, cell));
-    if (may_meet_others || mesh.cells[i].bridge_axis() >= 0) share = std::max(share, kLeastShare);
-    if (share == 1.0F && !shared) continue;
+    // Sheets of one cell would come to lie in one place, and have edges of four triangles there.
+    const bool may_meet_others = shape.smoothness < kLeastShare &&
+                                 (mesh.cells[i].bridge_axis() >= 0 || !has_one_sheet(solid_corners_of(chunks, cell)));
+    const float share = may_meet_others ? kLeastShare : shape.smoothness;
     for (int axis = 0; axis < 3; ++axis) {
+      const bool is_thin = thin && cell.level == 0 && (shared || thin->has(cell.first, axis));
+      const float kept = is_thin ? share * kThinShare : share;
+      if (kept == 1.0F && !shared) continue;
       // In a bridge: from the middle of the face between two cells.
       const float middle = axis == mesh.cells[i].bridge_axis() ? 1.0F : 0.5F;
-      const float moved = snap(middle + (fraction[axis] - middle) * share);
+      const float moved = snap(middle + (fraction[axis] - middle) * kept);
       mesh.positions[i][axis] = first[axis] + moved * size;
     }
   }
