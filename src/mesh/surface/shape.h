@@ -22,9 +22,9 @@ struct Shape {
 ///
 /// Smoothness: the share of the way from the middle of the cell to the vertex that is left; where a cell has several
 ///             sheets 1/256 at least, so that these do not meet.
-/// Thin:       a sample is thin along an axis when both neighbours there are of the other sign, and it does not go on at
-///             a slant on either side; so that a wall at 45 degrees, which is smooth and thick enough, is not. Vertices
-///             of level-0 cells with a corner that is thin along an axis keep a third of that way along it.
+/// Thin:       a sample is thin along an axis when both neighbours there are of the other sign, and it does not go
+///             on at a slant on either side; so that a wall at 45 degrees, which is smooth and thick enough, is not.
+///             Vertices of level-0 cells with a corner that is thin along an axis keep a third of that way along it.
 /// Bodies:     in a cell of level 0 that samples of several bodies and one sheet share, the vertex is the mean of the
 ///             crossings of all edges between different bodies or air, in the middle where both ends are solid, and is
 ///             kept as if thin; the normal is that of the whole, if that is crossed. Quads are split anew, so that two
