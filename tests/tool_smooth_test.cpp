@@ -37,6 +37,19 @@ class ToolSmooth : public ToolTest {
     return name.ends_with(".obj") ? world_of_obj(bytes) : world_of(parse_glb(bytes));
   }
 
+  /// A floor and a wall: corner.vox.
+  void write_corner() {
+    std::string voxels;
+    for (int x = 0; x < 16; ++x) {
+      for (int y = 0; y < 16; ++y) {
+        for (int z = 0; z < (x < 4 ? 12 : 4); ++z) {
+          for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
+        }
+      }
+    }
+    std::ofstream(folder_.file("corner.vox"), std::ios::binary) << vox_file({16, 16, 16}, voxels);
+  }
+
   void write(const std::string& name, const std::vector<std::byte>& bytes) {
     ASSERT_TRUE(write_file(folder_.file(name), bytes));
   }
@@ -130,15 +143,7 @@ TEST_F(ToolSmooth, VoxelsKeepTheirPlacesAndColours) {
 }
 
 TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
-  std::string voxels;  // a floor and a wall
-  for (int x = 0; x < 16; ++x) {
-    for (int y = 0; y < 16; ++y) {
-      for (int z = 0; z < (x < 4 ? 12 : 4); ++z) {
-        for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
-      }
-    }
-  }
-  std::ofstream(folder_.file("corner.vox"), std::ios::binary) << vox_file({16, 16, 16}, voxels);
+  write_corner();
   const auto darkest = [&](const std::string& flags) {
     converted("corner.vox out.glb --mesher smooth " + flags);
     double least = 1.0;
@@ -151,15 +156,7 @@ TEST_F(ToolSmooth, OcclusionDarkensHollowsUnlessItIsLeftOut) {
 }
 
 TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
-  std::string voxels;  // a floor and a wall
-  for (int x = 0; x < 16; ++x) {
-    for (int y = 0; y < 16; ++y) {
-      for (int z = 0; z < (x < 4 ? 12 : 4); ++z) {
-        for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
-      }
-    }
-  }
-  std::ofstream(folder_.file("corner.vox"), std::ios::binary) << vox_file({16, 16, 16}, voxels);
+  write_corner();
   const auto glb = [&](const std::string& flags) {
     converted("corner.vox out.glb --mesher smooth " + flags);
     return read_file(folder_.file("out.glb")).value();

@@ -32,27 +32,6 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   job.surface = std::move(surface);
 }
 
-// The densities around the chunk at an offset of 0 or -1 on each axis, as far as those around this one tell.
-DensityNeighbourhood moved(const DensityNeighbourhood& chunks, IVec3 offset) {
-  DensityNeighbourhood result;
-  result.outside = chunks.outside;
-  std::size_t i = 0;
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx, ++i) {
-        const IVec3 at = IVec3{dx, dy, dz} + offset;
-        if (std::min({at.x, at.y, at.z}) >= -1) result.chunks[i] = chunks.at(at.x, at.y, at.z);
-      }
-    }
-  }
-  return result;
-}
-
-// Of a chunk as a neighbourhood has it, and of those before it along x, y and z, by the bits of its place.
-int level_at(const std::array<std::uint8_t, 27>& levels, std::size_t previous) {
-  return levels[13 - (previous & 1) - 3 * (previous >> 1 & 1) - 9 * (previous >> 2)];
-}
-
 void copy_exactly(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
   copy_exactly(from.positions, to.positions);
   copy_exactly(from.normals, to.normals);
@@ -85,21 +64,6 @@ void copy_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& opti
     out.cells[i] = mesh.cells[vertex];
     surface.albedo.push_back(materials.albedo(copies[i].look.type));
     surface.types.push_back(copies[i].look.type);
-  }
-}
-
-// A vertex of a cell before the chunk's own looks as it does in that cell's chunk.
-void add_materials(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
-                   const std::array<std::uint8_t, 27>& levels, ChunkSurface& surface) {
-  std::array<DensityNeighbourhood, 8> around;
-  for (int i = 0; i < 8; ++i) around[static_cast<std::size_t>(i)] = moved(chunks, -IVec3{i & 1, i >> 1 & 1, i >> 2});
-  surface.albedo.reserve(surface.smooth.cells.size());
-  surface.types.reserve(surface.smooth.cells.size());
-  for (const SmoothCell cell : surface.smooth.cells) {
-    const std::size_t previous = cell.bits >> SmoothCell::kPreviousShift & 7U;
-    const CellMaterial material = materials.of_cell(around[previous], cell.cell(), level_at(levels, previous));
-    surface.albedo.push_back(material.albedo);
-    surface.types.push_back(material.type);
   }
 }
 
@@ -152,7 +116,12 @@ void mesh_smooth(const LiveMeshOptions& options, const DensityNeighbourhood& chu
     copy_by_faces(chunks, wanted, *job.materials, workspace.mesh, *surface);
   } else {
     copy_exactly(workspace.mesh, surface->smooth);
-    add_materials(chunks, *job.materials, job.levels, *surface);
+    surface->albedo.reserve(surface->smooth.cells.size());
+    surface->types.reserve(surface->smooth.cells.size());
+    for (const CellMaterial& material : smooth::materials_of(chunks, wanted, *job.materials, surface->smooth)) {
+      surface->albedo.push_back(material.albedo);
+      surface->types.push_back(material.type);
+    }
   }
   job.surface = std::move(surface);
 }

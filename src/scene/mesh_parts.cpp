@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include <quoin/mesh/simplify.h>
-
+#include "mesh/surface/simplify_tagged.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -42,21 +41,24 @@ Progress part_of(const Progress& whole, double begin, double end) {
   return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
 }
 
-void add_stats(const SmoothMesh& mesh, MeshStats& stats) {
+Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vector<std::uint32_t>& tags,
+                          MeshStats& stats) {
+  if (error) {
+    const auto reached = simplify_tagged(mesh, *error, tags);
+    if (!reached) return reached.error();
+    stats.simplify_error = std::max(stats.simplify_error, *reached);
+  }
   stats.triangles += static_cast<std::int64_t>(mesh.indices.size() / 3);
   stats.vertices += static_cast<std::int64_t>(mesh.positions.size());
+  return {};
 }
 
 Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& types, const SurfaceOptions& wanted,
                               MeshStats& stats, Threads threads, const Progress& progress) {
   auto mesh = build_smooth_mesh(field, types, wanted.mesh, threads, progress);
   if (!mesh) return mesh;
-  if (wanted.simplify_error) {
-    const auto error = simplify_smooth_mesh(*mesh, *wanted.simplify_error);
-    if (!error) return error.error();
-    stats.simplify_error = std::max(stats.simplify_error, *error);
-  }
-  add_stats(*mesh, stats);
+  std::vector<std::uint32_t> no_tags;
+  if (auto done = simplify_and_count(*mesh, wanted.simplify_error, no_tags, stats); !done) return done.error();
   return mesh;
 }
 

@@ -31,8 +31,9 @@ struct SurfaceOptions {
                                             const SurfaceOptions& wanted, MeshStats& stats, Threads threads,
                                             const Progress& progress);
 
-/// Adds triangles and vertices.
-void add_stats(const SmoothMesh& mesh, MeshStats& stats);
+/// Simplifies a mesh, whose vertices' `tags` (or none) go with them, where an error is given; counts what is left.
+[[nodiscard]] Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vector<std::uint32_t>& tags,
+                                        MeshStats& stats);
 
 /// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
 /// instances, in their order.

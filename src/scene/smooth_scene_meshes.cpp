@@ -19,7 +19,6 @@
 #include "grid/coordinate_hash.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
-#include "mesh/surface/simplify_tagged.h"
 #include "scene/lattices.h"
 #include "scene/mesh_parts.h"
 
@@ -164,6 +163,10 @@ class Mesher {
                    : mesh_body(smooth::field_of_body(whole, scene_.types, bodies[i], threads_), &whole, united, part);
       if (!body) return body.error();
       Body& out = made[bodies[i] == 0 ? 0 : 1];
+      if (out.mesh.indices.empty()) {
+        out = std::move(*body);
+        continue;
+      }
       append(out.mesh, body->mesh);
       out.owners.insert(out.owners.end(), body->owners.begin(), body->owners.end());
     }
@@ -183,12 +186,9 @@ class Mesher {
     Body body;
     body.owners = smooth::finish_surface(*surface, scene_.types, options_.mesh, owners);
     body.mesh = std::move(surface->mesh);
-    if (options_.simplify_error) {
-      const auto error = simplify_tagged(body.mesh, *options_.simplify_error, body.owners);
-      if (!error) return error.error();
-      stats_.simplify_error = std::max(stats_.simplify_error, *error);
+    if (auto done = simplify_and_count(body.mesh, options_.simplify_error, body.owners, stats_); !done) {
+      return done.error();
     }
-    add_stats(body.mesh, stats_);
     return body;
   }
 
@@ -268,6 +268,7 @@ std::vector<Unit> units_of(const Scene& scene, const SmoothSceneOptions& options
     }
   }
   std::vector<Unit> units;
+  units.reserve(alone.size() + united.size());
   for (auto& [grid, unit] : alone) units.push_back(std::move(unit));
   std::move(united.begin(), united.end(), std::back_inserter(units));
   return units;

@@ -79,7 +79,6 @@ void App::draw_bars() {
   draw_help(state_, scale);
   if (!state_.open.backend && !state_.loader && !chooser_.is_shown()) draw_welcome(state_, choice);
   if (state_.message) draw_message(state_, bottom);
-  state_.settings.camera_mode = state_.camera.mode;
   for (const Command command : choice.commands) run_command(command);
   if (choice.recent) leave({false, *choice.recent});
 }

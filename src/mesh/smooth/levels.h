@@ -106,8 +106,8 @@ class ChunkLevels {
 inline Corners corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
   Corners corners;
   for (int i = 0; i < 8; ++i) {
-    const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
-    corners[static_cast<std::size_t>(i)] = float_from_half(chunks.get(cell.first + corner * cell.size()));
+    const IVec3 sample = cell.first + corner_place(i) * cell.size();
+    corners[static_cast<std::size_t>(i)] = float_from_half(chunks.get(sample));
   }
   return corners;
 }
@@ -124,8 +124,8 @@ inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const 
   }
   std::uint32_t solid = 0;
   for (int i = 0; i < 8; ++i) {
-    const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
-    solid |= static_cast<std::uint32_t>(DensityChunk::is_solid(chunks.get(first + corner * cell.size()))) << i;
+    const IVec3 sample = first + corner_place(i) * cell.size();
+    solid |= static_cast<std::uint32_t>(DensityChunk::is_solid(chunks.get(sample))) << i;
   }
   return solid;
 }

@@ -19,6 +19,11 @@ inline IVec3 unit_axis(int axis) {
   return unit;
 }
 
+/// Where a corner of a cell lies from its first, in cells; corners are numbered by x + 2 y + 4 z.
+inline IVec3 corner_place(int corner) {
+  return {corner & 1, corner >> 1 & 1, corner >> 2};
+}
+
 /// The name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's.
 inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
   std::uint32_t bits = 0;

@@ -16,10 +16,6 @@ namespace {
 
 constexpr std::size_t kEdges = 12;
 
-IVec3 corner_place(int corner) {
-  return {corner & 1, corner >> 1 & 1, corner >> 2};
-}
-
 int corner_at(IVec3 place) {
   return place.x + 2 * place.y + 4 * place.z;
 }

@@ -1,5 +1,6 @@
 #include "mesh/surface/faces.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 
@@ -102,35 +103,46 @@ TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* 
   return face;
 }
 
-CellMaterial material_of(const DensityNeighbourhood& chunks, const SurfaceMaterials& materials,
-                         const ChunkLevels& levels, SmoothCell name) {
-  const LevelCell cell = levels.cell_of(name);
-  return materials.of_cell(chunks, cell.first / cell.size(), cell.level);
+}  // namespace
+
+std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+                                       const SurfaceMaterials& materials, const SmoothChunkMesh& mesh) {
+  const ChunkLevels levels(options.levels);
+  std::vector<CellMaterial> of_vertex;
+  of_vertex.reserve(mesh.cells.size());
+  for (const SmoothCell name : mesh.cells) {
+    const LevelCell cell = levels.cell_of(name);
+    of_vertex.push_back(materials.of_cell(chunks, cell.first / cell.size(), cell.level));
+  }
+  return of_vertex;
 }
 
-}  // namespace
+std::size_t quad_indices_of(const SmoothChunkMesh& mesh) {
+  const auto is_bridge = [&](std::uint32_t vertex) { return mesh.cells[vertex].bridge_axis() >= 0; };
+  std::size_t i = 0;
+  while (i + 6 <= mesh.indices.size() &&
+         std::none_of(mesh.indices.begin() + i, mesh.indices.begin() + i + 6, is_bridge)) {
+    i += 6;
+  }
+  return i;
+}
 
 void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
                 const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces) {
   faces.reserve(mesh.indices.size() / 3);
   const ChunkLevels levels(options.levels);
   if (levels.all_same() && options.levels[0] == 0) {
-    std::size_t i = 0;
-    // Quads, whose two triangles are one face; then triangles, which all have a vertex in a bridge.
-    const auto is_bridge = [&](std::uint32_t vertex) { return mesh.cells[vertex].bridge_axis() >= 0; };
-    for (; i + 6 <= mesh.indices.size(); i += 6) {
-      const std::uint32_t* quad = mesh.indices.data() + i;
-      if (is_bridge(quad[0]) || is_bridge(quad[1]) || is_bridge(quad[2]) || is_bridge(quad[5])) break;
-      faces.insert(faces.end(), 2, face_around_edge(chunks, mesh, quad));
+    // The two triangles of a quad are one face.
+    const std::size_t quads_end = quad_indices_of(mesh);
+    for (std::size_t i = 0; i < quads_end; i += 6) {
+      faces.insert(faces.end(), 2, face_around_edge(chunks, mesh, mesh.indices.data() + i));
     }
-    for (; i < mesh.indices.size(); i += 3) {
+    for (std::size_t i = quads_end; i < mesh.indices.size(); i += 3) {
       faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
     }
     return;
   }
-  std::vector<CellMaterial> of_vertex;
-  of_vertex.reserve(mesh.cells.size());
-  for (const SmoothCell name : mesh.cells) of_vertex.push_back(material_of(chunks, materials, levels, name));
+  const std::vector<CellMaterial> of_vertex = materials_of(chunks, options, materials, mesh);
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
     faces.push_back(face_of_triangle(mesh, mesh.indices.data() + i, of_vertex));
   }

@@ -20,6 +20,14 @@ struct TriangleFace {
   Direction direction = Direction::PosX;  ///< from it into the air
 };
 
+/// The blended materials of a chunk's vertices; one of a cell before the chunk looks as it does in that chunk's mesh.
+[[nodiscard]] std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+                                                     const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
+
+/// How many of the indices are quads, six each, where all is of one level: the triangles after them have a vertex in a
+/// bridge each.
+[[nodiscard]] std::size_t quad_indices_of(const SmoothChunkMesh& mesh);
+
 /// The faces of the triangles of a chunk's mesh, in the chunk's coordinates.
 void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
                 const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces);

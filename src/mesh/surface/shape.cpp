@@ -11,6 +11,7 @@
 #include "mesh/smooth/split.h"
 #include "mesh/smooth/vertex.h"
 #include "mesh/surface/bodies.h"
+#include "mesh/surface/faces.h"
 
 namespace quoin::smooth {
 namespace {
@@ -118,10 +119,6 @@ class ThinCells {
   std::vector<std::array<WideRow, 3>> thin_;  // [z][y], by axis
 };
 
-IVec3 corner_of(int corner) {
-  return {corner & 1, corner >> 1 & 1, corner >> 2};
-}
-
 /// Whether a cell has one sheet, whichever way they are told apart.
 bool has_one_sheet(std::uint32_t solid) {
   return sheets_of(solid).count == 1 && sheets_of(solid ^ 255U).count == 1;
@@ -140,7 +137,7 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
   std::uint32_t any = kNone;
   bool several = false;
   for (int i = 0; i < 8; ++i) {
-    const IVec3 sample = cell.first + corner_of(i);
+    const IVec3 sample = cell.first + corner_place(i);
     const IVec3 at = chunk_of(sample);
     const DensityChunk* chunk = shape.whole->at(at.x, at.y, at.z);
     const bool solid = DensityChunk::is_solid(shape.whole->get(sample));
@@ -158,7 +155,7 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
     for (std::size_t i = 0; i < 8; ++i) {
       const std::size_t k = i | std::size_t{1} << axis;
       if (k == i || body[i] == body[k]) continue;
-      Vec3 crossing(corner_of(static_cast<int>(i)));
+      Vec3 crossing(corner_place(static_cast<int>(i)));
       const bool meets_air = body[i] == kNone || body[k] == kNone;
       crossing[axis] = meets_air ? corners[i] / (corners[i] - corners[k]) : 0.5F;
       sum += crossing;
@@ -173,12 +170,9 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
 
 /// Splits quads along the diagonals that are shorter now: each body chose its own before its vertices were moved.
 void split_quads_again(const ChunkLevels& levels, SmoothChunkMesh& mesh) {
-  for (std::size_t i = 0; i + 6 <= mesh.indices.size(); i += 6) {
+  const std::size_t quads_end = quad_indices_of(mesh);
+  for (std::size_t i = 0; i < quads_end; i += 6) {
     std::uint32_t* quad = mesh.indices.data() + i;
-    // Triangles that come after the quads have a vertex in a bridge each.
-    const bool is_quad =
-        std::none_of(quad, quad + 6, [&](std::uint32_t v) { return mesh.cells[v].bridge_axis() >= 0; });
-    if (!is_quad) return;
     const std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, mesh);
     std::array<QuadCorner, 4> corners;
     for (std::size_t k = 0; k < 4; ++k) {
