@@ -17,12 +17,33 @@ const DensityStorage* find_storage(const DensityGrid& field, int x, int y, int z
 }
 
 void read_corners(const DensityGrid& field, int x, int y, int z, float* corners) {
-  for (int i = 0; i < 8; ++i) corners[i] = field.density(IVec3{x, y, z} + IVec3{i & 1, i >> 1 & 1, i >> 2});
+  const auto offset = [](unsigned i) { return IVec3(i & 1U, i >> 1 & 1U, i >> 2); };
+  const IVec3 chunk = IVec3{x, y, z} >> kChunkShift;
+  const IVec3 local = IVec3{x, y, z} & (kChunkEdge - 1);
+  constexpr int kLast = kChunkEdge - 1;
+  const unsigned beyond =
+      unsigned{local.x == kLast} | unsigned{local.y == kLast} << 1 | unsigned{local.z == kLast} << 2;
+  const DensityChunk* chunks[8];
+  unsigned known = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const unsigned side = i & beyond;
+    if ((known >> side & 1U) == 0) {
+      known |= 1U << side;
+      chunks[side] = field.find_chunk(chunk + offset(side));
+    }
+    const IVec3 at = (local + offset(i)) & kLast;
+    corners[i] = chunks[side] == nullptr ? field.density(IVec3{x, y, z} + offset(i))
+                                         : float_from_half(chunks[side]->get(at.x, at.y, at.z));
+  }
+}
+
+trace::FieldView view_of(const DensityTree& tree) {
+  return {tree.cells().view(), &tree.field(), find_storage, read_corners};
 }
 
 template <bool kAsksWhere>
 std::optional<FieldHit> find(const DensityTree& tree, const Ray& ray, double max_t) {
-  const trace::FieldView field{tree.cells().view(), &tree.field(), find_storage, read_corners};
+  const trace::FieldView field = view_of(tree);
   const auto kernel = kAsksWhere ? trace::kernel().first_in_field : trace::kernel().any_in_field;
   FieldHit hit;
   bool is_unfinished = true;
@@ -70,25 +91,37 @@ bool any_hit(const DensityTree& tree, const Ray& ray, double max_t) {
 }
 
 void first_hits(const DensityTree& tree, const RayPacket& rays, DensityPacketHits& hits) {
+  const trace::FieldView field = view_of(tree);
+  const auto kernel = trace::kernel().first_hits_in_field;
+  RayPacket::Lanes<FieldHit> found;
+  std::uint32_t one_by_one = rays.active;
   hits.hit = 0;
-  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
+  if (field.cells != nullptr && kernel != nullptr) hits.hit = kernel(field, rays, found.data(), one_by_one);
+  for (; one_by_one != 0; one_by_one &= one_by_one - 1) {
+    const int lane = std::countr_zero(one_by_one);
+    const auto i = static_cast<std::size_t>(lane);
+    const std::optional<FieldHit> hit = find<true>(tree, rays.ray(lane), rays.max_t[i]);
+    if (!hit) continue;
+    hits.hit |= 1U << lane;
+    found[i] = *hit;
+  }
+  for (std::uint32_t left = hits.hit; left != 0; left &= left - 1) {
     const int lane = std::countr_zero(left);
     const auto i = static_cast<std::size_t>(lane);
-    const Ray ray = rays.ray(lane);
-    const std::optional<FieldHit> found = find<true>(tree, ray, rays.max_t[i]);
-    if (!found) continue;
-    hits.hit |= 1U << lane;
-    hits.lanes[i] = described(tree.field(), ray, *found);
+    hits.lanes[i] = described(tree.field(), rays.ray(lane), found[i]);
   }
 }
 
 std::uint32_t any_hits(const DensityTree& tree, const RayPacket& rays) {
+  const trace::FieldView field = view_of(tree);
+  const auto kernel = trace::kernel().any_hits_in_field;
+  std::uint32_t one_by_one = rays.active;
   std::uint32_t blocked = 0;
-  for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
-    const int lane = std::countr_zero(left);
-    const auto i = static_cast<std::size_t>(lane);
-    const bool is_blocked = find<false>(tree, rays.ray(lane), rays.max_t[i]).has_value();
-    blocked |= std::uint32_t{is_blocked} << lane;
+  if (field.cells != nullptr && kernel != nullptr) blocked = kernel(field, rays, one_by_one);
+  for (; one_by_one != 0; one_by_one &= one_by_one - 1) {
+    const int lane = std::countr_zero(one_by_one);
+    const double max_t = rays.max_t[static_cast<std::size_t>(lane)];
+    blocked |= std::uint32_t{find<false>(tree, rays.ray(lane), max_t).has_value()} << lane;
   }
   return blocked;
 }

@@ -227,6 +227,56 @@ TEST_P(DensityRays, MeetASphereWhereItIs) {
   }
 }
 
+// Hills of 2,048 samples, 12 high, with a rough skin.
+DensityGrid long_hills() {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> rough(-0.2F, 0.2F);
+  DensityGrid field;
+  field.edit({IVec3{-1024, 30, 40}, IVec3{1024, 60, 72}}, [&](IVec3 p, DensitySample) {
+    const auto height = static_cast<float>(44.0 + 4.0 * std::sin(p.x * 0.05) + 3.0 * std::sin(p.z * 0.3));
+    return DensitySample{static_cast<float>(p.y) - height + rough(random), 3};
+  });
+  return field;
+}
+
+// Single precision leaves no cell out that a ray passes in double: also where it grazes the surface from far away.
+TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
+  const DensityGrid field = long_hills();
+  const DensityTree tree(field);
+  std::mt19937 random(5);
+  int hits = 0;
+  int others = 0;
+  for (int i = 0; i < 500; ++i) {
+    RayPacket packet;
+    const double side = i % 2 == 0 ? -1.0 : 1.0;
+    const DVec3 eye = DVec3(side * (i % 3 == 0 ? 900.0 : 300.0), 52.0, 56.0) + random_in(random, -3.0, 3.0);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const DVec3 spread = random_in(random, -0.006, 0.006);
+      const DVec3 direction = DVec3(-side, -0.008 + spread.y, spread.z) * (i % 4 == 0 ? 0.01 : 1.0);
+      // Some along the surface that the ray before came to.
+      packet.set(lane, {eye, direction}, kInfinity);
+      const auto before = i % 5 == 0 ? first_hit(tree, {eye, direction}) : std::nullopt;
+      if (before)
+        packet.set(lane, {eye + direction * before->t + before->normal * 0.001, {-side, 0.05, 0.1}}, kInfinity);
+    }
+    DensityPacketHits found;
+    first_hits(tree, packet, found);
+    const std::uint32_t blocked = any_hits(tree, packet);
+    const InstructionSetOverride plain(InstructionSet::Plain);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const auto expected = first_hit(tree, packet.ray(lane));
+      const bool is_hit = (found.hit >> lane & 1U) != 0;
+      EXPECT_EQ(blocked >> lane & 1U, found.hit >> lane & 1U);
+      hits += is_hit;
+      const DensityHit& hit = found.lanes[static_cast<std::size_t>(lane)];
+      // Cells that rays pass for less than 1e-3 are another matter.
+      others += is_hit != expected.has_value() || (is_hit && (hit.t != expected->t || hit.cell != expected->cell));
+    }
+  }
+  EXPECT_GT(hits, 2'000);
+  EXPECT_LE(others, 2);
+}
+
 TEST(DensityRay, StopsAtItsEnd) {
   DensityGrid field;
   field.add_box({10, 10, 10}, {20, 20, 20}, 1);

@@ -58,13 +58,10 @@ class SurfaceWalk {
       cell_ = next->voxel;
       do {
         look();
-        const Corners corners = read();
-        const double t = meet_cell<kAsksWhere>(in_cells_, place(), span_, corners);
-        if (t >= 0.0) {
-          FieldHit hit{t, cell_.x, cell_.y, cell_.z, {}};
-          std::memcpy(hit.corners, &corners, sizeof hit.corners);
-          return hit;
-        }
+        FieldHit hit{0.0, cell_.x, cell_.y, cell_.z, {}};
+        field_.read(*field_.grid, cell_.x, cell_.y, cell_.z, hit.corners);
+        hit.t = meet_cell<kAsksWhere>(in_cells_, at_, span_, hit.corners);
+        if (hit.t >= 0.0) return hit;
         if (!step()) return std::nullopt;
       } while (cells_.is_occupied(cell_));
       next = find_next_cell();
@@ -73,15 +70,10 @@ class SurfaceWalk {
   }
 
  private:
-  [[nodiscard]] CellD4 place() const {
-    return CellD4{static_cast<double>(cell_.x), static_cast<double>(cell_.y), static_cast<double>(cell_.z), 0.0};
+  void look() {
+    for (int axis = 0; axis < 3; ++axis) at_[axis] = cell_[axis];
+    span_ = span_in(in_cells_, at_);
   }
-  [[nodiscard]] Corners read() const {
-    Corners out;
-    field_.read(*field_.grid, cell_.x, cell_.y, cell_.z, reinterpret_cast<float*>(&out.density));
-    return out;
-  }
-  void look() { span_ = span_in(in_cells_, place()); }
 
   // Into the next cell, through the plane that is crossed first; false when that lies beyond the end.
   bool step() {
@@ -120,6 +112,7 @@ class SurfaceWalk {
   Ray ray_;
   CellRay in_cells_;
   IVec3 cell_{0};
+  double at_[3] = {};  // the cell again
   CellSpan span_{};
 };
 

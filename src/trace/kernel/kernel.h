@@ -48,6 +48,10 @@ struct Kernel {
   /// means nothing.
   bool (*first_in_field)(const FieldView& field, const Ray& ray, double max_t, FieldHit& hit, bool& unfinished);
   bool (*any_in_field)(const FieldView& field, const Ray& ray, double max_t, FieldHit& hit, bool& unfinished);
+  /// The same of packets, lane by lane; null where rays are to be traced one by one.
+  std::uint32_t (*first_hits_in_field)(const FieldView& field, const RayPacket& rays, FieldHit* hits,
+                                       std::uint32_t& unfinished);
+  std::uint32_t (*any_hits_in_field)(const FieldView& field, const RayPacket& rays, std::uint32_t& unfinished);
 };
 
 /// The same by any processor, for any ray and whatever the size of the world: `field.cells` may be null.

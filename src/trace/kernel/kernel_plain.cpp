@@ -322,7 +322,13 @@ bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray
   return found.has_value();
 }
 
-const Kernel kPlainKernel = {
-    first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one, any_one_by_one, nullptr, nullptr};
+const Kernel kPlainKernel = {first_single<PlainTracer>,
+                             any_single<PlainTracer>,
+                             first_one_by_one,
+                             any_one_by_one,
+                             nullptr,
+                             nullptr,
+                             nullptr,
+                             nullptr};
 
 }  // namespace quoin::trace

@@ -293,6 +293,15 @@ inline F cross_next(const Lanes& lanes, const Planes& steps, Nexts& nexts, Cross
   return t;
 }
 
+// The same, of the lanes of `who`.
+inline void cross_next(const Lanes& lanes, const Planes& steps, Mask who, Nexts& nexts, Crossing& crossing) {
+  first_of({nexts.x.t, nexts.y.t, nexts.z.t}, crossing);
+  crossing = {crossing.x & who, crossing.y & who, crossing.z & who};
+  cross_if(crossing.x, lanes.x, steps.x, nexts.x);
+  cross_if(crossing.y, lanes.y, steps.y, nexts.y);
+  cross_if(crossing.z, lanes.z, steps.z, nexts.z);
+}
+
 // The same for numbers that change by a constant with each plane.
 struct Strides {
   I x, y, z;
@@ -473,6 +482,26 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   return walk;
 }
 
+// One step of the lanes of `who`; returns those that are still in their cell.
+inline Mask step_on(const Lanes& lanes, const VoxelSteps& steps, Mask who, VoxelWalk& walk) {
+  Crossing crossing;
+  cross_next(lanes, steps.one, who, walk.nexts, crossing);
+  walk.code = stepped(walk.code, crossing, steps.strides);
+  return who & ~test(walk.code, all(kLeft));
+}
+
+// Walks until each lane of `walking` stands in an occupied voxel, and stays there, or has left its cell.
+inline Mask stop_at_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking) {
+  Mask hit = mask_of(0);
+  for (;;) {
+    const I half = select(test(walk.code, all(32)), walk.high_half, walk.low_half);
+    const Mask met = test_bit(half, walk.code) & walking;
+    hit = hit | met;
+    walking = step_on(lanes, steps, walking & ~met, walk);
+    if (!any(walking)) return hit;
+  }
+}
+
 // Walks until each lane of `walking` has met a voxel, whose code it leaves, or has left its cell.
 template <Ask kAsk>
 inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking, I& code) {
@@ -510,33 +539,50 @@ inline void find_faces(const Lanes& lanes, Mask hit, Met& met) {
   met.axis = select(hit, crossed(entered, all(0), all(1), all(2)), met.axis);
 }
 
-// Asked whether alone, it does not say where.
-template <Ask kAsk>
-inline Met trace_apart(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered, Met met) {
+// Walks the lanes from cell to cell; `meet(cells, voxels, found)` goes through the voxels of those in which the lanes
+// of `found` stand, and returns the lanes that are done. Returns all that are.
+template <class Meet>
+[[gnu::always_inline]] inline Mask walk_apart(const TreeView& tree, const Lanes& lanes, const VoxelSteps& steps, F t,
+                                              const Crossing& entered, Meet&& meet) {
   CellWalk cells = enter_box(tree, lanes, t, entered);
   const Planes eight = steps_of(lanes, 8.0F);
-  const VoxelSteps steps = voxel_steps(lanes);
   Mask searching = lanes.live;
   Mask found = searching & is_occupied(tree, cells.index);
-  Mask hit_any = mask_of(0);
+  Mask done = mask_of(0);
   for (;;) {
     found = found | find_cells(tree, lanes, cells, searching & ~found);
-    if (!any(found)) break;
+    if (!any(found)) return done;
     const Planes entries = {cells.after.x - eight.x, cells.after.y - eight.y, cells.after.z - eight.z};
     const Cells at = {cell_of(lanes.x, entries.x), cell_of(lanes.y, entries.y), cell_of(lanes.z, entries.z)};
     VoxelWalk voxels = enter_cells(lanes, entries, steps);
     read_words(tree, at, found, voxels);
+    const Mask met = meet(at, voxels, found);
+    done = done | met;
+    searching = found & ~met;
+    found = mask_of(0);
+  }
+}
+
+inline Cells voxels_at(const Cells& cells, I code) {
+  return {shift_left<2>(cells.x) + (code & all(3)), shift_left<2>(cells.y) + (shift_right<2>(code) & all(3)),
+          shift_left<2>(cells.z) + (shift_right<4>(code) & all(3))};
+}
+
+// Asked whether alone, it does not say where.
+template <Ask kAsk>
+inline Met trace_apart(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered, Met met) {
+  const VoxelSteps steps = voxel_steps(lanes);
+  const Mask hit_any = walk_apart(tree, lanes, steps, t, entered, [&](const Cells& at, VoxelWalk& voxels, Mask found) {
     I code = all(0);
     const Mask hit = find_voxels<kAsk>(lanes, steps, voxels, found, code);
     if (kAsk == Ask::Where) {
-      met.x = select(hit, shift_left<2>(at.x) + (code & all(3)), met.x);
-      met.y = select(hit, shift_left<2>(at.y) + (shift_right<2>(code) & all(3)), met.y);
-      met.z = select(hit, shift_left<2>(at.z) + (shift_right<4>(code) & all(3)), met.z);
+      const Cells voxel = voxels_at(at, code);
+      met.x = select(hit, voxel.x, met.x);
+      met.y = select(hit, voxel.y, met.y);
+      met.z = select(hit, voxel.z, met.z);
     }
-    hit_any = hit_any | hit;
-    searching = found & ~hit;
-    found = mask_of(0);
-  }
+    return hit;
+  });
   met.hit = met.hit | hit_any;
   if (kAsk == Ask::Where && any(hit_any)) find_faces(lanes, hit_any, met);
   return met;

@@ -176,7 +176,7 @@ class PathWalk {
   template <Ask kAsk>
   [[gnu::always_inline]] SingleHit find() {
     SingleHit found{false, ray_.is_cut, -1, IVec3{0}};
-    walk([&](int brick, int cell, std::uint64_t met) {
+    walk([&](int brick, int cell, std::uint64_t met) __attribute__((always_inline)) {
       found = hit<kAsk>(brick, cell, met);
       return true;
     });
@@ -251,15 +251,17 @@ class PathWalk {
             (own[0] >> 2 & 3) + (own[1] & 12) + (own[2] & 12) * 4, (own[0] & 3) + (own[1] & 3) * 4 + (own[2] & 3) * 16};
   }
   [[nodiscard]] bool is_set(std::uint64_t word, int unit) const { return (word >> (unit ^ flip_) & 1U) != 0; }
-  [[nodiscard]] std::uint64_t bits_of_bricks() const { return mirrored_(&tree_.chunks[index_].bricks); }
+  [[nodiscard, gnu::always_inline]] std::uint64_t bits_of_bricks() const {
+    return mirrored_(&tree_.chunks[index_].bricks);
+  }
   [[nodiscard]] const ChunkNode& node() const { return *tree_.chunks[index_].node; }
-  [[nodiscard]] std::uint64_t bricks_of_chunk() const {
+  [[nodiscard, gnu::always_inline]] std::uint64_t bricks_of_chunk() const {
     return tree_.chunks[index_].bricks == 0 ? 0 : paths_.bricks(chunk_) & bits_of_bricks();
   }
-  [[nodiscard]] std::uint64_t cells_of(int brick) const {
+  [[nodiscard, gnu::always_inline]] std::uint64_t cells_of(int brick) const {
     return paths_.cells(chunk_, brick) & mirrored_(&node().cells[static_cast<std::size_t>(brick ^ flip_)]);
   }
-  [[nodiscard]] std::uint64_t voxels_of(const Paths::Block& block, int brick, int cell) const {
+  [[nodiscard, gnu::always_inline]] std::uint64_t voxels_of(const Paths::Block& block, int brick, int cell) const {
     const Node& words = tree_.nodes[node().bricks[static_cast<std::size_t>(brick ^ flip_)]];
     return paths_.voxels(block, cell) & mirrored_(&words[static_cast<std::size_t>(cell ^ flip_)]);
   }
