@@ -13,6 +13,8 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
+#include "grid/density/density_storage.h"
+
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/quad.h"
 
@@ -117,8 +119,11 @@ inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const 
   const IVec3 first = cell.first;
   const bool inside = cell.level == 0 && cell.chunk == IVec3{0} && std::max({first.x, first.y, first.z}) < 63;
   if (const DensityChunk* centre = chunks.centre(); inside && centre != nullptr) {
+    const DensityStorage* const storage = centre->storage();
+    if (storage == nullptr) return centre->solid_row(0, 0) != 0 ? 255U : 0U;
+    const std::uint64_t* const rows = storage->solid.data() + first.z * kChunkEdge + first.y;
     const auto pair = [&](int y, int z) {
-      return static_cast<std::uint32_t>(centre->solid_row(first.y + y, first.z + z) >> first.x & 3U);
+      return static_cast<std::uint32_t>(rows[z * kChunkEdge + y] >> first.x & 3U);
     };
     return pair(0, 0) | pair(1, 0) << 2 | pair(0, 1) << 4 | pair(1, 1) << 6;
   }

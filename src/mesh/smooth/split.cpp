@@ -134,12 +134,14 @@ int find_joined_face(std::uint32_t solid) {
 struct SheetTables {
   std::array<std::array<Sheets, kNoFace + 1>, 256> sheets;  // by solid corners, then flipped face
   std::array<std::uint8_t, 256> joined_face;
+  std::array<bool, 256> is_plain;  // by solid corners: one sheet at most, whatever the cells beside it
   SheetTables() {
     for (std::uint32_t solid = 0; solid < 256; ++solid) {
       joined_face[solid] = static_cast<std::uint8_t>(find_joined_face(solid));
       for (int face = 0; face <= kNoFace; ++face) {
         sheets[solid][static_cast<std::size_t>(face)] = find_sheets(solid, face);
       }
+      is_plain[solid] = joined_face[solid] == kNoFace && sheets[solid][kNoFace].count < 2;
     }
   }
 };
@@ -174,7 +176,12 @@ class Splitter {
 
   void run(std::size_t quad_indices) {
     const std::size_t vertices = out_.cells.size();
-    for (std::size_t i = 0; i < vertices; ++i) split_vertex(static_cast<std::uint32_t>(i));
+    const std::array<bool, 256>& is_plain = tables().is_plain;
+    for (std::size_t i = 0; i < vertices; ++i) {
+      const LevelCell cell = levels_.cell_of(out_.cells[i]);
+      const std::uint32_t solid = parted_corners(cell);
+      if (!is_plain[solid]) split_vertex(static_cast<std::uint32_t>(i), cell, solid);
+    }
     if (split_.empty() && bridges_.empty()) return;
     is_split_.assign(vertices, false);
     for (const auto& [vertex, split] : split_) is_split_[vertex] = true;
@@ -205,11 +212,8 @@ class Splitter {
     std::uint32_t first;  // of the lesser corner; the other's follows
   };
 
-  void split_vertex(std::uint32_t vertex) {
-    const LevelCell cell = levels_.cell_of(out_.cells[vertex]);
-    const std::uint32_t solid = parted_corners(cell);
+  void split_vertex(std::uint32_t vertex, const LevelCell& cell, std::uint32_t solid) {
     const int joined = tables().joined_face[solid];
-    if (joined == kNoFace && tables().sheets[solid][kNoFace].count < 2) return;
     if (!same_levels_ && levels_.touches_another(cell)) return;
     const bool joins = joined != kNoFace && joins_as_well(cell, joined);
     // Where solids are to hold together there is a bridge instead, which the lower of both cells makes.

@@ -2,6 +2,9 @@
 
 // Putting single vertices into a chunk's mesh, in scalar: for the cells that the fast kernels leave out.
 
+#include <array>
+#include <limits>
+
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
@@ -11,14 +14,47 @@
 
 namespace quoin::smooth {
 
+/// Reads single densities that lie near each other, in rows along x of which there are two by y and two by z.
+class NearbyDensities {
+ public:
+  explicit NearbyDensities(const DensityNeighbourhood& chunks) : chunks_(chunks) {}
+
+  [[nodiscard]] Half get(IVec3 sample) {
+    Row& row = rows_[static_cast<std::size_t>((sample.y & 1) + 2 * (sample.z & 1))];
+    const IVec3 place{sample.x >> kChunkShift, sample.y, sample.z};
+    if (place != row.place) row = find(place);
+    return row.values == nullptr ? row.only : row.values[sample.x & (kChunkEdge - 1)];
+  }
+
+ private:
+  struct Row {
+    IVec3 place{std::numeric_limits<int>::min()};
+    const Half* values = nullptr;
+    Half only = 0;  // where there are none
+  };
+
+  [[nodiscard]] Row find(IVec3 place) const {
+    const DensityChunk* const chunk = chunks_.at(place.x, place.y >> kChunkShift, place.z >> kChunkShift);
+    if (chunk == nullptr) return {place, nullptr, chunks_.outside};
+    const int y = place.y & (kChunkEdge - 1);
+    const int z = place.z & (kChunkEdge - 1);
+    const Half* const values = chunk->row(y, z);
+    return {place, values, values == nullptr ? chunk->get(0, y, z) : Half{0}};
+  }
+
+  const DensityNeighbourhood& chunks_;
+  std::array<Row, 4> rows_;
+};
+
 /// Writes all that a mesh knows of a vertex to an index that is there already.
 inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
                          const LevelCell& cell, const CellVertex& vertex, std::uint32_t index, SmoothChunkMesh& out) {
   out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());
   out.normals[index] = vertex.normal;
   if (occlusion.form == SmoothOcclusion::None) return;
+  NearbyDensities nearby(chunks);
   const auto density = [&](int x, int y, int z) {
-    return float_from_half(chunks.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
+    return float_from_half(nearby.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
   };
   out.occlusion[index] =
       occlusion_at_vertex(vertex.snapped, vertex.normal, within_limits(occlusion, cell.level), density);

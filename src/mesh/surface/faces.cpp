@@ -1,8 +1,7 @@
 #include "mesh/surface/faces.h"
 
 #include <algorithm>
-#include <limits>
-#include <numeric>
+#include <array>
 
 #include <quoin/core/assert.h>
 
@@ -11,74 +10,116 @@
 namespace quoin::smooth {
 namespace {
 
-/// A copy of a vertex, in the list of those of its vertex.
-struct ListedCopy {
-  FaceLook look;
-  std::uint32_t next = 0;  // 0: none, else the place of another, plus one
+/// What a FaceLook holds, in one number; not 0.
+class LookCode {
+ public:
+  LookCode() = default;
+  explicit LookCode(const FaceLook& look)
+      : code_(std::uint64_t{look.group} << 32 | std::uint64_t{look.type} << 8 |
+              static_cast<std::uint64_t>(look.direction) << 1 | 1U) {}
+
+  [[nodiscard]] bool is_set() const { return code_ != 0; }
+  [[nodiscard]] FaceLook look() const {
+    return {static_cast<VoxelType>(code_ >> 8 & 0xFFFFU), static_cast<Direction>(code_ >> 1 & 7U),
+            static_cast<std::uint32_t>(code_ >> 32)};
+  }
+  bool operator==(const LookCode&) const = default;
+
+ private:
+  std::uint64_t code_ = 0;
 };
 
-/// The copies that each vertex needs.
+/// The copies that each vertex needs. Nearly all need one.
 class Copies {
  public:
-  explicit Copies(std::size_t vertices) : first_(vertices), count_(vertices + 1) { all_.reserve(vertices); }
+  explicit Copies(std::size_t vertices) : first_(vertices) {}
 
-  /// The number, among the copies of the vertex, of that with the look.
-  std::uint32_t find_or_add(std::uint32_t vertex, const FaceLook& look) {
-    std::uint32_t number = 0;
-    std::uint32_t* link = &first_[vertex];
-    for (; *link != 0; link = &all_[*link - 1].next, ++number) {
-      if (all_[*link - 1].look == look) return number;
+  /// Whether the first copy of the vertex has the look; a vertex without copies has it from now on.
+  bool is_first(std::uint32_t vertex, LookCode look) {
+    // Without a branch: which triangle is the first of its vertex nobody can guess.
+    const LookCode first = first_[vertex].is_set() ? first_[vertex] : look;
+    first_[vertex] = first;
+    return first == look;
+  }
+
+  /// The number, among the copies of the vertex, of that with the look, which is not the first.
+  std::uint32_t find_or_add_other(std::uint32_t vertex, LookCode look) {
+    if (second_.empty()) second_.resize(first_.size());
+    std::uint32_t number = 1;
+    std::uint32_t* link = &second_[vertex];
+    for (; *link != 0; link = &others_[*link - 1].next, ++number) {
+      if (others_[*link - 1].look == look) return number;
     }
-    *link = static_cast<std::uint32_t>(all_.size() + 1);
-    all_.push_back({look, 0});
-    ++count_[vertex + std::size_t{1}];
+    *link = static_cast<std::uint32_t>(others_.size() + 1);
+    others_.push_back({look, 0});
     return number;
   }
 
-  /// Where the copies of each vertex begin among all.
-  [[nodiscard]] std::vector<std::uint32_t> places() const {
-    std::vector<std::uint32_t> places(count_.size());
-    std::partial_sum(count_.begin(), count_.end(), places.begin());
-    return places;
-  }
-
-  /// In the order of the vertices, those of one in the order in which they were added.
-  [[nodiscard]] std::vector<VertexCopy> list() const {
+  /// In the order of the vertices, those of one in the order in which they were added. `places` becomes where those of
+  /// each vertex begin.
+  [[nodiscard]] std::vector<VertexCopy> list(std::vector<std::uint32_t>& places) const {
     std::vector<VertexCopy> copies;
-    copies.reserve(all_.size());
+    copies.reserve(first_.size() + others_.size());
+    places.resize(first_.size());
     for (std::uint32_t vertex = 0; vertex < first_.size(); ++vertex) {
-      for (std::uint32_t at = first_[vertex]; at != 0; at = all_[at - 1].next) {
-        copies.push_back({vertex, all_[at - 1].look});
+      places[vertex] = static_cast<std::uint32_t>(copies.size());
+      if (!first_[vertex].is_set()) continue;
+      copies.push_back({vertex, first_[vertex].look()});
+      if (second_.empty()) continue;
+      for (std::uint32_t at = second_[vertex]; at != 0; at = others_[at - 1].next) {
+        copies.push_back({vertex, others_[at - 1].look.look()});
       }
     }
     return copies;
   }
 
  private:
-  std::vector<std::uint32_t> first_;  // by vertex, as ListedCopy::next
-  std::vector<std::uint32_t> count_;  // by vertex plus one
-  std::vector<ListedCopy> all_;
+  // A copy of a vertex after its first, in the list of these.
+  struct Other {
+    LookCode look;
+    std::uint32_t next = 0;  // 0: none, else the place of another, plus one
+  };
+
+  std::vector<LookCode> first_;        // by vertex
+  std::vector<std::uint32_t> second_;  // by vertex, as Other::next; empty while no vertex has two
+  std::vector<Other> others_;
 };
+
+// Whether a sample next to the chunk or in it is solid.
+bool is_solid_at(const DensityNeighbourhood& chunks, IVec3 sample) {
+  const IVec3 chunk = chunk_of(sample);
+  const IVec3 local = local_of(sample);
+  const DensityChunk* const found = chunks.at(chunk.x, chunk.y, chunk.z);
+  if (found == nullptr) return DensityChunk::is_solid(chunks.outside);
+  const DensityStorage* const storage = found->storage();
+  const std::uint64_t row = storage == nullptr
+                                ? found->solid_row(0, 0)
+                                : storage->solid[static_cast<std::size_t>(local.z * kChunkEdge + local.y)];
+  return (row >> local.x & 1U) != 0;
+}
 
 // The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or
 // between, which are three or four of those around the edge.
 TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
-                              const std::uint32_t* triangle) {
-  IVec3 first{std::numeric_limits<int>::max()};
-  IVec3 last{std::numeric_limits<int>::min()};
-  for (std::size_t i = 0; i < 3; ++i) {
+                              const std::uint32_t* triangle, bool has_bridges) {
+  const auto place_of = [&](std::size_t i) {
     const SmoothCell name = mesh.cells[triangle[i]];
-    const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
-    first = glm::min(first, place);
-    last = glm::max(last, place);
-    if (const int axis = name.bridge_axis(); axis >= 0) last = glm::max(last, place + unit_axis(axis));
+    return name.cell() + name.chunk_offset() * kChunkEdge;
+  };
+  const std::array<IVec3, 3> places = {place_of(0), place_of(1), place_of(2)};
+  const IVec3 first = glm::min(glm::min(places[0], places[1]), places[2]);
+  IVec3 last = glm::max(glm::max(places[0], places[1]), places[2]);
+  if (has_bridges) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const int axis = mesh.cells[triangle[i]].bridge_axis();
+      if (axis >= 0) last = glm::max(last, places[i] + unit_axis(axis));
+    }
   }
   // These cells share their extent along the edge; the last of them begins where the edge does.
-  int axis = 0;
-  while (axis < 2 && first[axis] != last[axis]) ++axis;
+  const int axis = first.x == last.x ? 0 : first.y == last.y ? 1 : 2;
   TriangleFace face;
   face.sample = last;
-  const bool is_first_solid = DensityChunk::is_solid(chunks.get(last));
+  const bool is_first_solid = is_solid_at(chunks, last);
   if (!is_first_solid) ++face.sample[axis];
   face.direction = static_cast<Direction>(2 * axis + (is_first_solid ? 0 : 1));
   const IVec3 chunk = chunk_of(face.sample);
@@ -135,10 +176,10 @@ void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options
     // The two triangles of a quad are one face.
     const std::size_t quads_end = quad_indices_of(mesh);
     for (std::size_t i = 0; i < quads_end; i += 6) {
-      faces.insert(faces.end(), 2, face_around_edge(chunks, mesh, mesh.indices.data() + i));
+      faces.insert(faces.end(), 2, face_around_edge(chunks, mesh, mesh.indices.data() + i, false));
     }
     for (std::size_t i = quads_end; i < mesh.indices.size(); i += 3) {
-      faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i));
+      faces.push_back(face_around_edge(chunks, mesh, mesh.indices.data() + i, true));
     }
     return;
   }
@@ -152,18 +193,27 @@ std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::si
                                        std::span<const TriangleFace> faces, const FaceDifferences& differences) {
   QUOIN_ASSERT(faces.size() == indices.size() / 3);
   Copies copies(vertices);
-  std::vector<std::uint32_t> numbers(indices.size());
-  for (std::size_t i = 0; i < indices.size(); ++i) {
-    const TriangleFace& face = faces[i / 3];
+  struct Exception {
+    std::size_t index;
+    std::uint32_t number;  // among the copies of its vertex
+  };
+  std::vector<Exception> exceptions;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
     FaceLook look;
-    if (differences.types) look.type = face.type;
-    if (differences.directions) look.direction = face.direction;
-    if (!differences.groups.empty()) look.group = differences.groups[i / 3];
-    numbers[i] = copies.find_or_add(indices[i], look);
+    if (differences.types) look.type = faces[i].type;
+    if (differences.directions) look.direction = faces[i].direction;
+    if (!differences.groups.empty()) look.group = differences.groups[i];
+    const LookCode code(look);
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      const std::uint32_t vertex = indices[k];
+      if (!copies.is_first(vertex, code)) exceptions.push_back({k, copies.find_or_add_other(vertex, code)});
+    }
   }
-  const std::vector<std::uint32_t> places = copies.places();
-  for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = places[indices[i]] + numbers[i];
-  return copies.list();
+  std::vector<std::uint32_t> places;
+  std::vector<VertexCopy> list = copies.list(places);
+  for (std::uint32_t& index : indices) index = places[index];
+  for (const Exception& exception : exceptions) indices[exception.index] += exception.number;
+  return list;
 }
 
 }  // namespace quoin::smooth

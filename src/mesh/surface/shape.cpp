@@ -64,7 +64,8 @@ ThinRows thin_of(const RowsAround& rows) {
 /// Along which axes the cells of a chunk, -1 to 63 on each axis, have a thin corner.
 class ThinCells {
  public:
-  explicit ThinCells(const DensityNeighbourhood& chunks) : solid_(kRead * kRead), thin_(kFound * kFound) {
+  explicit ThinCells(const DensityNeighbourhood& chunks)
+      : solid_(kRead * kRead), thin_(kFound * kFound), any_(kFound * kFound) {
     for (int z = 0; z < kRead; ++z) {
       for (int y = 0; y < kRead; ++y) solid_[at(y, z)] = read(chunks, y - 2, z - 2);
     }
@@ -74,16 +75,27 @@ class ThinCells {
         const ThinRows high = find(y, z, &WideRow::high);
         const std::size_t row = static_cast<std::size_t>(z * kFound + y);
         for (std::size_t axis = 0; axis < 3; ++axis) thin_[row][axis] = {low[axis], high[axis]};
+        any_[row] = {low[0] | low[1] | low[2], high[0] | high[1] | high[2]};
       }
     }
+    for (std::size_t row = 0; row + kFound + 1 < any_.size(); ++row) {
+      for (const std::size_t other : {row + 1, row + kFound, row + kFound + 1}) {
+        any_[row].low |= any_[other].low;
+        any_[row].high |= any_[other].high;
+      }
+    }
+  }
+
+  /// Whether `has` holds along any axis.
+  [[nodiscard]] bool has_any(IVec3 cell) const {
+    return (pair_of(any_[static_cast<std::size_t>((cell.z + 1) * kFound + cell.y + 1)], cell.x) & 3U) != 0;
   }
 
   [[nodiscard]] bool has(IVec3 cell, int axis) const {
     std::uint64_t pair = 0;
     for (int i = 0; i < 4; ++i) {
       const auto at = static_cast<std::size_t>((cell.z + 1 + (i >> 1)) * kFound + cell.y + 1 + (i & 1));
-      const WideRow& row = thin_[at][static_cast<std::size_t>(axis)];
-      pair |= cell.x < kChunkEdge / 2 ? row.low >> (cell.x + 2) : row.high >> (cell.x - 2);
+      pair |= pair_of(thin_[at][static_cast<std::size_t>(axis)], cell.x);
     }
     return (pair & 3U) != 0;
   }
@@ -93,6 +105,10 @@ class ThinCells {
   static constexpr int kFound = kChunkEdge + 2;  // rows from -1 on
 
   static std::size_t at(int y, int z) { return static_cast<std::size_t>(z * kRead + y); }
+  // In the lowest two bits: samples x and x + 1.
+  static std::uint64_t pair_of(const WideRow& row, int x) {
+    return x < kChunkEdge / 2 ? row.low >> (x + 2) : row.high >> (x - 2);
+  }
 
   static WideRow read(const DensityNeighbourhood& chunks, int y, int z) {
     const auto part = [&](int dx) -> std::uint64_t {
@@ -107,6 +123,10 @@ class ThinCells {
   [[nodiscard]] ThinRows find(int y, int z, std::uint64_t WideRow::*half) const {
     const auto row = [&](int dy, int dz) { return solid_[at(y + 1 + dy, z + 1 + dz)].*half; };
     RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
+    // Within the ground and above it, as most rows are.
+    const std::uint64_t all = solid.here & solid.y[0] & solid.y[1] & solid.z[0] & solid.z[1];
+    const std::uint64_t some = solid.here | solid.y[0] | solid.y[1] | solid.z[0] | solid.z[1];
+    if (~all == 0 || some == 0) return {};
     solid.yz = {{{row(-1, -1), row(-1, 1)}, {row(1, -1), row(1, 1)}}};
     RowsAround air{~solid.here, {~solid.y[0], ~solid.y[1]}, {~solid.z[0], ~solid.z[1]}, {}};
     for (std::size_t i = 0; i < 4; ++i) air.yz[i / 2][i % 2] = ~solid.yz[i / 2][i % 2];
@@ -117,6 +137,7 @@ class ThinCells {
 
   std::vector<WideRow> solid_;                // [z][y]
   std::vector<std::array<WideRow, 3>> thin_;  // [z][y], by axis
+  std::vector<WideRow> any_;                  // [z][y]: along any axis, in any row of the cells that begin here
 };
 
 /// Whether a cell has one sheet, whichever way they are told apart.
@@ -192,8 +213,11 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
   const ChunkLevels levels(options.levels);
   std::unique_ptr<const ThinCells> thin;
   if (shape.keep_thin) thin = std::make_unique<const ThinCells>(chunks);
+  const bool moves_thin_only = shape.whole == nullptr && shape.smoothness == 1.0F;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const LevelCell cell = levels.cell_of(mesh.cells[i]);
+    const bool has_thin = thin && cell.level == 0 && thin->has_any(cell.first);
+    if (moves_thin_only && !has_thin) continue;
     const Vec3 first(cell.first);
     const auto size = static_cast<float>(cell.size());
     Vec3 fraction = (mesh.positions[i] - first) / size;
@@ -210,7 +234,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
                                  (mesh.cells[i].bridge_axis() >= 0 || !has_one_sheet(solid_corners_of(chunks, cell)));
     const float share = may_meet_others ? kLeastShare : shape.smoothness;
     for (int axis = 0; axis < 3; ++axis) {
-      const bool is_thin = thin && cell.level == 0 && (shared || thin->has(cell.first, axis));
+      const bool is_thin = thin && cell.level == 0 && (shared || (has_thin && thin->has(cell.first, axis)));
       const float kept = is_thin ? share * kThinShare : share;
       if (kept == 1.0F && !shared) continue;
       // In a bridge: from the middle of the face between two cells.
