@@ -125,7 +125,7 @@ TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
   std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(2);
   std::vector<Json> counts;
   for (const std::string hidden : {"", " --hidden"}) {
-    for (const std::string command : {"info hidden.vox", "convert hidden.vox a.glb", "convert hidden.vox a.vox",
+    for (const std::string command : {"info hidden.vox", "convert hidden.vox a.glb", "convert hidden.vox a.vox --force",
                                       "render hidden.vox -o a.png --size 8x8"}) {
       const ToolRun json = run(command + " --json" + hidden);
       ASSERT_EQ(json.status, 0) << json.err;
@@ -151,7 +151,7 @@ TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
     const ToolRun json = run("convert tiny.vox " + out + " --json");
     ASSERT_EQ(json.status, 0) << json.err;
     EXPECT_EQ(Json::parse(json.out)["files"], Json(files));
-    const ToolRun text = run("convert tiny.vox " + out);
+    const ToolRun text = run("convert tiny.vox " + out + " --force");
     std::string list = "\nWrote ";
     for (const std::string& file : files) list += file + ", ";
     EXPECT_NE(text.out.find(list), std::string::npos) << text.out;
@@ -212,11 +212,103 @@ TEST_F(Tool, MoreThreadsThanProcessorsAreNoNews) {
   EXPECT_EQ(result.err, "");
 }
 
-TEST_F(Tool, AFileMayBeConvertedOntoItself) {
-  ASSERT_EQ(run("convert tiny.vox tiny.vox").status, 0);
-  const ToolRun json = run("info tiny.vox --json");
-  ASSERT_EQ(json.status, 0) << json.err;
-  EXPECT_EQ(Json::parse(json.out)["voxels"], 4);
+TEST_F(Tool, WhatIsReadIsNeverReplaced) {
+  std::filesystem::create_symlink("tiny.vox", folder_.file("link.vox"));
+  std::ofstream(folder_.file("other.vox"), std::ios::binary) << tiny_vox();
+  for (const std::string arguments : {"tiny.vox tiny.vox", "tiny.vox ./tiny.vox --force", "tiny.vox link.vox --force",
+                                      "tiny.vox other.vox --to vox", "tiny.vox --to vox --out-dir . --force"}) {
+    const ToolRun result = run("convert " + arguments);
+    EXPECT_EQ(result.status, 1) << arguments;
+    EXPECT_NE(result.err.find("an input is never replaced"), std::string::npos) << result.err;
+    EXPECT_EQ(text_of(folder_.file("tiny.vox")), tiny_vox()) << arguments;
+  }
+}
+
+TEST_F(Tool, WhatHoldsAModelIsReplacedOnlyByForce) {
+  const std::string large = checkerboard_vox(6);
+  std::ofstream(folder_.file("other.vox"), std::ios::binary) << large;
+  std::ofstream(folder_.file("misnamed.glb"), std::ios::binary) << large;
+  for (const std::string command :
+       {"convert tiny.vox other.vox", "convert tiny.vox misnamed.glb", "generate terrain other.vox --chunks 1x1x1",
+        "convert tiny.vox --to glb --out-dir ."}) {
+    if (command.ends_with(".")) std::ofstream(folder_.file("tiny.glb"), std::ios::binary) << large;
+    const ToolRun result = run(command);
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_NE(result.err.find("there already, a vox file; --force replaces it"), std::string::npos) << result.err;
+    EXPECT_EQ(text_of(folder_.file("other.vox")), large);
+    EXPECT_EQ(text_of(folder_.file("misnamed.glb")), large);
+  }
+  EXPECT_EQ(run("convert tiny.vox other.vox --force").status, 0);
+  EXPECT_NE(text_of(folder_.file("other.vox")), large);
+  EXPECT_EQ(run("generate terrain other.vox --chunks 1x1x1 --force").status, 0);
+  // Products are replaced as they always were.
+  EXPECT_EQ(run("convert tiny.vox mesh.glb").status, 0);
+  EXPECT_EQ(run("convert tiny.vox mesh.glb").status, 0);
+}
+
+TEST_F(Tool, ConvertsManyFilesAndNamesThoseThatFailLast) {
+  std::filesystem::create_directories(folder_.file("models/deep"));
+  std::ofstream(folder_.file("models/one.vox"), std::ios::binary) << tiny_vox();
+  std::ofstream(folder_.file("models/deep/two.VOX"), std::ios::binary) << tiny_vox();
+  std::ofstream(folder_.file("models/deep/broken.vox"), std::ios::binary) << tiny_vox().substr(0, 40);
+  std::ofstream(folder_.file("models/notes.txt")) << "not a model";
+  const ToolRun text = run("convert tiny.vox models missing.vox --to glb --out-dir out --recursive");
+  EXPECT_EQ(text.status, 1);
+  EXPECT_NE(text.out.find("Converted 3 of 5"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("models/deep/two.VOX -> out/deep/two.glb"), std::string::npos) << text.out;
+  EXPECT_EQ(std::count(text.err.begin(), text.err.end(), '\n'), 2) << text.err;
+  EXPECT_NE(text.err.find("quoin: models/deep/broken.vox: "), std::string::npos) << text.err;
+  EXPECT_NE(text.err.find("quoin: missing.vox: "), std::string::npos) << text.err;
+  for (const std::string name : {"out/tiny.glb", "out/one.glb", "out/deep/two.glb"}) EXPECT_TRUE(exists(name)) << name;
+  ASSERT_EQ(run("convert tiny.vox alone.glb").status, 0);
+  EXPECT_EQ(text_of(folder_.file("out/tiny.glb")), text_of(folder_.file("alone.glb")));
+
+  const ToolRun json = run("convert tiny.vox models/one.vox missing.vox --to ply --json");
+  EXPECT_EQ(json.status, 1);
+  const Json object = Json::parse(json.out);
+  EXPECT_EQ(object["converted"].size(), 2U);
+  EXPECT_EQ(object["converted"][1]["input"], "models/one.vox");
+  EXPECT_EQ(object["converted"][1]["files"], Json({"models/one.ply"}));
+  EXPECT_EQ(object["converted"][1]["voxels"], 4);
+  ASSERT_EQ(object["failed"].size(), 1U);
+  EXPECT_EQ(object["failed"][0]["input"], "missing.vox");
+}
+
+TEST_F(Tool, ManyFilesAreNotMixedUp) {
+  std::filesystem::create_directories(folder_.file("a"));
+  std::ofstream(folder_.file("a/tiny.vox"), std::ios::binary) << tiny_vox();
+  const ToolRun both = run("convert tiny.vox a/tiny.vox --to glb --out-dir out");
+  EXPECT_EQ(both.status, 2);
+  EXPECT_EQ(both.err, "quoin: tiny.vox and a/tiny.vox would both become out/tiny.glb\n");
+  EXPECT_FALSE(exists("out"));
+  // Named twice it is still one.
+  EXPECT_EQ(run("convert tiny.vox ./tiny.vox --to glb --out-dir out").status, 0);
+  EXPECT_EQ(run("convert a --to glb").err, "quoin: a: a folder; --recursive converts what is in it\n");
+  std::filesystem::create_directories(folder_.file("empty"));
+  EXPECT_EQ(run("convert empty --to glb --recursive").err, "quoin: empty: no file in it can be read\n");
+}
+
+TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
+  ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
+  const ToolRun through = shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb");
+  EXPECT_EQ(through.status, 0);
+  EXPECT_EQ(through.err, "");
+  EXPECT_EQ(text_of(folder_.file("streamed.glb")), text_of(folder_.file("tiny.glb")));
+  EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
+  for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
+           {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: is vox, not nifti\n"},
+           {"convert - x.glb < tiny.glb", "quoin: standard input: not a file of any format that Quoin reads"},
+           {"convert tiny.vox -", "quoin: OUT is standard output: --to says as what"},
+           {"convert tiny.vox - --to obj", "quoin: .obj is several files, and standard output is one\n"},
+           {"convert tiny.vox - --to glb --json", "quoin: --json prints on standard output, where OUT goes\n"},
+           {"convert - --to glb", "quoin: - is standard input: it is converted alone"},
+           {"convert tiny.vox - --to glb > /dev/full", "quoin: standard output: No space left on device\n"}}) {
+    const ToolRun result = shell("'" QUOIN_TOOL "' " + arguments);
+    EXPECT_NE(result.status, 0) << arguments;
+    expect_one_error_line(result);
+    EXPECT_TRUE(result.err.starts_with(error)) << arguments << ": " << result.err;
+    EXPECT_FALSE(exists("x.glb"));
+  }
 }
 
 TEST_F(Tool, FailuresAreOneLineStatus1AndNoFile) {
@@ -325,6 +417,11 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
       {"convert tiny.vox out.glb --raw-size 1x1x1 --frame 2", "quoin: --hidden and --frame are for voxels"},
       {"convert tiny.vox out.glb --raw-order big", "quoin: --raw-type and --raw-order need --raw-size"},
       {"convert tiny.vox out.glb --raw-size 1x1x1 --mesher greedy", "quoin: --mesher greedy is for voxels"},
+      {"convert tiny.vox", "quoin: OUT is required"},
+      {"convert tiny.vox a.vox b.vox", "quoin: 3 files; several are converted by --to FORMAT, --out-dir DIR"},
+      {"convert tiny.vox a.glb --out-dir x", "quoin: --out-dir needs --to"},
+      {"convert tiny.vox --to xyz", "quoin: --to: the name must end in one of .glb"},
+      {"convert tiny.vox --to vox --no-ao", "quoin: --mesher, --no-ao"},
       {"", "quoin: no command; there are info, convert"},
       {"bogus", "quoin: no command \"bogus\"; there are info, convert"},
       {"bogus tiny.vox", "quoin: no command \"bogus\"; there are info, convert"},

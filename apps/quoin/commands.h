@@ -28,6 +28,9 @@ struct CommonOptions {
 /// Adds IN, --json, --threads, --hidden and --frame to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
+/// What --force is for.
+inline constexpr const char* kForceHelp = "Replace OUT even where it holds a model or a world";
+
 /// Refuses what is not a number of at least 0 (a whole one), in words for a person.
 [[nodiscard]] CLI::Validator not_negative();
 [[nodiscard]] CLI::Validator not_negative_whole();

@@ -25,6 +25,7 @@ struct GenerateOptions {
   std::string seed = "42";
   std::string chunks = "4x2x4";
   bool is_smooth = false;
+  bool force = false;
   TerrainOptions terrain;
   SmoothTerrainOptions smooth;  ///< what of it the other has not
   Threads threads;
@@ -85,6 +86,7 @@ Status make_content(const GenerateOptions& options, const TerrainTypes& types, c
 
 Result<Outcome> generate(const GenerateOptions& options) {
   Stopwatch watch;
+  if (auto kept = check_replaced(options.output, {}, options.force); !kept) return kept.error();
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
   ProgressBar bar;
@@ -169,6 +171,7 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks);
+  command.add_flag("--force", options->force, kForceHelp);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
   command.add_option("--threads", options->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));

@@ -29,6 +29,7 @@ void let_writes_fail() {
 }
 
 void catch_interrupts() {
+  if (was_interrupted()) return;
   for (const int signal : std::array{SIGINT, SIGTERM, SIGHUP}) {
     if (!is_ignored(signal)) std::signal(signal, note_signal);
   }

@@ -19,7 +19,7 @@ constexpr auto kInterval = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ProgressBar::ProgressBar() : terminal_(isatty(STDERR_FILENO) == 1), next_(start_ + kPatience) {}
+ProgressBar::ProgressBar(bool shows) : terminal_(shows && isatty(STDERR_FILENO) == 1), next_(start_ + kPatience) {}
 
 ProgressBar::~ProgressBar() {
   if (shown_) std::fputs("\r\033[K", stderr);

@@ -10,7 +10,8 @@ namespace quoin::tool {
 /// A bar on standard error for work that lasts longer than a second; nothing when standard error is no terminal.
 class ProgressBar {
  public:
-  ProgressBar();
+  /// `shows`: false for work that is part of another that has a bar.
+  explicit ProgressBar(bool shows = true);
   /// Wipes the bar.
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;

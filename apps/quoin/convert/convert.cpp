@@ -1,11 +1,13 @@
-#include "convert.h"
+#include "convert/convert.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <memory>
 
 #include <quoin/io/mesh_file.h>
 
+#include "convert/standard_streams.h"
 #include "field_occlusion.h"
 #include "interrupt.h"
 #include "output.h"
@@ -19,11 +21,11 @@ namespace quoin::tool {
 
 namespace {
 
-/// Refuses to replace the input by a file that the user did not name. OUT itself may be the input.
+/// Refuses to replace the input by a file that the user did not name.
 Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
   for (const auto& file : files) {
-    std::error_code missing;
-    if (file == files.front() || !std::filesystem::equivalent(file, options.common.input, missing)) continue;
+    const auto is_it = [&](const std::filesystem::path& input) { return is_same_file(file, input); };
+    if (std::none_of(options.inputs.begin(), options.inputs.end(), is_it)) continue;
     return make_error(ErrorCode::InvalidArgument,
                       "the input, which " + options.output.string() + " would replace with its companion of this name",
                       file.string());
@@ -34,7 +36,7 @@ Status check_companions(const std::vector<std::filesystem::path>& files, const C
 /// Meshes the scene blockily and writes it, filling in `outcome`.
 Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
-  ProgressBar bar;
+  ProgressBar bar(!options.is_one_of_many);
   outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
   const InstanceFilter filter = options.common.instances();
   const auto meshes =
@@ -66,32 +68,13 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   }
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
-  ProgressBar bar;
+  ProgressBar bar(!options.is_one_of_many);
   const auto bytes =
       save_scene(*loaded, options.output, outcome.warnings, options.common.threads, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
   outcome.seconds.write = watch.lap();
   return outcome;
-}
-
-Json outcome_json(const Outcome& outcome) {
-  Json files = Json::array();
-  for (const auto& file : outcome.files) files.push_back(file.string());
-  return {
-      {"voxels", outcome.voxels},
-      {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
-      {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
-      {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
-      {"quads", outcome.meshes.quads},
-      {"triangles", outcome.meshes.triangles},
-      {"vertices", outcome.meshes.vertices},
-      {"simplify_error", outcome.meshes.simplify_error},
-      {"bytes", outcome.bytes},
-      {"files", files},
-      {"seconds", {{"read", outcome.seconds.read}, {"mesh", outcome.seconds.mesh}, {"write", outcome.seconds.write}}},
-      {"warnings", outcome.warnings}};
 }
 
 std::string mesh_text(const Outcome& outcome) {
@@ -159,49 +142,70 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format,
   return is_volume ? convert_volume(options, format) : convert_scene(options, format);
 }
 
-int run_checked(const ConvertOptions& options, const FormatInfo& format) {
-  const auto is_volume = holds_volume(options);
-  if (!is_volume) {
-    print_error(is_volume.error());
-    return kFailed;
+/// Makes files of what is named "-". Returns what is wrong with that, or "".
+Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& many, StandardStreams& streams) {
+  if (options.output == kStandardStream) {
+    const auto format = format_for_writing("file." + many.to);
+    if (many.to.empty() || !format) return "OUT is standard output: --to says as what, " + writable_extensions();
+    if (format->format == FileFormat::Gltf || format->format == FileFormat::Obj) {
+      return std::string(format->extension) + " is several files, and standard output is one";
+    }
+    if (options.common.json) return std::string("--json prints on standard output, where OUT goes");
+    auto file = streams.output(std::string(format->extension));
+    if (!file) return file.error();
+    options.output = *file;
   }
-  if (const std::string fault = fault_of_usage(options, *is_volume); !fault.empty()) {
+  if (options.common.input == kStandardStream) {
+    auto file = streams.input();
+    if (!file) return file.error();
+    options.common.input = *file;
+  }
+  return std::string();
+}
+
+/// Refuses an input that is not of the format that was named.
+Status check_input(const ConvertOptions& options) {
+  if (options.from.empty()) return {};
+  const auto found = detect_format(options.common.input);
+  if (!found) return found.error();
+  const std::string name = *found ? std::string(format_info(**found).name) : "of no format that is read";
+  if (name == options.from) return {};
+  return make_error(ErrorCode::BadFormat, "is " + name + ", not " + options.from, options.common.input.string());
+}
+
+int run_one(ConvertOptions& options, const ManyOptions& many) {
+  const bool is_to_stream = options.output == kStandardStream;
+  StandardStreams streams;
+  const auto failed = [&](const Error& error) {
+    const Error named = streams.named(error);
+    streams.remove();
+    die_if_interrupted();
+    print_error(named);
+    return kFailed;
+  };
+  if (options.common.input == kStandardStream) catch_interrupts();
+  const auto fault_of_streams = open_streams(options, many, streams);
+  if (!fault_of_streams) return failed(fault_of_streams.error());
+  const auto format = format_for_writing(options.output);
+  std::string fault = !fault_of_streams->empty() ? *fault_of_streams
+                      : !format                  ? to_string(format.error())
+                                                 : fault_of_format(options, *format);
+  if (!fault.empty()) {
     print_error(fault);
     return kWrongUsage;
   }
-  if (auto writable = check_outputs({options.output}); !writable) {
-    print_error(writable.error());
-    return kFailed;
+  options.inputs = {&options.common.input, 1};
+  const auto outcome = convert_file(options, *format, fault);
+  if (!fault.empty()) {
+    print_error(fault);
+    return kWrongUsage;
   }
-  const auto outcome = convert(options, format, *is_volume);
-  if (!outcome) {
-    die_if_interrupted();
-    print_error(outcome.error());
-    return kFailed;
-  }
+  if (!outcome) return failed(outcome.error());
   if (options.common.json) return print_json(outcome_json(*outcome));
   print_warnings(outcome->warnings);
-  return print(outcome_text(*outcome));
-}
-
-int run_convert(const ConvertOptions& options) {
-  const auto format = format_for_writing(options.output);
-  if (!format) {
-    print_error(format.error());
-    return kWrongUsage;
-  }
-  if (!format->is_mesh && options.mesh_only) {
-    print_error(
-        "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are for "
-        "mesh formats; " +
-        options.output.string() + " is none");
-    return kWrongUsage;
-  }
-  if (options.occlusion_apart && format->format == FileFormat::Obj) {
-    print_error("--ao-attribute: .obj has no place for it; .glb, .gltf and .ply have");
-    return kWrongUsage;
-  }
-  return run_checked(options, *format);
+  if (!is_to_stream) return print(outcome_text(*outcome));
+  if (Status written = streams.write_output(); !written) return failed(written.error());
+  return kDone;
 }
 
 void add_mesh_options(CLI::App& command, ConvertOptions& options) {
@@ -270,6 +274,34 @@ std::optional<ScalarType> scalar_type(const std::string& name) {
   return std::nullopt;
 }
 
+/// "vox, scene, nifti, nrrd".
+std::string readable_names() {
+  std::string names;
+  for (const FormatInfo& format : file_formats()) {
+    if (format.readable) names += (names.empty() ? "" : ", ") + std::string(format.name);
+  }
+  return names;
+}
+
+/// Tells OUT from further inputs; returns what is wrong with the names of files, or "".
+std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
+  const bool is_to_stream = rest.size() == 1 && rest.front() == kStandardStream;
+  if (!many.to.empty() && !is_to_stream) {
+    many.inputs = {options.common.input};
+    many.inputs.insert(many.inputs.end(), rest.begin(), rest.end());
+    const bool has_stream = std::find(many.inputs.begin(), many.inputs.end(), kStandardStream) != many.inputs.end();
+    return has_stream ? "- is standard input: it is converted alone, with a name for OUT" : "";
+  }
+  if (many.folder) return is_to_stream ? "--out-dir: OUT is standard output" : "--out-dir needs --to: the format";
+  if (many.recursive) return "--recursive needs --to: the format";
+  if (rest.empty()) return "OUT is required";
+  if (rest.size() > 1) {
+    return std::to_string(rest.size() + 1) + " files; several are converted by --to FORMAT, --out-dir DIR";
+  }
+  options.output = rest.front();
+  return "";
+}
+
 /// Reads the options of volumes; returns what is wrong with them, or "".
 std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
   if (command.count("--iso") > 0) {
@@ -296,6 +328,48 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 
 }  // namespace
 
+Json outcome_json(const Outcome& outcome) {
+  Json files = Json::array();
+  for (const auto& file : outcome.files) files.push_back(file.string());
+  return {
+      {"voxels", outcome.voxels},
+      {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
+      {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
+      {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
+      {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
+      {"quads", outcome.meshes.quads},
+      {"triangles", outcome.meshes.triangles},
+      {"vertices", outcome.meshes.vertices},
+      {"simplify_error", outcome.meshes.simplify_error},
+      {"bytes", outcome.bytes},
+      {"files", files},
+      {"seconds", {{"read", outcome.seconds.read}, {"mesh", outcome.seconds.mesh}, {"write", outcome.seconds.write}}},
+      {"warnings", outcome.warnings}};
+}
+
+std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
+  if (!format.is_mesh && options.mesh_only) {
+    return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are "
+           "for mesh formats; " +
+           (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
+  }
+  if (options.occlusion_apart && format.format == FileFormat::Obj) {
+    return "--ao-attribute: .obj has no place for it; .glb, .gltf and .ply have";
+  }
+  return "";
+}
+
+Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
+  if (Status sound = check_input(options); !sound) return sound.error();
+  const auto is_volume = holds_volume(options);
+  if (!is_volume) return is_volume.error();
+  fault = fault_of_usage(options, *is_volume);
+  if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
+  if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
+  if (auto writable = check_outputs({options.output}); !writable) return writable.error();
+  return convert(options, format, *is_volume);
+}
+
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   outcome.meshes = meshes.stats;
@@ -318,9 +392,21 @@ void add_convert_command(CLI::App& app, int& status) {
   const auto options = std::make_shared<ConvertOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, options->common);
-  command->add_option("OUT", options->output, "File to write: " + writable_extensions())
-      ->required()
+  const auto many = std::make_shared<ManyOptions>();
+  const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
+  command->add_option("OUT", *rest, "File to write: " + writable_extensions() + "; with --to: more files to read")
       ->check(file_name());
+  command
+      ->add_option("--to", many->to,
+                   "Convert every file that is named to this format: glb, vox, ...; of OUT where that is -")
+      ->check(file_name());
+  command->add_option("--out-dir", many->folder, "With --to: where the files go (default: beside those they are of)")
+      ->check(file_name());
+  command->add_flag("--recursive", many->recursive,
+                    "With --to: of folders, all files in them and below that can be read");
+  command->add_option("--from", options->from, "Refuse what is not of this format: " + readable_names())
+      ->check(file_name());
+  command->add_flag("--force", options->force, kForceHelp);
   add_mesh_options(*command, *options);
   add_volume_options(*command, *texts);
   command->footer(
@@ -329,12 +415,15 @@ void add_convert_command(CLI::App& app, int& status) {
       "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
       "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
+      "IN and OUT may be -: standard input and output.\n"
+      "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
       "Example: quoin convert castle.vox castle.glb\n"
+      "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
       "Example: quoin convert fleet.json whole_fleet.json\n"
       "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
       "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
       "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute");
-  command->callback([command, options, texts, &status] {
+  command->callback([command, options, texts, many, rest, &status] {
     std::size_t given = 0;
     for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
                              "--no-unite", "--iso", "--simplify"}) {
@@ -344,12 +433,13 @@ void add_convert_command(CLI::App& app, int& status) {
     options->mesh_only = given > 0 || options->has_field_occlusion;
     std::string fault = read_texts(*command, *texts, *options);
     if (fault.empty()) fault = read_occlusion(*command, *options);
+    if (fault.empty()) fault = read_files(*rest, *options, *many);
     if (!fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;
     }
-    status = run_convert(*options);
+    status = many->inputs.empty() ? run_one(*options, *many) : run_many(*options, *many);
   });
 }
 

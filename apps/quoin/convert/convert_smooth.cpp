@@ -4,7 +4,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "convert.h"
+#include "convert/convert.h"
 #include "interrupt.h"
 #include "progress_bar.h"
 #include "scene_warnings.h"
@@ -77,7 +77,7 @@ void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& me
 
 Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
-  ProgressBar bar;
+  ProgressBar bar(!options.is_one_of_many);
   const InstanceFilter filter = options.common.instances();
   const auto meshes =
       mesh_scene_smoothly(scene, scene_options(options), options.common.threads, bar.listener("meshing"));
@@ -101,7 +101,7 @@ Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& 
   outcome.warnings = volume->warnings;
   outcome.seconds.read = watch.lap();
   catch_interrupts();
-  ProgressBar bar;
+  ProgressBar bar(!options.is_one_of_many);
   outcome.is_iso_found = !options.iso && volume->min < volume->max;
   outcome.iso = options.iso ? *options.iso : static_cast<double>(volume_threshold(*volume));
   VolumeMeshOptions wanted;

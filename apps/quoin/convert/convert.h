@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include "commands.h"
+#include "output.h"
 #include "progress_bar.h"
 
 namespace quoin::tool {
@@ -19,7 +21,11 @@ namespace quoin::tool {
 struct ConvertOptions {
   CommonOptions common;
   std::filesystem::path output;
-  std::string mesher;  ///< empty: greedy for voxels, smooth for volumes
+  std::span<const std::filesystem::path> inputs;  ///< what is never replaced: all that are read
+  std::string from;                               ///< the only format that is read; empty: any
+  bool force = false;
+  bool is_one_of_many = false;  ///< shows no progress of its own
+  std::string mesher;           ///< empty: greedy for voxels, smooth for volumes
   bool occlusion_off = false;
   bool occlusion_apart = false;  ///< as an attribute, not in the colours
   SmoothOcclusionOptions field_occlusion;
@@ -54,6 +60,25 @@ struct Outcome {
   Seconds seconds;
   std::vector<std::string> warnings;
 };
+
+/// Converts one file. Where the options contradict what the file holds, `fault` says how, as the error does.
+[[nodiscard]] Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault);
+
+/// What is wrong with the options for files of a format; empty when nothing is.
+[[nodiscard]] std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format);
+
+[[nodiscard]] Json outcome_json(const Outcome& outcome);
+
+/// What makes many files of many.
+struct ManyOptions {
+  std::vector<std::filesystem::path> inputs;  ///< files and folders
+  std::optional<std::filesystem::path> folder;
+  std::string to;  ///< an ending, with its dot or without
+  bool recursive = false;
+};
+
+/// Converts each of the inputs, several at once; those that fail are named last. Returns the exit status.
+[[nodiscard]] int run_many(const ConvertOptions& options, const ManyOptions& many);
 
 /// Writes what has been meshed, filling in `outcome`.
 [[nodiscard]] Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,

@@ -1,0 +1,234 @@
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <new>
+
+#include <quoin/core/parallel.h>
+#include <quoin/io/formats.h>
+
+#include "convert/convert.h"
+#include "interrupt.h"
+#include "output_files.h"
+#include "stopwatch.h"
+
+namespace quoin::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One file of many, and what came of it.
+struct Task {
+  fs::path input;
+  fs::path output;
+  std::optional<Outcome> outcome;
+  std::optional<Error> error;
+};
+
+Error error_of(const fs::path& path, const std::error_code& code) {
+  return make_error(ErrorCode::CannotRead, code.message(), path.string());
+}
+
+/// Whether a file of this name is meant to be read, whatever it holds. A .json may be anything.
+bool is_named_to_be_read(const fs::path& file) {
+  const auto formats = file_formats();
+  return std::any_of(formats.begin(), formats.end(), [&](const FormatInfo& format) {
+    return format.readable && format.format != FileFormat::Scene && file.extension() == format.extension;
+  });
+}
+
+/// Files in a folder and below that can be read, or should be, in the order of their names.
+Result<std::vector<fs::path>> files_below(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code code;
+  fs::recursive_directory_iterator at(folder, code);
+  for (; !code && at != fs::recursive_directory_iterator(); at.increment(code)) {
+    std::error_code is_broken;
+    if (!at->is_regular_file(is_broken)) continue;
+    const auto format = detect_format(at->path());
+    // What cannot be opened is to be heard of; what is no format of ours is not meant.
+    if (!format || *format || is_named_to_be_read(at->path())) found.push_back(at->path());
+  }
+  if (code) return error_of(folder, code);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// NAME of NAME.nii.gz and of NAME.vox.
+std::string stem_of(const fs::path& file) {
+  fs::path name = file.filename();
+  if (name.extension() == ".gz") name = name.stem();
+  return name.stem().string();
+}
+
+/// All that is to be done. `errors` gets what cannot be looked at.
+std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
+  std::vector<Task> tasks;
+  const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
+    const fs::path folder = many.folder ? *many.folder / below : beside;
+    tasks.push_back({input, (folder / (stem_of(input) + extension)).lexically_normal(), {}, {}});
+  };
+  for (const fs::path& input : many.inputs) {
+    std::error_code unknown;
+    if (!fs::is_directory(input, unknown)) {
+      add(input, input.parent_path(), {});
+      continue;
+    }
+    if (!many.recursive) {
+      errors.push_back(
+          make_error(ErrorCode::CannotRead, "a folder; --recursive converts what is in it", input.string()));
+      continue;
+    }
+    const auto files = files_below(input);
+    if (!files) {
+      errors.push_back(files.error());
+      continue;
+    }
+    if (files->empty())
+      errors.push_back(make_error(ErrorCode::CannotRead, "no file in it can be read", input.string()));
+    for (const fs::path& file : *files) add(file, file.parent_path(), file.parent_path().lexically_relative(input));
+  }
+  return tasks;
+}
+
+/// Two files that would become one; empty where there are none. Files that are named twice are one task.
+std::string fault_of_plan(std::vector<Task>& tasks) {
+  std::map<fs::path, fs::path> made;
+  std::vector<Task> kept;
+  for (Task& task : tasks) {
+    const auto [at, is_new] = made.emplace(task.output, task.input);
+    if (is_new) {
+      kept.push_back(std::move(task));
+    } else if (at->second != task.input && !is_same_file(at->second, task.input)) {
+      return at->second.string() + " and " + task.input.string() + " would both become " + task.output.string();
+    }
+  }
+  tasks = std::move(kept);
+  return "";
+}
+
+Status make_folder_of(const fs::path& file) {
+  if (!file.has_parent_path()) return {};
+  std::error_code code;
+  fs::create_directories(file.parent_path(), code);
+  if (!code) return {};
+  return make_error(ErrorCode::CannotWrite, code.message(), file.parent_path().string());
+}
+
+void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task) {
+  ConvertOptions options = wanted;
+  options.common.input = task.input;
+  options.output = task.output;
+  try {
+    if (Status made = make_folder_of(task.output); !made) {
+      task.error = made.error();
+      return;
+    }
+    std::string fault;
+    auto outcome = convert_file(options, format, fault);
+    if (outcome) {
+      task.outcome = std::move(*outcome);
+    } else {
+      task.error = outcome.error();
+    }
+  } catch (const std::bad_alloc&) {
+    task.error = make_error(ErrorCode::LimitExceeded, "out of memory", task.input.string());
+  }
+  if (task.error && task.error->path.empty()) task.error->path = task.input.string();
+}
+
+/// Several at once; where there are fewer files than threads, each has its share of these.
+void run_tasks(ConvertOptions options, const FormatInfo& format, std::vector<Task>& tasks) {
+  const unsigned threads = thread_count(options.common.threads);
+  const auto files = static_cast<unsigned>(std::max<std::size_t>(tasks.size(), 1));
+  options.is_one_of_many = true;
+  options.common.threads = {std::max(threads / files, 1U)};
+  ProgressBar bar;
+  const Progress progress = bar.listener("files");
+  std::mutex mutex;
+  std::size_t done = 0;
+  parallel_for(tasks.size(), {threads}, [&](std::size_t i) {
+    if (was_interrupted()) return;
+    run_task(options, format, tasks[i]);
+    const std::lock_guard lock(mutex);
+    (void)progress(static_cast<double>(++done) / static_cast<double>(tasks.size()));
+  });
+}
+
+Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, std::uint64_t bytes, double seconds) {
+  Json converted = Json::array();
+  Json failed = Json::array();
+  for (const Error& error : errors) failed.push_back({{"input", error.path}, {"error", to_string(error)}});
+  for (const Task& task : tasks) {
+    if (task.error) {
+      failed.push_back({{"input", task.input.string()}, {"error", to_string(*task.error)}});
+      continue;
+    }
+    Json entry = {{"input", task.input.string()}};
+    entry.update(outcome_json(*task.outcome));
+    converted.push_back(std::move(entry));
+  }
+  return {{"converted", converted}, {"failed", failed}, {"bytes", bytes}, {"seconds", seconds}};
+}
+
+}  // namespace
+
+int run_many(const ConvertOptions& options, const ManyOptions& many) {
+  const std::string extension = (many.to.starts_with('.') ? "" : ".") + many.to;
+  const auto format = format_for_writing("file" + extension);
+  if (!format) {
+    print_error("--to: " + format.error().message + ", not \"" + many.to + "\"");
+    return kWrongUsage;
+  }
+  if (const std::string fault = fault_of_format(options, *format); !fault.empty()) {
+    print_error(fault);
+    return kWrongUsage;
+  }
+  catch_interrupts();
+  Stopwatch watch;
+  std::vector<Error> errors;
+  std::vector<Task> tasks = plan(many, extension, errors);
+  if (const std::string fault = fault_of_plan(tasks); !fault.empty()) {
+    print_error(fault);
+    return kWrongUsage;
+  }
+  std::vector<fs::path> inputs;
+  inputs.reserve(tasks.size());
+  for (const Task& task : tasks) inputs.push_back(task.input);
+  ConvertOptions wanted = options;
+  wanted.inputs = inputs;
+  run_tasks(wanted, *format, tasks);
+  die_if_interrupted();
+
+  std::uint64_t bytes = 0;
+  std::size_t converted = 0;
+  for (const Task& task : tasks) {
+    if (task.error) {
+      errors.push_back(*task.error);
+      continue;
+    }
+    ++converted;
+    bytes += task.outcome->bytes;
+  }
+  const bool is_whole = errors.empty();
+  if (options.common.json) {
+    errors.resize(errors.size() - (tasks.size() - converted));  // those of tasks stand with them
+    const int printed = print_json(json_of(tasks, errors, bytes, watch.lap()));
+    return printed == kDone && !is_whole ? kFailed : printed;
+  }
+  std::string text;
+  for (const Task& task : tasks) {
+    if (!task.outcome) continue;
+    for (const std::string& warning : task.outcome->warnings)
+      print_error("warning: " + task.input.string() + ": " + warning);
+    text += task.input.string() + " -> " + task.output.string() + ", " + bytes_for_people(task.outcome->bytes) + "\n";
+  }
+  text += "Converted " + with_thousands(static_cast<std::int64_t>(converted)) + " of " +
+          with_thousands(static_cast<std::int64_t>(converted + errors.size())) + ", " + bytes_for_people(bytes) +
+          " in " + number_for_people(watch.lap()) + " s\n";
+  const int printed = print(text);
+  for (const Error& error : errors) print_error(error);
+  return printed == kDone && !is_whole ? kFailed : printed;
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,95 @@
+#include "convert/standard_streams.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "interrupt.h"
+
+namespace quoin::tool {
+
+namespace {
+
+constexpr std::size_t kPart = std::size_t{1} << 20;
+
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+File open(const std::filesystem::path& path, const char* mode) {
+  return {std::fopen(path.c_str(), mode), std::fclose};
+}
+
+/// Errors: CannotRead, CannotWrite, Cancelled.
+Status copy(std::FILE* from, std::FILE* to, const char* from_name, const char* to_name) {
+  std::vector<char> part(kPart);
+  while (const std::size_t read = std::fread(part.data(), 1, part.size(), from)) {
+    if (std::fwrite(part.data(), 1, read, to) != read) {
+      return make_error(ErrorCode::CannotWrite, std::strerror(errno), to_name);
+    }
+    if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", from_name);
+  }
+  if (std::ferror(from) != 0) return make_error(ErrorCode::CannotRead, std::strerror(errno), from_name);
+  if (std::fflush(to) != 0) return make_error(ErrorCode::CannotWrite, std::strerror(errno), to_name);
+  return {};
+}
+
+}  // namespace
+
+StandardStreams::~StandardStreams() {
+  remove();
+}
+
+void StandardStreams::remove() {
+  std::error_code unknown;
+  if (!folder_.empty()) std::filesystem::remove_all(folder_, unknown);
+  folder_.clear();
+}
+
+Status StandardStreams::make_folder() {
+  if (!folder_.empty()) return {};
+  std::error_code code;
+  std::string name = (std::filesystem::temp_directory_path(code) / "quoin-XXXXXX").string();
+  if (code) return make_error(ErrorCode::CannotWrite, code.message(), "the folder for temporary files");
+  if (::mkdtemp(name.data()) == nullptr) return make_error(ErrorCode::CannotWrite, std::strerror(errno), name);
+  folder_ = name;
+  return {};
+}
+
+Result<std::filesystem::path> StandardStreams::input() {
+  if (Status made = make_folder(); !made) return made.error();
+  input_ = folder_ / "input";
+  const File file = open(input_, "wb");
+  if (file == nullptr) return make_error(ErrorCode::CannotWrite, std::strerror(errno), input_.string());
+  if (Status copied = copy(stdin, file.get(), "standard input", input_.c_str()); !copied) return copied.error();
+  return input_;
+}
+
+Result<std::filesystem::path> StandardStreams::output(const std::string& extension) {
+  if (Status made = make_folder(); !made) return made.error();
+  output_ = folder_ / ("output" + extension);
+  return output_;
+}
+
+Status StandardStreams::write_output() const {
+  const File file = open(output_, "rb");
+  if (file == nullptr) return make_error(ErrorCode::CannotRead, std::strerror(errno), output_.string());
+  return copy(file.get(), stdout, output_.c_str(), "standard output");
+}
+
+Error StandardStreams::named(Error error) const {
+  const auto rename = [](std::string& text, const std::filesystem::path& path, const char* name) {
+    if (path.empty()) return;
+    for (std::size_t at = text.find(path.string()); at != std::string::npos; at = text.find(path.string())) {
+      text.replace(at, path.string().size(), name);
+    }
+  };
+  for (std::string* text : {&error.path, &error.message}) {
+    rename(*text, input_, "standard input");
+    rename(*text, output_, "standard output");
+  }
+  return error;
+}
+
+}  // namespace quoin::tool
