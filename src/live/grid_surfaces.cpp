@@ -3,6 +3,9 @@
 #include <memory>
 #include <utility>
 
+#include "live/live_field.h"
+#include "live/live_grid.h"
+
 namespace quoin {
 
 LiveMeshOptions GridSurfaces::options_for(SurfaceStyle style) {
@@ -11,22 +14,28 @@ LiveMeshOptions GridSurfaces::options_for(SurfaceStyle style) {
   return options;
 }
 
-GridSurfaces::GridSurfaces(GridHandle handle, SurfaceStyle style)
-    : options_(options_for(style)), grid_(handle, options_, totals_) {}
+GridSurfaces::GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style)
+    : options_(options_for(style)) {
+  if (content == SurfaceContent::Field) {
+    source_ = std::make_unique<LiveField>(handle, options_, totals_);
+  } else {
+    source_ = std::make_unique<LiveGrid>(handle, options_, totals_);
+  }
+}
 
-std::vector<SurfaceUpdate> GridSurfaces::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  grid_.follow(grid, LiveClock::now());
-  std::vector<SurfaceUpdate> updates;
-  if (!grid_.waiting().empty()) {
-    const auto voxels = std::make_shared<const Grid>(grid.snapshot());
-    LiveTypes looks;
-    looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
-    if (options_.style == SurfaceStyle::Smooth) looks.materials = std::make_shared<const SurfaceMaterials>(types);
-    const std::vector<IVec3> waiting(grid_.waiting().begin(), grid_.waiting().end());
+std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  source_->follow(grid, LiveClock::now());
+  LiveTypes looks;
+  looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
+  // Of a field what hangs together is done at once, and then perhaps what waited for it.
+  for (source_->prepare(grid); !source_->waiting().empty(); source_->prepare(grid)) {
+    if (looks.materials == nullptr) looks.materials = std::make_shared<const SurfaceMaterials>(types);
+    LiveInputs inputs(grid, looks);
+    const std::vector<IVec3> waiting(source_->waiting().begin(), source_->waiting().end());
     std::vector<std::unique_ptr<LiveJob>> jobs;
     for (const IVec3 chunk : waiting) {
-      jobs.push_back(grid_.make_job(voxels, chunk, looks));
-      grid_.hand_over(chunk, jobs.back()->serial);
+      jobs.push_back(source_->make_job(inputs, chunk));
+      source_->hand_over(chunk, jobs.back()->serial);
     }
     parallel_for(jobs.size(), threads, [&](std::size_t i) {
       thread_local LiveWorkspace workspace;
@@ -37,9 +46,10 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const Grid& grid, const VoxelReg
         throw;
       }
     });
-    for (const auto& job : jobs) grid_.collect(*job);
+    for (const auto& job : jobs) source_->collect(*job);
   }
-  for (const ReadyChunk& ready : std::exchange(totals_.ready, {})) grid_.take(ready.chunk, updates);
+  std::vector<SurfaceUpdate> updates;
+  for (const ReadyChunk& ready : std::exchange(totals_.ready, {})) source_->take(ready.chunk, updates);
   return updates;
 }
 

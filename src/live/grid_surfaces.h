@@ -1,37 +1,38 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <quoin/core/parallel.h>
-#include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/live/live_meshes.h>
+#include <quoin/scene/scene.h>
 
-#include "live/live_grid.h"
+#include "live/live_source.h"
 
 namespace quoin {
 
-/// The surfaces of one grid's chunks, made when they are asked for rather than by workers: as LiveMeshes makes them,
-/// and after an edit those that it could have changed.
+/// The surfaces of the chunks of one grid's voxels, or of its field, made when they are asked for rather than by
+/// workers: as LiveMeshes makes them, and after an edit those that it could have changed.
 class GridSurfaces {
  public:
-  GridSurfaces(GridHandle handle, SurfaceStyle style);
+  GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);
   GridSurfaces(const GridSurfaces&) = delete;
   GridSurfaces& operator=(const GridSurfaces&) = delete;
 
   [[nodiscard]] SurfaceStyle style() const { return options_.style; }
   /// Makes the next `update` begin anew: types may look otherwise.
-  void forget() { grid_.forget(); }
-  /// What is other than at the last call, as LiveMeshes::take. Requires: it is always the same grid.
+  void forget() { source_->forget(); }
+  /// What is other than at the last call, as LiveMeshes::take. Requires: it is always the same grid or its snapshots.
   /// Errors: bad_alloc; then it is not to be asked again.
-  [[nodiscard]] std::vector<SurfaceUpdate> update(const Grid& grid, const VoxelRegistry& types, Threads threads);
+  [[nodiscard]] std::vector<SurfaceUpdate> update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
 
  private:
   static LiveMeshOptions options_for(SurfaceStyle style);
 
   const LiveMeshOptions options_;
   LiveTotals totals_;
-  LiveGrid grid_;
+  std::unique_ptr<LiveSource> source_;
 };
 
 }  // namespace quoin

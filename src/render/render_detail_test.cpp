@@ -13,6 +13,7 @@
 
 #include <quoin/grid/downsample.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "render/render_test_support.h"
@@ -30,14 +31,16 @@ struct Model {
   Scene scene;
   InstanceHandle instance;
 
-  void place_turned(Grid grid) {
+  void place_turned(Grid grid) { place_turned(std::move(grid), DensityGrid()); }
+  void place_turned(Grid grid, DensityGrid field) {
     instance = place(scene, std::move(grid));
     SceneGrid& placed = scene.edit(scene.instances()[instance].grid);
-    placed.pivot = content_sphere(placed.grid).centre;
+    placed.field = std::move(field);
+    placed.pivot = content_sphere(placed).centre;
     scene.edit(instance).rotation = glm::angleAxis(0.7, glm::normalize(DVec3(0.3, 1.0, 0.1)));
   }
   [[nodiscard]] double radius() const {
-    return content_sphere(scene.grids()[scene.instances()[instance].grid].grid).radius;
+    return content_sphere(scene.grids()[scene.instances()[instance].grid]).radius;
   }
 };
 
@@ -91,6 +94,33 @@ Model bridge() {
     for (int x = -105; x <= 105; x += 15) grid.fill_box({{x, 41, z}, {x + 1, 48, z + 1}}, steel);
   }
   model.place_turned(std::move(grid));
+  return model;
+}
+
+Model smooth_terrain() {
+  Model model;
+  const auto types = add_terrain_types(model.scene.types);
+  const SmoothTerrainOptions options{.seed = 42, .size = {6, 2, 6}};
+  model.place_turned({}, generate_smooth_terrain(options, types.value()).value());
+  return model;
+}
+
+// A hill with a house of blocks, and walls two samples thick.
+Model village(bool has_thin_walls) {
+  Model model;
+  const VoxelType stone = add_type(model.scene, {150, 145, 135, 255});
+  const VoxelType grass = add_type(model.scene, {90, 160, 70, 255});
+  DensityGrid field;
+  field.add_sphere({0, -100, 0}, 130.0, grass);
+  field.add_sphere({40, 20, 30}, 25.0, stone, 6.0);
+  field.remove_sphere({-40, 20, 20}, 30.0, 3.0);
+  if (has_thin_walls) {
+    for (int x = -150; x < 150; x += 12) field.add_box({x + 0.4, 30, -120}, {x + 2.1, 120, 120}, stone);
+  }
+  Grid grid;
+  grid.fill_box({{-20, 20, -40}, {20, 60, 0}}, stone);
+  grid.fill_box({{-26, 60, -46}, {26, 64, 6}}, grass);
+  model.place_turned(std::move(grid), std::move(field));
   return model;
 }
 
@@ -173,6 +203,36 @@ TEST(RenderDetail, AThinBridgeStaysAsItIs) {
   expect_close(bridge(), 0);
 }
 
+// As far away as a grid may be halved so often.
+void expect_close_at(const Model& model, int level, int halvings, double difference) {
+  const DetailPolicy policy = without_impostors();
+  const double voxel_pixels = 0.999 * std::ldexp(policy.cell_pixels, -level);
+  const Camera camera = camera_for(model, voxel_pixels, DVec3(1, 0.6, 1.4));
+  EXPECT_EQ(halvings_traced(model, camera, policy), halvings);
+  const Closeness found = closeness_at(model, camera, policy);
+  EXPECT_LE(found.colour, difference) << "halved " << halvings << " times";
+  EXPECT_GE(found.overlap, 0.97) << "halved " << halvings << " times";
+  ::testing::Test::RecordProperty("difference" + std::to_string(level), std::to_string(found.colour));
+  ::testing::Test::RecordProperty("overlap" + std::to_string(level), std::to_string(found.overlap));
+}
+
+TEST(RenderDetail, ASmoothTerrainLooksTheSameInCoarserSamples) {
+  const Model model = smooth_terrain();
+  expect_close_at(model, 1, 1, 6.0);
+  expect_close_at(model, 2, 2, 7.5);
+  // Its caves' roofs would be a sample thin.
+  expect_close_at(model, 3, 2, 7.5);
+}
+
+TEST(RenderDetail, AFieldAndItsBlocksAreHalvedTogether) {
+  const Model model = village(false);
+  for (int level = 1; level <= 3; ++level) expect_close_at(model, level, level, 6.0);
+}
+
+TEST(RenderDetail, AFieldOfThinWallsStaysAsItIsAndItsBlocksToo) {
+  expect_close_at(village(true), 1, 0, 0.0);
+}
+
 TEST(RenderDetail, TheMeasureOfClosenessTellsThingsApart) {
   const Model model = terrain();
   DetailPolicy coarse = without_impostors();
@@ -236,6 +296,59 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
   EXPECT_GT(mid.pixels_hit, 300);
   const Picture near = taken(model.scene, camera, sized(64, 64));
   EXPECT_NE(mid.depth.values, near.depth.values);
+}
+
+TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
+  const Model model = village(false);
+  const Camera camera = towards({160, 150, 200}, {0, 0, 0}, 0.9);
+  Scene coarse;
+  for (VoxelType type = 1; type < model.scene.types.size(); ++type) {
+    ASSERT_TRUE(coarse.types.add(model.scene.types[type]));
+  }
+  Instance instance = model.scene.instances()[model.instance];
+  const SceneGrid& full = model.scene.grids()[instance.grid];
+  SceneGrid grid;
+  grid.grid = halved(full.grid, coarse.types);
+  grid.field = halved(full.field);
+  grid.pivot = full.pivot / 2.0;
+  instance.grid = coarse.add_grid(std::move(grid));
+  instance.voxel_size = 2.0;
+  coarse.add_instance(instance);
+  for (const OcclusionMode mode : {OcclusionMode::Rays, OcclusionMode::Smooth}) {
+    RenderOptions options = always_mid();
+    options.light.occlusion = mode;
+    RenderOptions expected = sized(64, 64);
+    expected.light = options.light;
+    expected.light.occlusion_distance /= 2.0;
+    expected.light.smooth.spread /= 2.0F;
+    const Picture mid = taken(model.scene, camera, options);
+    const Picture other = taken(coarse, camera, expected);
+    EXPECT_EQ(mid.depth.values, other.depth.values);
+    // Rays start a lift of the full samples, not of the halved ones, before the surface.
+    EXPECT_LE(count_different(mid, other, 8), 64);
+    EXPECT_GT(mid.pixels_hit, 1000);
+    EXPECT_NE(mid.depth.values, taken(model.scene, camera, sized(64, 64)).depth.values);
+  }
+}
+
+TEST(RenderDetail, LevelsFollowEditsOfAField) {
+  Model model = village(false);
+  CpuRenderer renderer(model.scene);
+  const Camera camera = towards({160, 150, 200}, {0, 0, 0}, 0.9);
+  const Picture before = renderer.render(camera, always_mid()).value();
+  DensityGrid& field = model.scene.edit(model.scene.instances()[model.instance].grid).field;
+  for (int step = 0; step < 4; ++step) {
+    if (step == 3) {
+      field.clear();
+    } else {
+      field.remove_sphere({40.0 - 20.0 * step, 30.0, 30.0}, 20.0);
+      field.add_box({-63.0, 20.0, 60.0}, {1.0, 40.0 + step, 66.0}, 1);
+    }
+    renderer.update();
+    const Picture after = renderer.render(camera, always_mid()).value();
+    EXPECT_NE(before.colour.rgb, after.colour.rgb);
+    EXPECT_EQ(taken(model.scene, camera, always_mid()).colour.rgb, after.colour.rgb) << step;
+  }
 }
 
 TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {

@@ -97,14 +97,21 @@ Choice chosen(const Measure& measure, const DetailPolicy& policy, const Choice* 
   return choice;
 }
 
-}  // namespace
-
-ContentSphere content_sphere(const Grid& grid) {
-  const IBox box = grid.bounds();
+ContentSphere sphere_around(const IBox& box) {
   if (box.empty()) return {};
   const DVec3 low(box.min);
   const DVec3 high(box.max);
   return {0.5 * (low + high), 0.5 * glm::length(high - low)};
+}
+
+}  // namespace
+
+ContentSphere content_sphere(const Grid& grid) {
+  return sphere_around(grid.bounds());
+}
+
+ContentSphere content_sphere(const SceneGrid& grid) {
+  return sphere_around(grid.bounds());
 }
 
 Detail detail_by_radius(double distance, double radius, const DetailPolicy& policy) {
@@ -166,10 +173,9 @@ void DetailSelector::Impl::look_at_grids(const Scene& scene) {
 void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid) {
   if (handle.index >= contents.size()) contents.resize(handle.index + std::size_t{1});
   Content& content = contents[handle.index];
-  content.sphere = content_sphere(grid.grid);
+  content.sphere = content_sphere(grid);
   content.generation = handle.generation;
-  // Fields have no levels: what holds one is drawn whole.
-  content.is_there = content.sphere.radius > 0.0 && grid.field.chunk_count() == 0;
+  content.is_there = content.sphere.radius > 0.0;
   content.from_pivot = content.sphere.centre - grid.pivot;
 }
 

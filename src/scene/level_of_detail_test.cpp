@@ -99,6 +99,31 @@ TEST(LevelOfDetail, ContentIsWhatIsThereNotTheOriginNorTheChunk) {
   EXPECT_NEAR(sphere.radius, 20.5 * std::sqrt(3.0), 1e-12);
 }
 
+TEST(LevelOfDetail, AFieldIsContentToo) {
+  SceneGrid grid;
+  grid.field.add_box({9.5, -4.5, 0.5}, {30.5, 20.5, 7.5}, 1);
+  EXPECT_EQ(content_sphere(grid).centre, DVec3(20.0, 8.0, 4.0));
+  EXPECT_EQ(content_sphere(grid.grid).radius, 0.0);
+  grid.grid.fill_box({{-11, 0, 0}, {0, 4, 4}}, 1);
+  EXPECT_EQ(content_sphere(grid).centre, DVec3(10.0, 8.0, 4.0));
+  Scene scene;
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  scene.add_instance({"", handle, DVec3(0.0)});
+  const Camera camera = looking_at_origin(200.0);
+  std::vector<SelectedInstance> selected;
+  DetailSelector selector;
+  selector.select(scene, camera, 64, 64, {}, selected);
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_NEAR(selected[0].distance, glm::length(DVec3(10.0, 8.0, 4.0) - camera.position), 1e-9);
+  scene.edit(handle).grid.clear();
+  selector.select(scene, camera, 64, 64, {}, selected);
+  ASSERT_EQ(selected.size(), 1U);
+  EXPECT_NEAR(selected[0].distance, glm::length(DVec3(20.0, 8.0, 4.0) - camera.position), 1e-9);
+  scene.edit(handle).field.clear();
+  selector.select(scene, camera, 64, 64, {}, selected);
+  EXPECT_TRUE(selected.empty());
+}
+
 TEST(LevelOfDetail, DistancesCountFromTheContentAndInTheInstancesSize) {
   Scene scene = cubes(1, 20);
   Instance& instance = scene.edit(scene.instances().handles()[0]);

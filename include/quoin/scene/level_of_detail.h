@@ -18,7 +18,8 @@ enum class Detail : std::uint8_t {
   Far,   ///< an impostor
 };
 
-/// The sphere around a grid's content: about the centre of the tight box of its voxels, through that box's corners.
+/// The sphere around a grid's content: about the centre of the tight box of its voxels and its field's solid, through
+/// that box's corners.
 struct ContentSphere {
   DVec3 centre{0.0};    ///< grid coordinates
   double radius = 0.0;  ///< voxels; 0 for an empty grid
@@ -26,6 +27,7 @@ struct ContentSphere {
 
 /// Cost: O(chunks).
 [[nodiscard]] ContentSphere content_sphere(const Grid& grid);
+[[nodiscard]] ContentSphere content_sphere(const SceneGrid& grid);
 
 /// Which detail is chosen.
 struct DetailPolicy {

@@ -26,7 +26,7 @@ struct PlacedGrid {
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
-  const DensityTree* field = nullptr;          ///< null when the grid's field has no solid
+  const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units a voxel of `voxels`
@@ -65,8 +65,9 @@ class SceneTracer {
   /// Threads:  grids are updated on several.
   bool update(Threads threads = {});
 
-  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, or less
-  /// often where that would change the volume of their voxels by more than an eighth. The others, which are out of the
+  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, voxels and
+  /// field, or less often where that would change the volume of either by more than an eighth or leave more than an
+  /// eighth of the field's surface a sample thin. The others, which are out of the
   /// picture but may cast shadows into it, stay as they are.
   ///
   /// Lifetime: this one, which keeps the halved grids so that only the first picture pays for them, must outlive the

@@ -1,6 +1,7 @@
 #include <quoin/grid/downsample.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -10,24 +11,41 @@
 
 #include "grid/chunk_order.h"
 #include "grid/halving/chunk_halver.h"
+#include "grid/halving/density_halver.h"
 
 namespace quoin {
 namespace {
+
+struct ByZyx {
+  bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
+};
 
 IVec3 halved_coordinates(IVec3 chunk) {
   return {chunk.x >> 1, chunk.y >> 1, chunk.z >> 1};
 }
 
-// Makes these chunks of `coarse` anew.
-void remake(const Grid& grid, const VoxelRegistry& types, const std::vector<IVec3>& chunks, Threads threads,
-            Grid& coarse) {
-  std::vector<Chunk> made(chunks.size());
-  parallel_for(chunks.size(), threads, [&](std::size_t i) { made[i] = halved_chunk(grid, types, chunks[i]); });
-  for (std::size_t i = 0; i < chunks.size(); ++i) coarse.put_chunk(chunks[i], std::move(made[i]));
-}
+// A halved chunk of voxels.
+struct VoxelHalving {
+  using Content = Grid;
+  using Made = Chunk;
+  const VoxelRegistry* types;
 
-// Adds the halved chunks that read a voxel of the change: their own voxels and those of one cell past them.
-void add_readers(const ChunkChange& change, std::vector<IVec3>& chunks) {
+  [[nodiscard]] Chunk make(const Grid& finer, IVec3 chunk) const { return halved_chunk(finer, *types, chunk); }
+};
+
+// A halved chunk of densities.
+struct DensityHalving {
+  using Content = DensityGrid;
+  using Made = HalvedDensityChunk;
+
+  [[nodiscard]] static HalvedDensityChunk make(const DensityGrid& finer, IVec3 chunk) {
+    return DensityHalver(finer, chunk).make();
+  }
+};
+
+// Adds the halved chunks that read a voxel, or a sample, of the change: their own voxels and those of one cell past them.
+template <class Change>
+void add_readers(const Change& change, std::vector<IVec3>& chunks) {
   constexpr int kReach = 2;
   const IVec3 low = halved_coordinates(change.chunk - IVec3(glm::lessThan(change.box.min, IVec3(kReach))));
   const IVec3 high =
@@ -39,33 +57,97 @@ void add_readers(const ChunkChange& change, std::vector<IVec3>& chunks) {
   }
 }
 
-// What is kept of a level: how far it has followed the finer grid.
-struct Level {
-  Grid grid;
-  ChangeCursor followed;
+// A level of voxels.
+struct VoxelLevel {
+  Grid content;
 
-  void update(const Grid& finer, const VoxelRegistry& types, Threads threads);
+  void begin(const Grid& finer) { static_cast<void>(finer); }
+  void put(IVec3 chunk, Chunk made) { content.put_chunk(chunk, std::move(made)); }
 };
 
-void Level::update(const Grid& finer, const VoxelRegistry& types, Threads threads) {
-  ChangeCursor now = followed;
-  const GridChanges changes = finer.changes_since(now);
-  std::vector<IVec3> dirty;
-  if (changes.all) {
-    dirty = grid.chunks();
-    for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
+// A level of a field.
+struct DensityLevel {
+  DensityGrid content;
+  std::map<IVec3, HalvedDensityCounts, ByZyx> chunks;  // that hold any solid
+  HalvedDensityCounts counts;                          // of all
+
+  // Of another field its band may be another.
+  void begin(const DensityGrid& finer) {
+    const float band = DensityGrid(0.5F * finer.band()).band();
+    if (content.band() == band) return;
+    content = DensityGrid(band);
+    chunks.clear();
+    counts = {};
   }
-  for (const ChunkChange& change : changes.items) add_readers(change, dirty);
-  sort_and_unite(dirty);
-  std::erase_if(dirty, [&](IVec3 chunk) {
-    for (int i = 0; i < 8; ++i) {
-      if (finer.find_chunk(2 * chunk + IVec3{i & 1, i >> 1 & 1, i >> 2}) != nullptr) return false;
+  void put(IVec3 chunk, HalvedDensityChunk made) {
+    content.put_chunk(chunk, std::move(made.samples));
+    HalvedDensityCounts& known = chunks[chunk];
+    counts -= known;
+    counts += known = made.counts;
+    if (known == HalvedDensityCounts{}) chunks.erase(chunk);
+  }
+};
+
+// What is kept of a level, and how far it has followed the finer one.
+template <class Halving, class Kept>
+struct Level : Kept {
+  using Content = typename Halving::Content;
+  using Kept::content;
+  ChangeCursor followed;
+
+  void update(const Content& finer, const Halving& halving, Threads threads) {
+    ChangeCursor now = followed;
+    const auto changes = finer.changes_since(now);
+    std::vector<IVec3> dirty;
+    if (changes.all) {
+      Kept::begin(finer);
+      dirty = content.chunks();
+      for (const IVec3 chunk : finer.chunks()) dirty.push_back(halved_coordinates(chunk));
     }
-    return grid.find_chunk(chunk) == nullptr;
-  });
-  remake(finer, types, dirty, threads, grid);
-  followed = now;
-}
+    for (const auto& change : changes.items) add_readers(change, dirty);
+    sort_and_unite(dirty);
+    std::erase_if(dirty, [&](IVec3 chunk) {
+      for (int i = 0; i < 8; ++i) {
+        if (finer.find_chunk(2 * chunk + IVec3{i & 1, i >> 1 & 1, i >> 2}) != nullptr) return false;
+      }
+      return content.find_chunk(chunk) == nullptr;
+    });
+    std::vector<typename Halving::Made> made(dirty.size());
+    parallel_for(dirty.size(), threads, [&](std::size_t i) { made[i] = halving.make(finer, dirty[i]); });
+    for (std::size_t i = 0; i < dirty.size(); ++i) Kept::put(dirty[i], std::move(made[i]));
+    followed = now;
+  }
+};
+
+// The levels of a grid or a field.
+template <class Halving, class Kept>
+struct Levels {
+  using Content = typename Halving::Content;
+  std::vector<std::unique_ptr<Level<Halving, Kept>>> kept;
+
+  void update(const Content& full, const Halving& halving, int levels, Threads threads) {
+    const Content* finer = &full;
+    const auto wanted = static_cast<std::size_t>(std::max(levels, 0));
+    kept.resize(std::min(kept.size(), wanted));
+    for (std::size_t i = 0; i < wanted; ++i) {
+      if (i == kept.size()) kept.push_back(std::make_unique<Level<Halving, Kept>>());
+      kept[i]->update(*finer, halving, threads);
+      finer = &kept[i]->content;
+      if (finer->chunk_count() != 0) continue;
+      // It stays, though it counts as none, so that the next edit does not make it anew.
+      kept.resize(i + 1);
+      return;
+    }
+  }
+  [[nodiscard]] int count() const {
+    const bool is_last_empty = !kept.empty() && kept.back()->content.chunk_count() == 0;
+    return static_cast<int>(kept.size()) - static_cast<int>(is_last_empty);
+  }
+  [[nodiscard]] const Level<Halving, Kept>& at(int level) const {
+    QUOIN_ASSERT(level >= 1 && level <= count(), "1 <= level <= levels()");
+    return *kept[static_cast<std::size_t>(level) - 1];
+  }
+};
 
 }  // namespace
 
@@ -74,17 +156,18 @@ Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
 }
 
 Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  Grid coarse;
-  std::vector<IVec3> chunks = grid.chunks();
-  for (IVec3& chunk : chunks) chunk = halved_coordinates(chunk);
-  sort_and_unite(chunks);
-  remake(grid, types, chunks, threads, coarse);
-  return coarse;
+  Level<VoxelHalving, VoxelLevel> level;
+  level.update(grid, {&types}, threads);
+  return std::move(level.content);
 }
 
-struct GridPyramid::Impl {
-  std::vector<std::unique_ptr<Level>> levels;
-};
+DensityGrid halved(const DensityGrid& field, Threads threads) {
+  Level<DensityHalving, DensityLevel> level;
+  level.update(field, {}, threads);
+  return std::move(level.content);
+}
+
+struct GridPyramid::Impl : Levels<VoxelHalving, VoxelLevel> {};
 
 GridPyramid::GridPyramid() : impl_(std::make_unique<Impl>()) {}
 GridPyramid::GridPyramid(GridPyramid&&) noexcept = default;
@@ -92,30 +175,38 @@ GridPyramid& GridPyramid::operator=(GridPyramid&&) noexcept = default;
 GridPyramid::~GridPyramid() = default;
 
 void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads) {
-  const Grid* finer = &grid;
-  const auto wanted = static_cast<std::size_t>(std::max(levels, 0));
-  auto& kept = impl_->levels;
-  kept.resize(std::min(kept.size(), wanted));
-  for (std::size_t i = 0; i < wanted; ++i) {
-    if (i == kept.size()) kept.push_back(std::make_unique<Level>());
-    kept[i]->update(*finer, types, threads);
-    finer = &kept[i]->grid;
-    if (finer->chunk_count() != 0) continue;
-    // It stays, though it counts as none, so that the next edit does not make it anew.
-    kept.resize(i + 1);
-    return;
-  }
+  impl_->update(grid, {&types}, levels, threads);
 }
 
 int GridPyramid::levels() const {
-  const auto& kept = impl_->levels;
-  const bool is_last_empty = !kept.empty() && kept.back()->grid.chunk_count() == 0;
-  return static_cast<int>(kept.size()) - static_cast<int>(is_last_empty);
+  return impl_->count();
 }
 
 const Grid& GridPyramid::level(int level) const {
-  QUOIN_ASSERT(level >= 1 && level <= levels(), "1 <= level <= levels()");
-  return impl_->levels[static_cast<std::size_t>(level) - 1]->grid;
+  return impl_->at(level).content;
+}
+
+struct DensityPyramid::Impl : Levels<DensityHalving, DensityLevel> {};
+
+DensityPyramid::DensityPyramid() : impl_(std::make_unique<Impl>()) {}
+DensityPyramid::DensityPyramid(DensityPyramid&&) noexcept = default;
+DensityPyramid& DensityPyramid::operator=(DensityPyramid&&) noexcept = default;
+DensityPyramid::~DensityPyramid() = default;
+
+void DensityPyramid::update(const DensityGrid& field, int levels, Threads threads) {
+  impl_->update(field, {}, levels, threads);
+}
+
+int DensityPyramid::levels() const {
+  return impl_->count();
+}
+
+const DensityGrid& DensityPyramid::level(int level) const {
+  return impl_->at(level).content;
+}
+
+const HalvedDensityCounts& DensityPyramid::counts(int level) const {
+  return impl_->at(level).counts;
 }
 
 }  // namespace quoin

@@ -17,6 +17,8 @@ std::vector<GridHandle> far_grids(const Scene& scene, std::span<const SelectedIn
   for (const SelectedInstance& choice : selected) {
     if (choice.detail != Detail::Far) continue;
     const GridHandle grid = scene.instances()[choice.instance].grid;
+    // Fields have no impostors: they are traced at their level.
+    if (scene.grids()[grid].field.chunk_count() != 0) continue;
     if (known.try_emplace(grid, true).second) grids.push_back(grid);
   }
   return grids;

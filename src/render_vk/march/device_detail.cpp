@@ -115,7 +115,7 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
   level = &known;
   if (known.last_use == picture_) return {};
   Status done =
-      known.voxels.update(*memory_, {coarse.voxels, &coarse.trees.opaque(), coarse.trees.transparent(), nullptr});
+      known.voxels.update(*memory_, {coarse.voxels, &coarse.trees.opaque(), coarse.trees.transparent(), coarse.trees.field()});
   known.last_use = picture_;
   known.index = static_cast<std::int32_t>(table.size());
   table.push_back(known.voxels.shader_grid());

@@ -122,6 +122,47 @@ TEST_F(VulkanDetail, AnEditSendsWhatItChanged) {
   compare(camera, options, "after_the_edit");
 }
 
+// Hills with caves, and a house on them.
+GridHandle add_hills(Scene& scene, bool has_house) {
+  const GridHandle handle = add_blobs(scene, 31, has_house ? 30 : 0);
+  DensityGrid& field = scene.edit(handle).field;
+  field.add_box({-150, -100, -150}, {150, -30, 150}, 2, 20.0);
+  field.add_sphere({60, -30, 40}, 50.0, 1, 6.0);
+  field.remove_sphere({-60, -20, -30}, 40.0);
+  field.add_sphere({-20, 60, 90}, 22.0, 4);
+  return handle;
+}
+
+TEST_F(VulkanDetail, HalvedFieldsAreTheProcessors) {
+  add_crowd(scene_, {add_hills(scene_, true), add_blobs(scene_, 32), add_hills(scene_, false)}, 3, 360.0);
+  const Camera camera = towards({-300, 420, -500}, {400, 0, 400}, 0.7);
+  std::set<int> halvings;
+  for (const double pixels : {0.4, 1.0, 2.0, 6.0}) {
+    compare(camera, always_mid(pixels), "mid_field_" + std::to_string(static_cast<int>(10 * pixels)));
+    halvings.merge(halvings_of(camera, always_mid(pixels)));
+  }
+  EXPECT_EQ(halvings, (std::set<int>{1, 2, 3, 4}));
+  EXPECT_NE(taken_as_is(camera, sized(128, 96)).depth.values, taken_as_is(camera, always_mid(6.0)).depth.values);
+}
+
+TEST_F(VulkanDetail, EditsReachHalvedFields) {
+  const GridHandle edited = add_hills(scene_, true);
+  add_crowd(scene_, {edited, add_hills(scene_, false)}, 2, 360.0);
+  const Camera camera = towards({-300, 420, -500}, {150, 0, 150}, 0.6);
+  const RenderOptions options = always_mid(4.0);
+  compare(camera, options, "field_before_edits");
+  std::mt19937 random(5);
+  for (int round = 0; round < 4; ++round) {
+    DensityGrid& field = scene_.edit(edited).field;
+    const auto coordinate = [&] { return static_cast<double>(random() % 200) - 100.0; };
+    field.remove_sphere({coordinate(), -30.0, coordinate()}, 30.0);
+    field.add_sphere({coordinate(), 10.0, coordinate()}, 24.0, 4);
+    if (round == 2) field.clear();
+    if (round == 3) scene_.edit(edited).grid.clear();
+    compare(camera, options, "field_after_edit_" + std::to_string(round));
+  }
+}
+
 TEST_F(VulkanDetail, GridsThatAreGoneLeaveNothing) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);

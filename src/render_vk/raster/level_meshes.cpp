@@ -28,25 +28,26 @@ void LevelMeshes::drop(std::map<MeshKey, Level>::iterator level) {
 }
 
 // As the chunks of the full grid are, if there are any.
-SurfaceStyle LevelMeshes::style_of(GridHandle grid) {
-  const MeshStore::StoredGrid* full = store_->find({grid, 0});
+SurfaceStyle LevelMeshes::style_of(MeshKey key) {
+  if (key.content == SurfaceContent::Field) return SurfaceStyle::Smooth;
+  const MeshStore::StoredGrid* full = store_->find({key.grid, 0});
   return full == nullptr ? SurfaceStyle::Blocky : full->chunks.begin()->second.style;
 }
 
-Status LevelMeshes::put(MeshKey key, const Grid& voxels, const VoxelRegistry& types, Threads threads) {
-  const SurfaceStyle style = style_of(key.grid);
+Status LevelMeshes::put(MeshKey key, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads) {
+  const SurfaceStyle style = style_of(key);
   auto known = levels_.find(key);
   if (known != levels_.end() && known->second.surfaces->style() != style) {
     drop(known);
     known = levels_.end();
   }
   if (known == levels_.end()) {
-    known = levels_.emplace(key, Level{std::make_unique<GridSurfaces>(key.grid, style), 0}).first;
+    known = levels_.emplace(key, Level{std::make_unique<GridSurfaces>(key.grid, key.content, style), 0}).first;
   }
   if (known->second.last_use == picture_) return {};
   known->second.last_use = picture_;
   try {
-    Status done = put_updates(key, known->second, voxels, types, threads);
+    Status done = put_updates(key, known->second, placed, types, threads);
     if (!done) drop(known);
     return done;
   } catch (...) {
@@ -55,9 +56,12 @@ Status LevelMeshes::put(MeshKey key, const Grid& voxels, const VoxelRegistry& ty
   }
 }
 
-Status LevelMeshes::put_updates(MeshKey key, Level& level, const Grid& voxels, const VoxelRegistry& types,
+Status LevelMeshes::put_updates(MeshKey key, Level& level, const PlacedGrid& placed, const VoxelRegistry& types,
                                 Threads threads) {
-  const std::vector<SurfaceUpdate> updates = level.surfaces->update(voxels, types, threads);
+  SceneGrid content;
+  if (key.content == SurfaceContent::Voxels) content.grid = placed.voxels->snapshot();
+  if (key.content == SurfaceContent::Field && placed.field != nullptr) content.field = placed.field->field().snapshot();
+  const std::vector<SurfaceUpdate> updates = level.surfaces->update(content, types, threads);
   return updates.empty() ? Status{} : store_->put(updates, key.level);
 }
 

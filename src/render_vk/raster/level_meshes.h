@@ -6,13 +6,14 @@
 
 #include <quoin/core/changes.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
 
 #include "live/grid_surfaces.h"
 #include "render_vk/raster/mesh_store.h"
 
 namespace quoin::vulkan {
 
-/// The meshes of halved grids, made when a picture first asks for them and kept; where grids were edited since, those
+/// The meshes of halved grids, of their voxels and of their fields, made when a picture first asks for them and kept; where grids were edited since, those
 /// of the chunks that an edit can have changed are made anew.
 class LevelMeshes {
  public:
@@ -25,9 +26,9 @@ class LevelMeshes {
 
   /// Begins a picture.
   void begin() { ++picture_; }
-  /// Has the meshes of a grid halved `key.level` times in the store: `voxels`. Once a picture.
+  /// Has the meshes of a grid halved `key.level` times in the store: as `placed` has it. Once a picture.
   /// Errors: of MeshStore::put, and bad_alloc; then nothing of this level is there.
-  [[nodiscard]] Status put(MeshKey key, const Grid& voxels, const VoxelRegistry& types, Threads threads);
+  [[nodiscard]] Status put(MeshKey key, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads);
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
   void drop_unused(std::uint64_t max_bytes);
 
@@ -36,8 +37,8 @@ class LevelMeshes {
     std::unique_ptr<GridSurfaces> surfaces;
     std::uint64_t last_use = 0;
   };
-  Status put_updates(MeshKey key, Level& level, const Grid& voxels, const VoxelRegistry& types, Threads threads);
-  [[nodiscard]] SurfaceStyle style_of(GridHandle grid);
+  Status put_updates(MeshKey key, Level& level, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads);
+  [[nodiscard]] SurfaceStyle style_of(MeshKey key);
   void drop(std::map<MeshKey, Level>::iterator level);
 
   MeshStore* store_;

@@ -206,7 +206,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     instance.mesh.level = placed.level;
     instance.pivot = placed.pivot;
     instance.voxel_size = placed.voxel_size;
-    Status done = levels.put(instance.mesh, *placed.voxels, scene->types, threads);
+    Status done = levels.put(instance.mesh, placed, scene->types, threads);
     if (!done) return done.error();
   }
   levels.drop_unused(kMaxLevelBytes);

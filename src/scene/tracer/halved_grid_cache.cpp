@@ -9,12 +9,25 @@
 namespace quoin {
 namespace {
 
+const DensityGrid& no_field() {
+  static const DensityGrid none;
+  return none;
+}
+
 // Whether the voxels of a grid halved that often fill as much as those of the full one, but for an
 // eighth.
 bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
   const auto cells = std::ldexp(static_cast<double>(coarse.voxel_count()), 3 * halvings);
   const auto voxels = static_cast<double>(full.voxel_count());
   return std::abs(cells - voxels) <= 0.125 * voxels;
+}
+
+// The same of a field; and whether little of its surface is so thin that the next halving would tear it.
+bool has_shape_of(const DensityPyramid& fields, int halvings) {
+  const HalvedDensityCounts& now = fields.counts(halvings);
+  const auto cells = std::ldexp(static_cast<double>(now.solid), 3 * halvings);
+  const auto samples = static_cast<double>(fields.counts(1).finer_solid);
+  return std::abs(cells - samples) <= 0.125 * samples && 8 * now.thin <= now.surface;
 }
 
 }  // namespace
@@ -24,47 +37,67 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   placed.voxels = voxels;
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
+  placed.field = trees.field();
   placed.pivot = placed.grid->pivot / cell;
   placed.voxel_size *= cell;
   placed.level = level;
 }
 
-void HalvedGridCache::Entry::make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
+void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads) {
   ChangeCursor now = followed;
-  const GridChanges changes = grid.changes_since(now);
-  followed = {};  // stays so when memory runs out
-  if (changes.all) {
+  ChangeCursor field_now = followed_field;
+  const GridChanges changes = grid.grid.changes_since(now);
+  const DensityChanges field_changes = grid.field.changes_since(field_now);
+  followed = followed_field = {};  // stay so when memory runs out
+  if (changes.all || field_changes.all) {
     *this = {};
-  } else if (!changes.empty()) {
+  } else if (!changes.empty() || !field_changes.empty()) {
     renew(grid, types, threads);
   }
   followed = now;
+  followed_field = field_now;
   for (int level = static_cast<int>(levels.size()) + 1; level <= halvings && !is_coarsest; ++level) {
-    pyramid.update(grid, types, level, threads);
+    pyramid.update(grid.grid, types, level, threads);
+    fields.update(grid.field, level, threads);
     is_coarsest = !take_level(grid, types, level);
   }
 }
 
 // Brings what there is up to date with an edit.
-void HalvedGridCache::Entry::renew(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  const int most = pyramid.levels();
-  pyramid.update(grid, types, most, threads);
+void HalvedGridCache::Entry::renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  const int most = std::max(pyramid.levels(), fields.levels());
+  pyramid.update(grid.grid, types, most, threads);
+  fields.update(grid.field, most, threads);
   is_coarsest = false;
   for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
 }
 
-// Puts a level of the pyramid among those that are like the grid; false, and none from there on, when it is not.
-bool HalvedGridCache::Entry::take_level(const Grid& grid, const VoxelRegistry& types, int halvings) {
+bool HalvedGridCache::Entry::is_alike(const SceneGrid& grid, int halvings) const {
+  const bool has_voxels = grid.grid.chunk_count() != 0;
+  const bool has_field = grid.field.chunk_count() != 0;
+  if (has_voxels && (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid.grid))) {
+    return false;
+  }
+  if (has_field && (fields.levels() < halvings || !has_shape_of(fields, halvings))) return false;
+  return has_voxels || has_field;
+}
+
+// Puts a level of the pyramids among those that are like the grid; false, and none from there on, when it is not.
+bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings) {
   const auto index = static_cast<std::size_t>(halvings - 1);
-  if (pyramid.levels() < halvings || !has_volume_of(pyramid.level(halvings), halvings, grid)) {
+  if (!is_alike(grid, halvings)) {
     levels.resize(std::min(levels.size(), index));
     return false;
   }
   if (levels.size() == index) levels.push_back(std::make_unique<CoarseLevel>());
   CoarseLevel& level = *levels[index];
-  level.voxels = &pyramid.level(halvings);
+  level.voxels = grid.grid.chunk_count() != 0 ? &pyramid.level(halvings) : &no_voxels;
+  level.field = grid.field.chunk_count() != 0 ? &fields.level(halvings) : nullptr;
   level.level = halvings;
-  if (level.trees.update(*level.voxels, types)) level.tight = level.voxels->bounds();
+  const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
+  level.trees.update(*level.voxels, types);
+  level.trees.update(field);
+  level.tight = unite(level.voxels->bounds(), field.bounds());
   return true;
 }
 
@@ -89,7 +122,7 @@ HalvedGridCache::Lock HalvedGridCache::make(const Scene& scene, std::span<const 
   const Threads inner = tasks.size() > 1 ? Threads{1} : threads;
   parallel_for(tasks.size(), threads, [&](std::size_t i) {
     const auto& [handle, halvings] = tasks[i];
-    entries_.find(handle)->second.make(scene.grids()[handle].grid, scene.types, halvings, inner);
+    entries_.find(handle)->second.make(scene.grids()[handle], scene.types, halvings, inner);
   });
   return lock;
 }

@@ -19,12 +19,14 @@ struct PlacedGrid;
 
 /// A halved grid, ready to be traced.
 struct CoarseLevel {
-  const Grid* voxels = nullptr;
-  IBox tight;  ///< around these
+  const Grid* voxels = nullptr;        ///< of none where the grid has none
+  const DensityGrid* field = nullptr;  ///< null where the grid has none
+  IBox tight;                          ///< around both
   int level = 0;
   TreeCache trees;
 
-  /// Has a placed grid traced through this instead of its own voxels. Requires: it is placed as the scene says.
+  /// Has a placed grid traced through this instead of its own voxels and field. Requires: it is placed as the scene
+  /// says.
   void put_in(PlacedGrid& placed) const;
 };
 
@@ -32,16 +34,22 @@ struct CoarseLevel {
 /// edit can have changed are made anew.
 ///
 /// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
-/// bridge's deck, becomes twice as thick, and shows. Threads: any number may call.
+/// bridge's deck, becomes twice as thick, and shows. Likewise its field, of whose surface besides at most an eighth may
+/// be one sample thin: what is, loses its shape next, and then holes come. Where a grid has both, both are halved as
+/// often. Threads: any number may call.
 class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;
+    ChangeCursor followed_field;
     GridPyramid pyramid;
+    DensityPyramid fields;
+    Grid no_voxels;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
     bool is_coarsest = false;                          // there are no more levels that are like the grid
-    void make(const Grid& grid, const VoxelRegistry& types, int halvings, Threads threads);
-    void renew(const Grid& grid, const VoxelRegistry& types, Threads threads);
-    bool take_level(const Grid& grid, const VoxelRegistry& types, int halvings);
+    void make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads);
+    void renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
+    [[nodiscard]] bool is_alike(const SceneGrid& grid, int halvings) const;
+    bool take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings);
   };
 
  public:

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/downsample.h>
+
+namespace quoin {
+
+/// A chunk of a halved field, and what it has kept.
+struct HalvedDensityChunk {
+  DensityChunk samples{Half{0}};
+  HalvedDensityCounts counts;
+};
+
+/// Makes one chunk of a halved field.
+///
+/// Space: fine, samples from the chunk's least corner, -2 to 129 on each axis; coarse, -1 to 64. Reads no others: an
+///        edit elsewhere leaves the chunk as it was.
+class DensityHalver {
+ public:
+  /// `chunk` is of the halved field.
+  DensityHalver(const DensityGrid& field, IVec3 chunk);
+
+  [[nodiscard]] HalvedDensityChunk make() const;
+
+ private:
+  static constexpr int kRows = kChunkEdge + 2;
+
+  /// Which samples of a coarse row are solid, bit by bit, and the one before and after.
+  struct Signs {
+    std::uint64_t bits = 0;
+    bool before = false;
+    bool after = false;
+    [[nodiscard]] std::uint64_t lower() const { return bits << 1 | std::uint64_t{before}; }
+    [[nodiscard]] std::uint64_t upper() const { return bits >> 1 | std::uint64_t{after} << 63; }
+    [[nodiscard]] std::uint64_t all_three() const { return bits & lower() & upper(); }
+  };
+
+  [[nodiscard]] const DensityChunk* chunk_at(IVec3 fine) const {
+    const IVec3 at = (fine >> kChunkShift) + 1;
+    return chunks_[static_cast<std::size_t>(at.x + 4 * at.y + 16 * at.z)];
+  }
+  [[nodiscard]] Half density(IVec3 fine) const {
+    const DensityChunk* const chunk = chunk_at(fine);
+    const IVec3 p = fine & (kChunkEdge - 1);
+    return chunk == nullptr ? far_ : chunk->get(p.x, p.y, p.z);
+  }
+  [[nodiscard]] const Signs& signs(int y, int z) const {
+    return signs_[static_cast<std::size_t>((z + 1) * kRows + y + 1)];
+  }
+  void read_signs(int y, int z);
+  void halve_densities(DensityChunk& made) const;
+  void copy_materials(Chunk& made) const;
+  void choose_materials(Chunk& made) const;
+  [[nodiscard]] VoxelType outermost(IVec3 fine) const;
+  [[nodiscard]] std::uint64_t beside_air(int y, int z) const;
+  [[nodiscard]] bool is_of_one_material() const;
+  [[nodiscard]] HalvedDensityCounts counts() const;
+
+  Half far_;         // of the field
+  Half coarse_far_;  // of the result
+  std::array<const DensityChunk*, 64> chunks_{};
+  std::vector<Signs> signs_;
+};
+
+}  // namespace quoin
