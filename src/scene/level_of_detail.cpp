@@ -97,21 +97,21 @@ Choice chosen(const Measure& measure, const DetailPolicy& policy, const Choice* 
   return choice;
 }
 
-ContentSphere sphere_around(const IBox& box) {
-  if (box.empty()) return {};
-  const DVec3 low(box.min);
-  const DVec3 high(box.max);
-  return {0.5 * (low + high), 0.5 * glm::length(high - low)};
-}
-
 }  // namespace
 
 ContentSphere content_sphere(const Grid& grid) {
-  return sphere_around(grid.bounds());
+  return content_sphere(grid.bounds());
 }
 
 ContentSphere content_sphere(const SceneGrid& grid) {
-  return sphere_around(grid.bounds());
+  return content_sphere(grid.bounds());
+}
+
+ContentSphere content_sphere(const IBox& bounds) {
+  if (bounds.empty()) return {};
+  const DVec3 low(bounds.min);
+  const DVec3 high(bounds.max);
+  return {0.5 * (low + high), 0.5 * glm::length(high - low)};
 }
 
 Detail detail_by_radius(double distance, double radius, const DetailPolicy& policy) {

@@ -28,6 +28,8 @@ struct ContentSphere {
 /// Cost: O(chunks).
 [[nodiscard]] ContentSphere content_sphere(const Grid& grid);
 [[nodiscard]] ContentSphere content_sphere(const SceneGrid& grid);
+/// Of what has these tight bounds.
+[[nodiscard]] ContentSphere content_sphere(const IBox& bounds);
 
 /// Which detail is chosen.
 struct DetailPolicy {

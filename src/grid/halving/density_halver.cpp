@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <optional>
+#include <span>
 
 #include "grid/density/stored_density.h"
 #include "grid/halving/halving.h"
@@ -129,26 +130,48 @@ bool DensityHalver::is_of_one_material() const {
   return true;
 }
 
-void DensityHalver::choose_materials(Chunk& made) const {
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      for (std::uint64_t left = beside_air(y, z); left != 0; left &= left - 1) {
-        const int x = std::countr_zero(left);
-        made.set(x, y, z, outermost(2 * IVec3{x, y, z}));
+void DensityHalver::read_rows(int y, int z, NearRows& rows) const {
+  for (int i = 0; i < 9; ++i) {
+    auto& row = rows[static_cast<std::size_t>(i)];
+    const IVec3 first{0, 2 * y + i % 3 - 1, 2 * z + i / 3 - 1};
+    row[0] = density(first - IVec3{1, 0, 0});
+    for (int part = 0; part < 2; ++part) {
+      const std::span<Half, kChunkEdge> out(row.data() + 1 + part * kChunkEdge, std::size_t{kChunkEdge});
+      const DensityChunk* const chunk = chunk_at(first + IVec3{part * kChunkEdge, 0, 0});
+      if (chunk == nullptr) {
+        std::fill(out.begin(), out.end(), far_);
+      } else {
+        chunk->read_row(first.y & (kChunkEdge - 1), first.z & (kChunkEdge - 1), out);
       }
     }
   }
 }
 
+void DensityHalver::choose_materials(Chunk& made) const {
+  NearRows rows;
+  std::array<VoxelType, kChunkEdge> chosen{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const std::uint64_t open = beside_air(y, z);
+      if (open == 0) continue;
+      read_rows(y, z, rows);
+      for (std::uint64_t left = open; left != 0; left &= left - 1) {
+        const int x = std::countr_zero(left);
+        chosen[static_cast<std::size_t>(x)] = outermost(rows, 2 * IVec3{x, y, z});
+      }
+      made.write_row(y, z, open, chosen);
+    }
+  }
+}
+
 // Halves of one sign are in the order of their bits.
-VoxelType DensityHalver::outermost(IVec3 fine) const {
+VoxelType DensityHalver::outermost(const NearRows& rows, IVec3 fine) const {
   IVec3 best = fine;
-  Half least = density(fine);
+  Half least = rows[4][static_cast<std::size_t>(fine.x) + 1];
   for (int i = 0; i < 27; ++i) {
-    const IVec3 at = fine + Neighbourhood::offset(i);
-    const Half found = density(at);
+    const Half found = rows[static_cast<std::size_t>(i / 3)][static_cast<std::size_t>(fine.x + i % 3)];
     if (!DensityChunk::is_solid(found) || found >= least) continue;
-    best = at;
+    best = fine + Neighbourhood::offset(i);
     least = found;
   }
   const IVec3 p = best & (kChunkEdge - 1);

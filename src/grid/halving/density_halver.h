@@ -56,7 +56,10 @@ class DensityHalver {
   void halve_densities(DensityChunk& made) const;
   void copy_materials(Chunk& made) const;
   void choose_materials(Chunk& made) const;
-  [[nodiscard]] VoxelType outermost(IVec3 fine) const;
+  /// The densities of the 3x3 rows around coarse row (y, z), from the sample before the chunk's first on.
+  using NearRows = std::array<std::array<Half, 2 * kChunkEdge + 1>, 9>;
+  void read_rows(int y, int z, NearRows& rows) const;
+  [[nodiscard]] VoxelType outermost(const NearRows& rows, IVec3 fine) const;
   [[nodiscard]] std::uint64_t beside_air(int y, int z) const;
   [[nodiscard]] bool is_of_one_material() const;
   [[nodiscard]] HalvedDensityCounts counts() const;

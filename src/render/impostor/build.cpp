@@ -33,10 +33,21 @@ std::uint8_t packed(const FaceOcclusion& corners) {
 
 constexpr double kOcclusionReach = LightOptions{}.occlusion_distance;
 
+// A point before the middle of a surfel, in the grid.
+DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& surfel, double lift) {
+  const FaceFrame& frame = frame_of(face.direction);
+  DVec3 point = DVec3(face.voxel) + lift * DVec3(surfel.normal);
+  point[frame.axis] += double{surfel.offset};
+  point[frame.u] += double{surfel.shift[0]};
+  point[frame.v] += double{surfel.shift[1]};
+  return point;
+}
+
 // How many of the rays of OcclusionDirections reach open space from the middle of each of the faces at `wanted`; by
 // sixteens, which mostly are of one direction.
-void count_open_rays(const OccupancyTree& opaque, std::span<const std::uint32_t> wanted,
-                     std::vector<ImpostorFaces::Face>& faces) {
+void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std::span<const std::uint32_t> wanted,
+                     ImpostorFaces& impostor) {
+  std::vector<ImpostorFaces::Face>& faces = impostor.faces;
   constexpr double kLift = 0.01;
   constexpr int kRays = ImpostorFaces::Face::kRays;
   const OcclusionDirections directions(kRays);
@@ -47,17 +58,29 @@ void count_open_rays(const OccupancyTree& opaque, std::span<const std::uint32_t>
     rays.active = (1U << size) - 1U;
     for (std::size_t i = 0; i < size; ++i) {
       const ImpostorFaces::Face& face = faces[wanted[begin + i]];
-      const DVec3 origin = DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
+      const DVec3 origin = face.in_field
+                               ? place_of(face, impostor.surfel_of(wanted[begin + i]), kLift)
+                               : DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
       rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
     }
     std::array<int, RayPacket::kSize> open{};
     for (int ray = 0; ray < kRays; ++ray) {
       for (std::size_t i = 0; i < size; ++i) {
-        const auto side = static_cast<std::size_t>(faces[wanted[begin + i]].direction);
-        const DVec3 direction = directions.fixed(side, ray);
+        const ImpostorFaces::Face& face = faces[wanted[begin + i]];
+        // Those of a field's surface are those of an upper face, turned with it.
+        const auto side = static_cast<std::size_t>(face.in_field ? Direction::PosY : face.direction);
+        DVec3 direction = directions.fixed(side, ray);
+        if (face.in_field) {
+          direction = turned_from_up(direction, DVec3(impostor.surfel_of(wanted[begin + i]).normal));
+        }
         rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
       }
-      const std::uint32_t blocked = any_hits(opaque, rays);
+      std::uint32_t blocked = any_hits(opaque, rays);
+      if (field != nullptr) {
+        RayPacket rest = rays;
+        rest.active &= ~blocked;
+        blocked |= any_hits(*field, rest);
+      }
       for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
     }
     for (std::size_t i = 0; i < size; ++i) {
@@ -97,17 +120,29 @@ struct Subject {
   const Grid* grid;
   const VoxelRegistry* types;
   const OccupancyTree* opaque;
+  const DensityTree* field;  // null: none
   ContentSphere content;
+  IBox box;  // of what is drawn
   int edge = 0;
   std::optional<ImpostorShell> shell;  // none where there are very many faces
+  FieldSurfels surfels;
+  bool is_left_to_rays = false;
 
-  Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const ImpostorOptions& options)
-      : grid(&of_grid), types(&of_types), opaque(&tree), content(content_sphere(of_grid)) {
-    if (tree.bounds().empty()) return;
+  Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const DensityTree* of_field,
+          const ImpostorOptions& options)
+      : grid(&of_grid), types(&of_types), opaque(&tree), field(of_field) {
+    const IBox of_surface = field == nullptr ? IBox{} : field->field().bounds();
+    content = content_sphere(unite(of_grid.bounds(), of_surface));
+    box = unite(tree.bounds(), of_surface);
+    if (box.empty()) return;
     edge = edge_for(content, options);
     // Beyond that, a ray for each texel takes less time.
     const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
     shell = ImpostorShell::build(tree, kMaxVoxels, max_faces);
+    if (field == nullptr) return;
+    auto found = surfels_of(field->field(), static_cast<std::size_t>(max_faces));
+    is_left_to_rays = !shell || !found;
+    if (found) surfels = std::move(*found);
   }
 
   [[nodiscard]] bool is_opaque(IVec3 voxel, GridReader& reader) const {
@@ -119,6 +154,7 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
   GridReader reader(*subject.grid);
   GridReader beside(*subject.grid);
   std::vector<std::uint32_t> fresh;
+  out.surfels = subject.surfels.surfels;
   out.faces.reserve(seen.size());
   for (const SeenFace& each : seen) {
     ImpostorFaces::Face& face = out.faces.emplace_back();
@@ -129,18 +165,23 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
     fresh.push_back(static_cast<std::uint32_t>(out.faces.size() - 1));
     face.voxel = each.face.voxel;
     face.direction = each.face.direction;
+    if (each.surfel != nullptr) {
+      face.in_field = true;
+      face.type = subject.surfels.types[static_cast<std::size_t>(each.surfel - subject.surfels.surfels.data())];
+      continue;
+    }
     face.type = reader.get(face.voxel);
     face.occlusion = packed(
         corner_occlusion([&](IVec3 voxel) { return subject.is_opaque(voxel, beside); }, face.voxel, face.direction));
   }
-  count_open_rays(*subject.opaque, fresh, out.faces);
+  count_open_rays(*subject.opaque, subject.field, fresh, out);
 }
 
 std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std::vector<SeenFace>& seen,
                                               KnownFaces known) {
   auto faces = std::make_shared<ImpostorFaces>();
   faces->edge = subject.edge;
-  faces->is_whole = subject.shell.has_value();
+  faces->is_whole = subject.shell.has_value() && subject.field == nullptr;
   faces->centre = subject.content.centre;
   for (std::size_t level = 0; level < faces->levels.size(); ++level) {
     faces->levels[level] = faces_of_level(seen, level, subject.edge >> level, subject.content);
@@ -173,26 +214,40 @@ std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const I
 }  // namespace
 
 Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                         const ImpostorOptions& options) {
+                         const DensityTree* field, const ImpostorOptions& options) {
   QUOIN_ASSERT(options.edge >= 16 && options.edge <= 1024, "16 to 1,024 texels");
-  const Subject subject(grid, types, opaque, options);
+  const Subject subject(grid, types, opaque, field, options);
   Impostor made;
   made.options_ = options;
   made.content_ = subject.content;
-  made.box_ = opaque.bounds();
+  made.is_left_to_rays_ = subject.is_left_to_rays;
+  if (made.is_left_to_rays_) return made;
+  made.box_ = subject.box;
   if (made.is_empty()) return made;
-  const std::vector<SeenFace> seen = subject.shell
-                                         ? faces_seen_of(*subject.shell, made.box_, subject.content, subject.edge)
-                                         : faces_seen_by_rays(opaque, subject.content, subject.edge);
+  const std::vector<SeenFace> seen =
+      subject.shell ? faces_seen_of(*subject.shell, subject.surfels, made.box_, subject.content, subject.edge)
+                    : faces_seen_by_rays(opaque, subject.content, subject.edge);
   made.faces_ = faces_of(subject, seen, {});
   return made;
+}
+
+Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
+                         const ImpostorOptions& options) {
+  return build(grid, types, opaque, nullptr, options);
+}
+
+Impostor Impostor::build(const SceneGrid& grid, const VoxelRegistry& types, const ImpostorOptions& options) {
+  const OccupancyTree opaque = OccupancyTree::build(grid.grid, types, Occupancy::Opaque);
+  if (grid.field.chunk_count() == 0) return build(grid.grid, types, opaque, nullptr, options);
+  const DensityTree field(grid.field);
+  return build(grid.grid, types, opaque, field.cells().bounds().empty() ? nullptr : &field, options);
 }
 
 Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const {
   if (changes.empty()) return *this;
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
   const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
-  const Subject subject(grid, types, opaque, options_);
+  const Subject subject(grid, types, opaque, nullptr, options_);
   const bool is_comparable = !is_empty() && changed && faces_->is_whole && subject.shell &&
                              subject.edge == faces_->edge && subject.content.centre == content_.centre &&
                              subject.content.radius == content_.radius;

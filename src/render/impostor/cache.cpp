@@ -22,13 +22,14 @@ using Clock = std::chrono::steady_clock;
 // What an impostor is made of.
 struct Origin {
   ChangeCursor grid;
+  ChangeCursor field;
   std::uint64_t types = 0;  // how often the transparency of types had changed
   int edge = 0;
 };
 
 // What a worker needs to build one.
 struct Job {
-  Grid voxels;  // a snapshot
+  SceneGrid grid;  // snapshots of voxels and field
   Origin origin;
   GridChanges changes;  // since the impostor that the job will find, or all
   std::shared_ptr<const VoxelRegistry> types;
@@ -58,7 +59,7 @@ struct ImpostorCache::Impl {
   ~Impl();
 
   void look_at(const VoxelRegistry& types);
-  void ask(Entry& entry, GridHandle handle, const Grid& grid, int edge);
+  void ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge);
   void start_workers();
   void work();
   [[nodiscard]] Entries::iterator next_to_build();
@@ -107,13 +108,19 @@ void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
 }
 
 // Puts the grid's present state into the queue, in place of an older one that waits there.
-void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const Grid& grid, int edge) {
+void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge) {
   start_workers();
-  Job job{grid.snapshot(), {grid.cursor(), types_changed, edge}, {}, types};
+  Job job;
+  job.grid.grid = grid.grid.snapshot();
+  job.grid.field = grid.field.snapshot();
+  job.origin = {grid.grid.cursor(), grid.field.cursor(), types_changed, edge};
+  job.types = types;
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
   if (base != nullptr && base->types == types_changed && base->edge == edge) {
     ChangeCursor cursor = base->grid;
-    job.changes = job.voxels.changes_since(cursor);
+    job.changes = job.grid.grid.changes_since(cursor);
+    // What has, or had, a field is built anew.
+    job.changes.all |= grid.field.chunk_count() != 0 || grid.field.has_changed_since(base->field);
   } else {
     job.changes.all = true;
   }
@@ -172,8 +179,8 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   std::shared_ptr<const Impostor> made;
   const bool is_again = before != nullptr && !job->changes.all;
   try {
-    made = std::make_shared<const Impostor>(is_again ? before->rebuilt(job->voxels, *job->types, job->changes)
-                                                     : Impostor::build(job->voxels, *job->types, {job->origin.edge}));
+    made = std::make_shared<const Impostor>(is_again ? before->rebuilt(job->grid.grid, *job->types, job->changes)
+                                                     : Impostor::build(job->grid, *job->types, {job->origin.edge}));
   } catch (const std::bad_alloc&) {
     // Nothing was made.
   }
@@ -294,8 +301,9 @@ std::shared_ptr<const Impostor> ImpostorCache::find(const Scene& scene, GridHand
   entry.last_use = impl_->round;
   const Origin* newest = entry.newest();
   const bool is_current = newest != nullptr && newest->types == impl_->types_changed && newest->edge == options.edge &&
-                          !named->grid.has_changed_since(newest->grid);
-  if (!is_current) impl_->ask(entry, grid, named->grid, options.edge);
+                          !named->grid.has_changed_since(newest->grid) &&
+                          !named->field.has_changed_since(newest->field);
+  if (!is_current) impl_->ask(entry, grid, *named, options.edge);
   return entry.impostor;
 }
 

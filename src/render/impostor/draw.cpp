@@ -52,7 +52,7 @@ class FarTile {
   void draw_block(int column, int row, const RayPacket& rays) {
     SceneHits hits;
     FarFaces faces;
-    hits.grids.hit = hits.grids.starts_inside = 0;
+    hits.grids.hit = hits.grids.starts_inside = hits.in_field = 0;
     pass_->find(column, row, rays, *far_, hits, faces);
     for (std::uint32_t left = faces.found; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
@@ -68,8 +68,14 @@ class FarTile {
       point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
       point.face = hits.grids.face[i];
       point.placed = hits.placed[i];
-      point.position = on_face(view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]),
-                               point.voxel, point.face);
+      point.position = view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+      point.in_field = (hits.in_field >> lane & 1U) != 0;
+      if (point.in_field) {
+        point.normal = hits.normal(i);
+        point.position += double{ImpostorFaces::kSurfelLift} * DVec3(point.normal);
+      } else {
+        point.position = on_face(point.position, point.voxel, point.face);
+      }
       point.type = faces.face[i]->type;
       point.openness = openness_of(*faces.face[i], mode_, point.position);
       pixels_.push_back(pixel);

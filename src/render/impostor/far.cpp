@@ -17,8 +17,6 @@ std::vector<GridHandle> far_grids(const Scene& scene, std::span<const SelectedIn
   for (const SelectedInstance& choice : selected) {
     if (choice.detail != Detail::Far) continue;
     const GridHandle grid = scene.instances()[choice.instance].grid;
-    // Fields have no impostors: they are traced at their level.
-    if (scene.grids()[grid].field.chunk_count() != 0) continue;
     if (known.try_emplace(grid, true).second) grids.push_back(grid);
   }
   return grids;
@@ -39,7 +37,7 @@ FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene, std::span<
     cache.wait(scene, seconds);
     for (const GridHandle grid : some) {
       std::shared_ptr<const Impostor> found = cache.find(scene, grid, options);
-      if (found == nullptr) continue;
+      if (found == nullptr || found->is_left_to_rays()) continue;
       bytes += found->bytes();
       if (bytes > FarImpostors::kMaxBytes) break;
       far.kept.emplace(grid, std::move(found));

@@ -81,15 +81,16 @@ SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge)
 std::size_t ImpostorFaces::bytes() const {
   const auto of_level = [](const Level& level) {
     return level.views.size() * (3 * sizeof(float) + 2 * sizeof(std::uint32_t)) +
+           level.slope[0].size() * 4 * sizeof(float) +
            level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t));
   };
-  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + of_level(unseen);
+  std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + surfels.size() * sizeof(Surfel) + of_level(unseen);
   for (const Level& level : levels) sum += of_level(level);
   return sum;
 }
 
 float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position) {
-  if (mode != OcclusionMode::Vertex && mode != OcclusionMode::Smooth)
+  if (face.in_field || (mode != OcclusionMode::Vertex && mode != OcclusionMode::Smooth))
     return static_cast<float>(face.open_rays) / ImpostorFaces::Face::kRays;
   if (face.occlusion == 0) return 1.0F;
   return 1.0F - occlusion_at(unpacked_corners(face.occlusion), face.voxel, face.direction, position) / 3.0F;

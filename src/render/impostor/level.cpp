@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace quoin {
 namespace {
 
 constexpr std::size_t kGroup = ImpostorFaces::kGroup;
+constexpr std::size_t kSides = ImpostorFaces::kSides;
 // Texels: how far from its middle a face is taken to reach where voxels are smaller than texels.
 constexpr double kRoom = 0.5;
 
@@ -14,6 +16,11 @@ constexpr double kRoom = 0.5;
 void fill_up(ImpostorFaces::Level& level, std::size_t& at, std::size_t end) {
   for (; at < end; ++at) {
     for (auto& coordinates : level.centre) coordinates[at] = coordinates[at - 1];
+    for (auto* const shapes : {&level.slope, &level.reach}) {
+      for (auto& each : *shapes) {
+        if (!each.empty()) each[at] = each[at - 1];
+      }
+    }
     level.face[at] = level.face[at - 1];
   }
 }
@@ -34,17 +41,23 @@ void find_groups(ImpostorFaces::Level& level) {
       groups.centre[axis][group] = 0.5F * (*low + *high);
       groups.half[axis][group] = 0.5F * (*high - *low) + level.half;
     }
+    if (begin >= level.begin[kSides / 2]) {
+      // What is inclined rises to both sides.
+      float most = 0.0F;
+      for (std::size_t i = begin; i < begin + kGroup; ++i) {
+        most = std::max(most, std::abs(level.slope[0][i]) + std::abs(level.slope[1][i]));
+      }
+      for (auto& half : groups.half) half[group] += (level.half + 1.0F) * (1.0F + most);
+    }
     for (std::size_t i = begin; i < begin + kGroup; ++i) groups.views[group] |= level.views[i];
   }
 }
 
-// The numbers of places that each direction takes: of its faces that are there, filled up to whole groups.
+// The numbers of places that each side takes: of its faces that are there, filled up to whole groups.
 template <class ViewsOf>
-std::array<std::size_t, 6> places_of(const std::vector<SeenFace>& faces, ViewsOf views_of) {
-  std::array<std::size_t, 6> count{};
-  for (const SeenFace& face : faces) {
-    count[static_cast<std::size_t>(face.face.direction)] += static_cast<std::size_t>(views_of(face) != 0);
-  }
+std::array<std::size_t, kSides> places_of(const std::vector<SeenFace>& faces, ViewsOf views_of) {
+  std::array<std::size_t, kSides> count{};
+  for (const SeenFace& face : faces) count[face.side()] += static_cast<std::size_t>(views_of(face) != 0);
   for (std::size_t& each : count) each = (each + kGroup - 1) / kGroup * kGroup;
   return count;
 }
@@ -61,28 +74,40 @@ ImpostorFaces::Level level_of(const std::vector<SeenFace>& faces, const ContentS
   ImpostorFaces::Level level;
   level.size = static_cast<float>(content.radius);
   level.half = static_cast<float>(half);
-  const std::array<std::size_t, 6> places = places_of(faces, views_of);
-  for (std::size_t side = 0; side < 6; ++side) {
+  const std::array<std::size_t, kSides> places = places_of(faces, views_of);
+  for (std::size_t side = 0; side < kSides; ++side) {
     level.begin[side + 1] = level.begin[side] + static_cast<std::uint32_t>(places[side]);
   }
-  resize(level, level.begin[6]);
+  resize(level, level.begin[kSides]);
+  if (level.begin[kSides] != level.begin[kSides / 2]) {
+    for (auto& slopes : level.slope) slopes.resize(level.begin[kSides]);
+    for (auto& reaches : level.reach) reaches.resize(level.begin[kSides]);
+  }
   std::size_t at = 0;
   std::size_t side = 0;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::uint32_t views = views_of(faces[i]);
     if (views == 0) continue;
     const auto [voxel, direction] = faces[i].face;
-    for (; side < static_cast<std::size_t>(direction); ++side) fill_up(level, at, level.begin[side + 1]);
+    for (; side < faces[i].side(); ++side) fill_up(level, at, level.begin[side + 1]);
     const FaceFrame& frame = frame_of(direction);
+    const ImpostorFaces::Surfel* const surfel = faces[i].surfel;
+    for (std::size_t k = 0; surfel != nullptr && k < 2; ++k) {
+      level.slope[k][at] = surfel->slope[k];
+      level.reach[k][at] = surfel->half[k] + (level.half - 0.5F) + ImpostorFaces::kSurfelRoom;
+    }
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double edge = axis == frame.axis ? 0.5 + 0.5 * frame.sign : 0.5;
+      const bool is_along = axis == frame.axis;
+      const double of_voxel = is_along ? 0.5 + 0.5 * frame.sign : 0.5;
+      const auto of_surfel = [&] { return is_along ? surfel->offset : surfel->shift[axis == frame.u ? 0 : 1]; };
+      const double edge = surfel == nullptr ? of_voxel : double{of_surfel()};
       const auto a = static_cast<int>(axis);
       level.centre[axis][at] = static_cast<float>(voxel[a] + edge - content.centre[a]);
     }
     level.views[at] = views;
     level.face[at++] = static_cast<std::uint32_t>(i);
   }
-  for (; side < 6; ++side) fill_up(level, at, level.begin[side + 1]);
+  for (; side < kSides; ++side) fill_up(level, at, level.begin[side + 1]);
   find_groups(level);
   return level;
 }

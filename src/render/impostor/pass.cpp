@@ -108,13 +108,31 @@ bool ImpostorPass::is_hidden(const DrawnImpostor& drawn, const raster::Job& job,
   return true;
 }
 
-double ImpostorPass::distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Face& face, const Ray& ray) {
+double ImpostorPass::distance_to(const DrawnImpostor& drawn, std::size_t number, const Ray& ray) {
+  const ImpostorFaces::Face& face = drawn.faces->faces[number];
+  if (face.in_field) return distance_to_surfel(drawn, face, drawn.faces->surfel_of(number), ray);
   const FaceFrame& frame = frame_of(face.direction);
   const int axis = frame.axis;
   const double plane = face.voxel[axis] + (frame.sign > 0 ? 1.0 : 0.0) - drawn.faces->centre[axis];
   const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
   return ((plane - drawn.offset[axis]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) /
          glm::dot(row, ray.direction);
+}
+
+double ImpostorPass::distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
+                                       const ImpostorFaces::Surfel& surfel, const Ray& ray) {
+  const FaceFrame& frame = frame_of(face.direction);
+  DVec3 upright(0.0);
+  upright[frame.axis] = 1.0;
+  upright[frame.u] = -double{surfel.slope[0]};
+  upright[frame.v] = -double{surfel.slope[1]};
+  DVec3 centre = DVec3(face.voxel) - drawn.faces->centre;
+  centre[frame.axis] += double{surfel.offset};
+  centre[frame.u] += double{surfel.shift[0]};
+  centre[frame.v] += double{surfel.shift[1]};
+  const DVec3 in_view = upright * drawn.axes;  // the transposed matrix times it
+  return (glm::dot(upright, centre - drawn.offset) * drawn.aim.voxel_size - glm::dot(in_view, ray.origin)) /
+         glm::dot(in_view, ray.direction);
 }
 
 void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster::Canvas& canvas, SceneHits& hits,
@@ -127,8 +145,9 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     const std::uint32_t bit = 1U << lane;
     if (std::isinf(canvas.depth[first + i])) continue;
     const DrawnImpostor& drawn = drawn_[static_cast<std::size_t>(canvas.id[first + i])];
-    const ImpostorFaces::Face& face = drawn.faces->faces[static_cast<std::size_t>(canvas.face[first + i])];
-    const double t = distance_to(drawn, face, rays.ray(lane));
+    const auto number = static_cast<std::size_t>(canvas.face[first + i]);
+    const ImpostorFaces::Face& face = drawn.faces->faces[number];
+    const double t = distance_to(drawn, number, rays.ray(lane));
     const bool is_hit = (hits.grids.hit & bit) != 0;
     if (is_hit ? hits.grids.t[i] < t || (hits.grids.t[i] == t && hits.placed[i] < drawn.placed) : rays.max_t[i] < t) {
       continue;
@@ -136,6 +155,13 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     hits.grids.set(lane, {face.voxel, face.direction, t, false});
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
+    hits.in_field &= ~bit;
+    if (face.in_field) {
+      const Vec3 normal = drawn.faces->surfel_of(number).normal;
+      hits.normal_x[i] = normal.x, hits.normal_y[i] = normal.y, hits.normal_z[i] = normal.z;
+      hits.material[i] = face.type;
+      hits.in_field |= bit;
+    }
     faces.found |= bit;
     faces.face[i] = &face;
   }

@@ -46,7 +46,9 @@ class ImpostorPass {
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
   [[nodiscard]] static bool is_hidden(const DrawnImpostor& drawn, const raster::Job& job, const raster::Canvas& canvas);
   // Along a ray to the plane of a face.
-  [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Face& face, const Ray& ray);
+  [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, std::size_t face, const Ray& ray);
+  [[nodiscard]] static double distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
+                                                 const ImpostorFaces::Surfel& surfel, const Ray& ray);
 
   int width_;
   int height_;

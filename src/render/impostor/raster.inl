@@ -27,6 +27,7 @@ struct Side {
   std::size_t u;
   std::size_t v;
   float sign;
+  bool is_inclined;  // surfels
   float half;   // from a face's middle to its edges
   float reach;  // and a little further, since faces that share an edge meet at slightly different points of it
 };
@@ -94,17 +95,8 @@ inline void put(std::size_t pixel, float depth, std::int32_t id, std::uint32_t f
   canvas.face[pixel] = index;
 }
 
-// Of each lane's face one pixel: where its ray meets the face's plane.
-inline void meet(const Job& job, const Side& side, const F (&q)[3], F x, F y, Mask wanted, const std::uint32_t* faces,
-                 Canvas& canvas) {
-  const F towards = linear(job.direction, side.axis, x, y);
-  const F along = (q[side.axis] - linear(job.point, side.axis, x, y)) / towards;
-  const F at_u = linear(job.point, side.u, x, y) + along * linear(job.direction, side.u, x, y);
-  const F at_v = linear(job.point, side.v, x, y) + along * linear(job.direction, side.v, x, y);
-  const F depth = all(job.depth_at) + along * all(job.depth_step);
-  const F reach = all(side.reach);
-  const Mask met = wanted & (abs(at_u - q[side.u]) <= reach) & (abs(at_v - q[side.v]) <= reach) &
-                   (towards * all(side.sign) < all(0.0F)) & (all(0.0F) < depth);
+// Puts what rays meet in place.
+inline void put_met(const Job& job, F x, F y, F depth, Mask met, const std::uint32_t* faces, Canvas& canvas) {
   std::uint32_t left = bits(met);
   if (left == 0) return;
   alignas(64) float depths[kLanes];
@@ -117,6 +109,37 @@ inline void meet(const Job& job, const Side& side, const F (&q)[3], F x, F y, Ma
   }
 }
 
+// Of each lane's face one pixel: where its ray meets the face's plane.
+inline void meet(const Job& job, const Side& side, const F (&q)[3], F x, F y, Mask wanted, const std::uint32_t* faces,
+                 Canvas& canvas) {
+  const F towards = linear(job.direction, side.axis, x, y);
+  const F along = (q[side.axis] - linear(job.point, side.axis, x, y)) / towards;
+  const F at_u = linear(job.point, side.u, x, y) + along * linear(job.direction, side.u, x, y);
+  const F at_v = linear(job.point, side.v, x, y) + along * linear(job.direction, side.v, x, y);
+  const F depth = all(job.depth_at) + along * all(job.depth_step);
+  const F reach = all(side.reach);
+  const Mask met = wanted & (abs(at_u - q[side.u]) <= reach) & (abs(at_v - q[side.v]) <= reach) &
+                   (towards * all(side.sign) < all(0.0F)) & (all(0.0F) < depth);
+  put_met(job, x, y, depth, met, faces, canvas);
+}
+
+// The same of a surfel: a plane that rises by a slope along each side.
+inline void meet_inclined(const Job& job, const Side& side, const F (&q)[3], const F (&slope)[2], const F (&reach)[2],
+                          F x, F y, Mask wanted, const std::uint32_t* faces, Canvas& canvas) {
+  const F direction_u = linear(job.direction, side.u, x, y);
+  const F direction_v = linear(job.direction, side.v, x, y);
+  const F from_u = linear(job.point, side.u, x, y) - q[side.u];
+  const F from_v = linear(job.point, side.v, x, y) - q[side.v];
+  const F rise = q[side.axis] - linear(job.point, side.axis, x, y) + slope[0] * from_u + slope[1] * from_v;
+  const F towards = linear(job.direction, side.axis, x, y) - slope[0] * direction_u - slope[1] * direction_v;
+  const F along = rise / towards;
+  const F depth = all(job.depth_at) + along * all(job.depth_step);
+  const Mask met = wanted & (abs(from_u + along * direction_u) <= reach[0]) &
+                   (abs(from_v + along * direction_v) <= reach[1]) & (towards * all(side.sign) < all(0.0F)) &
+                   (all(0.0F) < depth);
+  put_met(job, x, y, depth, met, faces, canvas);
+}
+
 void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& canvas) {
   const ImpostorFaces::Level& level = *job.level;
   F half[3] = {all(side.half), all(side.half), all(side.half)};
@@ -125,6 +148,14 @@ void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& can
   for (std::size_t first = begin; first < begin + ImpostorFaces::kGroup; first += kLanes) {
     const F q[3] = {load(level.centre[0].data() + first), load(level.centre[1].data() + first),
                     load(level.centre[2].data() + first)};
+    F slope[2] = {all(0.0F), all(0.0F)};
+    F reach[2] = {all(0.0F), all(0.0F)};
+    if (side.is_inclined) {
+      slope[0] = load(level.slope[0].data() + first), slope[1] = load(level.slope[1].data() + first);
+      reach[0] = load(level.reach[0].data() + first), reach[1] = load(level.reach[1].data() + first);
+      half[side.u] = reach[0], half[side.v] = reach[1];
+      half[side.axis] = reach[0] * abs(slope[0]) + reach[1] * abs(slope[1]);
+    }
     project(job, q, half, areas);
     const auto* views = reinterpret_cast<const std::int32_t*>(level.views.data() + first);
     const Mask shown = areas.shown & test(load(views), all(static_cast<int>(job.views)));
@@ -137,7 +168,12 @@ void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& can
       const Mask in_row = shown & (y <= areas.bottom);
       for (float across = 0.0F; across <= width; across += 1.0F) {
         const F x = areas.left + all(across);
-        meet(job, side, q, x, y, in_row & (x <= areas.right), level.face.data() + first, canvas);
+        const Mask wanted = in_row & (x <= areas.right);
+        if (side.is_inclined) {
+          meet_inclined(job, side, q, slope, reach, x, y, wanted, level.face.data() + first, canvas);
+        } else {
+          meet(job, side, q, x, y, wanted, level.face.data() + first, canvas);
+        }
       }
     }
   }
@@ -205,15 +241,16 @@ bool is_seen(const Job& job, const Side& side) {
 }
 
 void draw_faces(const Job& job, Canvas& canvas) {
-  for (std::size_t i = 0; i < 6; ++i) {
+  for (std::size_t i = 0; i < ImpostorFaces::kSides; ++i) {
     const std::size_t begin = job.level->begin[i] / ImpostorFaces::kGroup;
     const std::size_t end = job.level->begin[i + 1] / ImpostorFaces::kGroup;
     if (begin == end) continue;
-    const FaceFrame& frame = kFaceFrames[i];
+    const bool is_inclined = i >= ImpostorFaces::kSides / 2;
+    const FaceFrame& frame = kFaceFrames[i % (ImpostorFaces::kSides / 2)];
     const float half = job.level->half;
     const float reach = half + 1e-5F + 2e-6F * job.level->size;
-    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), half, reach};
-    if (is_seen(job, side)) draw_side(job, side, begin, end, canvas);
+    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), is_inclined, half, reach};
+    if (is_inclined || is_seen(job, side)) draw_side(job, side, begin, end, canvas);
   }
   find_furthest(job, canvas);
 }

@@ -221,7 +221,7 @@ TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
     const ContentSphere content = content_sphere(grid);
     const auto shell = ImpostorShell::build(tree, 1 << 20, 1 << 20);
     ASSERT_TRUE(shell.has_value());
-    const auto drawn = faces_seen_of(*shell, tree.bounds(), content, 128);
+    const auto drawn = faces_seen_of(*shell, {}, tree.bounds(), content, 128);
     const auto met = faces_seen_by_rays(tree, content, 128);
     ASSERT_GT(drawn.size(), 5'000U);
     const auto key_of = [](const VoxelFace& face) {

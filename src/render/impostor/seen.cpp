@@ -202,7 +202,7 @@ class MetFaces {
   SeenFace& at(const VoxelFace& face) {
     if (last_ < faces_.size() && faces_[last_].face == face) return faces_[last_];
     const auto [found, is_new] = index_.try_emplace(face, static_cast<std::uint32_t>(faces_.size()));
-    if (is_new) faces_.push_back({face, {}});
+    if (is_new) faces_.push_back({face, nullptr, {}});
     last_ = found->second;
     return faces_[last_];
   }
@@ -251,9 +251,10 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 
 }  // namespace
 
-std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box, const ContentSphere& content,
-                                    int edge) {
+std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
+                                    const ContentSphere& content, int edge) {
   std::vector<SeenFace> faces = unseen_of(shell);
+  for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], {}});
   const ImpostorFaces::Level level = all_faces(faces, content);
   raster::Canvas canvas;
   for (int view = 0; view < kImpostorViews; ++view) {

@@ -11,21 +11,27 @@
 #include "render/impostor/faces.h"
 #include "render/impostor/shell.h"
 #include "render/impostor/snapshot.h"
+#include "render/impostor/surfels.h"
 
 namespace quoin {
 
 /// A face and the views that saw it, by level.
 struct SeenFace {
   VoxelFace face;
+  const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: of a voxel
   std::array<std::uint32_t, ImpostorFaces::kLevels> views{};
+
+  [[nodiscard]] std::size_t side() const {
+    return static_cast<std::size_t>(face.direction) + (surfel == nullptr ? 0 : ImpostorFaces::kSides / 2);
+  }
 };
 
-/// All faces of a shell, with what the 26 snapshots of `edge` texels a side see of them: by direction, neighbours
-/// mostly together.
+/// All faces of a shell and of a field, with what the 26 snapshots of `edge` texels a side see of them: by side,
+/// neighbours mostly together. `field` is to outlive the result.
 ///
 /// Source: all faces drawn from each view. Cost: about 10 ns a face and view.
-[[nodiscard]] std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const IBox& box,
-                                                  const ContentSphere& content, int edge);
+[[nodiscard]] std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
+                                                  const IBox& box, const ContentSphere& content, int edge);
 
 /// The same after an edit. `before`: of an impostor with the same content and edge whose faces are whole. `changed`:
 /// boxes around the voxels that are other than then.

@@ -46,7 +46,7 @@ inline Likeness likeness(const Picture& truth, const Picture& picture) {
 }
 
 // A few models in one scene, one grid each, with their pivots at the contents' centres.
-enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb };
+enum class Model { Ball, Box, Castle, Blobs, Ship, Terrain, Comb, SmoothBall, SmoothHills, SmoothRods, Village };
 
 inline Grid castle() {
   Grid grid;
@@ -84,6 +84,12 @@ inline VoxelType terrain_at(IVec3 v) {
 inline Grid voxels_of(Model model) {
   if (model == Model::Castle) return castle();
   if (model == Model::Ship) return ship();
+  if (model == Model::Village) {
+    Grid house;
+    house.fill_box({{-8, 4, -10}, {6, 20, 4}}, 2);
+    house.fill_box({{-10, 20, -12}, {8, 23, 6}}, 3);
+    return house;
+  }
   Grid grid;
   if (model == Model::Ball) grid.put_chunk({0, 0, 0}, workloads::blocky_chunk(workloads::Blocky::W4));
   if (model == Model::Box) {
@@ -108,6 +114,29 @@ inline Grid voxels_of(Model model) {
   return grid;
 }
 
+inline DensityGrid field_of(Model model) {
+  DensityGrid field;
+  if (model == Model::SmoothBall) field.add_sphere({20.3, 21.1, 19.7}, 20.0, 2);
+  if (model == Model::SmoothHills || model == Model::Village) {
+    const int edge = model == Model::Village ? 24 : 60;
+    field.edit({{-edge, -12, -edge}, {edge, 30, edge}}, [&](IVec3 p, DensitySample) {
+      const double height = 8.0 * std::sin(0.09 * p.x) * std::cos(0.07 * p.z) + 2.0 * std::sin(0.31 * p.x + 0.23 * p.z);
+      const double side = std::max({std::abs(p.x), std::abs(p.z), 2 * std::abs(p.y) - 4}) - (edge - 2.5);
+      const auto type = static_cast<VoxelType>(p.y > height - 1.5 ? 1 : 2 + (p.x / 8 + p.z / 8) % 2);
+      return DensitySample{static_cast<float>(std::max(0.8 * (p.y - height), side)), type};
+    });
+    field.remove_sphere({6.0, 4.0, 10.0}, 9.0, 2.0);
+    field.add_sphere({-14.0, 12.0, -8.0}, 7.0, 3, 3.0);
+  }
+  if (model == Model::SmoothRods) {
+    for (int i = 0; i < 5; ++i) {
+      field.add_box({8.0 * i, 0.3, 3.1 * i}, {8.0 * i + 2.6, 40.0, 3.1 * i + 2.4}, 1, 1.0);
+      field.add_box({-4.0, 8.2 * i, 2.0}, {40.0, 8.2 * i + 1.9, 14.0}, 3);
+    }
+  }
+  return field;
+}
+
 struct ImpostorWorld {
   Scene scene;
   InstanceHandle instance;
@@ -118,10 +147,11 @@ struct ImpostorWorld {
     scene.types = workloads::three_types();
     SceneGrid grid;
     grid.grid = voxels_of(model);
-    const ContentSphere content = content_sphere(grid.grid);
+    grid.field = field_of(model);
+    const ContentSphere content = content_sphere(grid);
     radius = content.radius;
     grid.pivot = content.centre;
-    impostor = Impostor::build(grid.grid, scene.types);
+    impostor = Impostor::build(grid, scene.types);
     instance = scene.add_instance({"", scene.add_grid(std::move(grid))});
   }
   Instance& placed() { return scene.edit(instance); }

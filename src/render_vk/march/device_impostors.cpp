@@ -1,17 +1,23 @@
 #include "render_vk/march/device_impostors.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
 
 #include "render_vk/device/drop_oldest.h"
 #include "render_vk/march/device_scene.h"
+#include "render_vk/trees/octahedral.h"
 
 namespace quoin::vulkan {
 namespace {
 
 constexpr std::uint32_t kFacesAGroup = 512;  // as far.comp has it
+constexpr std::uint32_t kSides = ImpostorFaces::kSides;
+constexpr std::uint32_t kIsSurfel = 8;  // as far.glsl has it
+constexpr std::uint32_t kSurfelHalvesShift = 4;
 constexpr std::uint32_t kAllViews = (1U << kImpostorViews) - 1U;
 
 Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
@@ -23,14 +29,26 @@ const ImpostorFaces::Level& level_of(const ImpostorFaces& faces, std::size_t lev
 }
 
 // What fills groups up no view saw, so shaders pass it by.
-std::vector<ShaderFarFace> packed(const ImpostorFaces::Level& level, std::size_t first, std::size_t count) {
+std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorFaces::Level& level, std::size_t first,
+                                  std::size_t count) {
   std::vector<ShaderFarFace> faces;
   faces.reserve(count);
   std::uint32_t direction = 0;
   for (std::size_t i = first; i < first + count; ++i) {
     while (i >= level.begin[direction + 1]) ++direction;
-    faces.push_back(
-        {{level.centre[0][i], level.centre[1][i], level.centre[2][i], 0.0F}, level.face[i], level.views[i], direction});
+    ShaderFarFace& face = faces.emplace_back();
+    face.centre = {level.centre[0][i], level.centre[1][i], level.centre[2][i], 0.0F};
+    face.face = level.face[i];
+    face.views = level.views[i];
+    face.direction = direction;
+    if (direction < kSides / 2) continue;
+    face.direction = (direction - kSides / 2) | kIsSurfel;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const float half = impostor.surfel_of(level.face[i]).half[k];
+      face.direction |= static_cast<std::uint32_t>(std::lround(1024.0F * half)) << (kSurfelHalvesShift + 12 * k);
+    }
+    face.centre.w = level.slope[0][i];
+    face.slope_v = level.slope[1][i];
   }
   return faces;
 }
@@ -38,12 +56,31 @@ std::vector<ShaderFarFace> packed(const ImpostorFaces::Level& level, std::size_t
 std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t first, std::size_t count) {
   std::vector<ShaderVoxelFace> faces;
   faces.reserve(count);
-  for (const ImpostorFaces::Face& face : std::span(impostor.faces).subspan(first, count)) {
+  const std::size_t voxel_faces = impostor.faces.size() - impostor.surfels.size();
+  for (std::size_t i = first; i < first + count; ++i) {
+    // Of a surfel first what a face of a voxel has, then its shape.
+    const std::size_t number = i < voxel_faces ? i : voxel_faces + (i - voxel_faces) / 3;
+    const std::size_t part = i < voxel_faces ? 0 : (i - voxel_faces) % 3;
+    if (part > 0) {
+      const ImpostorFaces::Surfel& surfel = impostor.surfel_of(number);
+      const bool is_first = part == 1;
+      const std::array<float, 3> numbers = is_first ? std::array{surfel.offset, surfel.slope[0], surfel.slope[1]}
+                                                    : std::array{surfel.shift[0], surfel.shift[1], 0.0F};
+      const auto bits = [&](std::size_t k) { return std::bit_cast<std::int32_t>(numbers.at(k)); };
+      faces.push_back({{bits(0), bits(1), bits(2)}, is_first ? octahedral(surfel.normal) : 0});
+      continue;
+    }
+    const ImpostorFaces::Face& face = impostor.faces[number];
     faces.push_back({face.voxel, std::uint32_t{face.type} | std::uint32_t{face.occlusion} << 16 |
                                      static_cast<std::uint32_t>(face.direction) << 24 |
                                      std::uint32_t{face.open_rays} << 27});
   }
   return faces;
+}
+
+// Entries of such a list.
+std::size_t entries_of(const ImpostorFaces& impostor) {
+  return impostor.faces.size() + 2 * impostor.surfels.size();
 }
 
 // From a face's middle to where rays still meet it; as draw_faces has it.
@@ -111,7 +148,7 @@ Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, S
     sent.levels[i] = {bytes, static_cast<std::uint32_t>(count), ~0U};
     bytes += count * sizeof(ShaderFarFace);
   }
-  const auto place = memory_->allocate(bytes + from.faces.size() * sizeof(ShaderVoxelFace), "uploading impostors");
+  const auto place = memory_->allocate(bytes + entries_of(from) * sizeof(ShaderVoxelFace), "uploading impostors");
   if (!place) return place.error();
   sent.place = *place;
   for (ShaderFarLevel& level : sent.levels) level.faces += place->address;
@@ -125,10 +162,10 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
   Status done;
   while (done && sent.part < kParts && faces_left > 0) {
     const bool is_level = sent.part < sent.levels.size();
-    const std::size_t all = is_level ? level_of(from, sent.part).views.size() : from.faces.size();
+    const std::size_t all = is_level ? level_of(from, sent.part).views.size() : entries_of(from);
     const std::size_t count = std::min(all - sent.at, faces_left);
     if (is_level) {
-      const std::vector<ShaderFarFace> some = packed(level_of(from, sent.part), sent.at, count);
+      const std::vector<ShaderFarFace> some = packed(from, level_of(from, sent.part), sent.at, count);
       const std::uint64_t first = sent.levels[sent.part].faces - sent.place.address;
       done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderFarFace));
     } else {
@@ -225,6 +262,7 @@ ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& dra
   far.level.views = drawn.views;
   if (drawn.has_unseen()) far.unseen = sent.levels.back();
   far.faces = sent.faces;
+  far.voxel_faces = static_cast<std::uint32_t>(drawn.faces->faces.size() - drawn.faces->surfels.size());
   return far;
 }
 

@@ -41,7 +41,8 @@ class VulkanImpostors : public vulkan_test::VulkanDetailTest {
 };
 
 TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
-  for (const Model model : {Model::Ball, Model::Castle, Model::Ship, Model::Comb, Model::Blobs}) {
+  for (const Model model : {Model::Ball, Model::Castle, Model::Ship, Model::Comb, Model::Blobs, Model::SmoothBall,
+                            Model::SmoothHills, Model::Village}) {
     add_model(model);
     const ImpostorWorld world(model);
     const std::string name = "far_" + std::to_string(static_cast<int>(model)) + "_";
@@ -56,24 +57,26 @@ TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
 }
 
 TEST_F(VulkanImpostors, EveryKindOfLight) {
-  add_model(Model::Castle);
-  const ImpostorWorld world(Model::Castle);
-  const Camera camera = orbiting(world, 0.7, 0.6, 0.2, 100.0, 148);
-  const auto with = [&](const std::string& name, auto&& change) {
-    RenderOptions options = far_options(148);
-    change(options);
-    compare(camera, options, "far_" + name);
-  };
-  with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
-  with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
-  with("all", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
-  with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
-  with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
-  with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
-  with("samples", [](RenderOptions& o) { o.samples = 5; });
-  with("colours", [](RenderOptions& o) { o.detail_colours = true; });
-  const Picture far = taken_as_is(camera, far_options(148));
-  EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
+  for (const Model model : {Model::Castle, Model::Village}) {
+    add_model(model);
+    const ImpostorWorld world(model);
+    const Camera camera = orbiting(world, 0.7, 0.6, 0.2, 100.0, 148);
+    const auto with = [&](const std::string& name, auto&& change) {
+      RenderOptions options = far_options(148);
+      change(options);
+      compare(camera, options, "far_" + name);
+    };
+    with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
+    with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+    with("all", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
+    with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
+    with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
+    with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
+    with("samples", [](RenderOptions& o) { o.samples = 5; });
+    with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+    const Picture far = taken_as_is(camera, far_options(148));
+    EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
+  }
 }
 
 TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
@@ -146,6 +149,22 @@ TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
   const RenderOptions options = in_detail(256, 192, 128);
   compare(towards(away + DVec3(-300, 420, -500), away + DVec3(500, 0, 500), 0.9), options, "far_away");
   compare(towards(away + DVec3(-3e5, 4e5, -5e5), away + DVec3(500, 0, 500), 0.004), options, "far_telescope");
+}
+
+// Their fields too, turned and mirrored.
+TEST_F(VulkanImpostors, OfFieldsFarFromTheOriginAndTheCamera) {
+  ImpostorWorld world(Model::Village);
+  scene_ = std::move(world.scene);
+  const GridHandle village = scene_.instances()[world.instance].grid;
+  scene_.remove_instance(world.instance);
+  add_crowd(scene_, {village}, 4, 90.0);
+  const DVec3 away{1e9, -3e8, 5e8};
+  for (const InstanceHandle handle : scene_.instances().handles()) scene_.edit(handle).position += away;
+  const RenderOptions options = in_detail(256, 192, 128);
+  compare(towards(away + DVec3(-100, 220, -200), away + DVec3(150, 0, 150), 0.7), options, "far_fields_away");
+  compare(towards(away + DVec3(-1e5, 2e5, -2e5), away + DVec3(150, 0, 150), 0.002), options, "far_fields_telescope");
+  scene_.edit(village).field.remove_sphere({0, 0, 0}, 14.0);
+  compare(towards(away + DVec3(-100, 220, -200), away + DVec3(150, 0, 150), 0.7), options, "far_fields_edited");
 }
 
 TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {

@@ -22,7 +22,7 @@ struct MeshImpostor {
   /// Of its faces some.
   struct Part {
     ShaderFarLevel faces;                  ///< of no address: none
-    std::array<std::uint32_t, 7> begin{};  ///< of each direction; the end of the last
+    std::array<std::uint32_t, 7> begin{};  ///< of each direction of voxels' faces; the end of the last
   };
   Part level;
   Part unseen;

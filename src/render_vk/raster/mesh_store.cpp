@@ -5,27 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "render_vk/trees/octahedral.h"
+
 namespace quoin::vulkan {
 namespace {
 
 // What is replaced stays until its replacement has arrived; no more of that than this at a time.
 constexpr std::size_t kBatchBytes = std::size_t{32} << 20;
-
-std::uint32_t signed_16(float value) {
-  const float scaled = std::round(std::clamp(value, -1.0F, 1.0F) * 32767.0F);
-  return static_cast<std::uint32_t>(static_cast<std::int32_t>(scaled)) & 0xFFFF;
-}
-
-// A unit vector in a word, to 1/20,000: the octahedron's faces folded into a square.
-std::uint32_t octahedral(Vec3 v) {
-  const float size = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
-  if (!(size > 0.0F)) return 0;
-  v /= size;
-  const auto fold = [](float a, float b) { return (1.0F - std::abs(b)) * (a >= 0.0F ? 1.0F : -1.0F); };
-  const float x = v.z >= 0.0F ? v.x : fold(v.x, v.y);
-  const float y = v.z >= 0.0F ? v.y : fold(v.y, v.x);
-  return signed_16(x) | signed_16(y) << 16;
-}
 
 void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::uint32_t>& words) {
   const SmoothChunkMesh& mesh = surface.smooth;

@@ -51,10 +51,16 @@ bool traces_light(const LightOptions& light) {
   return (light.shadows && light.sun_brightness > 0.0) || light.lamps > 0;
 }
 
+std::array<std::uint32_t, 7> sides_of(const ImpostorFaces::Level& level) {
+  std::array<std::uint32_t, 7> begin{};
+  std::copy_n(level.begin.begin(), begin.size(), begin.begin());
+  return begin;
+}
+
 vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::DevicePlaced& placed) {
   vulkan::MeshImpostor impostor;
-  impostor.level = {far.level, placed.impostor->levels.at(placed.impostor_level).begin};
-  impostor.unseen = {far.unseen, placed.impostor->unseen.begin};
+  impostor.level = {far.level, sides_of(placed.impostor->levels.at(placed.impostor_level))};
+  impostor.unseen = {far.unseen, sides_of(placed.impostor->unseen)};
   impostor.faces = far.faces;
   impostor.half = far.size.x;
   impostor.unseen_half = far.size.y;
@@ -201,7 +207,8 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     if (placed.instance != instance.handle) continue;
     instance.placed = static_cast<std::int32_t>(next - placement.placed.begin());
     instance.origin = next->origin;
-    instance.is_far = next->is_far;
+    // Surfels are not rasterised: what has a field is drawn from its meshes, whose levels live meshes choose.
+    instance.is_far = next->is_far && (next->impostor == nullptr || next->impostor->surfels.empty());
     if (placed.level == 0) continue;
     instance.mesh.level = placed.level;
     instance.pivot = placed.pivot;
@@ -216,6 +223,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
         shown_as.begin(), shown_as.end(), placed.placed.instance,
         [](const vulkan::MeshInstance& instance, InstanceHandle handle) { return instance.handle < handle; });
     if (found == shown_as.end() || found->handle != placed.placed.instance) continue;
+    if (!placed.impostor->surfels.empty()) continue;
     // Merged quads of what is simple are fewer than the faces that snapshots saw of it. Where not all chunks have a
     // mesh, some may still be on their way.
     const vulkan::MeshStore::StoredGrid* mesh = store.find(found->mesh);

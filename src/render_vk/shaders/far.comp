@@ -3,6 +3,7 @@
 // that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
 #include "compute.glsl"
 #include "far.glsl"
+#include "faces.glsl"
 
 layout(constant_id = 0) const bool kFindsFaces = false;
 
@@ -74,6 +75,35 @@ void draw(Far far, vec3 q, uint side, uint number, float half_size, float reach)
   }
 }
 
+// A surfel: a plane that rises by a slope along each side.
+void draw_surfel(Far far, vec3 q, vec2 slope, vec2 reach, uint side, uint number) {
+  int axis = int(side >> 1);
+  int u = kFaceU[side];
+  int v = kFaceV[side];
+  float sign = (side & 1) == 0 ? 1.0 : -1.0;
+  vec3 half_box;
+  half_box[u] = reach.x;
+  half_box[v] = reach.y;
+  half_box[axis] = dot(reach, abs(slope));
+  Rectangle rectangle = rectangle_of(far, q, half_box);
+  if (!rectangle.is_shown) return;
+  ivec2 to_tile = far.area.xy - push.corner;
+  for (float y = rectangle.low.y; y <= rectangle.high.y; y += 1.0) {
+    for (float x = rectangle.low.x; x <= rectangle.high.x; x += 1.0) {
+      vec2 at = vec2(x, y) + push.point;
+      precise vec3 from = far.point.xyz + far.point_x.xyz * at.x + far.point_y.xyz * at.y - q;
+      precise vec3 direction = far.direction.xyz + far.direction_x.xyz * at.x + far.direction_y.xyz * at.y;
+      precise float rise = slope.x * from[u] + slope.y * from[v] - from[axis];
+      precise float towards = direction[axis] - slope.x * direction[u] - slope.y * direction[v];
+      precise float along = rise / towards;
+      precise float depth = far.point.w + along * far.direction.w;
+      vec3 off = abs(from + along * direction);
+      bool is_met = off[u] <= reach.x && off[v] <= reach.y && towards * sign < 0.0 && 0.0 < depth;
+      if (is_met) put(ivec2(x, y) + to_tile, depth, number);
+    }
+  }
+}
+
 // Which part of the tile's list the workgroup belongs to: the last one that begins up to there.
 uvec2 part_of(uint group) {
   FarParts parts = FarParts(frame().far_parts);
@@ -105,7 +135,15 @@ void main() {
   uint end = min(first + kFacesAGroup, level.z);
   for (uint i = first + gl_LocalInvocationIndex; i < end; i += 64) {
     uvec4 what = FarFaces(level.xy).at[i].what;
-    if ((sides >> what.z & 1) == 0 || (what.y & views) == 0) continue;
+    if ((what.y & views) == 0) continue;
+    if ((what.z & kIsSurfel) != 0) {
+      vec4 centre = FarFaces(level.xy).at[i].centre;
+      vec2 halves = vec2(what.z >> kSurfelHalvesShift & 0xFFF, what.z >> (kSurfelHalvesShift + 12) & 0xFFF) / 1024.0;
+      draw_surfel(far, centre.xyz, vec2(centre.w, uintBitsToFloat(what.w)), halves + (half_size - 0.5 + kSurfelRoom),
+                  what.z & 7, far.faces.z + what.x);
+      continue;
+    }
+    if ((sides >> what.z & 1) == 0) continue;
     draw(far, FarFaces(level.xy).at[i].centre.xyz, what.z, far.faces.z + what.x, half_size, reach);
   }
 }

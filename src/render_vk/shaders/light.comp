@@ -98,7 +98,7 @@ float occlusion_at(vec4 corners, uint face, vec3 inside) {
 // What a face of an impostor says of itself.
 float openness_of_far(Point point) {
   uint light = point.what.z >> 8;
-  if (!has(kOcclusionVertex)) return float(light >> 8) / 9.0;
+  if (!has(kOcclusionVertex) || is_of_field(point)) return float(light >> 8) / 9.0;
   vec4 corners = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
   return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
 }

@@ -7,6 +7,32 @@
 #include "camera.glsl"
 #include "count.glsl"
 #include "far.glsl"
+#include "faces.glsl"
+
+// Where a ray meets a surfel, from the lower end of its edge, and how far along: by the point of the ray that is nearest
+// to the surfel's middle, so that only small numbers are left to be rounded. `from_voxel`: the ray's start from there.
+vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 shift, out float t) {
+  int axis = int(side >> 1);
+  int u = kFaceU[side];
+  int v = kFaceV[side];
+  Pair back = Pair(-from_voxel.high, -from_voxel.low);
+  vec3 middle = vec3(0.0);
+  middle[axis] = shape.x;
+  middle[u] = shift.x;
+  middle[v] = shift.y;
+  back = sum_of(back, Pair(middle, vec3(0.0)));
+  Pair products = product_of(back, ray.direction);
+  Pair squares = product_of(ray.direction, ray.direction);
+  Pair along = sum_of(sum_of(component(products, 0), component(products, 1)), component(products, 2));
+  Pair length_squared = sum_of(sum_of(component(squares, 0), component(squares, 1)), component(squares, 2));
+  Pair nearest_t = quotient_of(along, length_squared);
+  vec3 near = sum_of(from_voxel, product_of(nearest_t, ray.direction)).high;
+  vec3 off = near - middle;
+  vec3 d = ray.direction.high;
+  float rest = (shape.y * off[u] + shape.z * off[v] - off[axis]) / (d[axis] - shape.y * d[u] - shape.z * d[v]);
+  t = nearest_t.high.x + rest;
+  return near + rest * d;
+}
 
 // Puts what is drawn of impostors at the pixel into `point`; answers the start of the instance's ray, and how far
 // behind it the face lies.
@@ -25,7 +51,10 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
     }
   }
   Far far = fars.at[low];
-  ivec4 face = VoxelFaces(far.faces.xy).at[number - far.faces.z];
+  uint index = number - far.faces.z;
+  bool is_surfel = index >= far.faces.w;
+  if (is_surfel) index = 3 * index - 2 * far.faces.w;
+  ivec4 face = VoxelFaces(far.faces.xy).at[index];
   uint what = uint(face.w);
   uint side = what >> 24 & 7;
   uint light = what >> 16 & 0xFF | (what >> 27) << 8;
@@ -34,6 +63,17 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   ivec3 voxel = face.xyz - far.origin.xyz;
   ExactRay ray = exact_ray_in(placed, direction);
   depth = placed.start.w;
+  if (kHasFields && is_surfel) {
+    ivec4 shape = VoxelFaces(far.faces.xy).at[index + 1];
+    point.inside.xyz = place_on_surfel(ray, start_from(ray, placed, voxel), side, intBitsToFloat(shape.xyz),
+                                       intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy), nearest);
+    point.inside.xyz += kSurfelLift * normal_of(uint(shape.w));
+    point.voxel = ivec4(voxel, i);
+    point.inside.w = depth * scale + nearest;
+    point.what = uvec4(what & 0xFFFF, uint(shape.w), kIsField | kSurface | kIsFar | light << 8,
+                       floatBitsToUint(nearest));
+    return true;
+  }
   nearest = distance_to_face(ray, start_from(ray, placed, voxel), side).high.x;
   point.voxel = ivec4(voxel, i);
   point.inside.w = depth * scale + nearest;

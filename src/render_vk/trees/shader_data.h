@@ -75,7 +75,7 @@ struct ShaderFarFace {
   std::uint32_t face = 0;
   std::uint32_t views = 0;
   std::uint32_t direction = 0;
-  std::uint32_t pad = 0;
+  float slope_v = 0.0F;
 };
 
 struct ShaderVoxelFace {
@@ -107,7 +107,7 @@ struct ShaderFar {
   ShaderFarLevel unseen;
   std::uint64_t faces = 0;
   std::uint32_t first_number = 0;
-  std::uint32_t pad = 0;
+  std::uint32_t voxel_faces = 0;
 };
 
 struct ShaderFarPart {
