@@ -30,7 +30,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "trace"}},
     {"grid/chunk/packed_row.h", {"mesh", "trace"}},
     {"grid/chunk_boxes.h", {"trace"}},
-    {"grid/chunk_order.h", {"light", "live", "mesh", "scene", "trace"}},
+    {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
     {"grid/coordinate_hash.h", {"live", "mesh", "scene", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
@@ -64,7 +64,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/instance_tree.h", {"render_vk"}},
     {"scene/tracer/tree_cache.h", {"render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
-    {"trace/density/smooth_normal.h", {"scene"}},
+    {"trace/density/smooth_normal.h", {"render", "scene"}},
     {"trace/tree_view.h", {"light", "render", "render_vk"}},
 };
 

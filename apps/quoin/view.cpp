@@ -54,6 +54,7 @@ int run_view(const ViewArguments& arguments) {
   if (arguments.drawn == "rays") options.mode = viewer::DrawMode::Rays;
   if (arguments.drawn == "blocks") options.mode = viewer::DrawMode::Blocks;
   if (arguments.drawn == "smooth") options.mode = viewer::DrawMode::Smooth;
+  if (arguments.drawn == "density") options.mode = viewer::DrawMode::Density;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
   Status status = check_input(arguments.input);
@@ -117,7 +118,7 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
       ->check(file_name());
   command->add_option("--draw", arguments->drawn, "What it is drawn as at first (default: as it was last)")
-      ->check(CLI::IsMember({"rays", "blocks", "smooth"}));
+      ->check(CLI::IsMember({"rays", "blocks", "smooth", "density"}));
   command
       ->add_option("--backend", arguments->backend,
                    "What marches rays: a graphics card if there is one, the processor, or any device")

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/density_slice.h>
 
 namespace quoin::viewer {
 
@@ -52,6 +53,23 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage, Thread
   options.detail_colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;
+}
+
+// A picture of densities, which is whole with the first sample.
+Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, const Stage& stage,
+                               const CpuBackendOptions& options) {
+  DensitySliceOptions slice;
+  slice.width = stage.width(request);
+  slice.height = stage.height(request);
+  slice.axis = request.slice.axis;
+  slice.at = request.slice.at;
+  slice.instances = options.instances;
+  slice.threads = options.threads;
+  auto drawn = draw_density_slice(scene, slice);
+  if (!drawn) return drawn.error();
+  Picture picture;
+  picture.colour = std::move(drawn->colour);
+  return picture;
 }
 
 }  // namespace
@@ -155,15 +173,18 @@ Stage CpuBackend::Impl::first_stage() const {
 void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const bool is_first = !stage.has_value();
   if (is_first) stage = first_stage();
-  const ViewRequest wanted = *request;
+  ViewRequest wanted = *request;
+  const bool is_density = wanted.mode == DrawMode::Density;
+  if (is_density) wanted.samples = 1;
   const Stage now = *stage;
   const std::uint64_t number = request_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
   RenderOptions render = options_for(wanted, now, options.threads);
   render.selector = &selectors[now.divisor];
+  const auto goes_on = [&](double) { return !halt && (is_first || request_number == number); };
   auto picture =
-      renderer.render(wanted.camera, render, [&](double) { return !halt && (is_first || request_number == number); });
+      is_density ? draw_densities(scene, wanted, now, options) : renderer.render(wanted.camera, render, goes_on);
   const double seconds = seconds_since(start);
   lock.lock();
   if (!picture && picture.error().code == ErrorCode::Cancelled) return;
@@ -251,6 +272,10 @@ void CpuBackend::resume(bool changed) {
 std::optional<SceneHit> CpuBackend::pick(const Camera& camera, double x, double y, int width, int height) {
   // Only `resume`, on this thread, asks for an update of the tracer: without one under way it stays as it is.
   if (width <= 0 || height <= 0 || !is_up_to_date()) return std::nullopt;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (impl_->request && impl_->request->mode == DrawMode::Density) return std::nullopt;
+  }
   return quoin::pick(impl_->renderer.tracer(), camera, x, y, width, height);
 }
 

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/density_slice.h>
 
 #include "loader.h"
 #include "viewer_fixture.h"
@@ -173,6 +174,47 @@ TEST(CpuBackend, EditsAreDrawn) {
     ASSERT_FALSE(frames.empty());
     EXPECT_EQ(frames.back().colour.rgb, expected(document.scene(), request).rgb);
   }
+}
+
+TEST(CpuBackend, DensitiesAreTheSliceToTheByte) {
+  Scene scene;
+  SceneGrid ball;
+  ball.field.add_sphere({20, 21, 22}, 15.0, kAir);
+  scene.add_instance({"", scene.add_grid(std::move(ball))});
+  Watched watched(scene);
+  ViewRequest request = request_for(scene, View::Iso);
+  request.mode = DrawMode::Density;
+  for (const SlicePlace place : {SlicePlace{1, 0.5}, SlicePlace{0, 0.25}}) {
+    request.slice = place;
+    watched.backend.show(request);
+    const std::vector<ViewFrame> frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    DensitySliceOptions options;
+    options.width = request.width;
+    options.height = request.height;
+    options.axis = place.axis;
+    options.at = place.at;
+    EXPECT_EQ(frames.back().colour.rgb, draw_density_slice(scene, options).value().colour.rgb);
+    EXPECT_TRUE(frames.back().is_whole);
+    EXPECT_FALSE(watched.backend.pick(request.camera, 45, 30, request.width, request.height));
+  }
+  request.mode = DrawMode::Rays;
+  watched.backend.show(request);
+  const std::vector<ViewFrame> frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().colour.rgb, expected(scene, request).rgb);
+  EXPECT_TRUE(watched.backend.pick(request.camera, 45, 30, request.width, request.height));
+}
+
+TEST(CpuBackend, WithoutAFieldThereAreNoDensities) {
+  const Scene scene;
+  Watched watched(scene);
+  ViewRequest request;
+  request.width = request.height = 32;
+  request.mode = DrawMode::Density;
+  watched.backend.show(request);
+  ASSERT_TRUE(watched.bell.wait());
+  EXPECT_TRUE(watched.backend.fault());
 }
 
 TEST(CpuBackend, PicksWhatIsSeen) {

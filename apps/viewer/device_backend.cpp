@@ -49,7 +49,8 @@ struct DeviceBackend::Impl {
         cpu(of_scene, given.cpu, on_frame) {}
 
   [[nodiscard]] bool uses_device() const {
-    if (!request || request->mode != DrawMode::Rays) return request.has_value();
+    if (!request || request->mode == DrawMode::Density) return false;
+    if (has_meshes(request->mode)) return true;
     // Smooth occlusion of fields is the processor's.
     return options.rays_on_device && !is_device_gone && request->light.occlusion != OcclusionMode::Smooth;
   }
@@ -317,11 +318,11 @@ std::string DeviceBackend::name() const {
 }
 
 bool DeviceBackend::traces_light(DrawMode mode) const {
-  return mode == DrawMode::Rays || (impl_->renderer && !impl_->is_processor());
+  return mode == DrawMode::Rays || (has_meshes(mode) && impl_->renderer && !impl_->is_processor());
 }
 
 bool DeviceBackend::can_draw(DrawMode mode) const {
-  return mode == DrawMode::Rays || !impl_->is_device_gone;
+  return !has_meshes(mode) || !impl_->is_device_gone;
 }
 
 void DeviceBackend::show(const ViewRequest& request) {

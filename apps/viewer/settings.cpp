@@ -57,7 +57,8 @@ void read_sun(const Json& object, DVec3& sun) {
 constexpr std::array kShadings = {"lit", "unlit", "unlit with occlusion", "occlusion", "normals"};
 constexpr std::array kOcclusionModes = {"off", "rays", "vertex", "smooth"};
 constexpr std::array kForms = {"none", "share", "weighted", "weighted-published"};
-constexpr std::array kModes = {"rays", "blocks", "smooth"};
+constexpr std::array kModes = {"rays", "blocks", "smooth", "density"};
+constexpr std::array kAxes = {"x", "y", "z"};
 
 // One of an enumeration's names, in their order.
 template <class Names, class Value>
@@ -159,6 +160,10 @@ Settings parse_settings(std::string_view json) {
   read_whole(object, "samples", 1, 256, settings.samples);
   read_flag(object, "detail_by_pixels", settings.detail_by_pixels);
   read_name(object, "mode", kModes, settings.mode);
+  if (const Json* slice = find(object, "slice"); slice != nullptr && slice->is_object()) {
+    read_name(*slice, "axis", kAxes, settings.slice.axis);
+    read_number(*slice, "at", 0.0, 1.0, settings.slice.at);
+  }
   if (const Json* light = find(object, "light"); light != nullptr && light->is_object()) {
     read_light(*light, settings.light);
   }
@@ -175,6 +180,7 @@ std::string to_json(const Settings& settings) {
                  {"samples", settings.samples},
                  {"detail_by_pixels", settings.detail_by_pixels},
                  {"mode", kModes[static_cast<std::size_t>(settings.mode)]},
+                 {"slice", {{"axis", kAxes[static_cast<std::size_t>(settings.slice.axis)]}, {"at", settings.slice.at}}},
                  {"light",
                   {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
                    {"shading", kShadings[static_cast<std::size_t>(light.shading)]},

@@ -28,6 +28,7 @@ struct Settings {
   bool detail_colours = false;  ///< not remembered, as the two after it
   Wireframe wireframe = Wireframe::Off;
   DrawMode mode = DrawMode::Rays;
+  SlicePlace slice;
   LightOptions light = default_light();  ///< not the library's: lamps shine
   std::vector<std::string> recent;       ///< files, the newest first
 

@@ -34,6 +34,8 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.sky_brightness = 0.0;
   settings.light.lamps = 12;
   settings.light.lamp_brightness = 8.0;
+  settings.mode = DrawMode::Density;
+  settings.slice = {2, 0.25};
   settings.note_recent("/tmp/a.vox");
   settings.note_recent("/tmp/b\n\xff.vox");
   const Status written = write_settings(settings, path);
@@ -43,6 +45,8 @@ TEST(Settings, ComeBackAsTheyWere) {
   EXPECT_EQ(back.height, 700);
   EXPECT_FALSE(back.is_panel_shown);
   EXPECT_EQ(back.camera_mode, CameraMode::Fly);
+  EXPECT_EQ(back.mode, DrawMode::Density);
+  EXPECT_EQ(back.slice, (SlicePlace{2, 0.25}));
   EXPECT_EQ(back.ui_scale, 1.5);
   EXPECT_EQ(back.samples, 4);
   EXPECT_TRUE(back.detail_by_pixels);

@@ -25,9 +25,21 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
 
 /// What the scene is drawn as.
 enum class DrawMode : std::uint8_t {
-  Rays,    ///< a ray-marched picture
-  Blocks,  ///< blocky meshes of its chunks
-  Smooth,  ///< smooth meshes of its chunks
+  Rays,     ///< a ray-marched picture
+  Blocks,   ///< blocky meshes of its chunks
+  Smooth,   ///< smooth meshes of its chunks
+  Density,  ///< the densities of its fields on a plane, from the positive end of an axis: draw_density_slice
+};
+
+[[nodiscard]] inline bool has_meshes(DrawMode mode) {
+  return mode == DrawMode::Blocks || mode == DrawMode::Smooth;
+}
+
+/// Where densities are cut, as DensitySliceOptions has it.
+struct SlicePlace {
+  int axis = 1;
+  double at = 0.5;
+  bool operator==(const SlicePlace&) const = default;
 };
 
 /// What the window wants to show.
@@ -41,6 +53,7 @@ struct ViewRequest {
   int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted
   DrawMode mode = DrawMode::Rays;
   Wireframe wireframe = Wireframe::Off;  ///< of meshes
+  SlicePlace slice;                      ///< of densities, which know no camera and no light
 };
 
 /// Whether both want the same picture.
@@ -73,7 +86,7 @@ class ViewBackend {
   [[nodiscard]] virtual std::string name() const = 0;
 
   /// Whether there is a way to draw that; asked again after a fault.
-  [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return mode == DrawMode::Rays; }
+  [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return !has_meshes(mode); }
 
   /// Whether what is drawn so has shadows and the light of lamps.
   [[nodiscard]] virtual bool traces_light(DrawMode mode) const { return mode == DrawMode::Rays; }
@@ -99,8 +112,8 @@ class ViewBackend {
   /// The scene is left alone again, until the next `pause`; everything is drawn anew if it `changed`.
   virtual void resume(bool changed) = 0;
 
-  /// What is seen at a point of the picture that `request` asks for. Nothing where there is sky, and nothing while an
-  /// edit is being taken over: `is_up_to_date` tells the two apart.
+  /// What is seen at a point of the picture that `request` asks for. Nothing where there is sky or densities are shown,
+  /// and nothing while an edit is being taken over: `is_up_to_date` tells that apart.
   [[nodiscard]] virtual std::optional<SceneHit> pick(const Camera& camera, double x, double y, int width,
                                                      int height) = 0;
   [[nodiscard]] virtual bool is_up_to_date() = 0;

@@ -1,6 +1,7 @@
 #include "light/emissive_cells.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include <glm/geometric.hpp>
@@ -29,15 +30,17 @@ struct Sum {
 
   // Places are counted from the first voxel, so that squares stay small wherever the grid's origin is.
   void add(IVec3 voxel, Direction face, Vec3 light) {
-    const DVec3 middle = DVec3(voxel - origin) + 0.5 + 0.5 * DVec3(normal_of(face));
+    add(DVec3(voxel - origin) + 0.5 + 0.5 * DVec3(normal_of(face)), face, light);
+  }
+  void add(const DVec3& middle, Direction face, Vec3 light) {
     const double power = static_cast<double>(light.x) + static_cast<double>(light.y) + static_cast<double>(light.z);
     first += power * middle;
     second += power * glm::dot(middle, middle);
     weight += power;
     cell.power[static_cast<std::size_t>(face)] += light;
   }
-  void add_voxel(IVec3 voxel) {
-    const IBox own{voxel, voxel + 1};
+  void add_voxel(IVec3 voxel) { add_box(voxel, {voxel, voxel + 1}); }
+  void add_box(IVec3 voxel, const IBox& own) {
     cell.box = is_used ? unite(cell.box, own) : own;
     if (!is_used) origin = voxel;
     is_used = true;
@@ -51,10 +54,26 @@ struct Sum {
   }
 };
 
+// In the order of the cells' numbers.
+std::vector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
+  std::vector<EmissiveCell> cells;
+  for (const auto& [number, sum] : sums) {
+    if (sum.weight > 0.0) cells.push_back(sum.finished());
+  }
+  return cells;
+}
+
 bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types) {
   const std::vector<VoxelType> all = chunk.types();
   return std::any_of(all.begin(), all.end(),
                      [&](VoxelType type) { return type < types.size() && types[type].emission > 0.0F; });
+}
+
+// By how much a surface is smaller than what the three axes see of it together.
+float share_of_area(const DVec3& gradient) {
+  const DVec3 size = glm::abs(gradient);
+  const double sum = size.x + size.y + size.z;
+  return sum > 0.0 ? static_cast<float>(glm::length(gradient) / sum) : 1.0F;
 }
 
 }  // namespace
@@ -83,21 +102,58 @@ void EmissiveCells::look_at(const Grid& grid, const VoxelRegistry& types, IVec3 
       }
     }
   }
-  std::vector<EmissiveCell> cells;
-  for (const auto& [number, sum] : sums) {
-    if (sum.weight > 0.0) cells.push_back(sum.finished());
+  if (std::vector<EmissiveCell> cells = cells_of(sums); !cells.empty()) chunks_[at] = std::move(cells);
+}
+
+// What the surface crosses of the lattice's edges that begin or end at samples of the chunk that emit.
+void EmissiveCells::look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
+  chunks_.erase(at);
+  const DensityChunk* chunk = field.find_chunk(at);
+  if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return;
+  constexpr int kAcross = kChunkEdge / kEdge;
+  std::map<int, Sum> sums;  // by the cell's number
+  const IVec3 corner = at * kChunkEdge;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      for (std::uint64_t solid = chunk->solid_row(y, z); solid != 0; solid &= solid - 1) {
+        const int x = std::countr_zero(solid);
+        const VoxelType type = chunk->materials().get(x, y, z);
+        if (type >= types.size() || !(types[type].emission > 0.0F)) continue;
+        const IVec3 sample = corner + IVec3{x, y, z};
+        const double own = field.density(sample);
+        for (const Direction face : kDirections) {
+          const IVec3 out = normal_of(face);
+          const double next = field.density(sample + out);
+          if (next < 0.0) continue;
+          Sum& sum = sums[((z / kEdge) * kAcross + y / kEdge) * kAcross + x / kEdge];
+          sum.add_box(sample, {sample - 1, sample + 1});
+          const DVec3 place = own / (own - next) * DVec3(out);
+          const Vec3 light = emitted_by(types[type]) * share_of_area(field.gradient_at(DVec3(sample) + place));
+          sum.add(DVec3(sample - sum.origin) + place, face, light);
+        }
+      }
+    }
   }
-  if (!cells.empty()) chunks_[at] = std::move(cells);
+  if (std::vector<EmissiveCell> cells = cells_of(sums); !cells.empty()) chunks_[at] = std::move(cells);
+}
+
+template <class Content, class Find>
+void EmissiveCells::follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of) {
+  if (!types.changes_since(followed_types_).empty()) followed_ = {};
+  ChangeCursor now = followed_;
+  const auto changes = content.changes_since(now);
+  followed_ = {};  // stays so when memory runs out
+  if (changes.all) chunks_.clear();
+  for (const IVec3 chunk : chunks_of(changes)) look_at(content, types, chunk);
+  followed_ = now;
 }
 
 void EmissiveCells::update(const Grid& grid, const VoxelRegistry& types) {
-  if (!types.changes_since(followed_types_).empty()) followed_ = {};
-  ChangeCursor now = followed_;
-  const GridChanges changes = grid.changes_since(now);
-  followed_ = {};  // stays so when memory runs out
-  if (changes.all) chunks_.clear();
-  for (const IVec3 chunk : chunks_to_mesh(grid, changes)) look_at(grid, types, chunk);
-  followed_ = now;
+  follow(grid, types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); });
+}
+
+void EmissiveCells::update(const DensityGrid& field, const VoxelRegistry& types) {
+  follow(field, types, [&](const DensityChanges& changes) { return chunks_to_mesh(field, changes, 1); });
 }
 
 }  // namespace quoin

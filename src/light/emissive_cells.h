@@ -6,6 +6,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -13,22 +14,25 @@
 
 namespace quoin {
 
-/// The voxels of a cell of 4^3 that emit light, as one lamp. In the grid, in voxels.
+/// The voxels of a cell of 4^3 that emit light, or the surface of a field there, as one lamp. In the grid, in voxels.
 struct EmissiveCell {
   DVec3 centre{0.0};            ///< of the faces that shine, weighted by their power
   double spread_squared = 0.0;  ///< the mean square of their distances from there
   std::array<Vec3, 6> power{};  ///< colour * emission, linear, times the number of faces, by direction
-  IBox box;                     ///< tight around the voxels that emit
+  IBox box;                     ///< tight around what emits
 };
 
-/// Of one grid, kept up to date while it is edited. A face shines where no opaque voxel, and none of its own type, is
-/// before it.
+/// Of one grid, or one field, kept up to date while it is edited. A face shines where no opaque voxel, and none of its
+/// own type, is before it. A field's surface shines along each axis by the edges of the lattice that it crosses along that,
+/// from a sample that emits: so many samples wide it looks from there. Where it is inclined each counts so much less
+/// that all together are its area.
 class EmissiveCells {
  public:
   static constexpr int kEdge = 4;  ///< voxels
 
   /// Cost: of the chunks in which anything changed; a chunk without types that emit costs O(its types).
   void update(const Grid& grid, const VoxelRegistry& types);
+  void update(const DensityGrid& field, const VoxelRegistry& types);
 
   /// Calls `visit(const EmissiveCell&)` for every cell: chunks by z, y, x, then cells likewise.
   template <class Visit>
@@ -43,6 +47,9 @@ class EmissiveCells {
     bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
   };
   void look_at(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
+  void look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk);
+  template <class Content, class Find>
+  void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of);
 
   ChangeCursor followed_;
   ChangeCursor followed_types_;

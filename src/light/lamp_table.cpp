@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "grid/chunk_order.h"
 #include "trace/tree_view.h"
 
 namespace quoin {
@@ -121,7 +122,9 @@ class ListMaker {
       find_near(sphere_of(place, corner, kChunkEdge));
       if (near_.empty()) continue;
       std::uint64_t held = bricks_of(opaque, chunk);
-      if (place.transparent != nullptr) held |= bricks_of(trace::TreeNodes(*place.transparent), chunk);
+      for (const OccupancyTree* const other : {place.transparent, place.cells}) {
+        if (other != nullptr) held |= bricks_of(trace::TreeNodes(*other), chunk);
+      }
       for (std::uint64_t left = held; left != 0; left &= left - 1) {
         const int bit = std::countr_zero(left);
         const IVec3 brick = chunk * kBricksAChunk + IVec3{bit & 3, bit >> 2 & 3, bit >> 4};
@@ -183,6 +186,17 @@ void put_bricks(std::vector<ListMaker>& made, LampTable& table) {
   }
 }
 
+// Those that hold voxels, or cells of the field: these begin a sample before it.
+std::vector<IVec3> chunks_of(const LampPlace& place) {
+  std::vector<IVec3> chunks = place.voxels->chunks();
+  if (place.cells == nullptr) return chunks;
+  for (const IVec3 chunk : place.field->chunks()) {
+    for (int i = 0; i < 8; ++i) chunks.push_back(chunk - IVec3{i & 1, i >> 1 & 1, i >> 2});
+  }
+  sort_and_unite(chunks);
+  return chunks;
+}
+
 // On several threads, some chunks at a time; in the order of places and chunks.
 void make_lists(std::span<const LampPlace> places, int max_lamps, Threads threads, LampTable& table) {
   constexpr std::size_t kChunksATask = 16;
@@ -192,7 +206,7 @@ void make_lists(std::span<const LampPlace> places, int max_lamps, Threads thread
   };
   std::vector<std::vector<IVec3>> chunks;
   chunks.reserve(places.size());
-  for (const LampPlace& place : places) chunks.push_back(place.voxels->chunks());
+  for (const LampPlace& place : places) chunks.push_back(chunks_of(place));
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < places.size(); ++i) {
     for (std::size_t first = 0; first < chunks[i].size(); first += kChunksATask) {
@@ -255,16 +269,19 @@ std::span<const std::uint32_t> LampTable::at(IVec3 brick, std::int32_t placed) c
 }
 
 LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
-                     const OccupancyTree* transparent) {
+                     const OccupancyTree* transparent, const DensityTree* field) {
   const GridHandle grid = scene.instances()[placed.instance].grid;
+  const SceneGrid& content = scene.grids()[grid];
   return {grid,
-          &scene.grids()[grid].grid,
+          &content.grid,
+          &content.field,
           placed.pivot,
           placed.world_axes,
           placed.position,
           placed.voxel_size,
           &opaque,
-          transparent};
+          transparent,
+          field == nullptr ? nullptr : &field->cells()};
 }
 
 void LampCache::update() {
@@ -289,7 +306,9 @@ std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const Ligh
 }
 
 std::vector<PlacedLamp> LampCache::lamps_of(const Scene& scene, std::span<const LampPlace> places, double brightness) {
-  std::erase_if(cells_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
+  for (auto* const kept : {&cells_, &field_cells_}) {
+    std::erase_if(*kept, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
+  }
   std::vector<PlacedLamp> lamps;
   for (const Lamp& lamp : scene.lamps) {
     if (shines(lamp)) lamps.push_back(placed_lamp(lamp, brightness));
@@ -299,6 +318,10 @@ std::vector<PlacedLamp> LampCache::lamps_of(const Scene& scene, std::span<const 
     EmissiveCells& cells = cells_[place.grid];
     if (is_known.try_emplace(place.grid, true).second) cells.update(*place.voxels, scene.types);
     cells.for_each([&](const EmissiveCell& cell) { lamps.push_back(placed_cell(cell, place, brightness)); });
+    if (place.cells == nullptr) continue;
+    EmissiveCells& of_field = field_cells_[place.grid];
+    of_field.update(*place.field, scene.types);
+    of_field.for_each([&](const EmissiveCell& cell) { lamps.push_back(placed_cell(cell, place, brightness)); });
   }
   return lamps;
 }

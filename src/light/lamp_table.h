@@ -23,7 +23,7 @@
 
 namespace quoin {
 
-/// What lights others: a Lamp, or the emissive voxels of a cell.
+/// What lights others: a Lamp, or what emits of the voxels, or the field, of a cell.
 struct PlacedLamp {
   DVec3 position{0.0};          ///< in the world
   glm::dmat3 axes{1.0};         ///< its own axes in the world, unit columns
@@ -82,17 +82,19 @@ struct LampTable {
 struct LampPlace {
   GridHandle grid;
   const Grid* voxels = nullptr;
+  const DensityGrid* field = nullptr;
   DVec3 pivot{0.0};
   glm::dmat3 axes{1.0};
   DVec3 position{0.0};
   double voxel_size = 1.0;
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< may be null
+  const OccupancyTree* cells = nullptr;        ///< of the field; may be null
 };
 
 /// A placed grid's, which is traced as it is. Requires: `placed` is of `scene`; its pointers are not looked at.
 [[nodiscard]] LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
-                                   const OccupancyTree* transparent);
+                                   const OccupancyTree* transparent, const DensityTree* field);
 
 /// Makes the table of a scene when it is first asked for after an `update`. Threads: any number may call `table`.
 class LampCache {
@@ -113,6 +115,7 @@ class LampCache {
 
   std::mutex mutex_;
   std::map<GridHandle, EmissiveCells> cells_;
+  std::map<GridHandle, EmissiveCells> field_cells_;
   std::shared_ptr<const LampTable> table_;
   int max_lamps_ = 0;  // of the table; 0: it is out of date
   double brightness_ = 0.0;

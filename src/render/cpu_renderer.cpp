@@ -78,7 +78,7 @@ struct CpuRenderer::Impl {
   [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
     for (const PlacedGrid& each : tracer.placed()) {
-      places.push_back(lamp_place(*scene, each, *each.opaque, each.transparent));
+      places.push_back(lamp_place(*scene, each, *each.opaque, each.transparent, each.field));
     }
     return places;
   }

@@ -39,9 +39,7 @@ struct Model {
     placed.pivot = content_sphere(placed).centre;
     scene.edit(instance).rotation = glm::angleAxis(0.7, glm::normalize(DVec3(0.3, 1.0, 0.1)));
   }
-  [[nodiscard]] double radius() const {
-    return content_sphere(scene.grids()[scene.instances()[instance].grid]).radius;
-  }
+  [[nodiscard]] double radius() const { return content_sphere(scene.grids()[scene.instances()[instance].grid]).radius; }
 };
 
 Model ship() {

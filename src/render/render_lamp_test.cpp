@@ -136,6 +136,56 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   }
 }
 
+// A ball of one radiance, by what is known of it: its light falls off with the square of the distance from its middle.
+TEST(RenderLamps, AFieldThatEmitsLightsAsItsSurfaceDoes) {
+  Scene scene = floor_by_night();
+  const VoxelType glow = add_type(scene, kWhite, Visibility::Opaque, 1.5F);
+  constexpr double kRadius = 4.0;
+  const DVec3 middle{0.3, 12.2, -0.4};
+  SceneGrid ball;
+  ball.field.add_sphere(middle, kRadius, glow);
+  EmissiveCells cells;
+  cells.update(ball.field, scene.types);
+  double area = 0.0;
+  cells.for_each([&](const EmissiveCell& cell) {
+    for (const Vec3& power : cell.power) area += double{power.x} / 1.5;
+  });
+  EXPECT_NEAR(area, 4.0 * std::numbers::pi * kRadius * kRadius, 6.0);
+  scene.add_instance({"", scene.add_grid(std::move(ball)), DVec3(0.0)});
+  Camera camera = from_above(0.0, 5, 0.0, 60);
+  const Picture picture = taken(scene, camera, by_night(60, 60));
+  double sum = 0.0;
+  int count = 0;
+  for (int x = 2; x < 60; x += 3) {
+    for (int y = 2; y < 60; y += 3) {
+      const DVec3 to = middle - floor_at(x, y, 60, 60);
+      const double d = glm::length(to);
+      const double expected = 1.5 * kRadius * kRadius / (d * d) * (to.y / d);
+      const double found = linear({pixel_at(picture, x, y)[0], 0, 0, 255}).x;
+      EXPECT_NEAR(found / expected, 1.0, 0.4) << x << ' ' << y;
+      sum += found / expected;
+      ++count;
+    }
+  }
+  EXPECT_NEAR(sum / count, 1.0, 0.12);
+}
+
+TEST(RenderLamps, FieldsAreLitAndCastShadows) {
+  Scene scene = floor_by_night();
+  SceneGrid hill;
+  hill.field.add_sphere({0, -6, 0}, 10.0, 1);
+  scene.add_instance({"", scene.add_grid(std::move(hill)), DVec3(0.0)});
+  Lamp lamp;
+  lamp.position = {20.0, 6.0, 0.0};
+  lamp.intensity = 60.0;
+  scene.lamps.push_back(lamp);
+  const Picture picture = taken(scene, from_above(0, 30, 0, 60), by_night(60, 60));
+  EXPECT_GT(pixel_at(picture, 34, 30)[0], 40) << "the hill's side that looks at the lamp";
+  EXPECT_EQ(pixel_at(picture, 24, 30), (Pixel{0, 0, 0})) << "its other side";
+  EXPECT_EQ(pixel_at(picture, 16, 30), (Pixel{0, 0, 0})) << "its shadow";
+  EXPECT_GT(pixel_at(picture, 30, 8)[0], 10) << "beside it";
+}
+
 TEST(RenderLamps, AClosedLanternLightsNothing) {
   Scene scene = floor_by_night();
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 50.0F);
@@ -250,6 +300,43 @@ TEST(RenderLamps, BadOnesLightNothing) {
   }
   const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));
   EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
+}
+
+TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
+  DensityGrid field;
+  EmissiveCells kept;
+  std::uint32_t random = 7;
+  const auto below = [&](std::uint32_t limit) {
+    random = random * 1'664'525U + 1'013'904'223U;
+    return static_cast<int>((random >> 8) % limit);
+  };
+  std::size_t most = 0;
+  for (int round = 0; round < 40; ++round) {
+    const DVec3 at(below(90) - 20, below(90) - 20, below(90) - 20);
+    if (round % 3 == 2) {
+      field.remove_sphere(at, 2.0 + below(12));
+    } else {
+      field.add_sphere(at, 2.0 + below(8), round % 2 == 0 ? torch : stone);
+    }
+    kept.update(field, scene.types);
+    EmissiveCells fresh;
+    fresh.update(field, scene.types);
+    std::vector<EmissiveCell> a;
+    std::vector<EmissiveCell> b;
+    kept.for_each([&](const EmissiveCell& cell) { a.push_back(cell); });
+    fresh.for_each([&](const EmissiveCell& cell) { b.push_back(cell); });
+    ASSERT_EQ(a.size(), b.size());
+    most = std::max(most, a.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].centre, b[i].centre);
+      ASSERT_EQ(a[i].power, b[i].power);
+      ASSERT_EQ(a[i].box.min, b[i].box.min);
+    }
+  }
+  EXPECT_GT(most, 100U);
 }
 
 TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {

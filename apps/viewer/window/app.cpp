@@ -226,6 +226,7 @@ void App::ask_for_picture() {
   request.detail_colours = state_.settings.detail_colours;
   request.mode = state_.settings.mode;
   request.wireframe = state_.settings.wireframe;
+  request.slice = state_.settings.slice;
   // What was drawn before is another picture, however good.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
   asked_ = request;
@@ -264,7 +265,7 @@ void App::take_fault() {
   if (text == std::exchange(told_fault_, text) || !fault) return;
   state_.tell(*fault);
   if (!options_.screenshot.empty()) end_with(*fault);
-  if (!state_.open.backend->can_draw(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
+  if (state_.why_not_drawn_as(state_.settings.mode) != nullptr) state_.settings.mode = DrawMode::Rays;
 }
 
 Result<std::shared_ptr<VulkanRenderer>> App::open_device() {

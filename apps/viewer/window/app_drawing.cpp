@@ -2,9 +2,17 @@
 
 namespace quoin::viewer {
 
+const char* ViewState::why_not_drawn_as(DrawMode mode) const {
+  if (!open.backend) return nullptr;
+  if (!open.backend->can_draw(mode)) return "there is no device to draw meshes";
+  if (mode != DrawMode::Density) return nullptr;
+  bool has_field = false;
+  scene().grids().for_each([&](GridHandle, const SceneGrid& grid) { has_field |= grid.field.chunk_count() != 0; });
+  return has_field ? nullptr : "there is no field of densities to cut";
+}
+
 void App::draw_as(DrawMode mode) {
-  if (state_.open.backend && !state_.open.backend->can_draw(mode))
-    return state_.tell("there is no device to draw meshes");
+  if (const char* const why = state_.why_not_drawn_as(mode)) return state_.tell(why);
   state_.settings.mode = mode;
 }
 
@@ -39,6 +47,9 @@ bool App::run_draw_command(Command command) {
     case Command::DrawSmooth:
       draw_as(DrawMode::Smooth);
       return true;
+    case Command::DrawDensity:
+      draw_as(DrawMode::Density);
+      return true;
     case Command::NextWireframe:
       settings.wireframe = next(settings.wireframe, 3);
       break;
@@ -51,7 +62,7 @@ bool App::run_draw_command(Command command) {
     default:
       return false;
   }
-  if (settings.mode == DrawMode::Rays) {
+  if (!has_meshes(settings.mode)) {
     state_.tell("drawn as blocks: only meshes have edges");
     draw_as(DrawMode::Blocks);
   }

@@ -38,6 +38,7 @@ enum class Command : std::uint8_t {
   DrawRays,
   DrawBlocks,
   DrawSmooth,
+  DrawDensity,
   NextWireframe,
   NextShading,
   DetailColours,

@@ -184,22 +184,31 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
   }
 }
 
+void draw_slice_place(SlicePlace& slice) {
+  ImGui::Combo("square to", &slice.axis, "x\0y\0z\0");
+  auto at = static_cast<float>(slice.at);
+  if (ImGui::SliderFloat("cut at", &at, 0.0F, 1.0F, "%.3f of the fields", ImGuiSliderFlags_AlwaysClamp)) {
+    slice.at = static_cast<double>(at);
+  }
+}
+
 void draw_picture_part(ViewState& state) {
   if (!heading("Picture")) return;
   Settings& settings = state.settings;
   int mode = static_cast<int>(settings.mode);
-  if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0")) {
+  if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0densities\0")) {
     const auto wanted = static_cast<DrawMode>(mode);
-    const bool can = !state.open.backend || state.open.backend->can_draw(wanted);
-    can ? void(settings.mode = wanted) : state.tell("there is no device to draw meshes");
+    const char* const why = state.why_not_drawn_as(wanted);
+    why == nullptr ? void(settings.mode = wanted) : state.tell(why);
   }
+  if (settings.mode == DrawMode::Density) draw_slice_place(settings.slice);
   ImGui::Checkbox("coarser far away", &settings.detail_by_pixels);
   ImGui::BeginDisabled(!settings.detail_by_pixels);
   ImGui::SameLine();
   ImGui::Checkbox("in colours", &settings.detail_colours);
   ImGui::EndDisabled();
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
-  if (settings.mode != DrawMode::Rays) {
+  if (has_meshes(settings.mode)) {
     int edges = static_cast<int>(settings.wireframe);
     if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);

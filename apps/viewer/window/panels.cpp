@@ -69,12 +69,12 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
     menu_item(command, choice, state.open.backend != nullptr);
   }
   ImGui::Separator();
-  for (const Command command : {Command::DrawRays, Command::DrawBlocks, Command::DrawSmooth}) {
+  for (const Command command : {Command::DrawRays, Command::DrawBlocks, Command::DrawSmooth, Command::DrawDensity}) {
     const int index = static_cast<int>(command) - static_cast<int>(Command::DrawRays);
     menu_item(command, choice, state.open.backend != nullptr, static_cast<int>(state.settings.mode) == index);
   }
-  const bool has_meshes = state.settings.mode != DrawMode::Rays;
-  menu_item(Command::NextWireframe, choice, true, has_meshes && state.settings.wireframe != Wireframe::Off);
+  menu_item(Command::NextWireframe, choice, true,
+            has_meshes(state.settings.mode) && state.settings.wireframe != Wireframe::Off);
   menu_item(Command::NextShading, choice, true, state.settings.light.shading != Shading::Lit);
   menu_item(Command::DetailColours, choice, true, state.settings.detail_colours);
   ImGui::Separator();

@@ -77,6 +77,8 @@ struct ViewState {
   [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
   /// Whether the document may be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }
+  /// Why the scene cannot be drawn as that; null where it can.
+  [[nodiscard]] const char* why_not_drawn_as(DrawMode mode) const;
   /// Changes what dragging does. One walks from the place under the mouse, or from the middle of the scene, and sees
   /// with the angle of view of a person meanwhile.
   void set_camera_mode(CameraMode mode);

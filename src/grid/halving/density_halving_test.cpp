@@ -24,9 +24,15 @@ DensityGrid random_field(std::mt19937& random, float band = 8.0F) {
     const DVec3 at = centres[i % 3] + DVec3(near(random), near(random), near(random));
     const auto material = static_cast<VoxelType>(1 + random() % 4);
     switch (random() % 4) {
-      case 0: field.remove_sphere(at, size(random)); break;
-      case 1: field.add_box(at, at + DVec3(size(random), 0.7 * size(random), size(random)), material); break;
-      default: field.add_sphere(at, size(random), material); break;
+      case 0:
+        field.remove_sphere(at, size(random));
+        break;
+      case 1:
+        field.add_box(at, at + DVec3(size(random), 0.7 * size(random), size(random)), material);
+        break;
+      default:
+        field.add_sphere(at, size(random), material);
+        break;
     }
   }
   return field;
@@ -145,7 +151,9 @@ TEST(DensityHalving, APyramidFollowsEdits) {
       EXPECT_EQ(pyramid.counts(level).finer_solid, finer);
       EXPECT_EQ(pyramid.counts(level).solid, expected.solid_count());
     }
-    const auto near_border = [&] { return 64.0 * (static_cast<int>(random() % 5) - 2) - static_cast<int>(random() % 4); };
+    const auto near_border = [&] {
+      return 64.0 * (static_cast<int>(random() % 5) - 2) - static_cast<int>(random() % 4);
+    };
     const DVec3 at{near_border(), near_border(), near_border()};
     if (step == 4) field.remove_sphere({0, 0, 0}, 30.0);
     if (step == 6) field = random_field(random, 4.0F);

@@ -12,7 +12,7 @@
 #include "light/corner_light.h"
 #include "light/occlusion_directions.h"
 #include "render/impostor/seen.h"
-#include "render/impostor/shell.h"
+#include "render/shell/shell.h"
 
 namespace quoin {
 namespace {
@@ -58,9 +58,8 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
     rays.active = (1U << size) - 1U;
     for (std::size_t i = 0; i < size; ++i) {
       const ImpostorFaces::Face& face = faces[wanted[begin + i]];
-      const DVec3 origin = face.in_field
-                               ? place_of(face, impostor.surfel_of(wanted[begin + i]), kLift)
-                               : DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
+      const DVec3 origin = face.in_field ? place_of(face, impostor.surfel_of(wanted[begin + i]), kLift)
+                                         : DVec3(face.voxel) + 0.5 + (0.5 + kLift) * DVec3(normal_of(face.direction));
       rays.origin_x[i] = origin.x, rays.origin_y[i] = origin.y, rays.origin_z[i] = origin.z;
     }
     std::array<int, RayPacket::kSize> open{};

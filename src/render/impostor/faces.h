@@ -30,14 +30,14 @@ struct ImpostorFaces {
   /// What the snapshots of one size show: arrays over faces, by direction, those of voxels before those of the field,
   /// each direction's number rounded up to whole groups with faces that no view saw.
   struct Level {
-    std::array<std::vector<float>, 3> centre;  ///< of the face, voxels from the content's centre
-    std::vector<std::uint32_t> views;          ///< bit i: view i saw it
-    std::vector<std::uint32_t> face;           ///< index into `faces`
-    std::array<std::vector<float>, 2> slope;   ///< see Surfel; empty where there is no field
-    std::array<std::vector<float>, 2> reach;   ///< of surfels: `half`, and what texels are larger than a sample
+    std::array<std::vector<float>, 3> centre;       ///< of the face, voxels from the content's centre
+    std::vector<std::uint32_t> views;               ///< bit i: view i saw it
+    std::vector<std::uint32_t> face;                ///< index into `faces`
+    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty where there is no field
+    std::array<std::vector<float>, 2> reach;        ///< of surfels: `half`, and what texels are larger than a sample
     std::array<std::uint32_t, kSides + 1> begin{};  ///< of each side; the end of the last
-    Groups groups;                             ///< of each kGroup faces
-    float size = 0.0F;                         ///< of the largest coordinate
+    Groups groups;                                  ///< of each kGroup faces
+    float size = 0.0F;                              ///< of the largest coordinate
     float half = 0.5F;  ///< from a face's middle to its edges, voxels: more than a voxel's where texels are larger
   };
 
@@ -57,14 +57,15 @@ struct ImpostorFaces {
   /// the foot of a wall. `Face::voxel` is the edge's lower end, `direction` along it. So the surfels of one direction
   /// lie side by side as the lattice's edges do.
   struct Surfel {
-    Vec3 normal{0.0F};  ///< with which it is lit
-    float offset = 0.0F;  ///< of its middle from the edge's lower end, along the direction's axis
+    Vec3 normal{0.0F};             ///< with which it is lit
+    float offset = 0.0F;           ///< of its middle from the edge's lower end, along the direction's axis
     std::array<float, 2> shift{};  ///< the same along kFaceFrames' u and v
     std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: whole 1/1,024
     /// How much the plane rises along the direction's axis by a sample along these.
     std::array<float, 2> slope{};
   };
-  static constexpr float kSurfelRoom = 0.05F;  ///< by which rays meet a surfel beyond its edges, since they are not flush
+  static constexpr float kSurfelRoom =
+      0.05F;  ///< by which rays meet a surfel beyond its edges, since they are not flush
   /// From a surfel along its normal to where rays of light start, for what it leaves out of the surface's curvature.
   static constexpr float kSurfelLift = 0.5F;
 

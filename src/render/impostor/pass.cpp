@@ -120,7 +120,7 @@ double ImpostorPass::distance_to(const DrawnImpostor& drawn, std::size_t number,
 }
 
 double ImpostorPass::distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
-                                       const ImpostorFaces::Surfel& surfel, const Ray& ray) {
+                                        const ImpostorFaces::Surfel& surfel, const Ray& ray) {
   const FaceFrame& frame = frame_of(face.direction);
   DVec3 upright(0.0);
   upright[frame.axis] = 1.0;

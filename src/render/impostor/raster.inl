@@ -28,8 +28,8 @@ struct Side {
   std::size_t v;
   float sign;
   bool is_inclined;  // surfels
-  float half;   // from a face's middle to its edges
-  float reach;  // and a little further, since faces that share an edge meet at slightly different points of it
+  float half;        // from a face's middle to its edges
+  float reach;       // and a little further, since faces that share an edge meet at slightly different points of it
 };
 
 // Pixels, all inclusive.

@@ -9,9 +9,9 @@
 #include <quoin/trace/occupancy_tree.h>
 
 #include "render/impostor/faces.h"
-#include "render/impostor/shell.h"
 #include "render/impostor/snapshot.h"
 #include "render/impostor/surfels.h"
+#include "render/shell/shell.h"
 
 namespace quoin {
 

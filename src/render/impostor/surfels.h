@@ -7,7 +7,7 @@
 #include <quoin/grid/density_grid.h>
 
 #include "render/impostor/faces.h"
-#include "render/impostor/shell.h"
+#include "render/shell/shell.h"
 
 namespace quoin {
 

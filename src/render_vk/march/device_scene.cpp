@@ -192,7 +192,7 @@ std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   std::vector<LampPlace> places;
   for (const DevicePlaced& each : placement_.placed) {
     const TreeCache& trees = grids_.find(scene.instances()[each.placed.instance].grid)->second.trees;
-    places.push_back(lamp_place(scene, each.placed, trees.opaque(), trees.transparent()));
+    places.push_back(lamp_place(scene, each.placed, trees.opaque(), trees.transparent(), trees.field()));
   }
   return places;
 }

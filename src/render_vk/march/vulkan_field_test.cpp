@@ -98,6 +98,31 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
   compare(scene, towards({50, 40, 60}, {0, 10, 0}), options, "field_lamps");
 }
 
+// Glowing balls over hills, a house and a lantern; near, halved and from an impostor.
+TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  SceneGrid grid = village(types);
+  grid.field.add_sphere({25.0, 20.0, 60.0}, 4.0, types.glow);
+  grid.field.remove_box({22.0, 22.0, 50.0}, {60.0, 30.0, 70.0});
+  place_grid(scene, std::move(grid));
+  RenderOptions options = sized(128, 96);
+  options.light.lamps = 24;
+  options.light.sun_brightness = 0.1;
+  options.light.sky_brightness = 0.1;
+  const Camera camera = towards({90, 60, 110}, {10, 5, 20});
+  compare(scene, camera, options, "field_glow");
+  const Picture with = render_test::taken(scene, camera, options);
+  options.light.lamps = 0;
+  EXPECT_GT(render_test::count_different(with, render_test::taken(scene, camera, options), 8), 800);
+  options.light.lamps = 24;
+  options.detail.emplace().far_pixels = 0;
+  options.detail->cell_pixels = 4.0;
+  compare(scene, camera, options, "field_glow_halved");
+  options.detail->far_pixels = 1000;
+  compare(scene, camera, options, "field_glow_far");
+}
+
 TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
   Scene scene;
   const FieldTypes types = add_types(scene);

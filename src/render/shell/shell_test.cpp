@@ -1,4 +1,4 @@
-#include "render/impostor/shell.h"
+#include "render/shell/shell.h"
 
 #include <random>
 #include <set>
