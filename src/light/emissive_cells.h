@@ -23,9 +23,9 @@ struct EmissiveCell {
 };
 
 /// Of one grid, or one field, kept up to date while it is edited. A face shines where no opaque voxel, and none of its
-/// own type, is before it. A field's surface shines along each axis by the edges of the lattice that it crosses along that,
-/// from a sample that emits: so many samples wide it looks from there. Where it is inclined each counts so much less
-/// that all together are its area.
+/// own type, is before it. A field's surface shines along each axis by the edges of the lattice that it crosses along
+/// that, from a sample that emits: so many samples wide it looks from there. Where it is inclined each counts so much
+/// less that all together are its area.
 class EmissiveCells {
  public:
   static constexpr int kEdge = 4;  ///< voxels

@@ -78,8 +78,8 @@ class Impostor {
   /// texels and faces near what changed are looked at again, unless much changed, the content's sphere is another, or
   /// there are very many faces: then all are.
   ///
-  /// Requires: this one was built of that grid or a snapshot of it, without a field, with types of the same visibility; `changes` are
-  ///           those since.
+  /// Requires: this one was built of that grid or a snapshot of it, without a field, with types of the same visibility;
+  ///           `changes` are those since.
   /// Cost: some 20 ns a face, and what an edit can have changed.
   [[nodiscard]] Impostor rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const;
 

@@ -43,7 +43,7 @@ struct DensityHalving {
   }
 };
 
-// Adds the halved chunks that read a voxel, or a sample, of the change: their own voxels and those of one cell past them.
+// Adds the halved chunks that read a voxel, or a sample, of the change: their own and those of one cell past them.
 template <class Change>
 void add_readers(const Change& change, std::vector<IVec3>& chunks) {
   constexpr int kReach = 2;

@@ -85,8 +85,8 @@ struct ImpostorFaces {
   [[nodiscard]] std::size_t bytes() const;
 };
 
-/// 0 to 1 at a point of a face (in the grid): of voxels in OcclusionMode::Vertex and Smooth by its corners, else by rays
-/// from its middle.
+/// 0 to 1 at a point of a face (in the grid): of voxels in OcclusionMode::Vertex and Smooth by its corners, else by
+/// rays from its middle.
 [[nodiscard]] float openness_of(const ImpostorFaces::Face& face, OcclusionMode mode, DVec3 position);
 
 [[nodiscard]] inline FaceOcclusion unpacked_corners(std::uint8_t packed) {

@@ -13,8 +13,8 @@
 
 namespace quoin::vulkan {
 
-/// The meshes of halved grids, of their voxels and of their fields, made when a picture first asks for them and kept; where grids were edited since, those
-/// of the chunks that an edit can have changed are made anew.
+/// The meshes of halved grids, of their voxels and of their fields, made when a picture first asks for them and kept;
+/// where grids were edited since, those of the chunks that an edit can have changed are made anew.
 class LevelMeshes {
  public:
   /// What is put there goes with it.

@@ -9,8 +9,8 @@
 #include "far.glsl"
 #include "faces.glsl"
 
-// Where a ray meets a surfel, from the lower end of its edge, and how far along: by the point of the ray that is nearest
-// to the surfel's middle, so that only small numbers are left to be rounded. `from_voxel`: the ray's start from there.
+// Where a ray meets a surfel, from the lower end of its edge, and how far along: by the point of the ray that is
+// nearest to the surfel's middle, so that only small numbers are left to be rounded. `from_voxel`: the ray's start.
 vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 shift, out float t) {
   int axis = int(side >> 1);
   int u = kFaceU[side];
