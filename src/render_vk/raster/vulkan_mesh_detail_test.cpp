@@ -179,6 +179,56 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   EXPECT_LE(different * 50, static_cast<int>(halved.rgb.size()));
 }
 
+// Fields are drawn from meshes of their halved samples, beside the halved blocks of the same grid; far ones from their
+// own meshes.
+TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
+  const VoxelType stone = add_type(scene_, {200, 190, 170});
+  const VoxelType brick = add_type(scene_, {190, 90, 70});
+  SceneGrid hill;
+  hill.field.add_sphere({0.0, -20.0, 0.0}, 60.0, stone);
+  hill.field.remove_sphere({30.0, 30.0, 20.0}, 22.0);
+  hill.grid.fill_box({{-16, 30, -16}, {16, 70, 16}}, brick);
+  const GridHandle grid = scene_.add_grid(std::move(hill));
+  scene_.add_instance({"", grid});
+  const Camera camera = towards({0, 120, 300}, {0, 0, 0}, 0.6);
+  const auto shown = [&](const RenderOptions& options, std::int64_t& triangles) {
+    put(scene_, vulkan_test::live_surfaces(scene_, SurfaceStyle::Blocky));
+    Image image = drawn(camera, mesh_options(options));
+    triangles = meshes_->stats().drawn_triangles;
+    return image;
+  };
+  for (int round = 0; round < 2; ++round) {
+    RenderOptions options = with_mesh_light(always(Detail::Mid, 1.0));
+    options.light.shading = Shading::Normals;
+    std::int64_t halved = 0;
+    std::int64_t whole = 0;
+    std::int64_t far = 0;
+    const Image coarse = shown(options, halved);
+    const Image distant = shown(
+        [&] {
+          RenderOptions of_far = options;
+          of_far.detail = always(Detail::Far, 1.0).detail;
+          return of_far;
+        }(),
+        far);
+    options.detail.reset();
+    const Image fine = shown(options, whole);
+    EXPECT_LT(halved * 2, whole);
+    EXPECT_EQ(far, whole);
+    EXPECT_EQ(bytes_that_differ(distant, fine, 8), 0);
+    EXPECT_LE(bytes_that_differ(coarse, fine, 40) * 30, static_cast<int>(fine.rgb.size()));
+    EXPECT_GT(bytes_that_differ(coarse, fine, 2), 0);
+    // With the shadows of the halved field.
+    RenderOptions lit = with_mesh_light(always(Detail::Mid, 1.0));
+    std::int64_t triangles = 0;
+    const Image shaded = shown(lit, triangles);
+    lit.detail.reset();
+    EXPECT_LE(bytes_that_differ(shaded, shown(lit, triangles), 60) * 20, static_cast<int>(shaded.rgb.size()));
+    // Edits reach the levels.
+    scene_.edit(grid).field.add_sphere({-50.0, 30.0, 10.0}, 20.0, brick);
+  }
+}
+
 // A view's memory keeps what is about a threshold from trembling.
 TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 1, 260.0);
