@@ -155,7 +155,14 @@ void run_tasks(ConvertOptions options, const FormatInfo& format, std::vector<Tas
   });
 }
 
-Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, std::uint64_t bytes, double seconds) {
+struct Totals {
+  std::size_t converted = 0;
+  std::uint64_t bytes = 0;
+  double seconds = 0;
+};
+
+/// `errors`: of what could not be looked at, beside those of the tasks.
+Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, const Totals& totals) {
   Json converted = Json::array();
   Json failed = Json::array();
   for (const Error& error : errors) failed.push_back({{"input", error.path}, {"error", to_string(error)}});
@@ -168,7 +175,28 @@ Json json_of(const std::vector<Task>& tasks, const std::vector<Error>& errors, s
     entry.update(outcome_json(*task.outcome));
     converted.push_back(std::move(entry));
   }
-  return {{"converted", converted}, {"failed", failed}, {"bytes", bytes}, {"seconds", seconds}};
+  return {{"converted", converted}, {"failed", failed}, {"bytes", totals.bytes}, {"seconds", totals.seconds}};
+}
+
+/// What failed comes last. Returns as `print`.
+int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors, const Totals& totals) {
+  std::string text;
+  for (const Task& task : tasks) {
+    if (!task.outcome) continue;
+    for (const std::string& warning : task.outcome->warnings) {
+      print_error("warning: " + task.input.string() + ": " + warning);
+    }
+    text += task.input.string() + " -> " + task.output.string() + ", " + bytes_for_people(task.outcome->bytes) + "\n";
+  }
+  const auto count = [](std::size_t n) { return with_thousands(static_cast<std::int64_t>(n)); };
+  text += "Converted " + count(totals.converted) + " of " + count(tasks.size() + errors.size()) + ", " +
+          bytes_for_people(totals.bytes) + " in " + number_for_people(totals.seconds) + " s\n";
+  const int printed = print(text);
+  for (const Error& error : errors) print_error(error);
+  for (const Task& task : tasks) {
+    if (task.error) print_error(*task.error);
+  }
+  return printed;
 }
 
 }  // namespace
@@ -200,34 +228,16 @@ int run_many(const ConvertOptions& options, const ManyOptions& many) {
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
 
-  std::uint64_t bytes = 0;
-  std::size_t converted = 0;
-  for (const Task& task : tasks) {
-    if (task.error) {
-      errors.push_back(*task.error);
-      continue;
-    }
-    ++converted;
-    bytes += task.outcome->bytes;
-  }
-  const bool is_whole = errors.empty();
-  if (options.common.json) {
-    errors.resize(errors.size() - (tasks.size() - converted));  // those of tasks stand with them
-    const int printed = print_json(json_of(tasks, errors, bytes, watch.lap()));
-    return printed == kDone && !is_whole ? kFailed : printed;
-  }
-  std::string text;
+  Totals totals;
   for (const Task& task : tasks) {
     if (!task.outcome) continue;
-    for (const std::string& warning : task.outcome->warnings)
-      print_error("warning: " + task.input.string() + ": " + warning);
-    text += task.input.string() + " -> " + task.output.string() + ", " + bytes_for_people(task.outcome->bytes) + "\n";
+    ++totals.converted;
+    totals.bytes += task.outcome->bytes;
   }
-  text += "Converted " + with_thousands(static_cast<std::int64_t>(converted)) + " of " +
-          with_thousands(static_cast<std::int64_t>(converted + errors.size())) + ", " + bytes_for_people(bytes) +
-          " in " + number_for_people(watch.lap()) + " s\n";
-  const int printed = print(text);
-  for (const Error& error : errors) print_error(error);
+  totals.seconds = watch.lap();
+  const bool is_whole = totals.converted == tasks.size() && errors.empty();
+  const int printed =
+      options.common.json ? print_json(json_of(tasks, errors, totals)) : print_text(tasks, errors, totals);
   return printed == kDone && !is_whole ? kFailed : printed;
 }
 
