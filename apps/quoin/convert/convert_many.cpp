@@ -186,7 +186,8 @@ int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors,
     for (const std::string& warning : task.outcome->warnings) {
       print_error("warning: " + task.input.string() + ": " + warning);
     }
-    text += task.input.string() + " -> " + task.output.string() + ", " + bytes_for_people(task.outcome->bytes) + "\n";
+    text += on_one_line(task.input.string() + " -> " + task.output.string()) + ", " +
+            bytes_for_people(task.outcome->bytes) + "\n";
   }
   const auto count = [](std::size_t n) { return with_thousands(static_cast<std::int64_t>(n)); };
   text += "Converted " + count(totals.converted) + " of " + count(tasks.size() + errors.size()) + ", " +
