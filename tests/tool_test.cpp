@@ -238,6 +238,11 @@ TEST_F(Tool, WhatHoldsAModelIsReplacedOnlyByForce) {
     EXPECT_EQ(text_of(folder_.file("other.vox")), large);
     EXPECT_EQ(text_of(folder_.file("misnamed.glb")), large);
   }
+  // Beside OUT, too.
+  std::ofstream(folder_.file("scene.bin"), std::ios::binary) << large;
+  EXPECT_EQ(run("convert tiny.vox scene.gltf").status, 1);
+  EXPECT_EQ(text_of(folder_.file("scene.bin")), large);
+  EXPECT_FALSE(exists("scene.gltf"));
   EXPECT_EQ(run("convert tiny.vox other.vox --force").status, 0);
   EXPECT_NE(text_of(folder_.file("other.vox")), large);
   EXPECT_EQ(run("generate terrain other.vox --chunks 1x1x1 --force").status, 0);
@@ -281,6 +286,18 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   EXPECT_EQ(both.status, 2);
   EXPECT_EQ(both.err, "quoin: tiny.vox and a/tiny.vox would both become out/tiny.glb\n");
   EXPECT_FALSE(exists("out"));
+  // Whatever their folder is called.
+  std::filesystem::create_symlink("a", folder_.file("b"));
+  std::ofstream(folder_.file("a/tiny.json")) << "{}";
+  const ToolRun apart = run("convert a/tiny.vox b/tiny.json --to glb");
+  EXPECT_EQ(apart.status, 2);
+  EXPECT_EQ(apart.err, "quoin: a/tiny.vox and b/tiny.json would both become b/tiny.glb\n");
+  std::filesystem::remove(folder_.file("a/tiny.json"));
+  // What an earlier run wrote below a folder is not taken for a model of it.
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(run("convert a --to vox --recursive --out-dir a/out --force").status, 0);
+    EXPECT_FALSE(exists("a/out/out"));
+  }
   // Named twice it is still one.
   EXPECT_EQ(run("convert tiny.vox ./tiny.vox --to glb --out-dir out").status, 0);
   EXPECT_EQ(run("convert a --to glb").err, "quoin: a: a folder; --recursive converts what is in it\n");

@@ -35,6 +35,15 @@ void catch_interrupts() {
   }
 }
 
+void let_interrupts_end_reads() {
+  for (const int signal : std::array{SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction current {};
+    if (::sigaction(signal, nullptr, &current) != 0 || current.sa_handler != note_signal) continue;
+    current.sa_flags &= ~SA_RESTART;
+    ::sigaction(signal, &current, nullptr);
+  }
+}
+
 bool was_interrupted() {
   return caught_signal.load(std::memory_order_relaxed) != 0;
 }

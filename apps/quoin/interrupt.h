@@ -10,6 +10,9 @@ void let_writes_fail();
 /// files under way are taken back; a second one ends the program at once. Signals that are ignored stay so.
 void catch_interrupts();
 
+/// After `catch_interrupts`: a signal that is caught also ends a read that waits, which then fails with EINTR.
+void let_interrupts_end_reads();
+
 [[nodiscard]] bool was_interrupted();
 
 /// Ends the program as the caught signal would have, so that shells and scripts see what happened. Returns when none

@@ -1,5 +1,8 @@
 #include "output_files.h"
 
+#include <sys/stat.h>
+
+#include <optional>
 #include <string>
 
 #include <quoin/io/file.h>
@@ -15,17 +18,43 @@ Status check_outputs(std::initializer_list<std::filesystem::path> files) {
   return {};
 }
 
+namespace {
+
+std::optional<std::pair<std::uint64_t, std::uint64_t>> identity_of(const std::filesystem::path& name) {
+  struct stat found {};
+  if (::stat(name.c_str(), &found) != 0) return std::nullopt;
+  return std::pair{static_cast<std::uint64_t>(found.st_dev), static_cast<std::uint64_t>(found.st_ino)};
+}
+
+}  // namespace
+
+FileSet::FileSet(std::span<const std::filesystem::path> names) {
+  for (const auto& name : names) {
+    if (const auto file = identity_of(name)) files_.insert(*file);
+  }
+}
+
+bool FileSet::contains(const std::filesystem::path& name) const {
+  const auto file = identity_of(name);
+  return file && files_.contains(*file);
+}
+
+Status make_folder_of(const std::filesystem::path& file) {
+  if (!file.has_parent_path()) return {};
+  std::error_code code;
+  std::filesystem::create_directories(file.parent_path(), code);
+  if (!code) return {};
+  return make_error(ErrorCode::CannotWrite, code.message(), file.parent_path().string());
+}
+
 bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code missing;
   return std::filesystem::equivalent(a, b, missing);
 }
 
-Status check_replaced(const std::filesystem::path& output, std::span<const std::filesystem::path> inputs, bool force) {
-  for (const auto& input : inputs) {
-    if (is_same_file(output, input)) {
-      return make_error(ErrorCode::InvalidArgument, "an input is never replaced; write to another name",
-                        output.string());
-    }
+Status check_replaced(const std::filesystem::path& output, const FileSet& inputs, bool force) {
+  if (inputs.contains(output)) {
+    return make_error(ErrorCode::InvalidArgument, "an input is never replaced; write to another name", output.string());
   }
   std::error_code unknown;
   if (force || !std::filesystem::is_regular_file(output, unknown)) return {};

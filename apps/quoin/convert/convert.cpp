@@ -21,18 +21,6 @@ namespace quoin::tool {
 
 namespace {
 
-/// Refuses to replace the input by a file that the user did not name.
-Status check_companions(const std::vector<std::filesystem::path>& files, const ConvertOptions& options) {
-  for (const auto& file : files) {
-    const auto is_it = [&](const std::filesystem::path& input) { return is_same_file(file, input); };
-    if (std::none_of(options.inputs.begin(), options.inputs.end(), is_it)) continue;
-    return make_error(ErrorCode::InvalidArgument,
-                      "the input, which " + options.output.string() + " would replace with its companion of this name",
-                      file.string());
-  }
-  return {};
-}
-
 /// Meshes the scene blockily and writes it, filling in `outcome`.
 Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
   Stopwatch watch;
@@ -183,7 +171,7 @@ int run_one(ConvertOptions& options, const ManyOptions& many) {
     print_error(named);
     return kFailed;
   };
-  if (options.common.input == kStandardStream) catch_interrupts();
+  if (is_to_stream || options.common.input == kStandardStream) catch_interrupts();
   const auto fault_of_streams = open_streams(options, many, streams);
   if (!fault_of_streams) return failed(fault_of_streams.error());
   const auto format = format_for_writing(options.output);
@@ -194,7 +182,7 @@ int run_one(ConvertOptions& options, const ManyOptions& many) {
     print_error(fault);
     return kWrongUsage;
   }
-  options.inputs = {&options.common.input, 1};
+  options.inputs = FileSet({&options.common.input, 1});
   const auto outcome = convert_file(options, *format, fault);
   if (!fault.empty()) {
     print_error(fault);
@@ -293,7 +281,9 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
     return has_stream ? "- is standard input: it is converted alone, with a name for OUT" : "";
   }
   if (many.folder) return is_to_stream ? "--out-dir: OUT is standard output" : "--out-dir needs --to: the format";
-  if (many.recursive) return "--recursive needs --to: the format";
+  if (many.recursive) {
+    return is_to_stream ? "--recursive: OUT is standard output" : "--recursive needs --to: the format";
+  }
   if (rest.empty()) return "OUT is required";
   if (rest.size() > 1) {
     return std::to_string(rest.size() + 1) + " files; several are converted by --to FORMAT, --out-dir DIR";
@@ -366,6 +356,9 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   fault = fault_of_usage(options, *is_volume);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
   if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
+  if (options.is_one_of_many) {
+    if (auto made = make_folder_of(options.output); !made) return made.error();
+  }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   return convert(options, format, *is_volume);
 }
@@ -377,7 +370,10 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();
   outcome.files = *files;
-  if (auto sound = check_companions(outcome.files, options); !sound) return sound;
+  // Of OUT's companions, which the user did not name, nobody has heard yet.
+  for (const auto& file : *files) {
+    if (auto kept = check_replaced(file, options.inputs, options.force); !kept) return kept;
+  }
   MeshFileOptions file;
   if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));

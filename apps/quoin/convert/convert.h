@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 
 #include "commands.h"
 #include "output.h"
+#include "output_files.h"
 #include "progress_bar.h"
 
 namespace quoin::tool {
@@ -21,8 +21,8 @@ namespace quoin::tool {
 struct ConvertOptions {
   CommonOptions common;
   std::filesystem::path output;
-  std::span<const std::filesystem::path> inputs;  ///< what is never replaced: all that are read
-  std::string from;                               ///< the only format that is read; empty: any
+  FileSet inputs;    ///< what is never replaced: all that are read
+  std::string from;  ///< the only format that is read; empty: any
   bool force = false;
   bool is_one_of_many = false;  ///< shows no progress of its own
   std::string mesher;           ///< empty: greedy for voxels, smooth for volumes

@@ -8,7 +8,6 @@
 
 #include "convert/convert.h"
 #include "interrupt.h"
-#include "output_files.h"
 #include "stopwatch.h"
 
 namespace quoin::tool {
@@ -37,13 +36,22 @@ bool is_named_to_be_read(const fs::path& file) {
   });
 }
 
-/// Files in a folder and below that can be read, or should be, in the order of their names.
-Result<std::vector<fs::path>> files_below(const fs::path& folder) {
+/// Files in a folder and below that can be read, or should be, in the order of their names; not those below `without`.
+/// `errors` gets the folders that cannot be read.
+Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::optional<fs::path>& without,
+                                          std::vector<Error>& errors) {
   std::vector<fs::path> found;
   std::error_code code;
   fs::recursive_directory_iterator at(folder, code);
   for (; !code && at != fs::recursive_directory_iterator(); at.increment(code)) {
     std::error_code is_broken;
+    if (at->is_directory(is_broken)) {
+      const fs::directory_iterator opened(at->path(), is_broken);
+      if (is_broken) errors.push_back(error_of(at->path(), is_broken));
+      // Of what was written there before, more is not to be made.
+      if (is_broken || (without && is_same_file(*without, at->path()))) at.disable_recursion_pending();
+      continue;
+    }
     if (!at->is_regular_file(is_broken)) continue;
     const auto format = detect_format(at->path());
     // What cannot be opened is to be heard of; what is no format of ours is not meant.
@@ -65,8 +73,8 @@ std::string stem_of(const fs::path& file) {
 std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
   std::vector<Task> tasks;
   const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
-    const fs::path folder = many.folder ? *many.folder / below : beside;
-    tasks.push_back({input, (folder / (stem_of(input) + extension)).lexically_normal(), {}, {}});
+    const fs::path folder = !many.folder ? beside : below == "." ? *many.folder : *many.folder / below;
+    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}});
   };
   for (const fs::path& input : many.inputs) {
     std::error_code unknown;
@@ -79,7 +87,7 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
           make_error(ErrorCode::CannotRead, "a folder; --recursive converts what is in it", input.string()));
       continue;
     }
-    const auto files = files_below(input);
+    const auto files = files_below(input, many.folder, errors);
     if (!files) {
       errors.push_back(files.error());
       continue;
@@ -91,12 +99,19 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
   return tasks;
 }
 
+/// One name for each file, however its folder is named.
+fs::path real_name(const fs::path& file) {
+  std::error_code unknown;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(file, unknown).parent_path(), unknown);
+  return unknown ? file.lexically_normal() : folder / file.filename();
+}
+
 /// Two files that would become one; empty where there are none. Files that are named twice are one task.
 std::string fault_of_plan(std::vector<Task>& tasks) {
   std::map<fs::path, fs::path> made;
   std::vector<Task> kept;
   for (Task& task : tasks) {
-    const auto [at, is_new] = made.emplace(task.output, task.input);
+    const auto [at, is_new] = made.emplace(real_name(task.output), task.input);
     if (is_new) {
       kept.push_back(std::move(task));
     } else if (at->second != task.input && !is_same_file(at->second, task.input)) {
@@ -107,23 +122,11 @@ std::string fault_of_plan(std::vector<Task>& tasks) {
   return "";
 }
 
-Status make_folder_of(const fs::path& file) {
-  if (!file.has_parent_path()) return {};
-  std::error_code code;
-  fs::create_directories(file.parent_path(), code);
-  if (!code) return {};
-  return make_error(ErrorCode::CannotWrite, code.message(), file.parent_path().string());
-}
-
 void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task) {
   ConvertOptions options = wanted;
   options.common.input = task.input;
   options.output = task.output;
   try {
-    if (Status made = make_folder_of(task.output); !made) {
-      task.error = made.error();
-      return;
-    }
     std::string fault;
     auto outcome = convert_file(options, format, fault);
     if (outcome) {
@@ -225,7 +228,7 @@ int run_many(const ConvertOptions& options, const ManyOptions& many) {
   inputs.reserve(tasks.size());
   for (const Task& task : tasks) inputs.push_back(task.input);
   ConvertOptions wanted = options;
-  wanted.inputs = inputs;
+  wanted.inputs = FileSet(inputs);
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
 

@@ -28,8 +28,9 @@ Status copy(std::FILE* from, std::FILE* to, const char* from_name, const char* t
     if (std::fwrite(part.data(), 1, read, to) != read) {
       return make_error(ErrorCode::CannotWrite, std::strerror(errno), to_name);
     }
-    if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", from_name);
+    if (was_interrupted()) break;
   }
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", from_name);
   if (std::ferror(from) != 0) return make_error(ErrorCode::CannotRead, std::strerror(errno), from_name);
   if (std::fflush(to) != 0) return make_error(ErrorCode::CannotWrite, std::strerror(errno), to_name);
   return {};
@@ -60,6 +61,7 @@ Status StandardStreams::make_folder() {
 Result<std::filesystem::path> StandardStreams::input() {
   if (Status made = make_folder(); !made) return made.error();
   input_ = folder_ / "input";
+  let_interrupts_end_reads();
   const File file = open(input_, "wb");
   if (file == nullptr) return make_error(ErrorCode::CannotWrite, std::strerror(errno), input_.string());
   if (Status copied = copy(stdin, file.get(), "standard input", input_.c_str()); !copied) return copied.error();

@@ -277,6 +277,20 @@ TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
   EXPECT_LE(others, 2);
 }
 
+// As two turns of 90 degrees leave it: less than walks heed, on a whole coordinate.
+TEST_P(DensityRays, ThatHardlyMoveAlongAnAxisStandStillThere) {
+  DensityGrid field;
+  field.add_box({300, 20, 20}, {310, 100, 100}, 1);
+  const DensityTree tree(field);
+  for (const double slow : {0.0, -3.7e-33, 3.7e-33, -1e-310}) {
+    for (const double z : {64.0, 63.5}) {
+      const auto hit = first_hit(tree, {{0.4, 60.3, z}, {1, 0, slow}});
+      ASSERT_TRUE(hit) << slow;
+      EXPECT_NEAR(hit->t, 299.6, 1e-6) << slow;
+    }
+  }
+}
+
 TEST(DensityRay, StopsAtItsEnd) {
   DensityGrid field;
   field.add_box({10, 10, 10}, {20, 20, 20}, 1);

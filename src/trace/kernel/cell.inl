@@ -35,7 +35,8 @@ struct CellRay {
 inline CellRay cell_ray(const Ray& ray, double max_t) {
   CellRay out;
   for (int axis = 0; axis < 3; ++axis) {
-    const double d = ray.direction[axis];
+    // As the walks: what is so slow stands still.
+    const double d = std::abs(ray.direction[axis]) < 0x1p-100 ? 0.0 : ray.direction[axis];
     out.origin[axis] = ray.origin[axis];
     out.direction[axis] = d;
     out.inverse[axis] = d != 0.0 ? 1.0 / d : 1e300;

@@ -81,7 +81,7 @@ class SurfaceWalk {
     int axis = -1;
     double least = 0.0;
     for (int other = 0; other < 3; ++other) {
-      const double d = ray_.direction[other];
+      const double d = in_cells_.direction[other];
       if (d == 0.0) continue;
       const double t = (cell_[other] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[other]) * in_cells_.inverse[other];
       if (axis < 0 || t < least) {
@@ -89,7 +89,7 @@ class SurfaceWalk {
         least = t;
       }
     }
-    cell_[axis] += ray_.direction[axis] > 0.0 ? 1 : -1;
+    cell_[axis] += in_cells_.direction[axis] > 0.0 ? 1 : -1;
     return true;
   }
 
