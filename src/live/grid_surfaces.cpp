@@ -29,7 +29,8 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const Vox
   looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
   // Of a field what hangs together is done at once, and then perhaps what waited for it.
   for (source_->prepare(grid); !source_->waiting().empty(); source_->prepare(grid)) {
-    if (looks.materials == nullptr) looks.materials = std::make_shared<const SurfaceMaterials>(types);
+    const bool needs_materials = options_.style == SurfaceStyle::Smooth && looks.materials == nullptr;
+    if (needs_materials) looks.materials = std::make_shared<const SurfaceMaterials>(types);
     LiveInputs inputs(grid, looks);
     const std::vector<IVec3> waiting(source_->waiting().begin(), source_->waiting().end());
     std::vector<std::unique_ptr<LiveJob>> jobs;

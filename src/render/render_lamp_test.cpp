@@ -302,17 +302,42 @@ TEST(RenderLamps, BadOnesLightNothing) {
   EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
 }
 
+// The same numbers on every machine: each below a limit.
+class Below {
+ public:
+  int operator()(std::uint32_t limit) {
+    state_ = state_ * 1'664'525U + 1'013'904'223U;
+    return static_cast<int>((state_ >> 8) % limit);
+  }
+
+ private:
+  std::uint32_t state_ = 7;
+};
+
+std::vector<EmissiveCell> cells_of(const EmissiveCells& cells) {
+  std::vector<EmissiveCell> all;
+  cells.for_each([&](const EmissiveCell& cell) { all.push_back(cell); });
+  return all;
+}
+
+void expect_same(const EmissiveCells& kept, const EmissiveCells& fresh) {
+  const std::vector<EmissiveCell> a = cells_of(kept);
+  const std::vector<EmissiveCell> b = cells_of(fresh);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(a[i].centre, b[i].centre);
+    ASSERT_EQ(a[i].power, b[i].power);
+    ASSERT_EQ(a[i].box.min, b[i].box.min);
+  }
+}
+
 TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
   DensityGrid field;
   EmissiveCells kept;
-  std::uint32_t random = 7;
-  const auto below = [&](std::uint32_t limit) {
-    random = random * 1'664'525U + 1'013'904'223U;
-    return static_cast<int>((random >> 8) % limit);
-  };
+  Below below;
   std::size_t most = 0;
   for (int round = 0; round < 40; ++round) {
     const DVec3 at(below(90) - 20, below(90) - 20, below(90) - 20);
@@ -324,17 +349,8 @@ TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
     kept.update(field, scene.types);
     EmissiveCells fresh;
     fresh.update(field, scene.types);
-    std::vector<EmissiveCell> a;
-    std::vector<EmissiveCell> b;
-    kept.for_each([&](const EmissiveCell& cell) { a.push_back(cell); });
-    fresh.for_each([&](const EmissiveCell& cell) { b.push_back(cell); });
-    ASSERT_EQ(a.size(), b.size());
-    most = std::max(most, a.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      ASSERT_EQ(a[i].centre, b[i].centre);
-      ASSERT_EQ(a[i].power, b[i].power);
-      ASSERT_EQ(a[i].box.min, b[i].box.min);
-    }
+    most = std::max(most, cells_of(kept).size());
+    ASSERT_NO_FATAL_FAILURE(expect_same(kept, fresh));
   }
   EXPECT_GT(most, 100U);
 }
@@ -346,11 +362,7 @@ TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
   const VoxelType glow = add_type(scene, {60, 220, 90, 120}, Visibility::Transparent, 2.0F);
   Grid grid;
   EmissiveCells kept;
-  std::uint32_t random = 7;
-  const auto below = [&](std::uint32_t limit) {
-    random = random * 1'664'525U + 1'013'904'223U;
-    return static_cast<int>((random >> 8) % limit);
-  };
+  Below below;
   for (int round = 0; round < 60; ++round) {
     const IVec3 at{below(90) - 20, below(90) - 20, below(90) - 20};
     const std::array<VoxelType, 4> types = {kAir, stone, torch, glow};
@@ -358,16 +370,7 @@ TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
     kept.update(grid, scene.types);
     EmissiveCells fresh;
     fresh.update(grid, scene.types);
-    std::vector<EmissiveCell> a;
-    std::vector<EmissiveCell> b;
-    kept.for_each([&](const EmissiveCell& cell) { a.push_back(cell); });
-    fresh.for_each([&](const EmissiveCell& cell) { b.push_back(cell); });
-    ASSERT_EQ(a.size(), b.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      ASSERT_EQ(a[i].centre, b[i].centre);
-      ASSERT_EQ(a[i].power, b[i].power);
-      ASSERT_EQ(a[i].box.min, b[i].box.min);
-    }
+    ASSERT_NO_FATAL_FAILURE(expect_same(kept, fresh));
   }
 }
 

@@ -82,17 +82,10 @@ class CellGroup {
     I8 code;
     std::memcpy(&code, codes_ + first, sizeof code);
     I8 at[3];
-    I8 cell[3];
-    I8 place[3];
-    I8 within = chunk_ == nullptr ? I8{} : lanes;
     for (int axis = 0; axis < 3; ++axis) {
       at[axis] = permute8(words_[axis], code >> 6) + ((code >> 2 * axis & 3) ^ backward_[axis]) - backward_[axis];
-      cell[axis] = at[axis] & 63;
-      place[axis] = at[axis] - base_[axis];
-      within = within & (cell[axis] < 63);
     }
-    std::uint32_t asked = bits8(lanes & ~within);
-    if (bits8(within) != 0) asked |= bits8(may_be_negative(near_, *chunk_, cell, place, within));
+    std::uint32_t asked = lanes_to_ask(near_, chunk_, at, base_, lanes);
     for (; asked != 0; asked &= asked - 1) {
       const int lane = std::countr_zero(asked);
       if (meet_at<kAsksWhere>(field_, chunk_, ray_, at[0][lane], at[1][lane], at[2][lane], hit)) return true;

@@ -137,5 +137,25 @@ inline I8 may_be_negative(const NearRay<Number>& ray, const DensityStorage& chun
   return ~(least(curve_of<float>(field).low(), field.c0) > doubt) & mask;
 }
 
+/// Of eight cells those of `lanes` that are to be asked in double: in which the field may become negative along the
+/// ray, and those with corners in other chunks. `chunk`: that of the cells; null where it is uniform. `at` in the
+/// field, as is `base`, from where the ray counts.
+template <class Number, class Base>
+inline std::uint32_t lanes_to_ask(const NearRay<Number>& ray, const DensityStorage* chunk, const I8 (&at)[3],
+                                  const Base (&base)[3], I8 lanes) {
+  if (chunk == nullptr) return bits8(lanes);
+  I8 cell[3];
+  I8 place[3];
+  I8 within = lanes;
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[axis] = at[axis] & 63;
+    place[axis] = at[axis] - base[axis];
+    within = within & (cell[axis] < 63);
+  }
+  std::uint32_t asked = bits8(lanes & ~within);
+  if (bits8(within) != 0) asked |= bits8(may_be_negative(ray, *chunk, cell, place, within));
+  return asked;
+}
+
 }  // namespace
 }  // namespace quoin::trace

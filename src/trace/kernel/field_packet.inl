@@ -77,18 +77,12 @@ class FieldLanes {
   std::uint32_t may_be(int half, std::uint32_t left) {
     const I8 lane_bits = {1, 2, 4, 8, 16, 32, 64, 128};
     I8 at[3];
-    I8 cell[3];
-    I8 place[3];
+    I8 base[3];
     for (int axis = 0; axis < 3; ++axis) {
-      I8 base;
       std::memcpy(&at[axis], cell_[axis] + 8 * half, sizeof(I8));
-      std::memcpy(&base, base_[axis] + 8 * half, sizeof base);
-      cell[axis] = at[axis] & 63;
-      place[axis] = at[axis] - base;
+      std::memcpy(&base[axis], base_[axis] + 8 * half, sizeof(I8));
     }
-    const I8 inner = (cell[0] < 63) & (cell[1] < 63) & (cell[2] < 63);
-    std::uint32_t may = left & ~bits8(inner);
-    left &= ~may;
+    std::uint32_t may = 0;
     // By chunk; mostly there is one.
     while (left != 0) {
       const int lane = std::countr_zero(left);
@@ -99,7 +93,7 @@ class FieldLanes {
       const I8 wanted = ((I8{} + static_cast<int>(left)) & lane_bits) != 0;
       const I8 here = wanted & (at[0] >> 6 == x) & (at[1] >> 6 == y) & (at[2] >> 6 == z);
       left &= ~bits8(here);
-      may |= chunk_ == nullptr ? bits8(here) : bits8(may_be_negative(near_[half], *chunk_, cell, place, here));
+      may |= lanes_to_ask(near_[half], chunk_, at, base, here);
     }
     return may;
   }
