@@ -122,7 +122,8 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
         DVec3 patch(0.0, 6.0, 0.0);
         patch[frame.axis] += frame.sign > 0 ? 1.0 : 0.0;
         patch[frame.u] += (i % 16 + 0.5) / 16;
-        patch[frame.v] += (i / 16 + 0.5) / 16;
+        const int row = i / 16;
+        patch[frame.v] += (row + 0.5) / 16;
         const DVec3 to = patch - at;
         const double d = glm::length(to);
         const double shining = -frame.sign * to[frame.axis] / d;
@@ -245,7 +246,8 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 200; ++i) {
     Lamp lamp;
-    lamp.position = {-35.0 + i % 20 * 3.7, 1.5 + i % 3, -35.0 + i / 20 * 7.1};
+    const int row = i / 20;
+    lamp.position = {-35.0 + i % 20 * 3.7, 1.5 + i % 3, -35.0 + row * 7.1};
     lamp.colour = {0.2F + static_cast<float>(i % 3) * 0.4F, 0.5F, 0.2F + static_cast<float>(i % 5) * 0.2F};
     lamp.intensity = 0.3 + i % 7;
     scene.lamps.push_back(lamp);
