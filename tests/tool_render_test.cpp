@@ -127,11 +127,11 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
   const std::string base = "many.vox -o out.png --size 64x48";
   drawn(base);
   const std::string plain = bytes("out.png");
-  for (const std::string flags :
-       {"--view front", "--view top", "--sun=-1,1,0", "--preset no-shadows", "--preset no-ao", "--preset unlit",
-        "--preset ao", "--preset unlit --ao vertex", "--ao-distance 0.4", "--shadow-distance 0.4", "--ao vertex",
-        "--ao-rays 6", "--ao-affects all", "--exposure 0.5", "--samples 4", "--camera 30,30,30 --look-at 0,0,0",
-        "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
+  for (const std::string flags : {"--view front", "--view top", "--sun=-1,1,0", "--preset no-shadows", "--preset no-ao",
+                                  "--preset unlit", "--preset ao", "--preset unlit --ao vertex", "--ao-distance 0.4",
+                                  "--shadow-distance 0.4", "--ao vertex", "--ao-rays 6", "--ao-affects all",
+                                  "--exposure 0.5", "--samples 1", "--sun 1,-0.1,0", "--sun 1,-0.1,0 --fixed-sky",
+                                  "--camera 30,30,30 --look-at 0,0,0", "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
     drawn(base + " " + flags);
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }
@@ -141,9 +141,9 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
     drawn(base + " --preset unlit " + flags);
     EXPECT_NE(bytes("out.png"), unlit) << flags;
   }
-  drawn(
-      base +
-      " --preset full --ao rays --ao-rays 9 --ao-distance 6 --ao-affects ambient --exposure 1 --samples 1 --view iso");
+  drawn(base +
+        " --preset full --ao rays --ao-rays 9 --ao-distance 6 --ao-affects ambient --exposure 1 --samples 4 --view iso "
+        "--sun=-0.48,0.72,0.5 --lamps 64");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
@@ -266,6 +266,8 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--preset density --slice y:2", "--slice: must be x, y or z, and a place from 0 to 1"},
       {out + "--preset density --slice w:0.5", "--slice: must be"},
       {out + "--preset density --slice 0.5", "--slice: must be"},
+      {out + "--preset unlit --fixed-sky", "--fixed-sky: the preset unlit has no light"},
+      {out + "--preset density --fixed-sky", "--fixed-sky: the preset density is a flat slice"},
       {out + "--preset density --samples 4", "--samples: the preset density is a flat slice"},
       {out + "--backend gpu", "--backend: "},
       {out + "--device 0", "--device needs --backend vulkan"},

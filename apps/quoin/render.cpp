@@ -229,7 +229,7 @@ void add_render_command(CLI::App& app, int& status) {
   add_render_options(*command, *arguments);
   command->footer("Reads " + readable_extensions() +
                   ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
-                  "Example: quoin render castle.vox -o castle.png --view iso --samples 4\n"
+                  "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
                   "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5");

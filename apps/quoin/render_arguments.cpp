@@ -70,8 +70,12 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
 }
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
-  add_text_option(command, "--sun", "X,Y,Z|off",
-                  "Direction towards the sun (default 0.371,0.743,0.223), or off: night with --sky-brightness 0.05");
+  add_text_option(
+      command, "--sun", "X,Y,Z|off",
+      "Direction towards the sun (default -0.48,0.72,0.5); the sky follows it, to dusk and night where y is "
+      "less than 0. Or off: no sun, and the sky as it is");
+  command.add_flag("--fixed-sky", arguments.has_fixed_sky,
+                   "The sky and the colour of light are a clear day's wherever the sun stands");
   add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
   command
       .add_option("--lamps", arguments.render.light.lamps,
@@ -200,7 +204,8 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   if (const char* given = given_field_occlusion(command); given != nullptr && arguments.occlusion != "smooth") {
     return std::string(given) + " needs --ao smooth";
   }
-  for (const char* option : {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness"}) {
+  for (const char* option :
+       {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness", "--fixed-sky"}) {
     if (command.count(option) > 0 && (preset == "unlit" || preset == "ao")) {
       return std::string(option) + ": the preset " + preset + " has no light";
     }
@@ -220,11 +225,12 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
   }
-  for (const char* option : {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
-                             "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
-                             "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
-                             "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
-                             "--detail",         "--lod-colours",     "--backend",         "--device"}) {
+  for (const char* option :
+       {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
+        "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
+        "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
+        "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
+        "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -286,12 +292,14 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
 
 void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_common_options(command, arguments.common);
-  arguments.render.light.lamps = 64;
+  arguments.render.light = natural_light();
+  arguments.render.samples = 4;
   command.add_option("-o,--output", arguments.output, "Picture to write: .png")->required()->check(file_name());
   add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
   add_camera_options(command, arguments);
   add_light_options(command, arguments);
-  command.add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges (default 1)")
+  command
+      .add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges and even light (default 4)")
       ->check(CLI::Range(1, kMaxSamples));
   add_text_option(command, "--iso", "VALUE",
                   "Surface value of a volume; what is above is solid (default: between its two groups of values)");
@@ -318,6 +326,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
   if (is_sun_off(command)) light.sun_brightness = 0.0;
+  if (arguments.has_fixed_sky) light.sky_follows_sun = false;
   if (arguments.occlusion == "vertex") light.occlusion = OcclusionMode::Vertex;
   if (arguments.occlusion == "smooth") light.occlusion = OcclusionMode::Smooth;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;

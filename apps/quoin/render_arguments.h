@@ -25,6 +25,7 @@ struct RenderArguments {
   double fov_degrees = 45.0;
   bool has_view = false;  ///< --view was given: a scene file's camera does not count
   bool has_sun = false;   ///< likewise
+  bool has_fixed_sky = false;
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";

@@ -92,6 +92,7 @@ void read_light(const Json& object, LightOptions& light) {
   read_number(object, "exposure", 0.0, 100.0, light.exposure);
   read_number(object, "sun_brightness", 0.0, 100.0, light.sun_brightness);
   read_number(object, "sky_brightness", 0.0, 100.0, light.sky_brightness);
+  read_flag(object, "sky_follows_sun", light.sky_follows_sun);
   read_whole(object, "lamps", 0, 1024, light.lamps);
   read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
@@ -122,12 +123,6 @@ std::string environment(const char* name) {
 }
 
 }  // namespace
-
-LightOptions default_light() {
-  LightOptions light;
-  light.lamps = 64;
-  return light;
-}
 
 void Settings::note_recent(const std::filesystem::path& file) {
   std::error_code ignored;
@@ -195,6 +190,7 @@ std::string to_json(const Settings& settings) {
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
                    {"sun_brightness", light.sun_brightness},
                    {"sky_brightness", light.sky_brightness},
+                   {"sky_follows_sun", light.sky_follows_sun},
                    {"lamps", light.lamps},
                    {"lamp_brightness", light.lamp_brightness},
                    {"exposure", light.exposure}}},

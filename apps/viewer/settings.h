@@ -13,9 +13,6 @@
 
 namespace quoin::viewer {
 
-/// What the viewer's light is like until somebody changes it.
-[[nodiscard]] LightOptions default_light();
-
 /// What the viewer remembers from one start to the next.
 struct Settings {
   int width = 1280;  ///< of the window
@@ -29,8 +26,8 @@ struct Settings {
   Wireframe wireframe = Wireframe::Off;
   DrawMode mode = DrawMode::Rays;
   SlicePlace slice;
-  LightOptions light = default_light();  ///< not the library's: lamps shine
-  std::vector<std::string> recent;       ///< files, the newest first
+  LightOptions light = natural_light();
+  std::vector<std::string> recent;  ///< files, the newest first
 
   /// Puts a file at the front of `recent`, once, and keeps at most ten.
   void note_recent(const std::filesystem::path& file);

@@ -32,6 +32,7 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.shadow_distance = 64.0;
   settings.light.sun_brightness = 0.25;
   settings.light.sky_brightness = 0.0;
+  settings.light.sky_follows_sun = false;
   settings.light.lamps = 12;
   settings.light.lamp_brightness = 8.0;
   settings.mode = DrawMode::Density;

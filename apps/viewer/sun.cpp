@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kDegreesPerPixel = 0.4;
-constexpr double kLowest = 2.0;    // a sun at the horizon lights nothing from above
+constexpr double kLowest = 2.0;  // a sun at the horizon lights nothing from above
+constexpr double kNight = -20.0;
 constexpr double kHighest = 89.0;  // where the azimuth still means something
 
 }  // namespace
@@ -25,10 +26,14 @@ DVec3 sun_direction(const SunAngles& angles) {
           std::cos(angles.azimuth * kDegree) * level};
 }
 
-DVec3 drag_sun(DVec3 sun, double dx, double dy) {
-  SunAngles angles = sun_angles(sun);
+double lowest_sun(const LightOptions& light) {
+  return light.sky_follows_sun ? kNight : kLowest;
+}
+
+DVec3 drag_sun(const LightOptions& light, double dx, double dy) {
+  SunAngles angles = sun_angles(light.sun);
   angles.azimuth = std::remainder(angles.azimuth + dx * kDegreesPerPixel, 360.0);
-  angles.elevation = std::clamp(angles.elevation - dy * kDegreesPerPixel, kLowest, kHighest);
+  angles.elevation = std::clamp(angles.elevation - dy * kDegreesPerPixel, lowest_sun(light), kHighest);
   return sun_direction(angles);
 }
 

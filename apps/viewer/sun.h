@@ -1,6 +1,7 @@
 #pragma once
 
 #include <quoin/core/vec.h>
+#include <quoin/light/light_options.h>
 
 namespace quoin::viewer {
 
@@ -15,8 +16,12 @@ struct SunAngles {
 /// The unit vector towards the sun.
 [[nodiscard]] DVec3 sun_direction(const SunAngles& angles);
 
+/// How low the sun can be put, in degrees of elevation: to where it is night, if the sky follows it, else as low as it
+/// still lights something from above.
+[[nodiscard]] double lowest_sun(const LightOptions& light);
+
 /// The sun after a drag by that many pixels: it goes round with dx and up with a drag upwards, never beyond straight up
-/// or the horizon.
-[[nodiscard]] DVec3 drag_sun(DVec3 sun, double dx, double dy);
+/// or `lowest_sun`.
+[[nodiscard]] DVec3 drag_sun(const LightOptions& light, double dx, double dy);
 
 }  // namespace quoin::viewer

@@ -20,15 +20,25 @@ TEST(Sun, AnglesAndDirectionsAgree) {
 }
 
 TEST(Sun, DraggingKeepsItInTheSky) {
-  DVec3 sun{0.3, 0.7, 0.2};
+  LightOptions light;
+  light.sun = {0.3, 0.7, 0.2};
   std::mt19937 random(2);
   std::normal_distribution<double> pixels(0.0, 200.0);
   for (int i = 0; i < 500; ++i) {
-    sun = drag_sun(sun, pixels(random), pixels(random));
-    EXPECT_NEAR(glm::length(sun), 1.0, 1e-9);
-    EXPECT_GT(sun.y, 0.0);
+    light.sun = drag_sun(light, pixels(random), pixels(random));
+    EXPECT_NEAR(glm::length(light.sun), 1.0, 1e-9);
+    EXPECT_GT(light.sun.y, 0.0);
   }
-  EXPECT_GT(drag_sun({0.0, 0.5, 1.0}, 0.0, -50.0).y, drag_sun({0.0, 0.5, 1.0}, 0.0, 0.0).y) << "up is up";
+  light.sun = {0.0, 0.5, 1.0};
+  EXPECT_GT(drag_sun(light, 0.0, -50.0).y, drag_sun(light, 0.0, 0.0).y) << "up is up";
+}
+
+TEST(Sun, ItGoesDownWhereTheSkyFollowsIt) {
+  LightOptions light = natural_light();
+  for (int i = 0; i < 10; ++i) light.sun = drag_sun(light, 0.0, 100.0);
+  EXPECT_LT(sun_angles(light.sun).elevation, -18.0) << "to where it is night";
+  EXPECT_NEAR(sun_angles(light.sun).elevation, lowest_sun(light), 1e-9);
+  EXPECT_NEAR(sun_angles(light.sun).azimuth, sun_angles(natural_light().sun).azimuth, 1e-9);
 }
 
 }  // namespace

@@ -6,6 +6,14 @@
 
 namespace quoin {
 
+LightOptions natural_light() {
+  LightOptions options;
+  options.sun = {-0.48, 0.72, 0.50};
+  options.sky_follows_sun = true;
+  options.lamps = 64;
+  return options;
+}
+
 Status check(const LightOptions& options) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (!is_finite(options.sun)) return refuse("sun: must be finite");

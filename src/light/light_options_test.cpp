@@ -14,11 +14,20 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(LightOptions, DefaultsAndLimitsAreAccepted) {
   EXPECT_TRUE(check(LightOptions{}).has_value());
+  EXPECT_TRUE(check(natural_light()).has_value());
   LightOptions options;
   options.sun = {0, -1e-300, 0};
   options.occlusion_rays = 4096;
   options.occlusion_distance = options.shadow_distance = options.exposure = 0.0;
   EXPECT_TRUE(check(options).has_value());
+}
+
+TEST(LightOptions, NaturalLightStandsBesideTheIsoCamera) {
+  const LightOptions options = natural_light();
+  EXPECT_LT(options.sun.x, 0.0) << "of the three sides that the view shows one lies in the shade";
+  EXPECT_GT(options.sun.z, 0.0);
+  EXPECT_TRUE(options.sky_follows_sun);
+  EXPECT_FALSE(LightOptions{}.sky_follows_sun) << "the reference stays";
 }
 
 TEST(LightOptions, ImpossibleOnesAreRefusedByName) {

@@ -14,7 +14,6 @@
 #include "light/corner_light.h"
 #include "light/glass.h"
 #include "light/light_model.h"
-#include "light/sky.h"
 
 namespace quoin {
 namespace {
@@ -102,7 +101,8 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       options_(options),
       directions_(options.occlusion_rays),
       exposure_(exposure_of(options)),
-      sky_(static_cast<float>(options.sky_brightness)) {
+      sky_(static_cast<float>(options.sky_brightness)),
+      daylight_(daylight_of(options)) {
   QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : view.tracer().placed()) {
@@ -112,7 +112,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
     frame.to_sun = glm::transpose(placed.world_axes) * sun;
     for (const Direction face : kDirections) {
       const double cosine = glm::dot(DVec3(normal_of(face)), frame.to_sun);
-      frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0) * options.sun_brightness);
+      frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0) * daylight_.sun_brightness);
     }
   }
 }
@@ -167,7 +167,7 @@ std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) 
 
 float Lighting::diffuse(const Frame& frame, const SurfacePoint& point) const {
   if (!point.in_field) return frame.diffuse[index_of(point.face)];
-  return static_cast<float>(std::max(glm::dot(DVec3(point.normal), frame.to_sun), 0.0) * options_.sun_brightness);
+  return static_cast<float>(std::max(glm::dot(DVec3(point.normal), frame.to_sun), 0.0) * daylight_.sun_brightness);
 }
 
 std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunlight) const {
@@ -175,7 +175,7 @@ std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunligh
   RayPacket rays = group.origins;
   for (std::size_t i = 0; i < group.size; ++i) {
     const float unshadowed = diffuse(frame, *group.points[i]);
-    sunlight[i] = Vec3(unshadowed);
+    sunlight[i] = unshadowed * daylight_.sun;
     if (unshadowed > 0.0F && (group.surfaces >> i & 1U) != 0) rays.active |= 1U << i;
   }
   if (!options_.shadows || rays.active == 0) return 0;
@@ -263,7 +263,7 @@ std::int64_t Lighting::add_lamp(const Group& group, const PlacedLamp& lamp, std:
 }
 
 Vec3 Lighting::sky(float up) const {
-  return sky_ * sky_colour(up);
+  return sky_ * sky_colour(up, daylight_.sky);
 }
 
 std::int64_t Lighting::find_openness(const Group& group, std::span<float> openness) const {
@@ -386,11 +386,11 @@ Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness)
   if (point.kind == PointKind::Surface) {
     Vec3 light(0.0F);
     if (options_.occlusion == OcclusionMode::Off) {
-      light = sky_ * kAmbientWithoutOcclusion + direct;
+      light = sky_ * kAmbientWithoutOcclusion * daylight_.ambient + direct;
     } else if (options_.occlusion_affects == OcclusionAffects::Ambient) {
-      light = sky_ * kAmbient * openness + direct;
+      light = sky_ * kAmbient * openness * daylight_.ambient + direct;
     } else {
-      light = (sky_ * kAmbient + direct) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
+      light = (sky_ * kAmbient * daylight_.ambient + direct) * (kLeastOfAll + (1.0F - kLeastOfAll) * openness);
     }
     colour += surface.colour * light;
   }

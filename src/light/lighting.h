@@ -8,6 +8,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
 
+#include "light/daylight.h"
 #include "light/lamp_table.h"
 #include "light/occlusion_directions.h"
 #include "light/surfaces.h"
@@ -41,7 +42,7 @@ struct SurfacePoint {
 ///   colour * (0.15 * openness + diffuse + lamplight) + emitted, times the exposure,
 ///
 /// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way, as is what lamps add; without
-/// occlusion the ambient term is 0.1. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of
+/// occlusion the ambient term is 0.1. The ambient term and the sun's light are of the colours of daylight_of. Secondary rays start 0.01 voxels in front of the face. Distances are in voxels of
 /// the grid that was hit, of the full one also where a halved one is traced. Other shadings: see Shading.
 class Lighting {
  public:
@@ -101,6 +102,7 @@ class Lighting {
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
   float exposure_ = 1.0F;
   float sky_ = 1.0F;  // brightness
+  Daylight daylight_;
 };
 
 }  // namespace quoin

@@ -11,6 +11,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kTurns = 1024;
+constexpr double kLean = 0.41421356237309505;  // tangent of half of 45 degrees
 
 struct Basis {
   DVec3 normal{0.0};
@@ -52,26 +53,35 @@ OcclusionDirections::OcclusionDirections(int rays) : count_(rays), is_fixed_(ray
   }
 }
 
-OcclusionDirections::Angle OcclusionDirections::turn_of(int sample, int rays) {
+// Multiples of the golden ratio, and of its likes in two dimensions, leave no large gaps, however many are taken.
+OcclusionDirections::Turn OcclusionDirections::turn_of(int sample, int rays) {
   if (rays != 9 || sample == 0) return {};
-  // Multiples of the golden ratio leave no large gaps, however many are taken.
-  const double share = std::fmod(sample * (std::numbers::phi - 1.0), 1.0);
-  const double radians = 0.5 * std::numbers::pi * share;
-  return {std::cos(radians), std::sin(radians)};
+  const auto share_of = [&](double step) { return std::fmod(sample * step, 1.0); };
+  constexpr double kPlastic = 1.32471795724474602596;
+  const double radians = 0.5 * std::numbers::pi * share_of(std::numbers::phi - 1.0);
+  const double around = 2.0 * std::numbers::pi * share_of(1.0 / kPlastic);
+  const double lean = kLean * std::sqrt(share_of(1.0 / (kPlastic * kPlastic)));
+  return {{std::cos(radians), std::sin(radians)},
+          glm::normalize(DVec3(lean * std::cos(around), lean * std::sin(around), 1.0))};
 }
 
-OcclusionDirections::Fixed OcclusionDirections::turned(Angle turn) const {
+OcclusionDirections::Fixed OcclusionDirections::turned(const Turn& turn) const {
   QUOIN_ASSERT(is_fixed_, "directions that all pixels have");
   Fixed all = fixed_;
-  if (turn.sine == 0.0) return all;
+  const auto [cosine, sine] = turn.about_normal;
+  if (sine == 0.0) return all;
   for (std::size_t face = 0; face < all.size(); ++face) {
     const FaceFrame& frame = kFaceFrames[face];
     for (DVec3& direction : all[face]) {
       const double u = direction[frame.u];
       const double v = direction[frame.v];
-      direction[frame.u] = turn.cosine * u - turn.sine * v;
-      direction[frame.v] = turn.sine * u + turn.cosine * v;
+      direction[frame.u] = cosine * u - sine * v;
+      direction[frame.v] = sine * u + cosine * v;
     }
+    DVec3& upright = all[face][0];
+    upright[frame.u] = turn.upright.x;
+    upright[frame.v] = turn.upright.y;
+    upright[frame.axis] = frame.sign * turn.upright.z;
   }
   return all;
 }

@@ -14,8 +14,8 @@ namespace quoin {
 ///
 /// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) with the normal's
 ///    sign along the normal: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four
-///    diagonals; each further sample of a pixel turns them about the normal, or flat faces would keep bands at any
-///    number of samples. Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden
+///    diagonals; each further sample of a pixel turns them about the normal and leans the first one, or flat faces
+///    would keep bands at any number of samples. Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden
 ///    angle apart; the whole is turned and shifted within the rings by a hash of the pixel.
 class OcclusionDirections {
  public:
@@ -36,13 +36,21 @@ class OcclusionDirections {
     double cosine = 1.0;
     double sine = 0.0;
   };
-  /// By how much a pixel's sample turns the nine about the normal, from u towards v: less than a quarter, over which
-  /// the samples are spread evenly; not at all for the first, nor where there are not nine.
-  [[nodiscard]] static Angle turn_of(int sample, int rays);
+  /// What a pixel's sample does to the nine.
+  struct Turn {
+    /// By how much they turn about the normal, from u towards v: less than a quarter, over which samples are spread
+    /// evenly.
+    Angle about_normal;
+    /// Where the first one, which turning leaves in its place, then points, along u, v and the normal: within half the
+    /// way to the four next to it, over which samples are spread evenly.
+    DVec3 upright{0.0, 0.0, 1.0};
+  };
+  /// Nothing for the first sample, nor where there are not nine.
+  [[nodiscard]] static Turn turn_of(int sample, int rays);
 
   using Fixed = std::array<std::array<DVec3, 9>, 6>;
   /// All fixed directions, by face, so turned. Requires: `is_fixed`.
-  [[nodiscard]] Fixed turned(Angle turn) const;
+  [[nodiscard]] Fixed turned(const Turn& turn) const;
 
   /// What `spread` is made of: the rings' angles, and those by which pixels turn them; empty where it is not.
   [[nodiscard]] const std::vector<Angle>& ring_angles() const { return ring_angles_; }

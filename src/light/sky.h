@@ -15,18 +15,25 @@ constexpr float kGroundBegins = -0.02F;
 constexpr float kGroundIsFull = -0.60F;
 }  // namespace sky
 
+/// The colours of a backdrop; by default a day's.
+struct SkyColours {
+  Vec3 zenith = sky::kZenith;
+  Vec3 horizon = sky::kHorizon;
+  Vec3 ground = sky::kGround;
+};
+
 /// The backdrop in linear light: paler towards the horizon, with ground that fades in below it. A picture's exposure
 /// does not change it, so that a scene can be made brighter without the sky burning out.
 ///
 /// `up`: the y of a unit direction.
-[[nodiscard]] inline Vec3 sky_colour(float up) {
+[[nodiscard]] inline Vec3 sky_colour(float up, const SkyColours& of = {}) {
   const float y = std::clamp(up, -1.0F, 1.0F);
   if (y >= 0.0F) {
     const float low = (1.0F - y) * (1.0F - y);
-    return sky::kZenith + (sky::kHorizon - sky::kZenith) * (low * (1.0F - 0.5F * y));
+    return of.zenith + (of.horizon - of.zenith) * (low * (1.0F - 0.5F * y));
   }
   const float s = std::clamp((sky::kGroundBegins - y) / (sky::kGroundBegins - sky::kGroundIsFull), 0.0F, 1.0F);
-  return sky::kHorizon + (sky::kGround - sky::kHorizon) * (s * s * (3.0F - 2.0F * s));
+  return of.horizon + (of.ground - of.horizon) * (s * s * (3.0F - 2.0F * s));
 }
 
 }  // namespace quoin

@@ -323,6 +323,30 @@ TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
   EXPECT_LE(largest_step(64), 12);
 }
 
+// The ray along the normal ends at the slab's edge: upright in all samples it would leave a step of a ninth there.
+TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kGrey);
+  Grid grid = floor_of(type);
+  grid.fill_box({{-40, 3, -40}, {0, 4, 40}}, type);
+  place(scene, std::move(grid));
+  RenderOptions options = sized(160, 1);
+  options.light.shading = Shading::Occlusion;
+  // From below the slab.
+  Camera camera = from_above(0, 2.5, 0.37, 0.025);
+  const auto largest_step = [&](int samples) {
+    options.samples = samples;
+    const Picture picture = taken(scene, camera, options);
+    int largest = 0;
+    for (int x = 1; x < 160; ++x) {
+      largest = std::max(largest, std::abs(pixel_at(picture, x, 0)[0] - pixel_at(picture, x - 1, 0)[0]));
+    }
+    return largest;
+  };
+  EXPECT_GE(largest_step(1), 28);
+  EXPECT_LE(largest_step(64), 6);
+}
+
 TEST(RenderLight, NormalsAreThoseOfTheWorldAndGlassIsAsGoodAsStone) {
   Scene scene;
   const VoxelType glass = add_type(scene, {60, 140, 220, 100}, Visibility::Transparent);

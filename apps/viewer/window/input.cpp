@@ -132,7 +132,7 @@ void Input::motion(const SDL_MouseMotionEvent& motion, ViewState& state) {
       state.camera.pan(dx, dy, state.picture_place.h);
       break;
     case Drag::Sun:
-      state.settings.light.sun = drag_sun(state.settings.light.sun, dx, dy);
+      state.settings.light.sun = drag_sun(state.settings.light, dx, dy);
       break;
     case Drag::Stroke:
       editing.move(state.mouse);

@@ -124,12 +124,14 @@ void draw_sun(LightOptions& light) {
   auto elevation = static_cast<float>(sun.elevation);
   const bool is_turned =
       ImGui::SliderFloat("azimuth", &azimuth, -180.0F, 180.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
-  const bool is_raised =
-      ImGui::SliderFloat("elevation", &elevation, 0.0F, 90.0F, "%.0f°", ImGuiSliderFlags_AlwaysClamp);
+  const double lowest = lowest_sun(light);
+  const bool is_raised = ImGui::SliderFloat("elevation", &elevation, static_cast<float>(lowest), 90.0F, "%.0f°",
+                                            ImGuiSliderFlags_AlwaysClamp);
   if (is_turned || is_raised) {
     // Straight up there is no azimuth to come back to.
-    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), 0.5, 89.5)});
+    light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), lowest, 89.5)});
   }
+  ImGui::Checkbox("sky follows the sun", &light.sky_follows_sun);
 }
 
 }  // namespace
@@ -281,7 +283,7 @@ void draw_lamps(LightOptions& light, bool has_rays) {
   draw_brightness("the sky", light.sky_brightness, 4.0F);
   ImGui::BeginDisabled(!has_rays);
   bool has_lamps = light.lamps > 0;
-  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.lamps = has_lamps ? default_light().lamps : 0;
+  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.lamps = has_lamps ? natural_light().lamps : 0;
   ImGui::BeginDisabled(light.lamps == 0);
   draw_brightness("lamps", light.lamp_brightness, 64.0F);
   ImGui::EndDisabled();
@@ -322,7 +324,7 @@ void draw_light_part(ViewState& state) {
   }
   draw_lamps(light, has_shadows);
   ImGui::EndDisabled();
-  if (ImGui::Button("Reset light")) light = default_light();
+  if (ImGui::Button("Reset light")) light = natural_light();
 }
 
 void draw_statistics_part(const ViewState& state) {

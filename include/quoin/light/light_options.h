@@ -49,6 +49,9 @@ struct LightOptions {
   double exposure = 1.0;
   double sun_brightness = 1.0;  ///< times the sun's light; 0: night
   double sky_brightness = 1.0;  ///< times the ambient light, and the sky behind everything
+  /// Whether the colours of the sky, of the ambient light and of the sun follow how high the sun stands in the world
+  /// (+Y is up): day, golden hour, dusk, night. A sun below the horizon lights nothing. Without, it is always day.
+  bool sky_follows_sun = false;
   /// How many lamps (Scene::lamps, and voxels that emit light, by cells of 4^3) light a surface at most, each with its
   /// shadow: of those that reach a brick of 16^3 voxels, those that can add most to it. 0: none, and what emits light
   /// only shows it. 64 is plenty. A lamp fades out where it adds less than 1/4096.
@@ -57,6 +60,11 @@ struct LightOptions {
 
   bool operator==(const LightOptions&) const = default;
 };
+
+/// What the command-line tool and the viewer draw in until they are told otherwise: a sun beside the camera of
+/// View::Iso, so that one sees shadows, a sky that follows it, and lamps. LightOptions{} is the reference model, whose
+/// pictures stay what they are.
+[[nodiscard]] LightOptions natural_light();
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of
 ///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,

@@ -11,9 +11,9 @@
 #include <glm/matrix.hpp>
 
 #include "core/srgb.h"
+#include "light/daylight.h"
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
-#include "light/sky.h"
 #include "render/camera_rays.h"
 
 namespace quoin::vulkan {
@@ -151,6 +151,7 @@ void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlace
 void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
                 FrameData& data) {
   const DVec3 sun = to_sun(options.light);
+  const double brightness = daylight_of(options.light).sun_brightness;
   std::vector<GridSpace> spaces;
   std::vector<double> depths;
   double least = scene.placed.empty() ? 0.0 : std::numeric_limits<double>::infinity();
@@ -166,7 +167,7 @@ void add_placed(const Placement& scene, const Camera& camera, const RenderOption
     ShaderPlaced& placed = data.placed.emplace_back();
     set_start(grid, spaces[i], rays, depths[i], options, placed);
     set_spaces(grid, spaces[i], view_origin, placed);
-    set_sun(grid.placed, sun, options.light.sun_brightness, placed);
+    set_sun(grid.placed, sun, brightness, placed);
     placed.origin = IVec4(grid.origin, grid.placed.level);
     placed.detail_colour = {colour_of_detail(grid.placed.detail, grid.placed.level), 0.0F};
   }
@@ -225,9 +226,12 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
   const auto sky = static_cast<float>(light.sky_brightness);
   frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
   frame.lift = static_cast<float>(kRayLift);
-  frame.sky_zenith = {sky * sky::kZenith, 0.0F};
-  frame.sky_horizon = {sky * sky::kHorizon, 0.0F};
-  frame.sky_ground = {sky * sky::kGround, 0.0F};
+  const Daylight daylight = daylight_of(light);
+  frame.ambient = {daylight.ambient, 0.0F};
+  frame.sun = {daylight.sun, 0.0F};
+  frame.sky_zenith = {sky * daylight.sky.zenith, 0.0F};
+  frame.sky_horizon = {sky * daylight.sky.horizon, 0.0F};
+  frame.sky_ground = {sky * daylight.sky.ground, 0.0F};
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
   frame.occlusion_count = light.occlusion_rays;

@@ -154,9 +154,12 @@ ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
   push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
   push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
-  const OcclusionDirections::Angle turn = OcclusionDirections::turn_of(sample, occlusion_rays_);
-  push.turn_cosine = static_cast<float>(turn.cosine);
-  push.turn_sine = static_cast<float>(turn.sine);
+  const OcclusionDirections::Turn turn = OcclusionDirections::turn_of(sample, occlusion_rays_);
+  push.turn_cosine = static_cast<float>(turn.about_normal.cosine);
+  push.turn_sine = static_cast<float>(turn.about_normal.sine);
+  for (int axis = 0; axis < 3; ++axis) {
+    push.upright[static_cast<std::size_t>(axis)] = static_cast<float>(turn.upright[axis]);
+  }
   push.first = sample == 0 ? 1 : 0;
   return push;
 }

@@ -328,5 +328,20 @@ TEST_F(VulkanScene, LampsOfEveryKind) {
   compare(lit_by_night(far), towards(far + DVec3(50, 36, 76), far + DVec3(12, 3, 9), 1.0), options, "lamps_far");
 }
 
+TEST_F(VulkanScene, SkiesThatFollowTheSun) {
+  Scene scene;
+  const Types types = add_types(scene);
+  place(scene, hut(types));
+  const Camera camera = towards({-20, 22, 40}, {10, 5, 10}, 0.9);
+  RenderOptions options = sized(96, 72);
+  options.samples = 4;
+  options.light = natural_light();
+  int hour = 0;
+  for (const double height : {1.0, 0.1, 0.0, -0.08, -0.5}) {
+    options.light.sun = {-0.8, height, 0.6};
+    compare(scene, camera, options, "hour_" + std::to_string(hour++));
+  }
+}
+
 }  // namespace
 }  // namespace quoin

@@ -9,8 +9,8 @@
 
 #include <quoin/grid/chunk.h>
 
+#include "light/daylight.h"
 #include "light/light_model.h"
-#include "light/sky.h"
 #include "render/camera_rays.h"
 #include "scene/frustum.h"
 
@@ -178,6 +178,7 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
   ShaderMeshInstance out;
   const MeshInstance& instance = *space.instance;
   const DVec3 sun_in_grid = glm::transpose(instance.world_axes) * to_sun(light);
+  const double brightness = daylight_of(light).sun_brightness;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
     out.clip[i] = clip_vector(view, space.view_axes[axis]);
@@ -187,8 +188,7 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
   for (const Direction face : kDirections) {
     const double cosine = glm::dot(DVec3(normal_of(face)), sun_in_grid);
     const int i = static_cast<int>(face);
-    out.diffuse[static_cast<std::size_t>(i / 4)][i % 4] =
-        static_cast<float>(std::max(cosine, 0.0) * light.sun_brightness);
+    out.diffuse[static_cast<std::size_t>(i / 4)][i % 4] = static_cast<float>(std::max(cosine, 0.0) * brightness);
   }
   out.home = IVec4(IVec3(space.base) - instance.origin, instance.placed);
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
@@ -244,7 +244,7 @@ void set_frame(const View& view, const LightOptions& light, MeshFrameData& data)
   data.sky.clip = {to_vec4(view.rays.right()), to_vec4(view.rays.down()), to_vec4(view.rays.corner()),
                    to_vec4(view.rays.forward())};
   data.sky.room = view.rays.is_perspective() ? 1.0F : static_cast<float>(view.rays.sky_scale());
-  data.frame.sun = to_vec4(to_sun(light) * light.sun_brightness);
+  data.frame.sun = to_vec4(to_sun(light) * daylight_of(light).sun_brightness);
 }
 
 // Axes in one plane see nothing of space; products of near to perpendicular unit vectors are near to 1.

@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "light/daylight.h"
 #include "render/picture_request.h"
 #include "render_vk/march/device_picture.h"
 #include "render_vk/march/renderer_impl.h"
@@ -48,7 +49,7 @@ Status check(const Camera& camera, const MeshPictureOptions& options) {
 
 bool traces_light(const LightOptions& light) {
   if (light.shading != Shading::Lit) return false;
-  return (light.shadows && light.sun_brightness > 0.0) || light.lamps > 0;
+  return (light.shadows && daylight_of(light).sun_brightness > 0.0) || light.lamps > 0;
 }
 
 std::array<std::uint32_t, 7> sides_of(const ImpostorFaces::Level& level) {

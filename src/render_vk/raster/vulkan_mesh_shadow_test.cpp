@@ -138,6 +138,17 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
   EXPECT_GT(bytes_that_differ(lit, drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options)), 20), 5000);
 }
 
+TEST_F(VulkanMeshShadow, TheSkyAndAllLightFollowTheSun) {
+  const Scene scene = yard();
+  RenderOptions options = with_mesh_light(sized(320, 180));
+  options.light.sky_follows_sun = true;
+  int hour = 0;
+  for (const double height : {1.0, 0.15, -0.05, -0.5}) {
+    options.light.sun = {-0.8, height, 0.6};
+    compare(scene, towards({40, 25, 60}, {0, 14, 5}), options, "hour_" + std::to_string(hour++));
+  }
+}
+
 // A slab over a plain, and a cliff behind a gentle slope: shadows where blocks have them, and no others.
 TEST_F(VulkanMeshShadow, SmoothSurfacesHaveThemToo) {
   Scene scene;

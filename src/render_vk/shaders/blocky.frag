@@ -29,7 +29,7 @@ vec3 light_of(uint face) {
   MeshFrame f = mesh_frame();
   float diffuse = diffuse_of(face, what.y);
   ivec4 home = f.instances[what.y].home;
-  if (home.w < 0) return vec3(diffuse);
+  if (home.w < 0) return sunlight_of(diffuse);
   vec3 from = before_face(face, frame().lift / placed_at(home.w).ref_view.w);
   vec3 behind = from;
   behind[axis_of(face)] -= 0.5 * sign_of(face);

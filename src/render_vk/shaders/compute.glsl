@@ -8,6 +8,7 @@ layout(push_constant) uniform Push {
   vec2 point;       // of the sample, within pixels
   vec2 point_low;   // what is left of that
   vec2 turn;        // of the sample: cosine and sine of what turns nine fixed directions of occlusion
+  vec3 upright;     // and where the first of these points, along u, v and the normal
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample

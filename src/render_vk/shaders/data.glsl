@@ -170,6 +170,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 sky_horizon;
   vec4 sky_ground;
   vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
+  vec4 ambient;  // colours: of the ambient light, of the sun's
+  vec4 sun;
   uvec2 placed;
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis

@@ -34,6 +34,12 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
   Vectors directions = Vectors(frame().directions);
   if (has(kFixedDirections)) {
     vec3 fixed_one = directions.at[face * 9 + ray].xyz;
+    if (ray == 0) {
+      fixed_one[kFaceU[face]] = push.upright.x;
+      fixed_one[kFaceV[face]] = push.upright.y;
+      fixed_one[axis_of(face)] = sign_of(face) * push.upright.z;
+      return fixed_one;
+    }
     float u = fixed_one[kFaceU[face]];
     float v = fixed_one[kFaceV[face]];
     fixed_one[kFaceU[face]] = push.turn.x * u - push.turn.y * v;
@@ -147,7 +153,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   float cells = placed.ref_view.w;
   float cosine = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
   if (is_field) cosine = max(dot(normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
-  sunlight = vec3(cosine);
+  sunlight = sunlight_of(cosine);
   openness = 0.0;
   GridRay ray = ray_from(point, placed);
   int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;

@@ -24,6 +24,12 @@ float own_share(Surface surface, float voxels, bool starts_inside) {
   return length > 0.0 ? 1.0 - exp(surface.log_clarity * length) : 0.0;
 }
 
+// The sun's light where nothing is in between. `diffuse`: its share of a point, with the sun's brightness.
+vec3 sunlight_of(float diffuse) {
+  vec4 colour = frame().sun;
+  return diffuse * colour.xyz;
+}
+
 bool has_occlusion() {
   return has(kOcclusionRays) || has(kOcclusionVertex);
 }
@@ -37,9 +43,10 @@ float left_by_occlusion(float openness) {
 // The light of a point, before exposure. `sunlight`: what the sun and lamps add.
 vec3 light_at(vec3 sunlight, float openness) {
   vec4 share = frame().light;
-  if (!has_occlusion()) return share.y + sunlight;
-  if (has(kAffectsAll)) return (share.x + sunlight) * left_by_occlusion(openness);
-  return share.x * openness + sunlight;
+  vec4 ambient = frame().ambient;
+  if (!has_occlusion()) return share.y * ambient.xyz + sunlight;
+  if (has(kAffectsAll)) return (share.x * ambient.xyz + sunlight) * left_by_occlusion(openness);
+  return share.x * openness * ambient.xyz + sunlight;
 }
 
 // What a surface shows where colours are seen, rather than values.

@@ -9,7 +9,7 @@
 // The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
 // `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
-  vec3 sunlight = vec3(diffuse);
+  vec3 sunlight = sunlight_of(diffuse);
   if (!kTraces || voxel.w < 0) return sunlight;
   Placed placed = placed_at(voxel.w);
   GridRay ray = GridRay(base, from, placed.to_sun.xyz, 0.0);

@@ -64,5 +64,5 @@ void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 hi
   edges = vec4(low[u], low[v], high[u], high[v]);
   what = uvec2(face, instance);
   colour = vec4(0.0);
-  if (!kTraces) colour = colour_of_face(face, type, instance, vec3(diffuse_of(face, instance)), openness);
+  if (!kTraces) colour = colour_of_face(face, type, instance, sunlight_of(diffuse_of(face, instance)), openness);
 }

@@ -158,6 +158,8 @@ struct ShaderFrame {
   Vec4 sky_horizon{0.0F};
   Vec4 sky_ground{0.0F};
   Vec4 light{0.0F};
+  Vec4 ambient{0.0F};
+  Vec4 sun{0.0F};
   std::uint64_t placed = 0;
   std::uint64_t grids = 0;
   std::uint64_t tree = 0;
@@ -214,6 +216,7 @@ struct ShaderPush {
   float point_low_y = 0.0F;
   float turn_cosine = 1.0F;
   float turn_sine = 0.0F;
+  std::array<float, 3> upright{0.0F, 0.0F, 1.0F};
   std::uint32_t seed = 0;
   std::uint32_t first = 0;
   std::uint32_t round = 0;
@@ -235,8 +238,8 @@ struct SwapPush {
 static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 144);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
-static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 15 * 16 + 24 * 8 + 20 * 4);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 17 * 16 + 24 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);
-static_assert(sizeof(ShaderPush) == 80 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderPush) == 96 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -1,0 +1,73 @@
+// Skies that follow the sun.
+
+#include "light/daylight.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::encoded;
+using render_test::from_above;
+using render_test::linear;
+using render_test::Pixel;
+using render_test::pixel_at;
+using render_test::place;
+using render_test::sized;
+using render_test::taken;
+using render_test::towards;
+
+constexpr Rgba8 kGrey{180, 180, 180, 255};
+
+Scene floor_scene() {
+  Scene scene;
+  Grid grid;
+  grid.fill_box({{-20, -1, -20}, {20, 0, 20}}, add_type(scene, kGrey));
+  place(scene, std::move(grid));
+  return scene;
+}
+
+RenderOptions follows(DVec3 sun) {
+  RenderOptions options = sized(9, 9);
+  options.light.sun = sun;
+  options.light.sky_follows_sun = true;
+  return options;
+}
+
+TEST(RenderSky, SurfacesAndTheBackdropAreInTheLightOfTheSunsHeight) {
+  const Scene scene = floor_scene();
+  for (const DVec3 sun : {DVec3(1, 3, 0), DVec3(1, 0.1, 0), DVec3(1, -0.05, 0), DVec3(0, -1, 0)}) {
+    const RenderOptions options = follows(sun);
+    const Daylight light = daylight_of(options.light);
+    const float diffuse = static_cast<float>(std::max(glm::normalize(sun).y, 0.0));
+    const Vec3 expected = linear(kGrey) * (0.15F * light.ambient + diffuse * light.sun);
+    const Pixel seen = pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen.at(i), encoded(expected).at(i), 1);
+    const Picture sky = taken(Scene{}, towards({0, 0, 0}, {0, 0, -1}), options);
+    EXPECT_EQ(pixel_at(sky, 4, 4), encoded(light.sky.horizon));
+  }
+}
+
+TEST(RenderSky, ASunBelowTheHorizonLightsNothingFromBelow) {
+  const Scene scene = floor_scene();
+  Camera camera = from_above(0, -9, 0, 2);
+  camera.forward = {0, 1, 0};
+  camera.right = {-1, 0, 0};
+  RenderOptions options = follows({0.2, -1, 0});
+  const Picture night = taken(scene, camera, options);
+  const Vec3 ambient = 0.15F * linear(kGrey) * daylight_of(options.light).ambient;
+  EXPECT_EQ(pixel_at(night, 4, 4), encoded(ambient));
+  options.light.sky_follows_sun = false;
+  EXPECT_GT(pixel_at(taken(scene, camera, options), 4, 4)[0], 150) << "it does where the sky is fixed";
+}
+
+TEST(RenderSky, BrightnessCountsAsBefore) {
+  const Scene scene = floor_scene();
+  RenderOptions options = follows({1, 0.3, 0});
+  options.light.sky_brightness = 0.0;
+  options.light.sun_brightness = 0.0;
+  EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 2), options), 4, 4), (Pixel{0, 0, 0}));
+}
+
+}  // namespace
+}  // namespace quoin
