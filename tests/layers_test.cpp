@@ -37,12 +37,13 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/trilinear.h", {"scene", "trace"}},
     {"grid/long_box.h", {"live"}},
     {"light/corner_light.h", {"render"}},
+    {"light/daylight.h", {"render", "render_vk"}},
     {"light/glass.h", {"render"}},
     {"light/lamp_table.h", {"render_vk"}},
     {"light/light_model.h", {"render", "render_vk"}},
     {"light/lighting.h", {"render"}},
     {"light/occlusion_directions.h", {"render", "render_vk"}},
-    {"light/sky.h", {"render", "render_vk"}},
+    {"light/sky.h", {"render"}},
     {"light/surfaces.h", {"render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
     {"mesh/surface/bodies.h", {"scene"}},
@@ -66,6 +67,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
     {"trace/density/smooth_normal.h", {"render", "scene"}},
     {"trace/tree_view.h", {"light", "render", "render_vk"}},
+    {"trace/walk.h", {"light"}},
 };
 
 // A folder with more files is several rooms in one.

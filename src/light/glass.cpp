@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <glm/geometric.hpp>
+
+#include "trace/walk.h"
 
 namespace quoin {
 namespace {
 
 // ln of the share of light below which a body counts as closed: a sixteenth of the least step of an 8-bit picture.
 constexpr double kClosed = -11.0;
+
+constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
+constexpr double kLeastClosing = 1e-9;            // of what is clear
 
 // Lengths of t within which two bodies touch; the rounding of placed grids.
 constexpr double kTouching = 1e-6;
@@ -42,30 +46,33 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
                 std::vector<GlassBody>& out) {
   out.clear();
   const double length = glm::length(ray_in_view.direction);
-  std::int32_t last_placed = -1;
-  std::optional<GridReader> voxels_of;
-  double clarity = 0.0;
-  view.visit_transparent(ray_in_view, max_t, [&](const TransparentSpan& found) {
-    const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(found.placed)];
-    if (found.placed != last_placed) {
-      clarity = 0.0;
-      voxels_of.emplace(*placed.voxels);
-    }
-    const VoxelSpan& span = found.span;
-    const VoxelType type = voxels_of->get(span.voxel);
-    const double t_exit = std::min(span.t_exit, max_t);
-    const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size * placed.voxels_per_cell();
-    if (!(voxels > 0.0)) return true;  // an edge that it only touches
-    const GlassBody next{found.placed, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
-    if (found.placed == last_placed && continues(out.back(), next)) {
-      out.back().t_exit = t_exit;
-      out.back().voxels += voxels;
-    } else {
-      out.push_back(next);
-    }
-    last_placed = found.placed;
-    clarity += surfaces[type].log_clarity * voxels;
-    return clarity > kClosed;
+  view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
+    const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(index)];
+    const double voxels_per_cell = placed.voxels_per_cell();
+    const std::size_t first = out.size();
+    GridReader voxels_of(*placed.voxels);
+    VoxelType type = kAir;
+    double clarity = 0.0;
+    // Blocks along whose diagonal it does not close: it closes at the same voxel as by single ones.
+    const auto largest = [&](IVec3 voxel) {
+      type = voxels_of.get(voxel);
+      const double closing = -static_cast<double>(surfaces[type].log_clarity) * voxels_per_cell * kDiagonal;
+      return (clarity - kClosed) / std::max(closing, kLeastClosing);
+    };
+    trace::visit_blocks(*placed.transparent, ray, max_t, largest, [&](const VoxelSpan& span) {
+      const double t_exit = std::min(span.t_exit, max_t);
+      const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size * voxels_per_cell;
+      if (!(voxels > 0.0)) return true;  // an edge that it only touches
+      const GlassBody next{index, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
+      if (out.size() > first && continues(out.back(), next)) {
+        out.back().t_exit = t_exit;
+        out.back().voxels += voxels;
+      } else {
+        out.push_back(next);
+      }
+      clarity += surfaces[type].log_clarity * voxels;
+      return clarity > kClosed;
+    });
   });
   join_touching(out);
 }

@@ -26,6 +26,15 @@ std::uint32_t index_of(const ChunkStorage& mixed, VoxelType type) {
 
 ChunkRows::ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which)
     : chunk_(&chunk), types_(&types), which_(which) {
+  sort_types();
+}
+
+ChunkRows::ChunkRows(const Chunk& chunk, VoxelType only) : chunk_(&chunk), types_(nullptr), only_(only) {
+  sort_types();
+}
+
+void ChunkRows::sort_types() {
+  const Chunk& chunk = *chunk_;
   for (const VoxelType type : chunk.types()) (belongs(type) ? in_ : out_).push_back(type);
   const bool by_absence = out_.size() < in_.size();
   inverted_ = by_absence ? kAll : 0;
@@ -35,7 +44,7 @@ ChunkRows::ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy w
 }
 
 bool ChunkRows::belongs(VoxelType type) const {
-  return counts(*types_, type, which_);
+  return types_ == nullptr ? type == only_ : counts(*types_, type, which_);
 }
 
 Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
@@ -61,6 +70,28 @@ Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
   }
   // Edits leave slabs behind that are of one type but not stored so.
   return slab_of(rows);
+}
+
+UniformBlocks uniform_blocks(const Chunk& chunk, const VoxelRegistry& types) {
+  constexpr int kCell = 64;
+  UniformBlocks blocks;
+  for (const VoxelType type : chunk.types()) {
+    if (!types.is_transparent(type) || chunk.count(type) < kCell) continue;
+    const ChunkRows rows(chunk, type);
+    RowsBox unused;
+    BrickRow four;
+    for (std::size_t row = 0; row < 16; ++row) {
+      const bool is_mixed = four.read(rows, static_cast<int>(row & 3) * 16, static_cast<int>(row >> 2) * 16, unused);
+      for (std::size_t x = 0; x < 4; ++x) {
+        std::uint64_t cells = is_mixed || !four.is_full ? 0 : kAll;
+        for (std::size_t i = 0; is_mixed && i < 64; ++i) cells |= std::uint64_t{four.bricks[x][i] == kAll} << i;
+        blocks.cells[x + 4 * row] |= cells;
+        blocks.bricks |= std::uint64_t{cells == kAll} << (x + 4 * row);
+      }
+    }
+    blocks.is_whole |= chunk.count(type) == static_cast<int>(kChunkVoxels);
+  }
+  return blocks;
 }
 
 void transpose_nibbles(SlabRows& w) {

@@ -31,6 +31,8 @@ using SlabRows = std::array<std::uint64_t, 16>;  ///< [z][y]
 class ChunkRows {
  public:
   ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which);
+  /// Of one type only.
+  ChunkRows(const Chunk& chunk, VoxelType only);
 
   /// Whether no voxel counts.
   [[nodiscard]] bool none() const { return in_.empty(); }
@@ -39,11 +41,13 @@ class ChunkRows {
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
  private:
+  void sort_types();
   [[nodiscard]] bool belongs(VoxelType type) const;
 
   const Chunk* chunk_;
-  const VoxelRegistry* types_;
-  Occupancy which_;
+  const VoxelRegistry* types_;  // null: of one type only
+  Occupancy which_ = Occupancy::NonAir;
+  VoxelType only_ = kAir;
   std::vector<VoxelType> in_;
   std::vector<VoxelType> out_;
   std::vector<std::uint32_t> asked_;  // indices of the palette: whichever list is shorter
@@ -77,6 +81,10 @@ class RowsBox {
   std::uint64_t y_ = 0;
   std::uint64_t z_ = 0;
 };
+
+/// Which blocks of a chunk are full of one transparent type.
+/// Cost: as that of a node of the tree for each such type of which there are voxels enough to fill a cell.
+[[nodiscard]] UniformBlocks uniform_blocks(const Chunk& chunk, const VoxelRegistry& types);
 
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {

@@ -103,6 +103,7 @@ struct OccupancyTree::Impl {
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
   std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // 0: none
   std::vector<Node> bricks = std::vector<Node>(2);                 // 0: empty, 1: full
+  std::vector<trace::UniformBlocks> uniform;                       // of transparent voxels: of each of `chunk_nodes`
   std::vector<std::uint32_t> free_chunks;
   std::vector<std::uint32_t> free_bricks;
   ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
@@ -230,7 +231,16 @@ struct OccupancyTree::Impl {
     return changed;
   }
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
-    return voxels == nullptr ? drop(chunk) : put(trace::ChunkRows(*voxels, types, which), chunk);
+    if (voxels == nullptr) return drop(chunk);
+    const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk);
+    if (which == Occupancy::Transparent) find_uniform(*voxels, types, chunk);
+    return changed;
+  }
+
+  void find_uniform(const Chunk& voxels, const VoxelRegistry& types, IVec3 chunk) {
+    uniform.resize(chunk_nodes.size());
+    const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
+    if (index != 0) uniform[index] = trace::uniform_blocks(voxels, types);
   }
 
   // Puts 4 bits in place of those at `bit`.
@@ -369,6 +379,7 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field) {
 void OccupancyTree::finish_build() {
   impl_->chunk_nodes.shrink_to_fit();
   impl_->bricks.shrink_to_fit();
+  impl_->uniform.shrink_to_fit();
   impl_->finish({});
   view_ = impl_->kernel_view();
 }
@@ -426,12 +437,16 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
 std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
-         impl_->chunk_boxes.bytes() + impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
+         impl_->uniform.capacity() * sizeof(trace::UniformBlocks) + impl_->chunk_boxes.bytes() +
+         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
-    : tree_(tree.impl_.get()), chunks_(tree_->chunk_nodes.data()), bricks_(tree_->bricks.data()) {}
+    : tree_(tree.impl_.get()),
+      chunks_(tree_->chunk_nodes.data()),
+      bricks_(tree_->bricks.data()),
+      uniform_(tree_->uniform.data()) {}
 
 const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {
   return tree_->find(region);

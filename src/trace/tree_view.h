@@ -26,6 +26,13 @@ struct ChunkNode {
   std::array<std::uint32_t, 64> bricks{};  ///< index of a brick; 0 is empty, 1 is full
 };
 
+/// Of a chunk of transparent voxels: which aligned blocks are full of one type.
+struct UniformBlocks {
+  Node cells{};              ///< cells of 4^3, as in ChunkNode
+  std::uint64_t bricks = 0;  ///< bricks of 16^3, x + 4 y + 16 z
+  bool is_whole = false;
+};
+
 /// Of 16^3 chunks.
 struct RegionNode {
   Node chunks{};                            ///< which chunks hold any voxel
@@ -73,11 +80,14 @@ class TreeNodes {
   [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
   [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
   [[nodiscard]] const Node& brick(std::uint32_t index) const { return bricks_[index]; }
+  /// Of one of the tree's chunks. Requires: a tree of transparent voxels.
+  [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const { return uniform_[&chunk - chunks_]; }
 
  private:
   const OccupancyTree::Impl* tree_;
   const ChunkNode* chunks_;
   const Node* bricks_;
+  const UniformBlocks* uniform_;
 };
 
 }  // namespace quoin::trace

@@ -52,6 +52,7 @@ TEST_F(ViewerTest, TheScreenshotIsTheRenderersPicture) {
   render.width = 333;
   render.height = 250;
   render.samples = 16;
+  render.light = natural_light();
   const auto picture = CpuRenderer(scene).render(frame_scene(scene, View::Iso, 333.0 / 250.0), render);
   ASSERT_TRUE(picture);
   const auto shot = read_png(given.screenshot);

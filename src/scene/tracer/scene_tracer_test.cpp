@@ -216,9 +216,12 @@ TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
   EXPECT_EQ(hits.placed[4], 1);
   EXPECT_EQ(view.any_transparent(rays), 1U << 4);
   double length = 0.0;
-  view.visit_transparent(rays.ray(4), kInfinity, [&](const TransparentSpan& found) {
-    length += found.span.t_exit - found.span.t_enter;
-    return true;
+  view.visit_transparent(rays.ray(4), kInfinity, [&](std::int32_t index, const Ray& ray) {
+    EXPECT_EQ(index, 0);
+    visit_hits(*tracer.placed()[0].transparent, ray, kInfinity, [&](const VoxelSpan& span) {
+      length += span.t_exit - span.t_enter;
+      return true;
+    });
   });
   EXPECT_DOUBLE_EQ(length, 3.0);
 }

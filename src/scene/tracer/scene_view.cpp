@@ -290,15 +290,17 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 }
 
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
-                                  const std::function<bool(const TransparentSpan&)>& visit) const {
+                                  const std::function<void(std::int32_t, const Ray&)>& visit) const {
+  const auto visit_one = [&](std::size_t i) {
+    if (impl_->tracer->placed()[i].transparent == nullptr) return;
+    const Affine& to_grid = impl_->grid_from_view[i];
+    visit(static_cast<std::int32_t>(i), {to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction});
+  };
+  if (impl_->is_alone) return visit_one(0);
   RayPacket alone;
   alone.set(0, ray_in_view, max_t);
   impl_->instances.visit(PacketBounds(alone), [&](std::size_t i, const FourBoxes&, std::size_t) {
-    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
-    if (tree == nullptr) return true;
-    const Affine& to_grid = impl_->grid_from_view[i];
-    const Ray ray{to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction};
-    visit_hits(*tree, ray, max_t, [&](const VoxelSpan& span) { return visit({span, static_cast<std::int32_t>(i)}); });
+    visit_one(i);
     return true;
   });
 }

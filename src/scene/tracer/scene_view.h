@@ -25,12 +25,6 @@ struct SceneHits {
   [[nodiscard]] Vec3 normal(std::size_t lane) const { return {normal_x[lane], normal_y[lane], normal_z[lane]}; }
 };
 
-/// A transparent voxel on a ray.
-struct TransparentSpan {
-  VoxelSpan span;
-  std::int32_t placed = 0;
-};
-
 /// Traces rays through a scene, relative to a point near which they are.
 ///
 /// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
@@ -62,10 +56,10 @@ class SceneView {
   /// Which rays meet a transparent voxel of any instance.
   [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
 
-  /// Calls `visit` for every transparent voxel that one ray passes: instance by instance, each in the ray's order.
-  /// Where `visit` returns false that instance ends.
+  /// Calls `visit` for each instance with transparent voxels that one ray may meet before `max_t`: an index into
+  /// SceneTracer::placed, and the ray in its grid.
   void visit_transparent(const Ray& ray_in_view, double max_t,
-                         const std::function<bool(const TransparentSpan&)>& visit) const;
+                         const std::function<void(std::int32_t, const Ray&)>& visit) const;
 
   [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
   [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;

@@ -1,0 +1,316 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <quoin/trace/ray.h>
+
+#include "trace/tree_view.h"
+
+namespace quoin::trace {
+
+/// A walk through a tree from one plane crossing to the next, in double. Every crossing's distance is found from the
+/// origin, (plane - origin) / direction, by the same formula whatever the size of the step, so a walk in large steps
+/// crosses the same planes at the same distances, in the same order, as one voxel at a time.
+class Walk {
+ public:
+  Walk(const OccupancyTree& tree, const Ray& ray) : nodes_(tree) {
+    for (int axis = 0; axis < 3; ++axis) {
+      origin_[axis] = ray.origin[axis];
+      direction_[axis] = ray.direction[axis];
+      inverse_[axis] = direction_[axis] != 0.0 ? 1.0 / direction_[axis] : 0.0;
+    }
+  }
+
+  /// Moves to where the ray enters the bounds; false when it misses them, or enters beyond `max_t`.
+  bool enter(const IBox& bounds, double max_t) {
+    double enter_t = 0.0;
+    double exit_t = max_t;
+    int enter_axis = -1;
+    int exit_axis = 3;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = bounds.min[axis];
+      const double high = bounds.max[axis];
+      const double o = origin_[axis];
+      if (direction_[axis] == 0.0) {
+        if (o < low || o >= high) return false;
+        continue;
+      }
+      const bool is_forward = direction_[axis] > 0.0;
+      const bool starts_before = is_forward ? o < low : o >= high;
+      if (starts_before) {
+        const double t = ((is_forward ? low : high) - o) * inverse_[axis];
+        // The last plane to be crossed; at a tie the later axis.
+        if (enter_axis < 0 || t >= enter_t) {
+          enter_t = t;
+          enter_axis = axis;
+        }
+      }
+      const double t = ((is_forward ? high : low) - o) * inverse_[axis];
+      if (t < exit_t) {
+        exit_t = t;
+        exit_axis = axis;
+      }
+    }
+    // Through an edge of the bounds: it has left before it enters if the axis on which it leaves goes first.
+    if (!(enter_t <= exit_t) || (enter_t == exit_t && exit_axis < enter_axis)) return false;
+    bounds_ = bounds;
+    t_ = enter_t;
+    axis_ = enter_axis;
+    for (int axis = 0; axis < 3; ++axis) {
+      voxel_[axis] = coordinate_at_start(axis);
+      find_next(axis);
+    }
+    return true;
+  }
+
+  /// Steps until the voxel is occupied (true), or the ray leaves the bounds or passes `max_t` (false).
+  bool find(double max_t) {
+    for (int size = empty_size(); size != 0; size = empty_size()) {
+      step(size);
+      if (!is_within(max_t)) return false;
+    }
+    return true;
+  }
+
+  /// Leaves the voxel it is in.
+  void leave_voxel() { step_voxel(); }
+  /// Leaves the largest aligned block around the voxel that is known to be full of one type and has an edge of no more
+  /// than `largest`; else the voxel. After `find` was true, in a tree of transparent voxels.
+  void leave_block(double largest) {
+    int size = largest < 4.0 ? 1 : uniform_size();
+    while (size > 1 && size > largest) size /= 4;
+    step(size);
+  }
+  [[nodiscard]] bool is_within(double max_t) const {
+    return t_ <= max_t && voxel_[axis_] >= bounds_.min[axis_] && voxel_[axis_] < bounds_.max[axis_];
+  }
+
+  [[nodiscard]] IVec3 voxel() const { return {voxel_[0], voxel_[1], voxel_[2]}; }
+  [[nodiscard]] double t() const { return t_; }
+  /// The axis of the last plane crossed; -1 before the first.
+  [[nodiscard]] int axis() const { return axis_; }
+
+ private:
+  // Where the ray stands on `axis` when it has entered its bounds, or starts within.
+  [[nodiscard]] int coordinate_at_start(int axis) const {
+    if (axis_ < 0) return static_cast<int>(std::floor(origin_[axis]));
+    const int last = bounds_.max[axis] - 1;
+    if (axis == axis_) return direction_[axis] > 0.0 ? bounds_.min[axis] : last;
+    return coordinate_after(axis, bounds_.min[axis], last);
+  }
+
+  // Where the ray is on `axis` just after the current crossing, between `low` and `high`.
+  [[nodiscard]] int coordinate_after(int axis, int low, int high) const {
+    const double d = direction_[axis];
+    const double o = origin_[axis];
+    const double position = o + t_ * d;
+    if (!(position > low)) return settled(axis, low, low, high);
+    if (!(position < high + 1.0)) return settled(axis, high, low, high);
+    const int floor = static_cast<int>(std::floor(position));
+    const double fraction = position - floor;
+    // Rounding can put a position on the wrong side of a plane only next to it.
+    if (fraction > 1e-5 && fraction < 1.0 - 1e-5) return floor;
+    return settled(axis, floor, low, high);
+  }
+
+  // Corrects a coordinate by comparing crossings: planes whose t is less were crossed before, and at a tie those of
+  // axes before this one.
+  [[nodiscard]] int settled(int axis, int guess, int low, int high) const {
+    if (direction_[axis] == 0.0) return std::clamp(static_cast<int>(std::floor(origin_[axis])), low, high);
+    const int forward = direction_[axis] > 0.0 ? 1 : -1;
+    const double start = std::floor(origin_[axis]);
+    const auto is_crossed = [&](int into) {
+      // The voxel it starts in was never entered, even if it starts on that voxel's plane.
+      if (forward > 0 ? into <= start : into >= start) return true;
+      // The plane through which the ray enters voxel `into`.
+      const double plane = forward > 0 ? into : into + 1.0;
+      const double t = (plane - origin_[axis]) * inverse_[axis];
+      return t < t_ || (t == t_ && axis < axis_);
+    };
+    int at = guess;
+    while (at + forward >= low && at + forward <= high && is_crossed(at + forward)) at += forward;
+    while (at - forward >= low && at - forward <= high && !is_crossed(at)) at -= forward;
+    return at;
+  }
+
+  // Leaves the voxel.
+  void step_voxel() {
+    int axis = next_[0] <= next_[1] ? 0 : 1;
+    if (next_[2] < next_[axis]) axis = 2;
+    t_ = next_[axis];
+    axis_ = axis;
+    voxel_[axis] += direction_[axis] > 0.0 ? 1 : -1;
+    find_next(axis);
+  }
+
+  // Leaves the aligned block of this size around the voxel.
+  void step(int size) {
+    if (size == 1) return step_voxel();
+    std::array<double, 3> t{};
+    std::array<int, 3> low{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<std::size_t>(axis);
+      low[a] = voxel_[axis] & ~(size - 1);
+      const double plane = direction_[axis] > 0.0 ? static_cast<double>(low[a]) + size : low[a];
+      t[a] = crossing(axis, plane);
+    }
+    int axis = t[0] <= t[1] ? 0 : 1;
+    if (t[2] < t[static_cast<std::size_t>(axis)]) axis = 2;
+    t_ = t[static_cast<std::size_t>(axis)];
+    axis_ = axis;
+    for (int other = 0; other < 3; ++other) {
+      const auto a = static_cast<std::size_t>(other);
+      if (other == axis) {
+        voxel_[other] = direction_[other] > 0.0 ? low[a] + size : low[a] - 1;
+      } else {
+        // Never back: the ray is at or beyond the voxel it was in.
+        const bool is_forward = direction_[other] > 0.0;
+        voxel_[other] = coordinate_after(other, is_forward ? voxel_[other] : low[a],
+                                         is_forward || direction_[other] == 0.0 ? low[a] + size - 1 : voxel_[other]);
+      }
+      find_next(other);
+    }
+  }
+
+  [[nodiscard]] double crossing(int axis, double plane) const {
+    return direction_[axis] != 0.0 ? (plane - origin_[axis]) * inverse_[axis] : std::numeric_limits<double>::infinity();
+  }
+  // Where the voxel ends along an axis.
+  void find_next(int axis) {
+    next_[axis] = crossing(axis, direction_[axis] > 0.0 ? static_cast<double>(voxel_[axis]) + 1.0 : voxel_[axis]);
+  }
+
+  // The edge of the largest aligned block around the voxel that is known to be empty; 0 when the voxel is occupied.
+  int empty_size() {
+    const IVec3 v = voxel();
+    if (v >> 2 != cell_) {
+      const int size = enter_cell(v);
+      if (size != 0) return size;
+    }
+    return (word_ >> ((v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3)) & 1U) != 0 ? 0 : 1;
+  }
+
+  // Looks up the cell of a voxel; returns the size of the empty block around it where there is nothing in it.
+  int enter_cell(IVec3 v) {
+    const IVec3 chunk = v >> 6;
+    if (chunk != chunk_ || !knows_chunk_) {
+      chunk_ = chunk;
+      knows_chunk_ = true;
+      const int size = enter_chunk(chunk);
+      if (size != 0) {
+        knows_chunk_ = false;
+        return size;
+      }
+    }
+    const std::size_t brick = brick_of(v);
+    const std::uint64_t cells = node_->cells[brick];
+    if (cells == 0) return 16;
+    const std::size_t cell = cell_of(v);
+    if ((cells >> cell & 1U) == 0) return 4;
+    cell_ = v >> 2;
+    word_ = nodes_.brick(node_->bricks[brick])[cell];
+    return 0;
+  }
+
+  // The edge of the largest aligned block around an occupied voxel that is of its type.
+  [[nodiscard]] int uniform_size() const {
+    const UniformBlocks& blocks = nodes_.uniform_blocks(*node_);
+    const std::size_t brick = brick_of(voxel());
+    if ((blocks.cells[brick] >> cell_of(voxel()) & 1U) == 0) return 1;
+    if (blocks.is_whole) return 64;
+    return (blocks.bricks >> brick & 1U) != 0 ? 16 : 4;
+  }
+
+  // Of a brick within its chunk, of a cell within its brick.
+  static std::size_t brick_of(IVec3 v) {
+    return static_cast<std::size_t>((v.x >> 4 & 3) + 4 * (v.y >> 4 & 3) + 16 * (v.z >> 4 & 3));
+  }
+  static std::size_t cell_of(IVec3 v) {
+    return static_cast<std::size_t>((v.x >> 2 & 3) + 4 * (v.y >> 2 & 3) + 16 * (v.z >> 2 & 3));
+  }
+
+  // Looks up a chunk's node; returns the size of the empty block around it where there is none.
+  int enter_chunk(IVec3 chunk) {
+    const IVec3 region = chunk >> 4;
+    if (region != region_coordinates_ || !knows_region_) {
+      region_coordinates_ = region;
+      knows_region_ = true;
+      region_ = nodes_.find_region(region);
+    }
+    if (region_ == nullptr) return 1'024;
+    const IVec3 c = chunk & 15;
+    const std::uint64_t word = region_->chunks[static_cast<std::size_t>((c.x >> 2) + 4 * (c.y >> 2) + 16 * (c.z >> 2))];
+    if (word == 0) return 256;
+    if ((word >> ((c.x & 3) + 4 * (c.y & 3) + 16 * (c.z & 3)) & 1U) == 0) return 64;
+    node_ = &nodes_.chunk(region_->nodes[static_cast<std::size_t>(c.x + 16 * c.y + 256 * c.z)]);
+    return 0;
+  }
+
+  TreeNodes nodes_;
+  const RegionNode* region_ = nullptr;
+  const ChunkNode* node_ = nullptr;
+  IVec3 region_coordinates_{0};
+  IVec3 chunk_{0};
+  bool knows_region_ = false;
+  bool knows_chunk_ = false;
+  IVec3 cell_{std::numeric_limits<int>::min()};  // none, of any voxel
+  std::uint64_t word_ = 0;                       // its voxels
+  double origin_[3] = {};
+  double direction_[3] = {};
+  double inverse_[3] = {};
+  IBox bounds_;
+  double t_ = 0.0;
+  int axis_ = -1;
+  int voxel_[3] = {};
+  double next_[3] = {};  // t at which it leaves the voxel along each axis
+};
+
+/// Whether there is anything to walk.
+inline bool is_usable(const Ray& ray, double max_t) {
+  double length = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!std::isfinite(ray.origin[axis]) || !std::isfinite(ray.direction[axis])) return false;
+    length += std::abs(ray.direction[axis]);
+  }
+  return length > 0.0 && max_t >= 0.0;
+}
+
+/// The face that looks most against a direction.
+inline Direction facing(const DVec3& direction) {
+  return nearest_direction(-direction);
+}
+
+/// The face through which a walk came into its voxel.
+inline Direction face_of(const Walk& walk, const Ray& ray) {
+  if (walk.axis() < 0) return facing(ray.direction);
+  return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
+}
+
+/// Calls `visit` with a VoxelSpan for each of what `leave` takes a walk out of, from one occupied voxel on, until it
+/// returns false.
+template <class Leave, class Visit>
+void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
+  if (!is_usable(ray, max_t)) return;
+  Walk walk(tree, ray);
+  if (!walk.enter(tree.bounds(), max_t)) return;
+  while (walk.find(max_t)) {
+    VoxelSpan span{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0};
+    leave(walk);
+    span.t_exit = walk.t();
+    if (!visit(span) || !walk.is_within(max_t)) return;
+  }
+}
+
+/// As `visit_hits`, of a tree of transparent voxels, for whole blocks of voxels of one type at a time: a span is that
+/// of a block, entered at its voxel. Together the spans are those of the voxels. `largest`: returns, for that voxel, how
+/// long the block's edge may be.
+template <class Largest, class Visit>
+void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Largest& largest, const Visit& visit) {
+  visit_spans(
+      tree, ray, max_t, [&](Walk& walk) { walk.leave_block(largest(walk.voxel())); }, visit);
+}
+
+}  // namespace quoin::trace
