@@ -186,7 +186,7 @@ class Walk {
   // The edge of the largest aligned block around the voxel that is known to be empty; 0 when the voxel is occupied.
   int empty_size() {
     const IVec3 v = voxel();
-    if (v >> 2 != cell_) {
+    if ((v >> 2) != cell_) {
       const int size = enter_cell(v);
       if (size != 0) return size;
     }

@@ -15,7 +15,7 @@ class WalkOfBlocks : public ::testing::Test {
     for (const Visibility visibility : {Visibility::Transparent, Visibility::Transparent, Visibility::Opaque}) {
       VoxelProperties properties;
       properties.visibility = visibility;
-      ids_.push_back(types_.add(properties).value());
+      ids.push_back(types.add(properties).value());
     }
   }
 
@@ -24,32 +24,32 @@ class WalkOfBlocks : public ::testing::Test {
     const int low = -80;
     std::uniform_int_distribution<int> place(low, 90);
     std::uniform_int_distribution<int> size(1, 40);
-    grid_.fill_box({{-64, 0, 0}, {0, 64, 64}}, ids_[0]);
+    grid.fill_box({{-64, 0, 0}, {0, 64, 64}}, ids[0]);
     for (int i = 0; i < 60; ++i) {
-      const IVec3 from{place(random_), place(random_), place(random_)};
-      grid_.fill_box({from, from + IVec3{size(random_), size(random_), size(random_)}}, pick(i % 7 == 0));
+      const IVec3 from{place(random), place(random), place(random)};
+      grid.fill_box({from, from + IVec3{size(random), size(random), size(random)}}, pick(i % 7 == 0));
     }
-    for (int i = 0; i < 500; ++i) grid_.set({place(random_), place(random_), place(random_)}, pick(i % 3 == 0));
+    for (int i = 0; i < 500; ++i) grid.set({place(random), place(random), place(random)}, pick(i % 3 == 0));
   }
 
   /// One of the two types of glass, or anything.
   VoxelType pick(bool anything) {
-    const VoxelType any[] = {ids_[0], ids_[1], ids_[2], kAir};
-    return any[std::uniform_int_distribution<std::size_t>(0, anything ? 3 : 1)(random_)];
+    const VoxelType any[] = {ids[0], ids[1], ids[2], kAir};
+    return any[std::uniform_int_distribution<std::size_t>(0, anything ? 3 : 1)(random)];
   }
 
   Ray ray() {
     std::uniform_real_distribution<double> place(-150.0, 150.0);
     std::normal_distribution<double> number;
-    const DVec3 from{place(random_), place(random_), place(random_)};
-    const DVec3 at = 0.4 * DVec3{place(random_), place(random_), place(random_)};
-    switch (std::uniform_int_distribution<int>(0, 7)(random_)) {
+    const DVec3 from{place(random), place(random), place(random)};
+    const DVec3 at = 0.4 * DVec3{place(random), place(random), place(random)};
+    switch (std::uniform_int_distribution<int>(0, 7)(random)) {
       case 0:  // along an axis, on the planes between voxels
         return {glm::floor(from), {0.0, 0.0, from.z > 0.0 ? -1.0 : 1.0}};
       case 1:  // through edges and corners
         return {glm::floor(from), {1.0, from.y > 0.0 ? -1.0 : 1.0, 1.0}};
       case 2:  // from within
-        return {at, {number(random_), number(random_), number(random_)}};
+        return {at, {number(random), number(random), number(random)}};
       default:
         return {from, at - from};
     }
@@ -85,7 +85,7 @@ class WalkOfBlocks : public ::testing::Test {
         EXPECT_GT(next, 0U) << "a voxel before the first block";
         if (next == 0) return false;
         EXPECT_LE(voxel.t_exit, found[next - 1].t_exit);
-        EXPECT_EQ(grid_.get(voxel.voxel), grid_.get(found[next - 1].voxel));
+        EXPECT_EQ(grid.get(voxel.voxel), grid.get(found[next - 1].voxel));
         ++voxel_count;
         return true;
       });
@@ -95,38 +95,38 @@ class WalkOfBlocks : public ::testing::Test {
     return static_cast<double>(voxel_count) / static_cast<double>(std::max<std::size_t>(block_count, 1));
   }
 
-  std::mt19937 random_{77};
-  VoxelRegistry types_;
-  std::vector<VoxelType> ids_;
-  Grid grid_;
+  std::mt19937 random{77};
+  VoxelRegistry types;
+  std::vector<VoxelType> ids;
+  Grid grid;
 };
 
 TEST_F(WalkOfBlocks, PassesTheSameVoxelsAtTheSameDistances) {
   scatter();
-  const OccupancyTree tree = OccupancyTree::build(grid_, types_, Occupancy::Transparent);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   EXPECT_GT(compare(tree, 4000), 2.0) << "most steps are longer than a voxel";
 }
 
 TEST_F(WalkOfBlocks, FollowsEdits) {
   scatter();
-  OccupancyTree tree = OccupancyTree::build(grid_, types_, Occupancy::Transparent);
+  OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   ChangeCursor cursor;
-  (void)grid_.changes_since(cursor);
+  (void)grid.changes_since(cursor);
   for (int round = 0; round < 20; ++round) {
     const IVec3 from{8 * round - 80, 5, 3 * round};
-    grid_.fill_box({from, from + 30}, round % 4 == 3 ? kAir : ids_[static_cast<std::size_t>(round) % 3]);
-    grid_.set(from + 9, ids_[1]);
-    tree.update(grid_, types_, grid_.changes_since(cursor));
+    grid.fill_box({from, from + 30}, round % 4 == 3 ? kAir : ids[static_cast<std::size_t>(round) % 3]);
+    grid.set(from + 9, ids[1]);
+    tree.update(grid, types, grid.changes_since(cursor));
     compare(tree, 150);
   }
 }
 
 TEST_F(WalkOfBlocks, WholeChunksAreOneStep) {
-  grid_.fill_box({{0, 0, 0}, {128, 64, 64}}, ids_[0]);
-  const OccupancyTree tree = OccupancyTree::build(grid_, types_, Occupancy::Transparent);
+  grid.fill_box({{0, 0, 0}, {128, 64, 64}}, ids[0]);
+  const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Transparent);
   EXPECT_EQ(blocks(tree, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 2U);
-  grid_.fill_box({{70, 0, 0}, {71, 64, 64}}, ids_[1]);
-  const OccupancyTree edited = OccupancyTree::build(grid_, types_, Occupancy::Transparent);
+  grid.fill_box({{70, 0, 0}, {71, 64, 64}}, ids[1]);
+  const OccupancyTree edited = OccupancyTree::build(grid, types, Occupancy::Transparent);
   // Bricks of 16 where there is one type, and cells of 4 beside the sheet.
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 1U + 1 + 4 + 2 + 3);
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9, 5.0).size(), 16U + 1 + 4 + 2 + 12);
