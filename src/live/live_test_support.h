@@ -80,7 +80,7 @@ class ShownSurfaces {
 inline std::set<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   std::set<GridHandle> drawn;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
-    if (passes(filter, instance)) drawn.insert(instance.grid);
+    if (passes(filter, scene, instance)) drawn.insert(instance.grid);
   });
   return drawn;
 }

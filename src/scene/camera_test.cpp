@@ -226,7 +226,7 @@ Extent extent_of(const Camera& camera, double aspect, const Scene& scene, Instan
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const SceneGrid& grid = scene.grids()[instance.grid];
-    if (!passes(filter, instance)) continue;
+    if (!passes(filter, scene, instance)) continue;
     grid.grid.for_each([&](IVec3 voxel, VoxelType) {
       for (unsigned i = 0; i < 8; ++i) {
         const DVec3 corner = DVec3(voxel) + DVec3{i & 1U, i >> 1U & 1U, i >> 2U & 1U};

@@ -186,7 +186,7 @@ std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instan
   if (seen.size() < scene.instances().size()) seen.resize(scene.instances().size());
   std::size_t count = 0;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
-    if (instance.grid.index >= contents.size() || !passes(filter, instance)) return;
+    if (instance.grid.index >= contents.size() || !passes(filter, scene, instance)) return;
     const Content& content = contents[instance.grid.index];
     const double voxel_size = instance.voxel_size;
     if (!content.is_there || content.generation != instance.grid.generation || !(voxel_size > 0.0)) return;

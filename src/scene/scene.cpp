@@ -1,11 +1,14 @@
 #include <quoin/scene/scene.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
+#include <type_traits>
 
 #include "core/change_journal.h"
 #include "core/edit_notices.h"
+#include "scene/hierarchy.h"
 #include "scene/instance_axes.h"
 
 namespace quoin {
@@ -49,7 +52,7 @@ bool has_place(const Instance& instance) {
 
 namespace {
 
-enum class Kind : std::uint8_t { Grid, Instance };
+enum class Kind : std::uint8_t { Grid, Instance, Group, Layer };
 
 struct SceneRecord {
   Kind kind = Kind::Grid;
@@ -57,6 +60,14 @@ struct SceneRecord {
   std::uint32_t generation = 0;
   void merge(const SceneRecord&) {}
 };
+
+template <class T>
+constexpr Kind kind_of() {
+  if constexpr (std::is_same_v<T, SceneGrid>) return Kind::Grid;
+  if constexpr (std::is_same_v<T, Instance>) return Kind::Instance;
+  if constexpr (std::is_same_v<T, SceneGroup>) return Kind::Group;
+  if constexpr (std::is_same_v<T, SceneLayer>) return Kind::Layer;
+}
 
 template <class T>
 void sort_and_unite(std::vector<Handle<T>>& handles) {
@@ -69,25 +80,49 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
 // What a scene knows of its changes. Edits of grids come as notices and are booked when somebody asks.
 struct Scene::Book {
   Book() = default;
-  Book(const Book& other) : journal(other.journal), grid_serials(other.grid_serials), serials(other.serials) {}
+  Book(const Book& other) : journal(other.journal), serials(other.serials) {}
 
   std::mutex mutex;  // guards concurrent queries
   ChangeJournal<SceneRecord> journal;
-  std::vector<std::uint64_t> grid_serials;  // by slot, of the last records in the journal
-  std::vector<std::uint64_t> serials;       // likewise of instances
+  std::array<std::vector<std::uint64_t>, 4> serials;  // by kind and slot, of the last records in the journal
   EditNotices notices;
   std::vector<std::uint32_t> noticed;
 
-  void note(GridHandle handle, std::size_t keys) {
-    journal.note(grid_serials[handle.index], {Kind::Grid, handle.index, handle.generation}, keys);
+  std::vector<std::uint64_t>& serials_of(Kind kind) { return serials[static_cast<std::size_t>(kind)]; }
+  // `keys` are grids, instances, groups and layers: they share a journal.
+  template <class T>
+  void note(Handle<T> handle, std::size_t keys) {
+    constexpr Kind kKind = kind_of<T>();
+    journal.note(serials_of(kKind)[handle.index], {kKind, handle.index, handle.generation}, keys);
   }
-  void note(InstanceHandle handle, std::size_t keys) {
-    journal.note(serials[handle.index], {Kind::Instance, handle.index, handle.generation}, keys);
-  }
-  static void make_room(std::vector<std::uint64_t>& of, std::uint32_t index) {
+  void make_room(Kind kind, std::uint32_t index) {
+    std::vector<std::uint64_t>& of = serials_of(kind);
     if (index >= of.size()) of.resize(index + std::size_t{1});
   }
-  // `keys` are grids and instances: they share a journal.
+  // Puts it in and books that. Whatever may throw comes first.
+  template <class T>
+  Handle<T> insert(SlotMap<T>& into, T value, std::size_t keys) {
+    make_room(kind_of<T>(), into.next_index());
+    const Handle<T> handle = into.insert(std::move(value));
+    journal.begin_change();
+    serials_of(kind_of<T>())[handle.index] = 0;  // records of another one in this slot stay as they are
+    note(handle, keys + 1);
+    return handle;
+  }
+  template <class T>
+  bool remove(SlotMap<T>& from, Handle<T> handle, std::size_t keys) {
+    if (!from.remove(handle)) return false;
+    journal.begin_change();
+    note(handle, keys);
+    return true;
+  }
+  template <class T>
+  T& edit(SlotMap<T>& in, Handle<T> handle, std::size_t keys) {
+    T& value = in[handle];
+    journal.begin_change();
+    note(handle, keys);
+    return value;
+  }
   void collect(const SlotMap<SceneGrid>& grids, std::size_t keys) {
     notices.take(noticed);
     for (const std::uint32_t index : noticed) {
@@ -114,43 +149,45 @@ Scene::~Scene() = default;
 Scene Scene::snapshot() const {
   Scene copy;
   const std::lock_guard lock(book_->mutex);
-  book_->collect(grids_, grids_.size() + instances_.size());
+  book_->collect(grids_, keys());
   copy.types = types;
   copy.lamps = lamps;
   copy.grids_ = grids_.copied([](const SceneGrid& grid) {
     return SceneGrid{grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()};
   });
   copy.instances_ = instances_.copied([](const Instance& instance) { return instance; });
+  copy.groups_ = groups_.copied([](const SceneGroup& group) { return group; });
+  copy.layers_ = layers_.copied([](const SceneLayer& layer) { return layer; });
   copy.book_ = std::make_unique<Book>(*book_);
   copy.grids_.for_each([&](GridHandle handle, const SceneGrid& grid) { copy.book_->follow(grid, handle.index); });
   return copy;
 }
 
+std::size_t Scene::keys() const {
+  return grids_.size() + instances_.size() + groups_.size() + layers_.size();
+}
+
 GridHandle Scene::add_grid(SceneGrid grid) {
-  // Whatever may throw comes first.
   book_->notices.make_room(grids_.next_index());
-  Book::make_room(book_->grid_serials, grids_.next_index());
-  const GridHandle handle = grids_.insert(std::move(grid));
-  book_->journal.begin_change();
-  book_->grid_serials[handle.index] = 0;  // records of another grid in this slot stay as they are
-  book_->note(handle, grids_.size() + instances_.size());
+  const GridHandle handle = book_->insert(grids_, std::move(grid), keys());
   book_->follow(grids_[handle], handle.index);
   return handle;
 }
 
 InstanceHandle Scene::add_instance(Instance instance) {
-  Book::make_room(book_->serials, instances_.next_index());
-  const InstanceHandle handle = instances_.insert(std::move(instance));
-  book_->journal.begin_change();
-  book_->serials[handle.index] = 0;
-  book_->note(handle, grids_.size() + instances_.size());
-  return handle;
+  return book_->insert(instances_, std::move(instance), keys());
+}
+
+GroupHandle Scene::add_group(SceneGroup group) {
+  return book_->insert(groups_, std::move(group), keys());
+}
+
+LayerHandle Scene::add_layer(SceneLayer layer) {
+  return book_->insert(layers_, std::move(layer), keys());
 }
 
 bool Scene::remove_grid(GridHandle handle) {
-  if (!grids_.remove(handle)) return false;
-  book_->journal.begin_change();
-  book_->note(handle, grids_.size() + instances_.size());
+  if (!book_->remove(grids_, handle, keys())) return false;
   for (const InstanceHandle instance : instances_.handles()) {
     if (instances_[instance].grid == handle) remove_instance(instance);
   }
@@ -158,37 +195,69 @@ bool Scene::remove_grid(GridHandle handle) {
 }
 
 bool Scene::remove_instance(InstanceHandle handle) {
-  if (!instances_.remove(handle)) return false;
-  book_->journal.begin_change();
-  book_->note(handle, grids_.size() + instances_.size());
-  return true;
+  return book_->remove(instances_, handle, keys());
+}
+
+bool Scene::remove_group(GroupHandle handle) {
+  const SceneGroup* group = groups_.find(handle);
+  if (group == nullptr) return false;
+  const GroupHandle parent = group->parent;
+  for (const GroupHandle each : groups_.handles()) {
+    if (groups_[each].parent == handle) edit(each).parent = parent == each ? GroupHandle{} : parent;
+  }
+  for (const InstanceHandle each : instances_.handles()) {
+    if (instances_[each].group == handle) edit(each).group = parent;
+  }
+  return book_->remove(groups_, handle, keys());
+}
+
+bool Scene::remove_layer(LayerHandle handle) {
+  if (layers_.find(handle) == nullptr) return false;
+  for (const GroupHandle each : groups_.handles()) {
+    if (groups_[each].layer == handle) edit(each).layer = {};
+  }
+  for (const InstanceHandle each : instances_.handles()) {
+    if (instances_[each].layer == handle) edit(each).layer = {};
+  }
+  return book_->remove(layers_, handle, keys());
 }
 
 SceneGrid& Scene::edit(GridHandle handle) {
-  SceneGrid& grid = grids_[handle];
-  book_->journal.begin_change();
-  book_->note(handle, grids_.size() + instances_.size());
-  return grid;
+  return book_->edit(grids_, handle, keys());
 }
-
 Instance& Scene::edit(InstanceHandle handle) {
-  Instance& instance = instances_[handle];
-  book_->journal.begin_change();
-  book_->note(handle, grids_.size() + instances_.size());
-  return instance;
+  return book_->edit(instances_, handle, keys());
+}
+SceneGroup& Scene::edit(GroupHandle handle) {
+  return book_->edit(groups_, handle, keys());
+}
+SceneLayer& Scene::edit(LayerHandle handle) {
+  return book_->edit(layers_, handle, keys());
 }
 
 SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   SceneChanges changes;
   const std::lock_guard lock(book_->mutex);
-  book_->collect(grids_, grids_.size() + instances_.size());
+  book_->collect(grids_, keys());
   changes.all = !book_->journal.visit_since(cursor, [&](const SceneRecord& record) {
-    if (record.kind == Kind::Grid) {
-      changes.grids.push_back({record.index, record.generation});
-    } else {
-      changes.instances.push_back({record.index, record.generation});
+    switch (record.kind) {
+      case Kind::Grid:
+        changes.grids.push_back({record.index, record.generation});
+        break;
+      case Kind::Instance:
+        changes.instances.push_back({record.index, record.generation});
+        break;
+      case Kind::Group:
+        changes.groups.push_back({record.index, record.generation});
+        break;
+      case Kind::Layer:
+        changes.layers.push_back({record.index, record.generation});
+        break;
     }
   });
+  sort_and_unite(changes.groups);
+  sort_and_unite(changes.layers);
+  add_instances_below(*this, changes);
   sort_and_unite(changes.grids);
   sort_and_unite(changes.instances);
   return changes;
@@ -196,7 +265,7 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
 
 bool Scene::has_changed_since(const ChangeCursor& cursor) const {
   const std::lock_guard lock(book_->mutex);
-  book_->collect(grids_, grids_.size() + instances_.size());
+  book_->collect(grids_, keys());
   return book_->journal.has_changed_since(cursor);
 }
 
@@ -217,7 +286,7 @@ DBox Scene::bounds(InstanceFilter filter) const {
   for (const InstanceHandle handle : instances_.handles()) {
     const Instance& instance = instances_[handle];
     const SceneGrid* grid = grids_.find(instance.grid);
-    if (grid == nullptr || !passes(filter, instance) || !has_place(instance)) continue;
+    if (grid == nullptr || !passes(filter, *this, instance) || !has_place(instance)) continue;
     const IBox tight = grid->bounds();
     if (tight.empty()) continue;
     for (int corner = 0; corner < 8; ++corner) {
@@ -230,7 +299,7 @@ DBox Scene::bounds(InstanceFilter filter) const {
 }
 
 bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter) {
-  return passes(filter, instance) && scene.grids().find(instance.grid) != nullptr;
+  return passes(filter, scene, instance) && scene.grids().find(instance.grid) != nullptr;
 }
 
 DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid) {

@@ -40,6 +40,11 @@ struct SceneGrid {
 
 using GridHandle = Handle<SceneGrid>;
 
+struct SceneGroup;
+struct SceneLayer;
+using GroupHandle = Handle<SceneGroup>;
+using LayerHandle = Handle<SceneLayer>;
+
 /// One placement of a grid in the world. Moving it touches no voxel and no mesh.
 struct Instance {
   std::string name;
@@ -50,27 +55,48 @@ struct Instance {
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
   double voxel_size = 1.0;  ///< world units a voxel; positive
   bool mirrored = false;    ///< the grid's x is negated (about the pivot) before the rotation
-  bool visible = true;      ///< false for hidden layers and nodes; such instances are kept, not drawn
+  bool visible = true;      ///< its own switch; `is_shown` says whether its groups and layers show it too
+  GroupHandle group = {};   ///< that it belongs to; one that names nothing: it stands at the top
+  LayerHandle layer = {};   ///< that it lies on; one that names nothing: on none
 };
 
 using InstanceHandle = Handle<Instance>;
 
+/// A node of a scene's hierarchy: instances and groups that belong together. Places of instances and groups are those
+/// of the world, so a group's place says only where its own frame lies: the point and the turn that tools handle it by.
+/// `move_group` moves a group with all that is below it.
+struct SceneGroup {
+  std::string name;
+  GroupHandle parent = {};             ///< that it belongs to; one that names nothing: it stands at the top
+  LayerHandle layer = {};              ///< that it lies on, with all below it
+  DVec3 position{0.0};                 ///< of its frame, in world units
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from group; as Instance::rotation
+  bool mirrored = false;               ///< as Instance::mirrored
+  bool visible = true;                 ///< false hides all below it
+};
+
+/// Groups and instances that are shown and hidden together, wherever they stand in the hierarchy.
+struct SceneLayer {
+  std::string name;
+  bool visible = true;
+};
+
 /// Which instances a function looks at.
 enum class InstanceFilter : std::uint8_t { Visible, All };
-
-/// Whether an instance is among those of a filter.
-[[nodiscard]] inline bool passes(InstanceFilter filter, const Instance& instance) {
-  return filter == InstanceFilter::All || instance.visible;
-}
 
 /// What changed in a scene; in the order of the handles, each once. Those that were removed are among them: they name
 /// nothing.
 struct SceneChanges {
-  bool all = false;                       ///< anything may have changed; the lists are empty
-  std::vector<GridHandle> grids;          ///< added, removed, edited, or with another name, pivot or canvas
-  std::vector<InstanceHandle> instances;  ///< added, removed, or changed
+  bool all = false;               ///< anything may have changed; the lists are empty
+  std::vector<GridHandle> grids;  ///< added, removed, edited, or with another name, pivot or canvas
+  /// Added, removed, or changed; and those below groups and on layers that were.
+  std::vector<InstanceHandle> instances;
+  std::vector<GroupHandle> groups;  ///< added, removed, or changed
+  std::vector<LayerHandle> layers;  ///< likewise
 
-  [[nodiscard]] bool empty() const { return !all && grids.empty() && instances.empty(); }
+  [[nodiscard]] bool empty() const {
+    return !all && grids.empty() && instances.empty() && groups.empty() && layers.empty();
+  }
 };
 
 /// Many grids, placed any number of times each, that share one registry.
@@ -104,8 +130,17 @@ class Scene {
   bool remove_grid(GridHandle handle);
   bool remove_instance(InstanceHandle handle);
 
+  GroupHandle add_group(SceneGroup group);
+  LayerHandle add_layer(SceneLayer layer);
+  /// Removes the group; what belonged to it belongs to its parent then. Cost: O(instances and groups).
+  bool remove_group(GroupHandle handle);
+  /// Removes the layer; what lay on it lies on none then. Cost: O(instances and groups).
+  bool remove_layer(LayerHandle handle);
+
   [[nodiscard]] const SlotMap<SceneGrid>& grids() const { return grids_; }
   [[nodiscard]] const SlotMap<Instance>& instances() const { return instances_; }
+  [[nodiscard]] const SlotMap<SceneGroup>& groups() const { return groups_; }
+  [[nodiscard]] const SlotMap<SceneLayer>& layers() const { return layers_; }
   /// A grid, to be edited, now or later: the scene learns of every edit of its voxels and its field. Name, pivot and
   /// canvas are to be changed before the next `changes_since`, since this call is what records the change.
   /// Requires: the handle names a grid.
@@ -113,10 +148,15 @@ class Scene {
   /// An instance, to be changed before the next `changes_since`: this call is what records it.
   /// Requires: the handle names an instance.
   [[nodiscard]] Instance& edit(InstanceHandle handle);
+  /// A group or a layer, likewise. Groups that go round in a circle by their parents count as standing at the top.
+  /// Requires: the handle names one.
+  [[nodiscard]] SceneGroup& edit(GroupHandle handle);
+  [[nodiscard]] SceneLayer& edit(LayerHandle handle);
 
   /// What changed since the cursor's last time; moves the cursor to the present. Which of a grid's chunks changed its
   /// own `changes_since` tells, which types those of `types`.
-  /// Cost: O(grids and instances that changed), whatever the size of the scene. See ChangeCursor.
+  /// Cost: O(grids and instances that changed), whatever the size of the scene; where a group or a layer changed, O(all
+  /// instances). See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
   /// Whether that would tell of anything; of `types` they tell themselves. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
@@ -132,10 +172,38 @@ class Scene {
 
  private:
   struct Book;
+  [[nodiscard]] std::size_t keys() const;
   SlotMap<SceneGrid> grids_;
   SlotMap<Instance> instances_;
+  SlotMap<SceneGroup> groups_;
+  SlotMap<SceneLayer> layers_;
   std::unique_ptr<Book> book_;
 };
+
+/// Whether an instance, and all that it belongs to, is visible: itself, its layer, its groups, and their layers.
+/// Cost: O(groups above it).
+[[nodiscard]] bool is_shown(const Scene& scene, const Instance& instance);
+/// The same of a group.
+[[nodiscard]] bool is_shown(const Scene& scene, const SceneGroup& group);
+
+/// Whether an instance is among those of a filter.
+[[nodiscard]] inline bool passes(InstanceFilter filter, const Scene& scene, const Instance& instance) {
+  return filter == InstanceFilter::All || is_shown(scene, instance);
+}
+
+/// The group that a group belongs to; one that names nothing for those at the top, whose parent is not there, or that
+/// are part of a circle. Cost: O(groups above it).
+[[nodiscard]] GroupHandle parent_of(const Scene& scene, GroupHandle group);
+
+/// All groups, each after the one that it belongs to, else in the order of their handles.
+/// Cost: O(groups * depth).
+[[nodiscard]] std::vector<GroupHandle> groups_from_top(const Scene& scene);
+
+/// Gives a group another place, and moves what is below it with it.
+///
+/// Requires: the handle names a group; its rotation and the new one are not zero.
+/// Cost: O(instances and groups).
+void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation);
 
 /// Whether an instance is to be drawn: its grid exists, and `filter` lets it pass; whatever its numbers are.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);

@@ -31,8 +31,8 @@ IBox content_bounds(const SceneGrid& grid) {
   return unite(grid.grid.bounds(), grid.field.bounds());
 }
 
-bool can_be_traced(const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
-  return grid != nullptr && passes(filter, instance) && has_place(instance) && is_finite(grid->pivot) &&
+bool can_be_traced(const Scene& scene, const Instance& instance, const SceneGrid* grid, InstanceFilter filter) {
+  return grid != nullptr && passes(filter, scene, instance) && has_place(instance) && is_finite(grid->pivot) &&
          !content_bounds(*grid).empty();
 }
 
@@ -80,7 +80,7 @@ void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   std::vector<DBox> boxes;
   scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene.grids().find(instance.grid);
-    if (!can_be_traced(instance, grid, filter)) return;
+    if (!can_be_traced(scene, instance, grid, filter)) return;
     KnownGrid& known = grids_[instance.grid];
     known.is_used = true;
     known.bounds = content_bounds(*grid);

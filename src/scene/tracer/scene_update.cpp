@@ -131,7 +131,7 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
 
 // The grid of an instance that is to be traced where it has a place; null for any other.
 TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
-  if (!passes(filter, instance) || instance.grid.index >= grids.size()) return nullptr;
+  if (!passes(filter, *scene, instance) || instance.grid.index >= grids.size()) return nullptr;
   TracedGrid* grid = grids[instance.grid.index].get();
   if (grid == nullptr || grid->handle != instance.grid || !grid->can_be_placed) return nullptr;
   return grid;

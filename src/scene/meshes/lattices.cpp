@@ -1,4 +1,4 @@
-#include "scene/lattices.h"
+#include "scene/meshes/lattices.h"
 
 #include <algorithm>
 #include <cmath>

@@ -19,8 +19,8 @@
 #include "grid/coordinate_hash.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
-#include "scene/lattices.h"
-#include "scene/mesh_parts.h"
+#include "scene/meshes/lattices.h"
+#include "scene/meshes/mesh_parts.h"
 
 namespace quoin {
 

@@ -8,7 +8,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "scene/instance_axes.h"
-#include "scene/mesh_parts.h"
+#include "scene/meshes/mesh_parts.h"
 
 namespace quoin {
 

@@ -1,4 +1,4 @@
-#include "scene/mesh_parts.h"
+#include "scene/meshes/mesh_parts.h"
 
 #include <algorithm>
 #include <utility>
