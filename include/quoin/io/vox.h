@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,6 +17,9 @@
 
 namespace quoin {
 
+/// A .vox file as it was read, with all that a scene has no place for: see write_vox.
+struct VoxSource;
+
 /// What reading a file gave.
 struct LoadedScene {
   Scene scene;
@@ -24,11 +28,15 @@ struct LoadedScene {
   std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
   std::optional<Camera> camera;       ///< where the file has one
   bool names_files = false;           ///< models came from other files, which saving would put into this one
+  std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
 };
 
 struct LoadOptions {
-  bool show_hidden = false;  ///< instances of hidden layers and nodes become visible ones; otherwise `visible` is false
-  int frame = 0;             ///< which animation frame to take
+  bool show_hidden = false;  ///< what is hidden (instances, groups, layers) becomes visible
+  int frame = 0;             ///< which animation frame to show
+  /// Whether LoadedScene::source is set, so that writing a .vox file again keeps what scenes cannot hold. It takes the
+  /// file's size, and of chunks that are edited later what they were.
+  bool keep_source = true;
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
   std::optional<float> iso = std::nullopt;
   Threads threads = {};  ///< for the field of a volume
@@ -43,12 +51,16 @@ struct LoadOptions {
 ///          nowhere stay grids without an instance; a warning counts them.
 /// Types:   1 to 255 are the palette as the artist sees it (IMAP applied); the raw material keys are kept in
 ///          VoxelProperties::attributes. The palette's alpha means nothing to MagicaVoxel and is not read.
+/// Groups:  a group of the scene graph is a SceneGroup, but for the topmost, which is the scene. Transforms that follow
+///          each other without a group between them are one place.
+/// Layers:  those of the file; of a file with a single one, without a name and shown, none.
 /// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
 ///          last key or the end of the animation's range.
-/// Hidden:  instances of hidden layers and nodes are kept; `visible` says so.
+/// Hidden:  nodes and layers that are hidden are kept; `is_shown` says what is to be drawn.
 /// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
 ///          sound.
-/// Skipped: with a warning, voxels outside their model's box or of colour 0; cameras, lights, notes and layers' names.
+/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, cameras, render settings,
+///          notes and chunks that are not known are in LoadedScene::source alone: `only_in_source` names them.
 /// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered
@@ -60,21 +72,43 @@ struct LoadOptions {
 [[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {},
                                            const Progress& progress = {});
 
+/// What a file holds that its scene does not, for people, a line each: "animation of 24 frames", "10 cameras". A .vox
+/// file written by write_vox keeps it; any other format loses it.
+[[nodiscard]] std::vector<std::string> only_in_source(const VoxSource& source);
+
 /// The scene as a .vox file of version 150; the same scene gives the same bytes.
 ///
 /// Reading it again gives the same scene when every canvas is a box of at most 256 voxels a side from the origin, as
 /// `read_vox` makes them. Otherwise voxels still stand where they stood, but grids are moved to the origin, and those
 /// beyond 256 become several, under a group.
 /// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1.
-/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, and lamps are left out, each
-///           with a warning.
-/// Errors:   Unsupported when a transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or a grid holds
-///           a field of densities;
+/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, turns of groups that are not
+///           by quarter turns and lamps are left out, each with a warning.
+/// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or a
+///           grid holds a field of densities;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
 /// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the
 /// file.
 [[nodiscard]] Result<std::uint64_t> write_vox(const Scene& scene, const std::filesystem::path& path,
                                               std::vector<std::string>& warnings);
+
+/// A scene that was read from a .vox file, with what was changed since, as a .vox file that keeps all else of the first
+/// one: chunks that no change concerns are the same bytes in the same order, so that a scene without a change is the
+/// same file. Without `source`: as above.
+///
+/// Voxels:   of a model that was changed the file's order stays, new ones follow.
+/// Frames:   moving an instance or a group that moves by itself sets a key at the frame that was read; other frames stay.
+///           A shape that shows several models keeps those of other frames.
+/// Canvas:   a model that has outgrown its box becomes larger about its pivot where more than one key shows it.
+/// Types:    those of the file stay where they are in its palette. New ones take entries of the same look, else some
+///           that no voxel uses.
+/// Lost:     also, with a warning each: colours of the palette that no voxel uses, when new ones need their entries;
+///           animation, where nodes of the scene graph have several parents and one of them has to change.
+[[nodiscard]] Result<std::vector<std::byte>> write_vox(const LoadedScene& loaded, std::vector<std::string>& warnings);
+[[nodiscard]] Result<std::uint64_t> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
+                                              std::vector<std::string>& warnings);
+/// What write_vox would warn of. Errors: those of write_vox, but for files of more than 4 GiB.
+[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
 
 }  // namespace quoin

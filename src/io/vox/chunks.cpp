@@ -12,7 +12,6 @@ namespace quoin::vox {
 namespace {
 
 constexpr std::size_t kFileHeaderBytes = 8;
-constexpr std::size_t kChunkHeaderBytes = 12;
 constexpr std::string_view kMagic = "VOX ";
 // Some writers count the headers before them among MAIN's children, 20 bytes at most. Such a file ends with a whole
 // chunk all the same. One that was cut off does not, or has lost a chunk of at most 8 bytes of content: that of no
@@ -152,6 +151,28 @@ struct ModelState {
   bool has_size = false;
 };
 
+/// What a chunk is, by its name and what came before it. Requires: `out` holds what came before, not the chunk itself.
+ChunkPlace place_of(const ChunkHeader& header, const ModelState& state, const Document& out) {
+  ChunkPlace place;
+  place.begin = header.offset;
+  place.content_bytes = header.content_bytes;
+  place.children_bytes = header.children_bytes;
+  const auto is = [&](ChunkKind kind, std::size_t number) {
+    place.kind = kind;
+    place.number = number;
+    return place;
+  };
+  const std::string_view id = header.id;
+  if (id == "PACK") return is(ChunkKind::ModelCount, 0);
+  if (id == "SIZE") return is(ChunkKind::Size, out.models.size());
+  if (id == "XYZI") return is(ChunkKind::Voxels, out.models.size() - 1);
+  if (id == "TDCZ") return is(ChunkKind::PackedVoxels, out.models.size() - (state.has_size ? 1 : 0));
+  if (id == "RGBA") return is(ChunkKind::Palette, 0);
+  if (id == "nTRN" || id == "nGRP" || id == "nSHP") return is(ChunkKind::Node, out.nodes.size());
+  if (id == "LAYR") return is(ChunkKind::Layer, out.layers.size());
+  return place;
+}
+
 Status parse_chunk(ChunkReader& chunk, ModelState& state, Document& out) {
   const std::string_view id = chunk.id();
   if (id == "SIZE") {
@@ -185,6 +206,7 @@ Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::si
     if (!header) return header.error();
     const std::size_t content = at + kChunkHeaderBytes;
     ChunkReader chunk(bytes, header->id, at, content, content + header->content_bytes);
+    out.chunks.push_back(place_of(*header, state, out));
     if (Status status = parse_chunk(chunk, state, out); !status) return status;
     at = content + header->content_bytes + header->children_bytes;
   }
@@ -233,8 +255,11 @@ Result<Document> parse_document(std::span<const std::byte> bytes) {
     return bad_at(kFileHeaderBytes, "the first chunk must be MAIN, not \"" + printable(main->id) + "\"");
   }
   const std::size_t begin = kFileHeaderBytes + kChunkHeaderBytes + main->content_bytes;
+  document.main_content = main->content_bytes;
   const std::size_t claimed_end = begin + main->children_bytes;
   const std::size_t end = std::min(claimed_end, bytes.size());
+  document.chunks_begin = begin;
+  document.chunks_end = end;
   if (Status status = parse_chunks(bytes, begin, end, document); !status) return status.error();
   if (claimed_end > end) {
     document.warnings.push_back("MAIN claims " + std::to_string(claimed_end - end) +
@@ -267,41 +292,9 @@ std::string quoted(std::string_view text) {
 /// `_f`; a key without one takes its place in the list.
 Result<std::int32_t> parse_frame(const ChunkReader& chunk, const Dict& dict, std::size_t place) {
   const std::string_view text = dict.get("_f");
-  if (text.empty()) return static_cast<std::int32_t>(place);
-  const std::optional<std::int64_t> frame = parse_integer(text);
-  if (!frame.has_value() || *frame < 0 || *frame > kMaxInt32) return chunk.error("has the frame " + quoted(text));
-  return static_cast<std::int32_t>(*frame);
-}
-
-Result<Orientation> parse_orientation(const ChunkReader& chunk, std::string_view text) {
-  if (text.empty()) return Orientation{};
-  const std::optional<std::int64_t> byte = parse_integer(text);
-  std::optional<Orientation> orientation;
-  if (byte.has_value() && *byte >= 0 && *byte <= 255) {
-    orientation = orientation_from_byte(static_cast<std::uint8_t>(*byte));
-  }
-  if (!orientation.has_value()) return chunk.error("has the rotation " + quoted(text));
-  return *orientation;
-}
-
-/// Three integers with blanks between them.
-Result<IVec3> parse_translation(const ChunkReader& chunk, std::string_view text) {
-  IVec3 translation{0};
-  std::string_view rest = text;
-  for (int axis = 0; axis < 3 && !text.empty(); ++axis) {
-    rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
-    const std::size_t length = std::min(rest.find(' '), rest.size());
-    const std::optional<std::int64_t> value = parse_integer(rest.substr(0, length));
-    if (!value.has_value() || *value < kMinInt32 || *value > kMaxInt32) {
-      return chunk.error("has the translation " + quoted(text));
-    }
-    translation[axis] = static_cast<int>(*value);
-    rest.remove_prefix(length);
-  }
-  if (rest.find_first_not_of(' ') != std::string_view::npos) {
-    return chunk.error("has the translation " + quoted(text));
-  }
-  return translation;
+  const std::optional<std::int32_t> frame = frame_of_key(text, place);
+  if (!frame.has_value()) return chunk.error("has the frame " + quoted(text));
+  return *frame;
 }
 
 Result<TransformKey> parse_transform_key(ChunkReader& chunk, std::size_t place) {
@@ -309,10 +302,10 @@ Result<TransformKey> parse_transform_key(ChunkReader& chunk, std::size_t place) 
   if (chunk.failed()) return chunk.too_short();
   const Result<std::int32_t> frame = parse_frame(chunk, dict, place);
   if (!frame) return frame.error();
-  const Result<Orientation> orientation = parse_orientation(chunk, dict.get("_r"));
-  if (!orientation) return orientation.error();
-  const Result<IVec3> translation = parse_translation(chunk, dict.get("_t"));
-  if (!translation) return translation.error();
+  const std::optional<Orientation> orientation = parse_orientation(dict.get("_r"));
+  if (!orientation) return chunk.error("has the rotation " + quoted(dict.get("_r")));
+  const std::optional<IVec3> translation = parse_translation(dict.get("_t"));
+  if (!translation) return chunk.error("has the translation " + quoted(dict.get("_t")));
   return TransformKey{*frame, *orientation, *translation};
 }
 
@@ -356,6 +349,46 @@ Node parse_node(ChunkReader& chunk, NodeKind kind) {
 
 }  // namespace
 
+std::optional<std::int32_t> frame_of_key(std::string_view text, std::size_t place) {
+  if (text.empty()) return static_cast<std::int32_t>(place);
+  const std::optional<std::int64_t> frame = parse_integer(text);
+  if (!frame.has_value() || *frame < 0 || *frame > kMaxInt32) return std::nullopt;
+  return static_cast<std::int32_t>(*frame);
+}
+
+std::optional<Orientation> parse_orientation(std::string_view text) {
+  if (text.empty()) return Orientation{};
+  const std::optional<std::int64_t> byte = parse_integer(text);
+  if (!byte.has_value() || *byte < 0 || *byte > 255) return std::nullopt;
+  return orientation_from_byte(static_cast<std::uint8_t>(*byte));
+}
+
+/// Three integers with blanks between them.
+std::optional<IVec3> parse_translation(std::string_view text) {
+  IVec3 translation{0};
+  std::string_view rest = text;
+  for (int axis = 0; axis < 3 && !text.empty(); ++axis) {
+    rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+    const std::size_t length = std::min(rest.find(' '), rest.size());
+    const std::optional<std::int64_t> value = parse_integer(rest.substr(0, length));
+    if (!value.has_value() || *value < kMinInt32 || *value > kMaxInt32) return std::nullopt;
+    translation[axis] = static_cast<int>(*value);
+    rest.remove_prefix(length);
+  }
+  if (rest.find_first_not_of(' ') != std::string_view::npos) return std::nullopt;
+  return translation;
+}
+
+bool is_animated(const Document& document) {
+  if (document.nodes.empty()) return document.models.size() > 1;
+  return std::ranges::any_of(document.nodes, [](const Node& node) { return node.key_count > 1; });
+}
+
+std::int64_t last_frame(const Document& document) {
+  if (!document.nodes.empty()) return document.last_frame;
+  return std::max<std::int64_t>(static_cast<std::int64_t>(document.models.size()) - 1, 0);
+}
+
 Status parse_transform(ChunkReader& chunk, Document& out) {
   Node node = parse_node(chunk, NodeKind::Transform);
   const std::int32_t child = chunk.i32();
@@ -398,7 +431,9 @@ Status parse_shape(ChunkReader& chunk, Document& out) {
 Status parse_layer(ChunkReader& chunk, Document& out) {
   Layer layer;
   layer.id = chunk.i32();
-  layer.hidden = chunk.dict().is_set("_hidden");
+  const Dict attributes = chunk.dict();
+  layer.hidden = attributes.is_set("_hidden");
+  layer.name = attributes.get("_name");
   if (chunk.failed()) return chunk.too_short();
   out.layers.push_back(layer);
   return {};

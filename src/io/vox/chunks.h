@@ -76,6 +76,18 @@ struct Node {
 struct Layer {
   std::int32_t id = 0;
   bool hidden = false;
+  std::string_view name;
+};
+
+/// What a chunk within MAIN says, in the order of the file.
+enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVoxels, Palette, Material, Node, Layer };
+
+struct ChunkPlace {
+  ChunkKind kind = ChunkKind::Other;
+  std::size_t begin = 0;  ///< of its header
+  std::size_t content_bytes = 0;
+  std::size_t children_bytes = 0;
+  std::size_t number = 0;  ///< in the list of its kind; of voxels the model, of a material its colour index
 };
 
 /// MATL's keys and values, or MATT's under MATL's names.
@@ -96,7 +108,25 @@ struct Document {
   std::int32_t last_frame = 0;       ///< of the keys and META's range
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is no colour index
   std::vector<std::string> warnings;
+  std::vector<ChunkPlace> chunks;
+  std::size_t main_content = 0;  ///< bytes; of a MAIN that has content of its own
+  std::size_t chunks_begin = 0;  ///< where the first chunk within MAIN begins
+  std::size_t chunks_end = 0;    ///< and where the last one ends
 };
+
+/// Of a chunk's header: what it is called, the bytes of its content, and of its children.
+inline constexpr std::size_t kChunkHeaderBytes = 12;
+
+/// The frame of a transform's or a shape's key; one without `_f` takes its place in the list. Nothing when it is none.
+[[nodiscard]] std::optional<std::int32_t> frame_of_key(std::string_view text, std::size_t place);
+/// `_r` and `_t` of a transform's key; nothing when they are none.
+[[nodiscard]] std::optional<Orientation> parse_orientation(std::string_view text);
+[[nodiscard]] std::optional<IVec3> parse_translation(std::string_view text);
+
+/// Whether one of several frames is shown.
+[[nodiscard]] bool is_animated(const Document& document);
+/// The last frame that there is.
+[[nodiscard]] std::int64_t last_frame(const Document& document);
 
 /// Reads all chunks and checks each against the bytes that are there; what nodes refer to is not checked.
 ///

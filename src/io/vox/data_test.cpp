@@ -68,6 +68,46 @@ TEST_F(VoxData, WritingAndReadingEveryFileIsTheIdentity) {
   }
 }
 
+TEST_F(VoxData, AnUntouchedFileComesBackByteForByte) {
+  for (const DataFile& file : files_) {
+    if (file.voxels < 0) continue;
+    const std::vector<std::byte> bytes = bytes_of(file.path);
+    const auto loaded = read_vox(bytes);
+    ASSERT_TRUE(loaded) << file.path;
+    std::vector<std::string> warnings;
+    const auto written = write_vox(*loaded, warnings);
+    ASSERT_TRUE(written) << file.path << ": " << to_string(written.error());
+    EXPECT_TRUE(*written == bytes) << file.path;
+    EXPECT_TRUE(warnings.empty()) << file.path << ": " << warnings.front();
+  }
+}
+
+// What an artist's first stroke does: of one model the voxels, nothing else.
+TEST_F(VoxData, APaintedVoxelChangesTheVoxelsOfItsModelAlone) {
+  for (const DataFile& file : files_) {
+    if (file.voxels <= 0) continue;
+    const std::vector<std::byte> bytes = bytes_of(file.path);
+    auto loaded = read_vox(bytes);
+    ASSERT_TRUE(loaded) << file.path;
+    const GridHandle shown = loaded->scene.instances()[loaded->scene.instances().handles().back()].grid;
+    Grid& grid = loaded->scene.edit(shown).grid;
+    if (grid.chunk_count() == 0) continue;
+    IVec3 painted{0};
+    visit_voxels(grid, [&](IVec3 voxel, VoxelType) { painted = voxel; });
+    grid.set(painted, static_cast<VoxelType>(grid.get(painted) % 255 + 1));
+    std::vector<std::string> warnings;
+    const auto written = write_vox(*loaded, warnings);
+    ASSERT_TRUE(written) << file.path << ": " << to_string(written.error());
+    ASSERT_EQ(written->size(), bytes.size()) << file.path;
+    std::size_t different = 0;
+    for (std::size_t i = 0; i < bytes.size(); ++i) different += bytes[i] != (*written)[i] ? 1U : 0U;
+    EXPECT_EQ(different, 1U) << file.path << ": a voxel's colour is a byte";
+    const auto again = read_vox(*written);
+    ASSERT_TRUE(again) << file.path;
+    EXPECT_EQ(vox_test::difference(loaded->scene, again->scene), "") << file.path;
+  }
+}
+
 TEST_F(VoxData, OtherFormatsUnderThisNameGiveOneLine) {
   for (const DataFile& file : files_) {
     if (file.voxels >= 0) continue;

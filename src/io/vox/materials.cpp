@@ -43,10 +43,16 @@ std::optional<std::size_t> colour_index_of(std::int32_t id) {
   return static_cast<std::size_t>(id) % kColours;
 }
 
-/// Null, and counted, when the id belongs to no colour.
+/// Null, and counted, when the id belongs to no colour. The chunk being read becomes known as that colour's.
 Attributes* slot_for(std::int32_t id, Document& out) {
   const std::optional<std::size_t> index = colour_index_of(id);
-  if (index.has_value()) return &out.materials[*index];
+  if (index.has_value()) {
+    if (!out.chunks.empty()) {
+      out.chunks.back().kind = ChunkKind::Material;
+      out.chunks.back().number = *index;
+    }
+    return &out.materials[*index];
+  }
   ++out.stray_materials;
   return nullptr;
 }

@@ -39,6 +39,28 @@ Offset operator*(const Orientation& a, const Offset& offset) {
   return {a.sign[0] * offset[a.axis[0]], a.sign[1] * offset[a.axis[1]], a.sign[2] * offset[a.axis[2]]};
 }
 
+Orientation inverse(const Orientation& orientation) {
+  Orientation transposed;
+  for (std::size_t row = 0; row < 3; ++row) {
+    transposed.axis[orientation.axis[row]] = static_cast<std::uint8_t>(row);
+    transposed.sign[orientation.axis[row]] = orientation.sign[row];
+  }
+  return transposed;
+}
+
+Motion operator*(const Motion& a, const Motion& b) {
+  Motion both{a.orientation * b.orientation, a.orientation * b.translation};
+  for (std::size_t axis = 0; axis < 3; ++axis) both.translation[axis] += a.translation[axis];
+  return both;
+}
+
+Motion inverse(const Motion& motion) {
+  Motion back{inverse(motion.orientation), {}};
+  back.translation = back.orientation * motion.translation;
+  for (std::int64_t& value : back.translation) value = -value;
+  return back;
+}
+
 bool is_reflection(const Orientation& orientation) {
   const bool even = (orientation.axis[0] + 1) % 3 == orientation.axis[1];
   const int signs = orientation.sign[0] * orientation.sign[1] * orientation.sign[2];

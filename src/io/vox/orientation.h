@@ -26,6 +26,20 @@ struct Orientation {
 /// Its determinant is -1.
 [[nodiscard]] bool is_reflection(const Orientation& orientation);
 
+[[nodiscard]] Orientation inverse(const Orientation& orientation);
+
+/// First turned, then moved. Requires of what is computed with them: offsets stay below 2^62, as those of files do.
+struct Motion {
+  Orientation orientation;
+  Offset translation{0, 0, 0};
+
+  bool operator==(const Motion&) const = default;
+};
+
+/// First `b`, then `a`.
+[[nodiscard]] Motion operator*(const Motion& a, const Motion& b);
+[[nodiscard]] Motion inverse(const Motion& motion);
+
 /// From and to the `_r` byte: bits 0-1 and 2-3 the columns of the first and second row's entry, bits 4-6 the rows'
 /// signs. Nothing when the two rows name the same column, or none.
 [[nodiscard]] std::optional<Orientation> orientation_from_byte(std::uint8_t byte);

@@ -12,8 +12,6 @@ namespace {
 constexpr std::size_t kFreeVisits = 65'536;
 constexpr std::size_t kBytesPerVisit = 4;
 
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
 /// Finds nodes by id. Sorted rather than hashed: a hostile choice of ids cannot slow it down.
 class NodeIndex {
  public:
@@ -59,13 +57,27 @@ std::int64_t frame_for(const Node& node, std::span<const Key> keys, int frame) {
   return node.loops ? folded(frame, keys.front().frame, keys.back().frame) : frame;
 }
 
-struct Motion {
-  Orientation orientation;
-  Offset translation{0, 0, 0};
-};
+std::span<const TransformKey> keys_of_transform(const Document& document, const Node& node) {
+  return std::span(document.transform_keys).subspan(node.first_key, node.key_count);
+}
+
+std::span<const ModelKey> keys_of_shape(const Document& document, const Node& node) {
+  return std::span(document.model_keys).subspan(node.first_key, node.key_count);
+}
+
+}  // namespace
+
+std::int64_t frame_of_transform(const Document& document, const Node& node, int frame) {
+  return frame_for(node, keys_of_transform(document, node), frame);
+}
+
+std::size_t key_of_shape(const Document& document, const Node& shape, int frame) {
+  const std::span keys = keys_of_shape(document, shape);
+  return key_at(keys, frame_for(shape, keys, frame));
+}
 
 Motion motion_at(const Document& document, const Node& node, int requested) {
-  const std::span keys = std::span(document.transform_keys).subspan(node.first_key, node.key_count);
+  const std::span keys = keys_of_transform(document, node);
   const std::int64_t frame = frame_for(node, keys, requested);
   const std::size_t i = key_at(keys, frame);
   Motion motion{keys[i].orientation, {}};
@@ -83,13 +95,15 @@ Motion motion_at(const Document& document, const Node& node, int requested) {
   return motion;
 }
 
-/// A node on the way from the root to where the walk stands, with the sum of the transforms above and at it.
+namespace {
+
+/// A transform or a group on the way from the root to where the walk stands; `hanging` is how it hangs if it is a
+/// group, else the chain down to it.
 struct Step {
   std::size_t node = 0;
   std::size_t next_child = 0;
-  Motion motion;
-  std::string_view name;  ///< of this node when it is a transform
-  bool hidden = false;
+  Hanging hanging;
+  std::size_t group = kNone;  ///< what it is in Placements::groups when it is one of them
 };
 
 class GraphWalk {
@@ -105,8 +119,15 @@ class GraphWalk {
   [[nodiscard]] std::size_t find_root() const;
   [[nodiscard]] bool is_layer_hidden(std::int32_t id) const;
   [[nodiscard]] Status check_shapes();
+  [[nodiscard]] Hanging below(const Step& parent) const;
+  [[nodiscard]] bool is_scene_itself(const Hanging& hanging) const;
+  [[nodiscard]] bool has_layer(std::int32_t id) const;
+  Status take_names(const Hanging& hanging, std::string_view more);
+  void close_chain(Hanging& hanging);
+  void add_transform(Step& step);
+  Status add_group(Step& step);
   Status enter(std::size_t node, const Step& parent);
-  Status place(const Node& node, const Step& parent);
+  Status place(std::size_t node, const Step& parent);
   Status walk(std::size_t root);
 
   const Document& document_;
@@ -114,7 +135,8 @@ class GraphWalk {
   std::size_t visits_left_;
   std::size_t names_left_;
   NodeIndex index_;
-  std::vector<std::int32_t> hidden_layers_;
+  std::vector<std::int32_t> hidden_layers_;  // sorted
+  std::vector<std::int32_t> layers_;         // sorted
   std::vector<bool> is_open_;
   std::vector<bool> is_seen_;
   std::vector<Step> way_;
@@ -123,6 +145,10 @@ class GraphWalk {
 
 bool GraphWalk::is_layer_hidden(std::int32_t id) const {
   return std::ranges::binary_search(hidden_layers_, id);
+}
+
+bool GraphWalk::has_layer(std::int32_t id) const {
+  return std::ranges::binary_search(layers_, id);
 }
 
 /// MagicaVoxel's root is transform 0; other writers' is the first node that no node refers to. In a graph that is all
@@ -144,7 +170,7 @@ Status GraphWalk::check_shapes() {
   out_.is_model_used.assign(document_.models.size(), false);
   for (const Node& node : document_.nodes) {
     if (node.kind != NodeKind::Shape) continue;
-    for (const ModelKey& key : std::span(document_.model_keys).subspan(node.first_key, node.key_count)) {
+    for (const ModelKey& key : keys_of_shape(document_, node)) {
       if (key.model >= document_.models.size()) {
         return bad_at(node.offset, "node " + std::to_string(node.id) + " shows model " + std::to_string(key.model) +
                                        ", but there are " + std::to_string(document_.models.size()));
@@ -155,21 +181,81 @@ Status GraphWalk::check_shapes() {
   return {};
 }
 
-Status GraphWalk::place(const Node& node, const Step& parent) {
-  const std::span keys = std::span(document_.model_keys).subspan(node.first_key, node.key_count);
-  Placement placement;
-  placement.model = keys[key_at(keys, frame_for(node, keys, frame_))].model;
-  placement.hidden = parent.hidden || node.hidden;
-  placement.orientation = parent.motion.orientation;
-  placement.translation = parent.motion.translation;
-  placement.name = parent.name;
-  placement.shape_name = node.name;
-  const std::size_t name_bytes = placement.name.size() + placement.shape_name.size();
-  if (name_bytes > names_left_) {
-    return make_error(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {}, node.offset);
+/// How what is below a step begins to hang.
+Hanging GraphWalk::below(const Step& parent) const {
+  if (parent.node != kNone && document_.nodes[parent.node].kind == NodeKind::Transform) return parent.hanging;
+  Hanging hanging;
+  hanging.parent = parent.group;
+  hanging.parent_motion = parent.hanging.world;
+  hanging.world = parent.hanging.world;
+  return hanging;
+}
+
+Status GraphWalk::take_names(const Hanging& hanging, std::string_view more) {
+  const std::size_t bytes = hanging.name.size() + more.size();
+  if (bytes > names_left_) {
+    return make_error(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {},
+                      document_.nodes[hanging.node].offset);
   }
-  names_left_ -= name_bytes;
+  names_left_ -= bytes;
+  return {};
+}
+
+Status GraphWalk::place(std::size_t at, const Step& parent) {
+  const Node& node = document_.nodes[at];
+  Placement placement{below(parent), 0, {}};
+  placement.node = at;
+  placement.hidden = placement.hidden || node.hidden;
+  placement.model = document_.model_keys[node.first_key + key_of_shape(document_, node, frame_)].model;
+  placement.shape_name = node.name;
+  if (Status status = take_names(placement, placement.shape_name); !status) return status;
+  close_chain(placement);
   out_.all.push_back(placement);
+  return {};
+}
+
+/// The chain's transforms are the last steps of the way.
+void GraphWalk::close_chain(Hanging& hanging) {
+  hanging.first_transform = out_.chains.size();
+  for (std::size_t i = way_.size() - hanging.transform_count; i < way_.size(); ++i) out_.chains.push_back(way_[i].node);
+}
+
+/// The topmost group is the scene itself, as long as it says nothing that a scene cannot.
+bool GraphWalk::is_scene_itself(const Hanging& hanging) const {
+  return out_.top_group == kNone && out_.groups.empty() && out_.all.empty() && hanging.parent == kNone &&
+         !hanging.hidden && hanging.name.empty() && !has_layer(hanging.layer);
+}
+
+void GraphWalk::add_transform(Step& step) {
+  const Node& node = document_.nodes[step.node];
+  Hanging& hanging = step.hanging;
+  // What a chain has above its last transform counts as its own.
+  if (hanging.transform_count > 0) {
+    hanging.before = inverse(hanging.parent_motion) * hanging.world;
+    hanging.hidden = hanging.hidden || is_layer_hidden(hanging.layer);
+  }
+  ++hanging.transform_count;
+  hanging.world = hanging.world * motion_at(document_, node, frame_);
+  hanging.hidden = hanging.hidden || node.hidden;
+  hanging.name = node.name;
+  hanging.layer = node.layer;
+}
+
+Status GraphWalk::add_group(Step& step) {
+  const Node& node = document_.nodes[step.node];
+  Hanging& hanging = step.hanging;
+  hanging.node = step.node;
+  hanging.hidden = hanging.hidden || node.hidden;
+  if (hanging.name.empty()) hanging.name = node.name;
+  close_chain(hanging);
+  if (is_scene_itself(hanging)) {
+    out_.top_group = step.node;
+    out_.top_motion = hanging.world;
+    return {};
+  }
+  if (Status status = take_names(hanging, {}); !status) return status;
+  step.group = out_.groups.size();
+  out_.groups.push_back(hanging);
   return {};
 }
 
@@ -181,18 +267,16 @@ Status GraphWalk::enter(std::size_t at, const Step& parent) {
                       node.offset);
   }
   --visits_left_;
+  if (is_seen_[at]) out_.is_tree = false;
   is_seen_[at] = true;
-  if (node.kind == NodeKind::Shape) return place(node, parent);
+  if (node.kind == NodeKind::Shape) return place(at, parent);
   Step step;
   step.node = at;
-  step.motion = parent.motion;
-  step.hidden = parent.hidden || node.hidden || is_layer_hidden(node.layer);
+  step.hanging = below(parent);
   if (node.kind == NodeKind::Transform) {
-    const Motion motion = motion_at(document_, node, frame_);
-    const Offset moved = step.motion.orientation * motion.translation;
-    for (std::size_t axis = 0; axis < 3; ++axis) step.motion.translation[axis] += moved[axis];
-    step.motion.orientation = step.motion.orientation * motion.orientation;
-    step.name = node.name;
+    add_transform(step);
+  } else if (Status status = add_group(step); !status) {
+    return status;
   }
   is_open_[at] = true;
   way_.push_back(step);
@@ -200,7 +284,9 @@ Status GraphWalk::enter(std::size_t at, const Step& parent) {
 }
 
 Status GraphWalk::walk(std::size_t root) {
-  if (Status status = enter(root, Step{}); !status) return status;
+  Step above;
+  above.node = kNone;
+  if (Status status = enter(root, above); !status) return status;
   while (!way_.empty()) {
     Step& step = way_.back();
     const Node& node = document_.nodes[step.node];
@@ -227,9 +313,11 @@ Result<Placements> GraphWalk::run() {
   if (!index) return index.error();
   index_ = std::move(*index);
   for (const Layer& layer : document_.layers) {
+    layers_.push_back(layer.id);
     if (layer.hidden) hidden_layers_.push_back(layer.id);
   }
   std::ranges::sort(hidden_layers_);
+  std::ranges::sort(layers_);
   if (Status status = check_shapes(); !status) return status.error();
   is_open_.assign(document_.nodes.size(), false);
   is_seen_.assign(document_.nodes.size(), false);
@@ -249,30 +337,24 @@ Result<Placements> place_lone_model(const Document& document, int frame) {
   }
   Placement placement;
   placement.model = static_cast<std::uint32_t>(frame);
-  placement.translation[2] = document.models[placement.model].size.z / 2;
+  placement.world.translation[2] = document.models[placement.model].size.z / 2;
   out.all.push_back(placement);
   return out;
-}
-
-bool is_animated(const Document& document) {
-  if (document.nodes.empty()) return document.models.size() > 1;
-  return std::ranges::any_of(document.nodes, [](const Node& node) { return node.key_count > 1; });
 }
 
 }  // namespace
 
 Result<Placements> place_models(const Document& document, int frame, std::size_t file_bytes) {
-  const std::int64_t from_models = std::max<std::int64_t>(static_cast<std::int64_t>(document.models.size()) - 1, 0);
-  const std::int64_t last_frame = document.nodes.empty() ? from_models : document.last_frame;
-  if (frame < 0 || frame > last_frame) {
+  const std::int64_t last = last_frame(document);
+  if (frame < 0 || frame > last) {
     return make_error(ErrorCode::InvalidArgument,
-                      "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last_frame));
+                      "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last));
   }
   Result<Placements> placements =
       document.nodes.empty() ? place_lone_model(document, frame) : GraphWalk(document, frame, file_bytes).run();
   if (placements && is_animated(document)) {
-    placements->warnings.push_back("animated: frame " + std::to_string(frame) + " of 0 to " +
-                                   std::to_string(last_frame) + " is taken");
+    placements->warnings.push_back("animated: frame " + std::to_string(frame) + " of 0 to " + std::to_string(last) +
+                                   " is shown");
   }
   return placements;
 }

@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <map>
+#include <memory>
+#include <utility>
 
 #include <quoin/io/vox.h>
 
@@ -6,6 +9,7 @@
 #include "io/vox/chunks.h"
 #include "io/vox/materials.h"
 #include "io/vox/read.h"
+#include "io/vox/source.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -46,34 +50,80 @@ Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::Mo
   return handles;
 }
 
-Instance instance_of(const vox::Placement& placement, GridHandle grid, const LoadOptions& options) {
-  const vox::InstanceTurn turn = vox::turn_from_orientation(placement.orientation);
-  const vox::Offset position = vox::quoin_from_vox(placement.translation);
-  Instance instance;
-  instance.name = printable(placement.name);
-  instance.grid = grid;
+template <class Placed>
+void put_place(const vox::Motion& motion, Placed& out) {
+  const vox::InstanceTurn turn = vox::turn_from_orientation(motion.orientation);
+  const vox::Offset position = vox::quoin_from_vox(motion.translation);
   for (int axis = 0; axis < 3; ++axis) {
-    instance.position[axis] = static_cast<double>(position[static_cast<std::size_t>(axis)]);
+    out.position[axis] = static_cast<double>(position[static_cast<std::size_t>(axis)]);
   }
-  instance.rotation = turn.rotation;
-  instance.mirrored = turn.mirrored;
-  instance.visible = !placement.hidden || options.show_hidden;
-  return instance;
+  out.rotation = turn.rotation;
+  out.mirrored = turn.mirrored;
+}
+
+/// Layers by their ids: of several with one id one that is hidden, since it hides.
+using LayersById = std::map<std::int32_t, LayerHandle>;
+
+LayersById add_layers(VoxSource& source, Scene& scene) {
+  LayersById by_id;
+  const std::vector<vox::Layer>& layers = source.document.layers;
+  source.layer_of.assign(layers.size(), vox::kNone);
+  if (layers.size() == 1 && layers[0].name.empty() && !layers[0].hidden) return by_id;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    const LayerHandle handle = scene.add_layer({printable(layers[i].name), !layers[i].hidden});
+    source.layer_of[i] = handle.index;
+    const auto [known, is_new] = by_id.try_emplace(layers[i].id, handle);
+    if (!is_new && layers[i].hidden) known->second = handle;
+  }
+  return by_id;
+}
+
+LayerHandle layer_named(const LayersById& layers, std::int32_t id) {
+  const auto found = layers.find(id);
+  return found == layers.end() ? LayerHandle{} : found->second;
+}
+
+std::vector<GroupHandle> add_groups(const vox::Placements& placements, const LayersById& layers, Scene& scene) {
+  std::vector<GroupHandle> handles;
+  handles.reserve(placements.groups.size());
+  for (const vox::Hanging& hanging : placements.groups) {
+    SceneGroup group;
+    group.name = printable(hanging.name);
+    if (hanging.parent != vox::kNone) group.parent = handles[hanging.parent];
+    group.layer = layer_named(layers, hanging.layer);
+    put_place(hanging.world, group);
+    group.visible = !hanging.hidden;
+    handles.push_back(scene.add_group(std::move(group)));
+  }
+  return handles;
 }
 
 /// A grid is called what its shape is called, else as the first of its instances that has a name.
-void add_instances(const vox::Placements& placements, const std::vector<GridHandle>& grids, const LoadOptions& options,
+void add_instances(const vox::Placements& placements, const std::vector<GridHandle>& grids, const LayersById& layers,
                    Scene& scene) {
+  const std::vector<GroupHandle> groups = add_groups(placements, layers, scene);
   for (const vox::Placement& placement : placements.all) {
-    const GridHandle grid = grids[placement.model];
-    scene.add_instance(instance_of(placement, grid, options));
-    std::string& name = scene.edit(grid).name;
+    Instance instance;
+    instance.name = printable(placement.name);
+    instance.grid = grids[placement.model];
+    put_place(placement.world, instance);
+    instance.visible = !placement.hidden;
+    if (placement.parent != vox::kNone) instance.group = groups[placement.parent];
+    instance.layer = layer_named(layers, placement.layer);
+    scene.add_instance(std::move(instance));
+    std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.shape_name);
   }
   for (const vox::Placement& placement : placements.all) {
     std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.name);
   }
+}
+
+void show_all(Scene& scene) {
+  for (const InstanceHandle each : scene.instances().handles()) scene.edit(each).visible = true;
+  for (const GroupHandle each : scene.groups().handles()) scene.edit(each).visible = true;
+  for (const LayerHandle each : scene.layers().handles()) scene.edit(each).visible = true;
 }
 
 void warn(const std::string& of_what, std::int64_t count, std::vector<std::string>& warnings) {
@@ -91,24 +141,37 @@ void add_warnings(const vox::Placements& placements, const vox::ModelLosses& los
 }  // namespace
 
 Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {
+  const auto source = std::make_shared<VoxSource>();
+  if (options.keep_source) {
+    source->bytes.assign(bytes.begin(), bytes.end());
+    bytes = source->bytes;
+  }
   Result<vox::Document> document = vox::parse_document(bytes);
   if (!document) return document.error();
-  const Result<vox::Placements> placements = vox::place_models(*document, options.frame, bytes.size());
+  source->document = std::move(*document);
+  source->frame = options.frame;
+  Result<vox::Placements> placements = vox::place_models(source->document, options.frame, bytes.size());
   if (!placements) return placements.error();
+  source->placements = std::move(*placements);
 
   LoadedScene loaded;
   loaded.format = "vox";
-  loaded.warnings = std::move(document->warnings);
-  const auto type_of = vox::types_by_colour_index(*document, loaded.warnings);
-  if (Status status = vox::register_palette(*document, type_of, loaded.scene.types); !status) {
+  loaded.warnings = source->document.warnings;
+  source->type_of = vox::types_by_colour_index(source->document, loaded.warnings);
+  if (Status status = vox::register_palette(source->document, source->type_of, loaded.scene.types); !status) {
     return status.error();
   }
-  vox::ModelBuilder builder(type_of);
-  const Result<std::vector<GridHandle>> grids = add_grids(*document, builder, bytes, progress, loaded.scene);
+  vox::ModelBuilder builder(source->type_of);
+  const Result<std::vector<GridHandle>> grids = add_grids(source->document, builder, bytes, progress, loaded.scene);
   if (!grids) return grids.error();
-  add_instances(*placements, *grids, options, loaded.scene);
-  warn("materials of no colour skipped", document->stray_materials, loaded.warnings);
-  add_warnings(*placements, builder.losses(), loaded.warnings);
+  add_instances(source->placements, *grids, add_layers(*source, loaded.scene), loaded.scene);
+  warn("materials of no colour skipped", source->document.stray_materials, loaded.warnings);
+  add_warnings(source->placements, builder.losses(), loaded.warnings);
+  if (options.keep_source) {
+    source->scene = loaded.scene.snapshot();
+    loaded.source = source;
+  }
+  if (options.show_hidden) show_all(loaded.scene);
   return loaded;
 }
 

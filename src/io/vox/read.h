@@ -13,22 +13,48 @@
 
 namespace quoin::vox {
 
+inline constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+/// Where a shape or a group hangs in the scene graph: below the nearest group above it, by a chain of transforms, which
+/// is mostly one.
+struct Hanging {
+  std::size_t node = kNone;    ///< the shape or the group itself, in Document::nodes; kNone where there is no graph
+  std::size_t parent = kNone;  ///< in Placements::groups; kNone: the scene itself
+  std::size_t first_transform = 0;  ///< in Placements::chains, from the highest down
+  std::size_t transform_count = 0;
+  Motion parent_motion;     ///< of the group above, in the world
+  Motion before;            ///< of all transforms of the chain but the last, together
+  Motion world;             ///< of all transforms down to here
+  bool hidden = false;      ///< by itself or its chain, whatever is above
+  std::int32_t layer = -1;  ///< of the last transform
+  std::string_view name;    ///< likewise
+};
+
 /// A model as the scene graph shows it: the sum of all transforms on one way down to a shape. MagicaVoxel's axes.
-struct Placement {
+struct Placement : Hanging {
   std::uint32_t model = 0;
-  bool hidden = false;
-  Orientation orientation;
-  Offset translation{0, 0, 0};
-  std::string_view name;        ///< of the transform right above the shape
   std::string_view shape_name;  ///< of the shape itself; Quoin's writer puts a grid's name there
 };
 
 /// The placements at one frame, in the order of the graph, and what there is to warn of.
 struct Placements {
   std::vector<Placement> all;
+  /// Groups but the topmost, which is the scene itself unless it is hidden, on a layer or named; parents come first.
+  std::vector<Hanging> groups;
+  std::vector<std::size_t> chains;  ///< of transforms, in Document::nodes
+  std::size_t top_group = kNone;    ///< the topmost group's node; kNone where it is in `groups` or is not there
+  Motion top_motion;                ///< of it
+  bool is_tree = true;              ///< no node has two parents
   std::vector<bool> is_model_used;  ///< at any frame
   std::vector<std::string> warnings;
 };
+
+/// What a transform does at a frame, as `place_models` has it.
+[[nodiscard]] Motion motion_at(const Document& document, const Node& node, int frame);
+/// The place of the key, in the file's order sorted by frames, that a shape shows at a frame.
+[[nodiscard]] std::size_t key_of_shape(const Document& document, const Node& shape, int frame);
+/// The frame as the keys of a node count it: folded into their range where it loops.
+[[nodiscard]] std::int64_t frame_of_transform(const Document& document, const Node& node, int frame);
 
 /// Walks the scene graph of the document.
 ///

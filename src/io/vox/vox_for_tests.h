@@ -14,8 +14,8 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/vox/chunk_writer.h"
-#include "io/vox/write.h"
+#include "io/vox/write/chunk_writer.h"
+#include "io/vox/write/write.h"
 
 /// What the tests and the fuzz target of .vox share.
 namespace quoin::vox_test {

@@ -1,14 +1,16 @@
 #include <quoin/core/assert.h>
 
-#include "io/vox/write.h"
+#include "io/vox/write/write.h"
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "io/vox/materials.h"
 #include "io/vox/read.h"
+#include "io/vox/source.h"
 
 namespace quoin::vox {
 
@@ -73,6 +75,109 @@ Result<TypeTable> make_type_table(const Scene& scene) {
     if (type < scene.types.size()) properties = scene.types[type];
   }
   return table;
+}
+
+namespace {
+
+/// A name is kept where it says something: the default one of another type does not.
+bool looks_the_same(VoxelProperties a, VoxelProperties b) {
+  a.name.clear();
+  b.name.clear();
+  a.attributes.clear();
+  b.attributes.clear();
+  return a == b;
+}
+
+/// Gives types that are no entries of the palette some of its places.
+class PaletteRoom {
+ public:
+  PaletteRoom(const Scene& scene, const VoxSource& source, TypeTable& table) : source_(source), table_(table) {
+    for (const VoxelType type : occurring_types(scene)) {
+      if (type < kColours) {
+        occurs_[type] = true;
+      } else {
+        strangers_.push_back(type);
+      }
+    }
+  }
+
+  [[nodiscard]] const std::vector<VoxelType>& strangers() const { return strangers_; }
+
+  /// An entry that looks like it already, or one that no voxel has; nothing when there is none.
+  std::optional<std::size_t> place(const VoxelProperties& wanted) {
+    for (std::size_t index = 1; index < kColours; ++index) {
+      if (!looks_the_same(table_.by_index[index], wanted)) continue;
+      occurs_[source_.type_of[index]] = true;
+      return index;
+    }
+    const auto free = best_free();
+    if (!free) return std::nullopt;
+    if (!says_little(*free)) ++replaced_;
+    const VoxelType type = source_.type_of[*free];
+    occurs_[type] = true;
+    VoxelProperties& entry = table_.by_index[*free];
+    entry = wanted;
+    if (entry.name.empty()) entry.name = default_type_name(type);
+    return free;
+  }
+
+  [[nodiscard]] std::int64_t replaced() const { return replaced_; }
+
+ private:
+  [[nodiscard]] bool says_little(std::size_t index) const {
+    const VoxelProperties& entry = table_.by_index[index];
+    VoxelProperties plain;
+    plain.colour = entry.colour;
+    if (!looks_the_same(entry, plain)) return false;
+    if (entry.colour == default_palette()[index]) return true;
+    for (std::size_t other = 1; other < kColours; ++other) {
+      if (other != index && table_.by_index[other].colour == entry.colour) return true;
+    }
+    return false;
+  }
+  /// From the end of the palette as the artist sees it.
+  [[nodiscard]] std::optional<std::size_t> best_free() const {
+    std::array<std::size_t, kColours> index_of{};
+    for (std::size_t i = 0; i < kColours; ++i) index_of[source_.type_of[i]] = i;
+    std::optional<std::size_t> free;
+    for (std::size_t type = kColours - 1; type > 0; --type) {
+      if (occurs_[type]) continue;
+      if (says_little(index_of[type])) return index_of[type];
+      if (!free) free = index_of[type];
+    }
+    return free;
+  }
+
+  const VoxSource& source_;
+  TypeTable& table_;
+  std::array<bool, kColours> occurs_{true};
+  std::vector<VoxelType> strangers_;
+  std::int64_t replaced_ = 0;
+};
+
+}  // namespace
+
+Result<RevisedTypes> revise_type_table(const Scene& scene, const VoxSource& source) {
+  RevisedTypes revised;
+  TypeTable& table = revised.table;
+  table.index_of_type.resize(kColours);
+  for (std::size_t index = 1; index < kColours; ++index) {
+    const VoxelType type = source.type_of[index];
+    table.index_of_type[type] = static_cast<std::uint8_t>(index);
+    table.by_index[index] = (type < scene.types.size() ? scene.types : source.scene.types)[type];
+  }
+  PaletteRoom room(scene, source, table);
+  for (const VoxelType type : room.strangers()) {
+    const auto index = room.place(type < scene.types.size() ? scene.types[type] : VoxelProperties{});
+    if (!index) {
+      return make_error(ErrorCode::LimitExceeded,
+                        "the scene uses more than the 255 voxel types that a .vox file holds");
+    }
+    if (type >= table.index_of_type.size()) table.index_of_type.resize(std::size_t{type} + 1);
+    table.index_of_type[type] = static_cast<std::uint8_t>(*index);
+  }
+  revised.replaced = room.replaced();
+  return revised;
 }
 
 namespace {

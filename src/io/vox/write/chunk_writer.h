@@ -50,7 +50,11 @@ class ChunkWriter {
     return bytes_.size();
   }
   /// `begin` is what begin_chunk gave. Content beyond 4 GiB wraps: ask `size` before trusting the bytes.
-  void end_chunk(std::size_t begin) { patch(begin - 8, bytes_.size() - begin); }
+  /// `children`: bytes of other chunks that follow.
+  void end_chunk(std::size_t begin, std::size_t children = 0) {
+    patch(begin - 8, bytes_.size() - begin);
+    patch(begin - 4, children);
+  }
   /// As end_chunk, for a chunk that holds nothing but other chunks.
   void end_parent(std::size_t begin) { patch(begin - 4, bytes_.size() - begin); }
 
@@ -61,11 +65,12 @@ class ChunkWriter {
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
 
- private:
+  /// Writes four bytes over those at `offset`.
   void patch(std::size_t offset, std::size_t value) {
     for (std::size_t i = 0; i < 4; ++i) bytes_[offset + i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
   }
 
+ private:
   std::vector<std::byte> bytes_;
 };
 

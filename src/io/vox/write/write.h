@@ -12,6 +12,10 @@
 
 #include "io/vox/chunks.h"
 
+namespace quoin {
+struct VoxSource;
+}
+
 /// What a scene becomes in a .vox file before it is bytes.
 namespace quoin::vox {
 
@@ -26,6 +30,18 @@ struct TypeTable {
 ///
 /// Errors: LimitExceeded when more than 255 types occur.
 [[nodiscard]] Result<TypeTable> make_type_table(const Scene& scene);
+
+struct RevisedTypes {
+  TypeTable table;
+  std::int64_t replaced = 0;  ///< colours of the palette that no voxel had, and that new ones took the place of
+};
+
+/// The same for a scene that was read from a file: the types that were its palette stay where they were. Others that
+/// occur take entries of the same look, else some whose type does not occur, those first that say least: of a colour
+/// that is there twice, or the default palette's.
+///
+/// Errors: LimitExceeded when more than 255 types occur.
+[[nodiscard]] Result<RevisedTypes> revise_type_table(const Scene& scene, const VoxSource& source);
 
 /// A model to write, cut from a grid.
 struct Piece {

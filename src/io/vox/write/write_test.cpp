@@ -10,7 +10,7 @@
 #include "io/vox/orientation.h"
 #include "io/vox/read.h"
 #include "io/vox/vox_for_tests.h"
-#include "io/vox/write.h"
+#include "io/vox/write/write.h"
 
 namespace quoin {
 namespace {

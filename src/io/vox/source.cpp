@@ -1,0 +1,42 @@
+#include "io/vox/source.h"
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "io/text.h"
+
+namespace quoin {
+
+namespace {
+
+/// How chunks that a scene has no place for are called, for people; nothing for those that say what it has.
+std::string kept_as(std::string_view id) {
+  if (id == "rCAM") return "cameras";
+  if (id == "rOBJ") return "render settings";
+  if (id == "NOTE") return "notes";
+  // IMAP is the order of the types; META the range of the frames.
+  if (id == "IMAP" || id == "META" || id == "MATL" || id == "MATT") return {};
+  return "chunks " + printable(id);
+}
+
+}  // namespace
+
+std::vector<std::string> only_in_source(const VoxSource& source) {
+  std::vector<std::string> lines;
+  if (vox::is_animated(source.document)) {
+    lines.push_back("animation: frames 0 to " + std::to_string(vox::last_frame(source.document)));
+  }
+  std::map<std::string, int> counts;
+  for (const vox::ChunkPlace& place : source.document.chunks) {
+    if (place.kind != vox::ChunkKind::Other) continue;
+    const std::string_view id(reinterpret_cast<const char*>(source.bytes.data()) + place.begin, 4);
+    std::string kept = kept_as(id);
+    if (!kept.empty()) ++counts[std::move(kept)];
+  }
+  for (const auto& [kept, count] : counts) lines.push_back(kept + ": " + std::to_string(count));
+  return lines;
+}
+
+}  // namespace quoin

@@ -1,0 +1,765 @@
+#include "io/vox/write/graph_revision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+#include <string_view>
+
+#include <quoin/core/assert.h>
+
+#include "io/text.h"
+
+namespace quoin::vox {
+
+namespace {
+
+constexpr std::int32_t kRootTransform = 0;
+constexpr std::int32_t kOnlyLayer = 0;
+constexpr std::int32_t kNoLayer = -1;
+
+std::string instance_text(const Instance& instance) {
+  if (instance.name.empty()) return "an instance";
+  std::string text = "instance \"";
+  text += printable(instance.name);
+  text += '"';
+  return text;
+}
+
+bool has_32_bits(const Offset& offset) {
+  return std::ranges::all_of(offset, [](std::int64_t value) {
+    // Less than the largest, so that it can be negated.
+    return value > -std::int64_t{std::numeric_limits<std::int32_t>::max()} &&
+           value < std::numeric_limits<std::int32_t>::max();
+  });
+}
+
+/// A point of the world in MagicaVoxel's axes, between voxels moved to the nearest; nothing beyond 32 bits.
+std::optional<Offset> rounded(DVec3 point, bool& is_exact) {
+  constexpr double kRounding = 1e-6;
+  Offset offset{};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(point[axis]) < std::numeric_limits<std::int32_t>::max())) return std::nullopt;
+    is_exact = is_exact && std::abs(point[axis] - std::round(point[axis])) < kRounding;
+    offset[static_cast<std::size_t>(axis)] = std::llround(point[axis]);
+  }
+  return vox_from_quoin(offset);
+}
+
+template <class Placed>
+bool has_same_place(const Placed& a, const Placed& b) {
+  return a.position == b.position && a.rotation == b.rotation && a.mirrored == b.mirrored;
+}
+
+/// Which of a node's keys, in the file's order, is in force at a frame, and whether it stands right there.
+struct KeyInForce {
+  std::size_t place = 0;
+  std::int64_t frame = 0;  ///< as the keys count: folded where the node loops
+  bool is_exact = false;
+};
+
+template <class Key, class AttributesOf>
+KeyInForce key_in_force(const std::vector<Key>& keys, bool loops, int frame, AttributesOf attributes_of) {
+  std::vector<std::pair<std::int64_t, std::size_t>> sorted;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    sorted.emplace_back(frame_of_key(attributes_of(keys[i]).get("_f"), i).value_or(0), i);
+  }
+  std::ranges::sort(sorted);
+  KeyInForce found;
+  found.frame = frame;
+  if (loops) {
+    const std::int64_t length = sorted.back().first - sorted.front().first + 1;
+    found.frame = sorted.front().first + ((frame - sorted.front().first) % length + length) % length;
+  }
+  const auto after = std::ranges::upper_bound(sorted, found.frame, {}, [](const auto& key) { return key.first; });
+  const auto& key = after == sorted.begin() ? *after : *std::prev(after);
+  found.place = key.second;
+  found.is_exact = key.first == found.frame;
+  return found;
+}
+
+bool loops(const NodeContent& node) {
+  return node.attributes.get("_loop") == "1";
+}
+
+KeyInForce frame_in_force(const NodeContent& transform, int frame) {
+  return key_in_force(transform.frames, loops(transform), frame,
+                      [](const Entries& key) -> const Entries& { return key; });
+}
+
+KeyInForce model_in_force(const NodeContent& shape, int frame) {
+  return key_in_force(shape.models, loops(shape), frame, [](const auto& key) -> const Entries& { return key.second; });
+}
+
+/// Gives a transform a place at a frame: its only key, the one that stands there, or a new one.
+void set_motion_at(NodeContent& transform, int frame, const Motion& motion) {
+  if (transform.frames.empty()) transform.frames.emplace_back();
+  const KeyInForce key = frame_in_force(transform, frame);
+  if (transform.frames.size() == 1 || key.is_exact) {
+    set_motion(transform.frames[key.place], motion);
+    return;
+  }
+  // At the end: keys that do not say their frame count by their place.
+  Entries& added = transform.frames.emplace_back();
+  set_motion(added, motion);
+  added.set("_f", std::to_string(key.frame));
+}
+
+/// Where a piece of a grid stands beside its first one.
+Motion from_first_piece(const GridPlan& plan, std::size_t piece) {
+  const DVec3 way = pivot_of(plan.pieces[piece]) - pivot_of(plan.pieces.front());
+  return {{}, vox_from_quoin({std::llround(way.x), std::llround(way.y), std::llround(way.z)})};
+}
+
+/// Looks for ids that no node has.
+class FreshIds {
+ public:
+  explicit FreshIds(const Document* document) {
+    if (document == nullptr) return;
+    for (const Node& node : document->nodes) used_.insert(node.id);
+    // What is referred to and not there must not come to be.
+    used_.insert(document->children.begin(), document->children.end());
+    constexpr std::int32_t kFarEnd = std::numeric_limits<std::int32_t>::max() / 2;
+    if (!used_.empty() && *used_.rbegin() >= 0 && *used_.rbegin() < kFarEnd) next_ = *used_.rbegin() + 1;
+  }
+  std::int32_t take() {
+    while (used_.contains(next_)) ++next_;
+    return next_++;
+  }
+
+ private:
+  std::set<std::int32_t> used_;
+  std::int32_t next_ = kRootTransform;
+};
+
+/// Where children are hung: a group of the source or a new one.
+struct Parent {
+  std::size_t source_node = kNone;  ///< else it is new
+  std::size_t added = kNone;        ///< in RevisedGraph::added
+  Motion world;
+
+  bool operator<(const Parent& other) const {
+    return source_node != other.source_node ? source_node < other.source_node : added < other.added;
+  }
+  [[nodiscard]] bool is_same(const Parent& other) const {
+    return source_node == other.source_node && added == other.added;
+  }
+};
+
+struct ChildChanges {
+  std::set<std::int32_t> removed;
+  std::map<std::int32_t, std::int32_t> replaced;
+  std::vector<std::int32_t> added;
+};
+
+/// What an instance and a group have in common: what its transform says.
+struct Wanted {
+  std::string name;
+  bool visible = true;
+  LayerHandle layer;
+  Parent parent;
+  Motion world;
+};
+
+/// What it was when it was read.
+struct Known {
+  const Hanging& hanging;
+  const std::string& name;
+  bool visible = true;
+  LayerHandle layer;
+  Parent parent;
+};
+
+class GraphRevision {
+ public:
+  GraphRevision(const Scene& scene, const VoxSource& source, const ModelPlan& models, bool keeps_graph)
+      : scene_(scene),
+        source_(source),
+        models_(models),
+        keeps_graph_(keeps_graph),
+        ids_(keeps_graph ? &source.document : nullptr) {
+    out_.is_removed.assign(source.document.nodes.size(), !keeps_graph);
+  }
+
+  Result<RevisedGraph> run();
+  RevisedGraph layers_only() {
+    number_layers();
+    return std::move(out_);
+  }
+
+ private:
+  void number_layers();
+  void find_top();
+  void begin_new_graph();
+  void remove_what_is_gone();
+  void remove(const Hanging& hanging);
+  Status revise_groups();
+  Status revise_group(GroupHandle handle);
+  Status revise_instances();
+  Status revise_instance(const Instance& instance, const Placement& placement, const Instance& before);
+  Status add_instance(InstanceHandle handle, const Instance& instance);
+  Status revise_transform(const Wanted& wanted, const Known& known);
+  void show(const Known& known, bool visible, NodeContent& transform);
+  Status move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read);
+  void show_model(const Placement& placement, const GridPlan& plan);
+  void show_pieces(std::size_t shape, const GridPlan& plan);
+  void name_shapes();
+  void apply_child_changes();
+
+  NodeContent& change(std::size_t node);
+  [[nodiscard]] NodeContent read(std::size_t node) const;
+  [[nodiscard]] std::size_t last_transform(const Hanging& hanging) const;
+  NodeContent& transform_of(const Known& known);
+  [[nodiscard]] Parent parent_in_source(std::size_t group) const;
+  [[nodiscard]] Parent parent_now(GroupHandle group) const;
+  [[nodiscard]] std::int32_t layer_id(LayerHandle layer) const;
+  [[nodiscard]] Result<Motion> place(const Instance& instance, const GridPlan& plan);
+  [[nodiscard]] Motion place(const SceneGroup& group, const Motion& parent);
+  [[nodiscard]] Result<NodeContent> transform_for(const Wanted& wanted, std::int32_t child);
+  void add_models(NodeContent& transform, NodeContent& shape, const Motion& world) const;
+  [[nodiscard]] NodeContent shape_of(std::int32_t id, std::uint32_t model) const;
+
+  const Scene& scene_;
+  const VoxSource& source_;
+  const ModelPlan& models_;
+  bool keeps_graph_;
+  FreshIds ids_;
+  RevisedGraph out_;
+  Parent top_;
+  bool has_top_ = false;
+  std::map<GroupHandle, Parent> groups_;  // of the scene
+  std::map<Parent, ChildChanges> children_;
+  std::map<std::size_t, std::size_t> inserted_;  // transforms that were put above nodes, in RevisedGraph::added
+  std::map<GridHandle, std::vector<std::size_t>> added_shapes_;   // of grids, in RevisedGraph::added
+  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // likewise, in the source's nodes
+};
+
+NodeContent GraphRevision::read(std::size_t node) const {
+  const auto known = out_.changed.find(node);
+  return known != out_.changed.end() ? known->second : node_of(source_, node);
+}
+
+NodeContent& GraphRevision::change(std::size_t node) {
+  if (!source_.placements.is_tree) out_.must_be_new = true;
+  const auto known = out_.changed.find(node);
+  return known != out_.changed.end() ? known->second : out_.changed.emplace(node, read(node)).first->second;
+}
+
+std::size_t GraphRevision::last_transform(const Hanging& hanging) const {
+  if (hanging.transform_count == 0) return kNone;
+  return source_.placements.chains[hanging.first_transform + hanging.transform_count - 1];
+}
+
+Parent GraphRevision::parent_in_source(std::size_t group) const {
+  if (group == kNone) return {source_.placements.top_group, kNone, source_.placements.top_motion};
+  const Hanging& hanging = source_.placements.groups[group];
+  return {hanging.node, kNone, hanging.world};
+}
+
+Parent GraphRevision::parent_now(GroupHandle group) const {
+  const auto found = groups_.find(group);
+  return found == groups_.end() ? top_ : found->second;
+}
+
+std::int32_t GraphRevision::layer_id(LayerHandle layer) const {
+  if (scene_.layers().find(layer) != nullptr) return out_.layer_ids[layer.index];
+  return out_.adds_only_layer ? kOnlyLayer : kNoLayer;
+}
+
+/// Layers of the source keep their ids; new ones take the next.
+void GraphRevision::number_layers() {
+  const std::vector<Layer>& layers = source_.document.layers;
+  std::set<std::int32_t> used;
+  for (const Layer& layer : layers) used.insert(layer.id);
+  for (const Node& node : source_.document.nodes) used.insert(node.layer);
+  std::int32_t next = 0;
+  scene_.layers().for_each([&](LayerHandle handle, const SceneLayer&) {
+    out_.layer_ids.resize(handle.index + std::size_t{1}, kNoLayer);
+    const auto known = std::ranges::find(source_.layer_of, std::size_t{handle.index});
+    if (handle.generation == 0 && known != source_.layer_of.end()) {
+      out_.layer_ids[handle.index] = layers[static_cast<std::size_t>(known - source_.layer_of.begin())].id;
+      return;
+    }
+    while (used.contains(next)) ++next;
+    out_.layer_ids[handle.index] = next++;
+  });
+  out_.adds_only_layer = layers.empty() && scene_.layers().empty() && !keeps_graph_;
+}
+
+void GraphRevision::begin_new_graph() {
+  NodeContent transform;
+  transform.kind = NodeKind::Transform;
+  transform.id = ids_.take();
+  NodeContent group;
+  group.kind = NodeKind::Group;
+  group.id = ids_.take();
+  transform.children = {group.id};
+  transform.frames.emplace_back();
+  out_.added.push_back(std::move(transform));
+  out_.added.push_back(std::move(group));
+  top_ = {kNone, 1, {}};
+  has_top_ = true;
+}
+
+void GraphRevision::find_top() {
+  if (!keeps_graph_) {
+    begin_new_graph();
+    return;
+  }
+  top_ = parent_in_source(kNone);
+  has_top_ = top_.source_node != kNone;
+}
+
+/// Takes it and the chain above it from the graph; what is below stays, or goes by itself.
+void GraphRevision::remove(const Hanging& hanging) {
+  if (!source_.placements.is_tree) out_.must_be_new = true;
+  const Document& document = source_.document;
+  std::size_t highest = hanging.node;
+  for (std::size_t i = hanging.transform_count; i-- > 0;) {
+    highest = source_.placements.chains[hanging.first_transform + i];
+    out_.is_removed[highest] = true;
+  }
+  out_.is_removed[hanging.node] = true;
+  const Parent parent = parent_in_source(hanging.parent);
+  if (parent.source_node == kNone) {
+    out_.must_be_new = true;  // it is the root
+  } else {
+    children_[parent].removed.insert(document.nodes[highest].id);
+  }
+}
+
+void GraphRevision::remove_what_is_gone() {
+  const Placements& placements = source_.placements;
+  for (std::size_t i = 0; i < placements.groups.size(); ++i) {
+    if (scene_.groups().find({static_cast<std::uint32_t>(i), 0}) == nullptr) remove(placements.groups[i]);
+  }
+  for (std::size_t i = 0; i < placements.all.size(); ++i) {
+    const Instance* instance = scene_.instances().find({static_cast<std::uint32_t>(i), 0});
+    if (instance == nullptr || models_.find(instance->grid) == nullptr) remove(placements.all[i]);
+  }
+}
+
+/// Where the pivot that the file gives the grid's first piece goes.
+Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& plan) {
+  if (instance.voxel_size != 1.0) {
+    return make_error(ErrorCode::Unsupported, instance_text(instance) + " is scaled, which a .vox file cannot say");
+  }
+  const auto orientation = orientation_from_turn({instance.rotation, instance.mirrored});
+  if (!orientation.has_value()) {
+    return make_error(ErrorCode::Unsupported,
+                      instance_text(instance) + " is not turned by quarter turns, as .vox requires");
+  }
+  bool is_exact = true;
+  const DVec3 world = world_from_grid(instance, scene_.grids()[plan.grid], pivot_of(plan.pieces.front()));
+  const auto translation = rounded(world, is_exact);
+  if (!translation) {
+    return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " lies too far out for a .vox file");
+  }
+  if (!is_exact) ++out_.rounded;
+  return Motion{*orientation, *translation};
+}
+
+/// A group's place is for handling it alone: what the file cannot say of it is left out, and nothing else moves.
+Motion GraphRevision::place(const SceneGroup& group, const Motion& parent) {
+  bool is_exact = true;
+  const auto translation = rounded(group.position, is_exact);
+  const auto orientation = orientation_from_turn({group.rotation, group.mirrored});
+  if (!translation || !orientation) {
+    ++out_.turns_left_out;
+    return {parent.orientation, translation.value_or(parent.translation)};
+  }
+  return {*orientation, *translation};
+}
+
+/// The transform right above a node, put there where there is none.
+NodeContent& GraphRevision::transform_of(const Known& known) {
+  const std::size_t last = last_transform(known.hanging);
+  if (last != kNone) return change(last);
+  const auto [place, is_new] = inserted_.try_emplace(known.hanging.node, out_.added.size());
+  if (!is_new) return out_.added[place->second];
+  NodeContent inserted;
+  inserted.kind = NodeKind::Transform;
+  inserted.id = ids_.take();
+  inserted.children = {source_.document.nodes[known.hanging.node].id};
+  inserted.frames.emplace_back();
+  if (known.parent.source_node == kNone || !source_.placements.is_tree) out_.must_be_new = true;
+  children_[known.parent].replaced.emplace(inserted.children.front(), inserted.id);
+  return out_.added.emplace_back(std::move(inserted));
+}
+
+void GraphRevision::show(const Known& known, bool visible, NodeContent& transform) {
+  if (!visible) {
+    transform.attributes.set("_hidden", "1");
+    return;
+  }
+  transform.attributes.erase("_hidden");
+  const Hanging& hanging = known.hanging;
+  if (source_.document.nodes[hanging.node].hidden) change(hanging.node).attributes.erase("_hidden");
+  for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
+    const std::size_t above = source_.placements.chains[hanging.first_transform + i];
+    const bool on_hidden_layer = std::ranges::any_of(source_.document.layers, [&](const Layer& layer) {
+      return layer.hidden && layer.id == source_.document.nodes[above].layer;
+    });
+    if (!on_hidden_layer && !source_.document.nodes[above].hidden) continue;
+    NodeContent& node = change(above);
+    node.attributes.erase("_hidden");
+    if (on_hidden_layer) node.layer = kNoLayer;
+  }
+}
+
+/// `transform`: null where there is none; then it is put in when it has to move.
+Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read) {
+  const Hanging& hanging = known.hanging;
+  const bool is_elsewhere = !wanted.parent.is_same(known.parent);
+  const Motion above_now = wanted.parent.world * hanging.before;
+  const Motion above_before = hanging.parent_motion * hanging.before;
+  const Motion local = inverse(above_now) * wanted.world;
+  Motion now = inverse(above_before) * hanging.world;
+  if (is_elsewhere && read.frames.size() > 1) {
+    // All keys come along.
+    const Motion from_before = inverse(above_now) * above_before;
+    if (transform == nullptr) transform = &transform_of(known);
+    for (Entries& key : transform->frames) {
+      const Motion motion = from_before * motion_of(key);
+      if (!has_32_bits(motion.translation)) {
+        return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" moves too far out for a .vox file");
+      }
+      set_motion(key, motion);
+    }
+    now = from_before * now;
+  }
+  if (local == now) return {};
+  if (!has_32_bits(local.translation)) {
+    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" lies too far out for a .vox file");
+  }
+  set_motion_at(transform != nullptr ? *transform : transform_of(known), source_.frame, local);
+  return {};
+}
+
+Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known) {
+  const Hanging& hanging = known.hanging;
+  if (wanted.name != known.name) {
+    transform_of(known).attributes.set_or_erase("_name", printable(wanted.name));
+    if (source_.document.nodes[hanging.node].kind == NodeKind::Group) {
+      if (!source_.document.nodes[hanging.node].name.empty()) change(hanging.node).attributes.erase("_name");
+    }
+  }
+  if (wanted.visible != known.visible) show(known, wanted.visible, transform_of(known));
+  if (wanted.layer != known.layer) transform_of(known).layer = layer_id(wanted.layer);
+  const std::size_t last = last_transform(hanging);
+  const NodeContent read_transform = last == kNone ? NodeContent{} : read(last);
+  const bool is_changed = last != kNone && out_.changed.contains(last);
+  const bool is_elsewhere = !wanted.parent.is_same(known.parent);
+  NodeContent* transform = is_changed ? &change(last) : nullptr;
+  if (Status moved = move(wanted, known, transform, read_transform); !moved) return moved;
+  if (!is_elsewhere) return {};
+  if (!source_.placements.is_tree || known.parent.source_node == kNone) out_.must_be_new = true;
+  const bool has_chain = hanging.transform_count > 0;
+  std::int32_t top =
+      source_.document.nodes[has_chain ? source_.placements.chains[hanging.first_transform] : hanging.node].id;
+  ChildChanges& before = children_[known.parent];
+  before.removed.insert(top);
+  // A transform that was put in goes along.
+  if (const auto inserted = before.replaced.find(top); inserted != before.replaced.end()) top = inserted->second;
+  children_[wanted.parent].added.push_back(top);
+  return {};
+}
+
+Status GraphRevision::revise_group(GroupHandle handle) {
+  const SceneGroup& group = scene_.groups()[handle];
+  Wanted wanted{group.name, group.visible, group.layer, parent_now(parent_of(scene_, handle)), {}};
+  if (scene_.layers().find(wanted.layer) == nullptr) wanted.layer = {};
+  const SceneGroup* before = keeps_graph_ ? source_.scene.groups().find(handle) : nullptr;
+  if (before == nullptr) {
+    wanted.world = place(group, wanted.parent.world);
+    const std::int32_t id = ids_.take();
+    NodeContent content;
+    content.kind = NodeKind::Group;
+    content.id = ids_.take();
+    auto transform = transform_for(wanted, content.id);
+    if (!transform) return transform.error();
+    transform->id = id;
+    children_[wanted.parent].added.push_back(id);
+    if (wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
+    out_.added.push_back(std::move(*transform));
+    groups_[handle] = {kNone, out_.added.size(), wanted.world};
+    out_.added.push_back(std::move(content));
+    return {};
+  }
+  const Hanging& hanging = source_.placements.groups[handle.index];
+  const Known known{hanging, before->name, before->visible, before->layer, parent_in_source(hanging.parent)};
+  wanted.world = has_same_place(group, *before) ? hanging.world : place(group, wanted.parent.world);
+  groups_[handle] = {hanging.node, kNone, wanted.world};
+  if (!wanted.parent.is_same(known.parent) && wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
+  return revise_transform(wanted, known);
+}
+
+Status GraphRevision::revise_groups() {
+  for (const GroupHandle handle : groups_from_top(scene_)) {
+    if (Status done = revise_group(handle); !done) return done;
+  }
+  return {};
+}
+
+NodeContent GraphRevision::shape_of(std::int32_t id, std::uint32_t model) const {
+  NodeContent shape;
+  shape.kind = NodeKind::Shape;
+  shape.id = id;
+  shape.models.emplace_back(model, Entries{});
+  return shape;
+}
+
+/// A new transform, without an id.
+Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int32_t child) {
+  NodeContent transform;
+  transform.kind = NodeKind::Transform;
+  transform.children = {child};
+  transform.layer = layer_id(wanted.layer);
+  transform.attributes.set_or_erase("_name", printable(wanted.name));
+  if (!wanted.visible) transform.attributes.set("_hidden", "1");
+  const Motion local = inverse(wanted.parent.world) * wanted.world;
+  if (!has_32_bits(local.translation)) {
+    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" lies too far out for a .vox file");
+  }
+  set_motion(transform.frames.emplace_back(), local);
+  return transform;
+}
+
+/// Without a scene graph each model was a frame: they stay so. Requires: it is the instance that was read.
+void GraphRevision::add_models(NodeContent& transform, NodeContent& shape, const Motion& world) const {
+  const auto lone = [&](std::size_t model) {
+    Motion motion;
+    motion.translation[2] = source_.document.models[model].size.z / 2;
+    return motion;
+  };
+  const Motion moved = world * inverse(lone(static_cast<std::size_t>(source_.frame)));
+  transform.frames.clear();
+  shape.models.clear();
+  for (std::size_t i = 0; i < source_.document.models.size(); ++i) {
+    const bool is_shown = i == static_cast<std::size_t>(source_.frame);
+    Entries& key = transform.frames.emplace_back();
+    set_motion(key, is_shown ? world : moved * lone(i));
+    key.set("_f", std::to_string(i));
+    shape.models.emplace_back(static_cast<std::uint32_t>(i), Entries{}).second.set("_f", std::to_string(i));
+  }
+}
+
+Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instance) {
+  const GridPlan& plan = *models_.find(instance.grid);
+  const auto world = place(instance, plan);
+  if (!world) return world.error();
+  Wanted wanted{instance.name, instance.visible, instance.layer, parent_now(instance.group), *world};
+  const std::int32_t id = ids_.take();
+  auto transform = transform_for(wanted, ids_.take());
+  if (!transform) return transform.error();
+  transform->id = id;
+  NodeContent shape = shape_of(transform->children.front(), plan.first_model);
+  const bool was_frame = source_.document.nodes.empty() && source_.document.models.size() > 1 &&
+                         source_.scene.instances().find(handle) != nullptr &&
+                         plan.source_model == static_cast<std::size_t>(source_.frame);
+  if (was_frame) add_models(*transform, shape, inverse(wanted.parent.world) * *world);
+  children_[wanted.parent].added.push_back(id);
+  if (wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
+  out_.added.push_back(std::move(*transform));
+  const std::size_t at = out_.added.size();
+  out_.added.push_back(std::move(shape));
+  if (plan.pieces.size() > 1) {
+    out_.added[at].kind = NodeKind::Group;
+    out_.added[at].models.clear();
+    for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
+      NodeContent piece;
+      piece.kind = NodeKind::Transform;
+      piece.id = ids_.take();
+      piece.children = {ids_.take()};
+      piece.layer = layer_id({});
+      piece.attributes.set_or_erase("_name", printable(instance.name));
+      set_motion(piece.frames.emplace_back(), from_first_piece(plan, i));
+      out_.added[at].children.push_back(piece.id);
+      NodeContent part = shape_of(piece.children.front(), plan.first_model + static_cast<std::uint32_t>(i));
+      out_.added.push_back(std::move(piece));
+      added_shapes_[plan.grid].push_back(out_.added.size());
+      out_.added.push_back(std::move(part));
+    }
+  } else {
+    added_shapes_[plan.grid].push_back(at);
+  }
+  return {};
+}
+
+/// A shape that shows one model at the frame becomes a group of shapes that show its pieces then, and nothing at other
+/// frames; what it shows at those is a shape beside them.
+void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
+  NodeContent& shape = change(shape_node);
+  const NodeContent before = shape;
+  const KeyInForce now = model_in_force(before, source_.frame);
+  const bool has_others = before.models.size() > 1;
+  const std::uint32_t nothing = models_.count;
+  out_.has_empty_model = out_.has_empty_model || has_others;
+  shape.kind = NodeKind::Group;
+  shape.models.clear();
+  shape.attributes = Entries{};
+  if (before.attributes.get("_hidden") == "1") shape.attributes.set("_hidden", "1");
+  std::vector<std::int32_t> children;
+  const auto hang = [&](const Motion& motion, const std::vector<std::uint32_t>& shown) {
+    NodeContent transform;
+    transform.kind = NodeKind::Transform;
+    transform.id = ids_.take();
+    transform.children = {ids_.take()};
+    set_motion(transform.frames.emplace_back(), motion);
+    NodeContent part = before;
+    part.id = transform.children.front();
+    part.attributes.erase("_hidden");
+    for (std::size_t i = 0; i < shown.size(); ++i) part.models[i].first = shown[i];
+    children.push_back(transform.id);
+    out_.added.push_back(std::move(transform));
+    added_shapes_[plan.grid].push_back(out_.added.size());
+    out_.added.push_back(std::move(part));
+  };
+  for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
+    std::vector<std::uint32_t> shown(before.models.size(), nothing);
+    shown[now.place] = plan.first_model + static_cast<std::uint32_t>(i);
+    hang(from_first_piece(plan, i), shown);
+  }
+  if (has_others) {
+    std::vector<std::uint32_t> shown;
+    for (const auto& [model, key] : before.models) shown.push_back(model);
+    shown[now.place] = nothing;
+    hang({}, shown);
+    added_shapes_[plan.grid].pop_back();
+  }
+  shape.children = std::move(children);
+}
+
+void GraphRevision::show_model(const Placement& placement, const GridPlan& plan) {
+  if (plan.pieces.size() > 1) {
+    show_pieces(placement.node, plan);
+    return;
+  }
+  source_shapes_[plan.grid].push_back(placement.node);
+  if (placement.model == plan.first_model) return;
+  NodeContent& shape = change(placement.node);
+  shape.models[model_in_force(shape, source_.frame).place].first = plan.first_model;
+}
+
+Status GraphRevision::revise_instance(const Instance& instance, const Placement& placement, const Instance& before) {
+  const GridPlan& plan = *models_.find(instance.grid);
+  Wanted wanted{instance.name, instance.visible, instance.layer, parent_now(instance.group), placement.world};
+  if (scene_.layers().find(wanted.layer) == nullptr) wanted.layer = {};
+  const Known known{placement, before.name, before.visible, before.layer, parent_in_source(placement.parent)};
+  const bool stands_still = has_same_place(instance, before) && instance.voxel_size == before.voxel_size &&
+                            instance.grid == before.grid && plan.source_model != kNone && !plan.is_resized &&
+                            scene_.grids()[plan.grid].pivot == source_.scene.grids()[plan.grid].pivot;
+  if (!stands_still) {
+    const auto world = place(instance, plan);
+    if (!world) return world.error();
+    wanted.world = *world;
+  }
+  if (!wanted.parent.is_same(known.parent) && wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
+  show_model(placement, plan);
+  return revise_transform(wanted, known);
+}
+
+/// Leaves out instances of grids that are not there.
+Status GraphRevision::revise_instances() {
+  for (const InstanceHandle handle : scene_.instances().handles()) {
+    const Instance& instance = scene_.instances()[handle];
+    if (models_.find(instance.grid) == nullptr) continue;
+    const Instance* before = keeps_graph_ ? source_.scene.instances().find(handle) : nullptr;
+    const Status done = before != nullptr ? revise_instance(instance, source_.placements.all[handle.index], *before)
+                                          : add_instance(handle, instance);
+    if (!done) return done;
+  }
+  return {};
+}
+
+/// Shapes name their grids where the names of instances do not.
+void GraphRevision::name_shapes() {
+  std::map<GridHandle, std::string> of_instances;
+  for (const InstanceHandle handle : scene_.instances().handles()) {
+    const Instance& instance = scene_.instances()[handle];
+    std::string& name = of_instances[instance.grid];
+    if (name.empty()) name = printable(instance.name);
+  }
+  for (const GridPlan& plan : models_.grids) {
+    const std::string wanted = printable(scene_.grids()[plan.grid].name);
+    const std::vector<std::size_t>& known = source_shapes_[plan.grid];
+    std::string read;
+    for (const std::size_t node : known) {
+      if (read.empty()) read = printable(source_.document.nodes[node].name);
+    }
+    const std::string& of_instance = of_instances[plan.grid];
+    if ((read.empty() ? of_instance : read) == wanted) continue;
+    const std::string name = wanted == of_instance ? std::string{} : wanted;
+    for (const std::size_t node : known) change(node).attributes.set_or_erase("_name", name);
+    for (const std::size_t node : added_shapes_[plan.grid]) out_.added[node].attributes.set_or_erase("_name", name);
+  }
+}
+
+void GraphRevision::apply_child_changes() {
+  for (const auto& [parent, changes] : children_) {
+    const bool is_gone = parent.source_node != kNone && out_.is_removed[parent.source_node];
+    if (is_gone || (parent.source_node == kNone && parent.added == kNone)) continue;
+    NodeContent& group = parent.source_node != kNone ? change(parent.source_node) : out_.added[parent.added];
+    std::erase_if(group.children, [&](std::int32_t child) { return changes.removed.contains(child); });
+    for (std::int32_t& child : group.children) {
+      const auto replaced = changes.replaced.find(child);
+      if (replaced != changes.replaced.end()) child = replaced->second;
+    }
+    group.children.insert(group.children.end(), changes.added.begin(), changes.added.end());
+  }
+}
+
+Result<RevisedGraph> GraphRevision::run() {
+  number_layers();
+  find_top();
+  if (keeps_graph_) remove_what_is_gone();
+  if (Status done = revise_groups(); !done) return done.error();
+  if (Status done = revise_instances(); !done) return done.error();
+  name_shapes();
+  apply_child_changes();
+  return std::move(out_);
+}
+
+}  // namespace
+
+NodeContent node_of(const VoxSource& source, std::size_t node) {
+  const vox::Node& known = source.document.nodes[node];
+  const auto& chunks = source.document.chunks;
+  const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkPlace::begin);
+  QUOIN_ASSERT(at != chunks.end() && at->kind == ChunkKind::Node, "every node has its chunk");
+  const std::span<const std::byte> file = source.bytes;
+  return read_node(known.kind, file.subspan(at->begin + kChunkHeaderBytes, at->content_bytes));
+}
+
+RevisedGraph revise_layers(const Scene& scene, const VoxSource& source) {
+  ModelPlan nothing;
+  return GraphRevision(scene, source, nothing, true).layers_only();
+}
+
+Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models,
+                                  bool keeps_graph) {
+  return GraphRevision(scene, source, models, keeps_graph).run();
+}
+
+bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models) {
+  if (!source.document.nodes.empty()) return false;
+  if (!scene.groups().empty()) return true;
+  if (source.placements.all.empty() || scene.instances().size() != 1) return !scene.instances().empty();
+  const auto handle = scene.instances().handle_at(0);
+  const Instance* before = handle ? source.scene.instances().find(*handle) : nullptr;
+  if (before == nullptr) return true;
+  const Instance& instance = scene.instances()[*handle];
+  const GridPlan* plan = models.find(instance.grid);
+  if (plan == nullptr || plan->source_model != static_cast<std::size_t>(source.frame)) return true;
+  const SceneGrid& grid = scene.grids()[instance.grid];
+  const bool says_nothing =
+      instance.name.empty() && grid.name.empty() && instance.visible && scene.layers().find(instance.layer) == nullptr;
+  // Where the reader would place it: on the ground, centred.
+  const int height = plan->pieces.front().size.y;
+  const DVec3 pivot = world_from_grid(instance, grid, pivot_of(plan->pieces.front()));
+  return !says_nothing || instance.rotation != before->rotation || instance.mirrored || instance.voxel_size != 1.0 ||
+         pivot != DVec3(0, height / 2, 0);
+}
+
+}  // namespace quoin::vox

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+#include "io/vox/source.h"
+#include "io/vox/write/model_plan.h"
+#include "io/vox/write/node_content.h"
+
+namespace quoin::vox {
+
+/// What the scene graph and the layers of a file become.
+struct RevisedGraph {
+  std::map<std::size_t, NodeContent> changed;  ///< by their places in the source's nodes
+  std::vector<bool> is_removed;                ///< likewise
+  std::vector<NodeContent> added;
+  std::vector<std::int32_t> layer_ids;  ///< by slots of the scene's layers
+  bool adds_only_layer = false;         ///< the file has none, and its shapes lie on layer 0
+  std::int64_t rounded = 0;             ///< instances between voxels, which were moved
+  std::int64_t turns_left_out = 0;      ///< groups whose turn or mirror the file cannot say
+  bool has_empty_model = false;         ///< shapes show one that has no voxel, whose number is the plan's count
+  /// A node with several parents has to change, so the graph has to be written anew.
+  bool must_be_new = false;
+};
+
+/// Compares the scene with the source, and changes of its graph what differs. Without `keeps_graph` all nodes are new.
+///
+/// Errors: as write_vox.
+[[nodiscard]] Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models,
+                                                bool keeps_graph);
+
+/// The same of a file without a scene graph that needs none: its layers.
+[[nodiscard]] RevisedGraph revise_layers(const Scene& scene, const VoxSource& source);
+
+/// What a node of the source says.
+[[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
+
+/// Whether a file without a scene graph shows the scene no more, but would need one: it shows one model, where its reader
+/// places it.
+[[nodiscard]] bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models);
+
+}  // namespace quoin::vox

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+#include "io/vox/source.h"
+#include "io/vox/write/write.h"
+
+namespace quoin::vox {
+
+/// What becomes of a grid in the file.
+struct GridPlan {
+  GridHandle grid;
+  std::vector<Piece> pieces;         ///< never empty; of a model of the source one
+  std::size_t source_model = kNone;  ///< the source's model that it stays; kNone for new models
+  bool is_resized = false;           ///< of a model of the source: its box changed
+  bool is_changed = false;           ///< likewise its voxels, or where they lie in the box
+  std::uint32_t first_model = 0;     ///< number of its first piece's model: the source's come first, then new ones
+};
+
+/// All grids, in the order of their handles.
+struct ModelPlan {
+  std::vector<GridPlan> grids;
+  std::uint32_t count = 0;  ///< of models, the source's and new ones
+
+  /// Null for a grid that is not in the scene.
+  [[nodiscard]] const GridPlan* find(GridHandle grid) const;
+};
+
+/// Which models the grids become. `keeps_graph`: the transforms of the source stay, so the pivot of a model that
+/// several keys show has to stay where it is.
+[[nodiscard]] ModelPlan plan_models(const Scene& scene, const VoxSource& source, bool keeps_graph);
+
+/// The content of a changed model's XYZI (or TDCZ) chunk: voxels that are still there in the file's order, then new
+/// ones. Voxels that cannot be seen, outside the model or of colour 0, stay as long as its box does.
+///
+/// Memory: up to a byte a voxel of the box and, of a TDCZ, four a voxel.
+/// Errors: those of unpack_voxels.
+[[nodiscard]] Result<std::vector<std::byte>> revised_voxels(const Grid& grid, const GridPlan& plan,
+                                                            const VoxSource& source,
+                                                            const std::vector<std::uint8_t>& index_of_type);
+
+}  // namespace quoin::vox

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/vox/chunks.h"
+#include "io/vox/write/chunk_writer.h"
+
+namespace quoin::vox {
+
+/// Keys and values of a DICT, to be changed and written again: every entry stays where it is, bytes as they are.
+class Entries {
+ public:
+  Entries() = default;
+  explicit Entries(const Dict& dict) {
+    for (const auto& [key, value] : dict.entries) all_.emplace_back(key, value);
+  }
+
+  /// The last value of that key; empty when there is none.
+  [[nodiscard]] std::string_view get(std::string_view key) const;
+  /// The last value of that key, or a new one after all others.
+  void set(std::string_view key, std::string value);
+  void erase(std::string_view key);
+  /// Sets it, or erases it where the value says nothing.
+  void set_or_erase(std::string_view key, const std::string& value);
+
+  [[nodiscard]] const ChunkWriter::Entries& all() const { return all_; }
+
+ private:
+  ChunkWriter::Entries all_;
+};
+
+/// A chunk of the scene graph with all that it says, to be changed and written again.
+struct NodeContent {
+  NodeKind kind = NodeKind::Group;
+  std::int32_t id = 0;
+  Entries attributes;
+  std::int32_t reserved = -1;                             ///< of a transform
+  std::int32_t layer = -1;                                ///< of a transform
+  std::vector<std::int32_t> children;                     ///< of a transform one; of a group
+  std::vector<Entries> frames;                            ///< of a transform, in the file's order
+  std::vector<std::pair<std::uint32_t, Entries>> models;  ///< of a shape, in the file's order
+  std::vector<std::byte> tail;                            ///< what follows in the chunk
+};
+
+/// Requires: `content` is that of a chunk of this kind, which `parse_document` has read without an error.
+[[nodiscard]] NodeContent read_node(NodeKind kind, std::span<const std::byte> content);
+
+/// Writes the content without a chunk's header: what read_node read, the same bytes.
+void write_node(const NodeContent& node, ChunkWriter& out);
+[[nodiscard]] std::string_view chunk_id(NodeKind kind);
+
+/// What a key of a transform says of its place: `_r` and `_t`, each left out where it says nothing and was not there.
+/// Requires of a motion: 32 bits.
+void set_motion(Entries& key, const Motion& motion);
+[[nodiscard]] Motion motion_of(const Entries& key);
+
+}  // namespace quoin::vox

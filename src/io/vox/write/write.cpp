@@ -1,0 +1,617 @@
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/io/vox.h>
+
+#include "io/field_check.h"
+#include "io/text.h"
+#include "io/vox/chunk_reader.h"
+#include "io/vox/materials.h"
+#include "io/vox/source.h"
+#include "io/vox/write/chunk_writer.h"
+#include "io/vox/write/graph_revision.h"
+#include "io/vox/write/model_plan.h"
+#include "io/vox/write/node_content.h"
+#include "io/vox/write/write.h"
+#include "io/whole_file.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr std::uint32_t kVersion = 150;
+constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
+// Of a file: its name, its version, and what MAIN's header says.
+constexpr std::size_t kChildrenOfMain = 16;
+
+/// A file without anything, of which a scene that came from nowhere is a revision.
+const VoxSource& no_source() {
+  static const VoxSource source = [] {
+    VoxSource empty;
+    for (std::size_t i = 0; i < vox::kColours; ++i) empty.type_of[i] = static_cast<std::uint8_t>(i);
+    return empty;
+  }();
+  return source;
+}
+
+/// What is written after which chunk of the source; kNone: before the first.
+struct Anchors {
+  std::size_t models = vox::kNone;
+  std::size_t nodes = vox::kNone;
+  std::size_t layers = vox::kNone;
+  std::size_t palette = vox::kNone;
+  std::size_t materials = vox::kNone;
+};
+
+Anchors anchors_of(const vox::Document& document) {
+  Anchors last;
+  for (std::size_t i = 0; i < document.chunks.size(); ++i) {
+    switch (document.chunks[i].kind) {
+      case vox::ChunkKind::ModelCount:
+      case vox::ChunkKind::Size:
+      case vox::ChunkKind::Voxels:
+      case vox::ChunkKind::PackedVoxels:
+        last.models = i;
+        break;
+      case vox::ChunkKind::Node:
+        last.nodes = i;
+        break;
+      case vox::ChunkKind::Layer:
+        last.layers = i;
+        break;
+      case vox::ChunkKind::Palette:
+        last.palette = i;
+        break;
+      case vox::ChunkKind::Material:
+        last.materials = i;
+        break;
+      case vox::ChunkKind::Other:
+        break;
+    }
+  }
+  const auto after = [](std::size_t place, std::size_t before) { return place == vox::kNone ? before : place; };
+  last.nodes = after(last.nodes, last.models);
+  last.layers = after(last.layers, last.nodes);
+  last.palette = after(last.palette, last.layers);
+  last.materials = after(last.materials, last.palette);
+  return last;
+}
+
+struct Chunk {
+  std::string_view id;
+  std::vector<std::byte> content;
+};
+
+/// Writes a file again with what a scene changed; of a scene without a file all is new.
+class Writer {
+ public:
+  Writer(const Scene& scene, const VoxSource& source) : scene_(scene), source_(source) {}
+
+  Result<std::vector<std::byte>> run(std::vector<std::string>& warnings);
+  /// Only what `run` would warn of. Errors: those of `run`, but for the size.
+  Result<std::vector<std::string>> losses();
+
+ private:
+  [[nodiscard]] bool is_new() const { return &source_ == &no_source(); }
+  Status plan();
+  Status plan_types();
+  Status plan_graph();
+  void number_models();
+  void renumber_shapes();
+  [[nodiscard]] std::vector<bool> shown_models() const;
+  void warn(std::vector<std::string>& warnings) const;
+
+  [[nodiscard]] std::size_t bytes_of_new_models() const;
+  void write_chunks();
+  void write_after(std::size_t chunk);
+  void write_chunk(const vox::ChunkPlace& place);
+  [[nodiscard]] std::optional<Chunk> revised(const vox::ChunkPlace& place);
+  [[nodiscard]] std::optional<Chunk> revised_count(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_size(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_model(const vox::ChunkPlace& place);
+  [[nodiscard]] std::optional<Chunk> revised_node(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_layer(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_material(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_palette(const vox::ChunkPlace& place) const;
+  [[nodiscard]] bool is_removed(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::span<const std::byte> content_of(const vox::ChunkPlace& place) const;
+  [[nodiscard]] const SceneLayer* layer_of(std::size_t number) const;
+  [[nodiscard]] vox::Attributes material(std::size_t index) const;
+  [[nodiscard]] bool has_changed_material(std::size_t index) const;
+  [[nodiscard]] bool has_changed_colour() const;
+
+  void write_new_models();
+  void write_new_nodes();
+  void write_new_layers();
+  void write_new_palette();
+  void write_new_materials();
+
+  const Scene& scene_;
+  const VoxSource& source_;
+  vox::RevisedTypes types_;
+  vox::ModelPlan models_;
+  vox::RevisedGraph graph_;
+  bool loses_animation_ = false;
+  std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null where the model is no grid any more
+  std::vector<std::uint32_t> number_of_;  // of models, by their numbers in the plan; kGone for those that are left out
+  std::uint32_t model_count_ = 0;
+  std::array<std::size_t, vox::kColours> material_chunk_{};  // by colour index, the last one; kNone without
+  std::size_t palette_chunk_ = vox::kNone;
+  Anchors anchors_;
+  Status failure_;
+  vox::ChunkWriter out_;
+};
+
+Status Writer::plan_types() {
+  if (is_new()) {
+    Result<vox::TypeTable> table = vox::make_type_table(scene_);
+    if (!table) return table.error();
+    types_.table = std::move(*table);
+    return {};
+  }
+  Result<vox::RevisedTypes> types = vox::revise_type_table(scene_, source_);
+  if (!types) return types.error();
+  types_ = std::move(*types);
+  return {};
+}
+
+Status Writer::plan_graph() {
+  const bool has_nodes = !source_.document.nodes.empty();
+  models_ = vox::plan_models(scene_, source_, has_nodes);
+  if (!has_nodes && !is_new() && !vox::needs_graph(scene_, source_, models_)) {
+    graph_ = vox::revise_layers(scene_, source_);
+    return {};
+  }
+  Result<vox::RevisedGraph> graph = vox::revise_graph(scene_, source_, models_, has_nodes);
+  if (!graph) return graph.error();
+  if (graph->must_be_new) {
+    loses_animation_ = vox::is_animated(source_.document);
+    models_ = vox::plan_models(scene_, source_, false);
+    graph = vox::revise_graph(scene_, source_, models_, false);
+    if (!graph) return graph.error();
+  }
+  graph_ = std::move(*graph);
+  return {};
+}
+
+/// By the plan's numbers, whether a shape of the file to be shows them at any frame.
+std::vector<bool> Writer::shown_models() const {
+  const vox::Document& document = source_.document;
+  std::vector<bool> shown(std::size_t{models_.count} + 1);
+  const auto show = [&](const vox::NodeContent& node) {
+    for (const auto& [model, key] : node.models) shown[model] = true;
+  };
+  for (std::size_t i = 0; i < document.nodes.size(); ++i) {
+    const vox::Node& node = document.nodes[i];
+    if (node.kind != vox::NodeKind::Shape || graph_.is_removed[i] || graph_.changed.contains(i)) continue;
+    for (std::size_t key = 0; key < node.key_count; ++key)
+      shown[document.model_keys[node.first_key + key].model] = true;
+  }
+  for (const auto& [place, node] : graph_.changed) {
+    if (!graph_.is_removed[place]) show(node);
+  }
+  for (const vox::NodeContent& node : graph_.added) show(node);
+  return shown;
+}
+
+/// Models whose grid was removed, or became others, and that nothing shows any more, are left out.
+void Writer::number_models() {
+  const std::vector<bool> shown = shown_models();
+  const std::size_t known = source_.document.models.size();
+  plan_of_.assign(known, nullptr);
+  for (const vox::GridPlan& grid : models_.grids) {
+    if (grid.source_model != vox::kNone) plan_of_[grid.source_model] = &grid;
+  }
+  number_of_.assign(shown.size(), kGone);
+  bool is_same = true;
+  for (std::uint32_t model = 0; model < models_.count; ++model) {
+    if (model < known && plan_of_[model] == nullptr && !shown[model]) {
+      is_same = false;
+    } else {
+      number_of_[model] = model_count_++;
+    }
+  }
+  if (graph_.has_empty_model) number_of_[models_.count] = model_count_++;
+  if (!is_same) renumber_shapes();
+}
+
+void Writer::renumber_shapes() {
+  for (std::size_t i = 0; i < source_.document.nodes.size(); ++i) {
+    const bool stays = source_.document.nodes[i].kind == vox::NodeKind::Shape && !graph_.is_removed[i];
+    if (stays) graph_.changed.try_emplace(i, vox::node_of(source_, i));
+  }
+  const auto renumber = [&](vox::NodeContent& shape) {
+    for (auto& [model, key] : shape.models) model = number_of_[model];
+  };
+  for (auto& [place, node] : graph_.changed) {
+    if (!graph_.is_removed[place]) renumber(node);
+  }
+  for (vox::NodeContent& node : graph_.added) renumber(node);
+}
+
+Status Writer::plan() {
+  for (const GridHandle handle : scene_.grids().handles()) {
+    if (Status sound = check_has_no_field(scene_.grids()[handle]); !sound) return sound;
+  }
+  if (Status done = plan_types(); !done) return done;
+  if (Status done = plan_graph(); !done) return done;
+  number_models();
+  anchors_ = anchors_of(source_.document);
+  material_chunk_.fill(vox::kNone);
+  for (std::size_t i = 0; i < source_.document.chunks.size(); ++i) {
+    const vox::ChunkPlace& place = source_.document.chunks[i];
+    if (place.kind == vox::ChunkKind::Material) material_chunk_[place.number] = i;
+    if (place.kind == vox::ChunkKind::Palette) palette_chunk_ = i;
+  }
+  return {};
+}
+
+void Writer::warn(std::vector<std::string>& warnings) const {
+  const auto count = [&](const char* of_what, std::int64_t number) {
+    if (number > 0) warnings.push_back(std::string(of_what) + ": " + std::to_string(number));
+  };
+  count("instances between voxels moved to the nearest", graph_.rounded);
+  count("groups whose turn a .vox file cannot say are not turned", graph_.turns_left_out);
+  count("colours of the palette that no voxel has gave way to new ones", types_.replaced);
+  count("lamps left out, which .vox does not hold (a .json keeps them)",
+        static_cast<std::int64_t>(scene_.lamps.size()));
+  if (loses_animation_) {
+    warnings.emplace_back(
+        "animation is left out: nodes of the file's scene graph have several parents, and one changed");
+  }
+}
+
+std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) const {
+  return std::span(source_.bytes).subspan(place.begin + vox::kChunkHeaderBytes, place.content_bytes);
+}
+
+/// Null when the scene has it no more.
+const SceneLayer* Writer::layer_of(std::size_t number) const {
+  const std::size_t slot = source_.layer_of[number];
+  return slot == vox::kNone ? nullptr : scene_.layers().find({static_cast<std::uint32_t>(slot), 0});
+}
+
+bool Writer::is_removed(const vox::ChunkPlace& place) const {
+  switch (place.kind) {
+    case vox::ChunkKind::Size:
+    case vox::ChunkKind::Voxels:
+    case vox::ChunkKind::PackedVoxels:
+      return number_of_[place.number] == kGone;
+    case vox::ChunkKind::Node:
+      return graph_.is_removed[place.number];
+    case vox::ChunkKind::Layer:
+      return source_.layer_of[place.number] != vox::kNone && layer_of(place.number) == nullptr;
+    default:
+      return false;
+  }
+}
+
+std::optional<Chunk> Writer::revised_count(const vox::ChunkPlace& place) const {
+  if (place.content_bytes < 4 || model_count_ == source_.document.models.size()) return std::nullopt;
+  vox::ChunkWriter content;
+  content.u32(model_count_);
+  content.raw(content_of(place).subspan(4));
+  return Chunk{"PACK", content.take()};
+}
+
+std::optional<Chunk> Writer::revised_size(const vox::ChunkPlace& place) const {
+  const vox::GridPlan* plan = plan_of_[place.number];
+  if (plan == nullptr || !plan->is_resized) return std::nullopt;
+  vox::ChunkWriter content;
+  const IVec3 size = plan->pieces.front().size;
+  for (const int edge : {size.x, size.z, size.y}) content.i32(edge);
+  content.raw(content_of(place).subspan(12));
+  return Chunk{"SIZE", content.take()};
+}
+
+std::optional<Chunk> Writer::revised_model(const vox::ChunkPlace& place) {
+  const vox::GridPlan* plan = plan_of_[place.number];
+  if (plan == nullptr || !plan->is_changed) return std::nullopt;
+  auto content = vox::revised_voxels(scene_.grids()[plan->grid].grid, *plan, source_, types_.table.index_of_type);
+  if (!content) {
+    failure_ = content.error();
+    return std::nullopt;
+  }
+  return Chunk{place.kind == vox::ChunkKind::Voxels ? "XYZI" : "TDCZ", std::move(*content)};
+}
+
+std::optional<Chunk> Writer::revised_node(const vox::ChunkPlace& place) const {
+  const auto changed = graph_.changed.find(place.number);
+  if (changed == graph_.changed.end()) return std::nullopt;
+  vox::ChunkWriter content;
+  vox::write_node(changed->second, content);
+  return Chunk{vox::chunk_id(changed->second.kind), content.take()};
+}
+
+std::optional<Chunk> Writer::revised_layer(const vox::ChunkPlace& place) const {
+  const SceneLayer* layer = layer_of(place.number);
+  if (layer == nullptr) return std::nullopt;
+  const vox::Layer& before = source_.document.layers[place.number];
+  if (layer->name == printable(before.name) && layer->visible == !before.hidden) return std::nullopt;
+  const std::span<const std::byte> bytes = content_of(place);
+  vox::ChunkReader reader(bytes, "LAYR", 0, 0, bytes.size());
+  vox::ChunkWriter content;
+  content.i32(reader.i32());
+  vox::Entries attributes(reader.dict());
+  if (layer->name != printable(before.name)) attributes.set_or_erase("_name", printable(layer->name));
+  if (layer->visible == before.hidden) attributes.set_or_erase("_hidden", layer->visible ? "" : "1");
+  content.dict(attributes.all());
+  content.raw(reader.take(reader.remaining()));
+  return Chunk{"LAYR", content.take()};
+}
+
+vox::Attributes Writer::material(std::size_t index) const {
+  return vox::encode_material(vox::default_type_name(source_.type_of[index]), types_.table.by_index[index]);
+}
+
+bool Writer::has_changed_material(std::size_t index) const {
+  const VoxelProperties& now = types_.table.by_index[index];
+  if (is_new()) return !material(index).empty();
+  const VoxelProperties& before = source_.scene.types[source_.type_of[index]];
+  return now != before && material(index) != before.attributes;
+}
+
+std::optional<Chunk> Writer::revised_material(const vox::ChunkPlace& place) const {
+  const std::size_t index = place.number;
+  const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
+  if (index == 0 || material_chunk_[index] != chunk || !has_changed_material(index)) return std::nullopt;
+  const std::span<const std::byte> bytes = content_of(place);
+  vox::ChunkReader reader(bytes, "MATL", 0, 0, bytes.size());
+  vox::ChunkWriter content;
+  content.i32(reader.i32());
+  // MATT has no keys: a MATL takes its place.
+  vox::Attributes wanted = material(index);
+  vox::ChunkWriter::Entries entries;
+  const std::string_view id(reinterpret_cast<const char*>(source_.bytes.data()) + place.begin, 4);
+  if (id == "MATL") {
+    for (const auto& [key, value] : reader.dict().entries) {
+      const auto found = wanted.find(std::string(key));
+      if (found == wanted.end()) continue;
+      entries.emplace_back(found->first, found->second);
+      wanted.erase(found);
+    }
+  }
+  entries.insert(entries.end(), wanted.begin(), wanted.end());
+  content.dict(entries);
+  if (id == "MATL") content.raw(reader.take(reader.remaining()));
+  return Chunk{"MATL", content.take()};
+}
+
+bool Writer::has_changed_colour() const {
+  for (std::size_t index = 1; index < vox::kColours; ++index) {
+    const Rgba8 now = types_.table.by_index[index].colour;
+    const Rgba8 before = source_.scene.types[source_.type_of[index]].colour;
+    if (now.r != before.r || now.g != before.g || now.b != before.b) return true;
+  }
+  return false;
+}
+
+std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const {
+  const auto chunk = static_cast<std::size_t>(&place - source_.document.chunks.data());
+  if (chunk != palette_chunk_ || !has_changed_colour()) return std::nullopt;
+  const std::span<const std::byte> bytes = content_of(place);
+  std::vector<std::byte> content(bytes.begin(), bytes.end());
+  for (std::size_t index = 1; index < vox::kColours; ++index) {
+    const Rgba8& colour = types_.table.by_index[index].colour;
+    const std::size_t entry = 4 * (index - 1);
+    content[entry] = std::byte{colour.r};
+    content[entry + 1] = std::byte{colour.g};
+    content[entry + 2] = std::byte{colour.b};
+  }
+  return Chunk{"RGBA", std::move(content)};
+}
+
+/// The chunk as it is now; nothing when it is as it was.
+std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
+  switch (place.kind) {
+    case vox::ChunkKind::ModelCount:
+      return revised_count(place);
+    case vox::ChunkKind::Size:
+      return revised_size(place);
+    case vox::ChunkKind::Voxels:
+    case vox::ChunkKind::PackedVoxels:
+      return revised_model(place);
+    case vox::ChunkKind::Palette:
+      return revised_palette(place);
+    case vox::ChunkKind::Material:
+      return revised_material(place);
+    case vox::ChunkKind::Node:
+      return revised_node(place);
+    case vox::ChunkKind::Layer:
+      return revised_layer(place);
+    case vox::ChunkKind::Other:
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+void Writer::write_chunk(const vox::ChunkPlace& place) {
+  if (is_removed(place)) return;
+  const std::optional<Chunk> now = revised(place);
+  const std::span<const std::byte> file = source_.bytes;
+  const std::size_t header_and_content = vox::kChunkHeaderBytes + place.content_bytes;
+  if (!now) {
+    out_.raw(file.subspan(place.begin, header_and_content + place.children_bytes));
+    return;
+  }
+  const std::size_t chunk = out_.begin_chunk(now->id);
+  out_.raw(now->content);
+  out_.end_chunk(chunk, place.children_bytes);
+  out_.raw(file.subspan(place.begin + header_and_content, place.children_bytes));
+}
+
+/// The voxels are what takes memory: they go where they belong in the file at once, and the file has room for all that
+/// follows, so that it is not moved.
+std::size_t Writer::bytes_of_new_models() const {
+  constexpr std::size_t kHeadBytes = 64;          // of a model, and more
+  constexpr std::size_t kNodeBytes = 128;         // of a node, with a name that is not long
+  constexpr std::size_t kPaletteBytes = 262'144;  // with materials, and more
+  std::size_t bytes = kPaletteBytes + kNodeBytes * graph_.added.size();
+  for (const vox::GridPlan& plan : models_.grids) {
+    if (plan.source_model != vox::kNone) continue;
+    for (const vox::Piece& piece : plan.pieces) bytes += kHeadBytes + 4 * piece.voxels;
+  }
+  return bytes;
+}
+
+void Writer::write_new_models() {
+  for (const vox::GridPlan& plan : models_.grids) {
+    if (plan.source_model != vox::kNone) continue;
+    std::vector<std::size_t> starts;
+    for (const vox::Piece& piece : plan.pieces) {
+      const std::size_t size_chunk = out_.begin_chunk("SIZE");
+      out_.i32(piece.size.x);
+      out_.i32(piece.size.z);
+      out_.i32(piece.size.y);
+      out_.end_chunk(size_chunk);
+      const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
+      out_.u32(static_cast<std::uint32_t>(piece.voxels));
+      starts.push_back(out_.size());
+      out_.leave(4 * piece.voxels);
+      out_.end_chunk(voxel_chunk);
+    }
+    vox::write_voxels(scene_.grids()[plan.grid].grid, types_.table.index_of_type, plan.pieces, starts, out_.bytes());
+  }
+  if (!graph_.has_empty_model) return;
+  const std::size_t size_chunk = out_.begin_chunk("SIZE");
+  for (int axis = 0; axis < 3; ++axis) out_.i32(1);
+  out_.end_chunk(size_chunk);
+  const std::size_t voxel_chunk = out_.begin_chunk("XYZI");
+  out_.u32(0);
+  out_.end_chunk(voxel_chunk);
+}
+
+void Writer::write_new_nodes() {
+  for (const vox::NodeContent& node : graph_.added) {
+    const std::size_t chunk = out_.begin_chunk(vox::chunk_id(node.kind));
+    vox::write_node(node, out_);
+    out_.end_chunk(chunk);
+  }
+}
+
+void Writer::write_new_layers() {
+  const auto write = [&](std::int32_t id, const SceneLayer& layer) {
+    vox::Entries attributes;
+    attributes.set_or_erase("_name", printable(layer.name));
+    if (!layer.visible) attributes.set("_hidden", "1");
+    const std::size_t chunk = out_.begin_chunk("LAYR");
+    out_.i32(id);
+    out_.dict(attributes.all());
+    out_.i32(-1);  // reserved
+    out_.end_chunk(chunk);
+  };
+  if (graph_.adds_only_layer) write(0, {});
+  scene_.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) {
+    const bool was_there = handle.generation == 0 &&
+                           std::ranges::find(source_.layer_of, std::size_t{handle.index}) != source_.layer_of.end();
+    if (!was_there) write(graph_.layer_ids[handle.index], layer);
+  });
+}
+
+void Writer::write_new_palette() {
+  if (palette_chunk_ != vox::kNone || !(is_new() || has_changed_colour())) return;
+  const std::size_t chunk = out_.begin_chunk("RGBA");
+  for (std::size_t index = 1; index < vox::kColours; ++index) {
+    const Rgba8& colour = types_.table.by_index[index].colour;
+    out_.raw(std::array{std::byte{colour.r}, std::byte{colour.g}, std::byte{colour.b}, std::byte{255}});
+  }
+  out_.u32(0);  // air's entry stands last
+  out_.end_chunk(chunk);
+}
+
+void Writer::write_new_materials() {
+  for (std::size_t index = 1; index < vox::kColours; ++index) {
+    if (material_chunk_[index] != vox::kNone || !has_changed_material(index)) continue;
+    const vox::Attributes attributes = material(index);
+    const std::size_t chunk = out_.begin_chunk("MATL");
+    out_.i32(static_cast<std::int32_t>(index));
+    out_.dict({attributes.begin(), attributes.end()});
+    out_.end_chunk(chunk);
+  }
+}
+
+/// What is new follows the last chunk of its kind.
+void Writer::write_after(std::size_t chunk) {
+  if (anchors_.models == chunk) write_new_models();
+  if (anchors_.nodes == chunk) write_new_nodes();
+  if (anchors_.layers == chunk) write_new_layers();
+  if (anchors_.palette == chunk) write_new_palette();
+  if (anchors_.materials == chunk) write_new_materials();
+}
+
+void Writer::write_chunks() {
+  write_after(vox::kNone);
+  for (std::size_t i = 0; i < source_.document.chunks.size(); ++i) {
+    write_chunk(source_.document.chunks[i]);
+    write_after(i);
+  }
+}
+
+Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
+  if (Status planned = plan(); !planned) return planned.error();
+  const std::span<const std::byte> file = source_.bytes;
+  out_.reserve(file.size() + bytes_of_new_models());
+  if (is_new()) {
+    out_.text("VOX ");
+    out_.u32(kVersion);
+    static_cast<void>(out_.begin_chunk("MAIN"));
+  } else {
+    out_.raw(file.first(source_.document.chunks_begin));
+  }
+  const std::size_t begin = out_.size();
+  write_chunks();
+  if (!failure_) return failure_.error();
+  if (out_.size() > std::numeric_limits<std::uint32_t>::max()) {
+    return make_error(ErrorCode::LimitExceeded, "the scene takes more than the 4 GiB that a .vox file can hold");
+  }
+  warn(warnings);
+  const auto before =
+      file.subspan(source_.document.chunks_begin, source_.document.chunks_end - source_.document.chunks_begin);
+  if (!is_new() && std::ranges::equal(out_.bytes().subspan(begin), before)) return source_.bytes;
+  out_.patch(kChildrenOfMain, out_.size() - begin);
+  out_.raw(file.subspan(source_.document.chunks_end));
+  return out_.take();
+}
+
+Result<std::vector<std::string>> Writer::losses() {
+  if (Status planned = plan(); !planned) return planned.error();
+  std::vector<std::string> warnings;
+  warn(warnings);
+  return warnings;
+}
+
+const VoxSource& source_of(const LoadedScene& loaded) {
+  return loaded.source != nullptr ? *loaded.source : no_source();
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings) {
+  return Writer(scene, no_source()).run(warnings);
+}
+
+Result<std::vector<std::byte>> write_vox(const LoadedScene& loaded, std::vector<std::string>& warnings) {
+  return Writer(loaded.scene, source_of(loaded)).run(warnings);
+}
+
+Result<std::uint64_t> write_vox(const Scene& scene, const std::filesystem::path& path,
+                                std::vector<std::string>& warnings) {
+  return write_whole(path, write_vox(scene, warnings));
+}
+
+Result<std::uint64_t> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
+                                std::vector<std::string>& warnings) {
+  return write_whole(path, write_vox(loaded, warnings));
+}
+
+Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded) {
+  return Writer(loaded.scene, source_of(loaded)).losses();
+}
+
+}  // namespace quoin
