@@ -126,14 +126,14 @@ TEST(VoxRead, HiddenNodesAndLayersHideWhatIsBelow) {
   const std::vector<std::byte> bytes = builder.file();
   const LoadedScene loaded = load(bytes);
   ASSERT_EQ(loaded.scene.instances().size(), 4U);
-  EXPECT_FALSE(instance_at(loaded, 0).visible);
-  EXPECT_FALSE(instance_at(loaded, 1).visible);
-  EXPECT_TRUE(instance_at(loaded, 2).visible);
-  EXPECT_FALSE(instance_at(loaded, 3).visible);
+  EXPECT_FALSE(is_shown(loaded.scene, instance_at(loaded, 0)));
+  EXPECT_FALSE(is_shown(loaded.scene, instance_at(loaded, 1)));
+  EXPECT_TRUE(is_shown(loaded.scene, instance_at(loaded, 2)));
+  EXPECT_FALSE(is_shown(loaded.scene, instance_at(loaded, 3)));
   EXPECT_TRUE(loaded.warnings.empty()) << "they are kept";
   const LoadedScene all = load(bytes, {.show_hidden = true});
   EXPECT_TRUE(all.warnings.empty());
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(instance_at(all, i).visible);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(is_shown(all.scene, instance_at(all, i)));
 }
 
 TEST(VoxRead, PaletteEntryZeroIsColourOne) {

@@ -201,6 +201,9 @@ class GraphRevision {
   Status add_instance(InstanceHandle handle, const Instance& instance);
   Status revise_transform(const Wanted& wanted, const Known& known);
   void show(const Known& known, bool visible, NodeContent& transform);
+  void keep_shown_by_chain(const Wanted& wanted, const Known& known);
+  [[nodiscard]] bool was_hidden(std::int32_t layer) const;
+  [[nodiscard]] bool is_hidden(std::int32_t layer) const;
   Status move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read);
   void show_model(const Placement& placement, const GridPlan& plan);
   void show_pieces(std::size_t shape, const GridPlan& plan);
@@ -398,13 +401,39 @@ void GraphRevision::show(const Known& known, bool visible, NodeContent& transfor
   if (source_.document.nodes[hanging.node].hidden) change(hanging.node).attributes.erase("_hidden");
   for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
     const std::size_t above = source_.placements.chains[hanging.first_transform + i];
-    const bool on_hidden_layer = std::ranges::any_of(source_.document.layers, [&](const Layer& layer) {
-      return layer.hidden && layer.id == source_.document.nodes[above].layer;
-    });
+    const bool on_hidden_layer = was_hidden(source_.document.nodes[above].layer);
     if (!on_hidden_layer && !source_.document.nodes[above].hidden) continue;
     NodeContent& node = change(above);
     node.attributes.erase("_hidden");
     if (on_hidden_layer) node.layer = kNoLayer;
+  }
+}
+
+bool GraphRevision::was_hidden(std::int32_t layer) const {
+  return std::ranges::any_of(source_.document.layers,
+                             [&](const Layer& each) { return each.hidden && each.id == layer; });
+}
+
+bool GraphRevision::is_hidden(std::int32_t layer) const {
+  const std::vector<Layer>& layers = source_.document.layers;
+  for (std::size_t i = 0; i < layers.size(); ++i) {
+    if (layers[i].id != layer || source_.layer_of[i] == kNone) continue;
+    const SceneLayer* now = scene_.layers().find({static_cast<std::uint32_t>(source_.layer_of[i]), 0});
+    if (now != nullptr && !now->visible) return true;
+  }
+  return false;
+}
+
+/// Transforms of a chain above its last one lie on layers of which the scene does not know: when such a layer is shown
+/// or hidden, they leave it.
+void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known) {
+  const Hanging& hanging = known.hanging;
+  for (std::size_t i = 0; i + 1 < hanging.transform_count; ++i) {
+    const std::size_t above = source_.placements.chains[hanging.first_transform + i];
+    const std::int32_t layer = source_.document.nodes[above].layer;
+    if (was_hidden(layer) == is_hidden(layer)) continue;
+    change(above).layer = kNoLayer;
+    if (!wanted.visible) transform_of(known).attributes.set("_hidden", "1");
   }
 }
 
@@ -446,6 +475,7 @@ Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known)
     }
   }
   if (wanted.visible != known.visible) show(known, wanted.visible, transform_of(known));
+  keep_shown_by_chain(wanted, known);
   if (wanted.layer != known.layer) transform_of(known).layer = layer_id(wanted.layer);
   const std::size_t last = last_transform(hanging);
   const NodeContent read_transform = last == kNone ? NodeContent{} : read(last);
@@ -745,7 +775,9 @@ Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, c
 bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models) {
   if (!source.document.nodes.empty()) return false;
   if (!scene.groups().empty()) return true;
-  if (source.placements.all.empty() || scene.instances().size() != 1) return !scene.instances().empty();
+  // Of models without a graph the reader shows one.
+  if (scene.instances().empty()) return models.count > 0;
+  if (source.placements.all.empty() || scene.instances().size() != 1) return true;
   const auto handle = scene.instances().handle_at(0);
   const Instance* before = handle ? source.scene.instances().find(*handle) : nullptr;
   if (before == nullptr) return true;
