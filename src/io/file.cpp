@@ -220,6 +220,30 @@ Status AtomicFile::commit() {
   return {};
 }
 
+Status keep_backup(const std::filesystem::path& path) {
+  const std::filesystem::path file = behind_links(path);
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0 && errno == ENOENT) return {};
+  std::filesystem::path backup = file;
+  backup += "~";
+  std::optional<mode_t> mode;
+  if (Status free = check_replaceable(backup, mode); !free) return free;
+  const std::filesystem::path second_name = temporary_name(file, 0);
+  if (::link(file.c_str(), second_name.c_str()) == 0) {
+    if (::rename(second_name.c_str(), backup.c_str()) == 0) {
+      // Where both were the same file already, renaming does nothing.
+      ::unlink(second_name.c_str());
+      return {};
+    }
+    const int error = errno;
+    ::unlink(second_name.c_str());
+    return cannot_write(reason(error), backup);
+  }
+  const auto bytes = read_file(file);
+  if (!bytes) return bytes.error();
+  return write_file(backup, *bytes);
+}
+
 Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();

@@ -92,6 +92,14 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   return error;
 }
 
+/// What only another .vox file would keep.
+std::vector<std::string> lost_with_source(const LoadedScene& loaded) {
+  if (loaded.source == nullptr) return {};
+  std::vector<std::string> lines = only_in_source(*loaded.source);
+  for (std::string& line : lines) line = "left out, which only .vox keeps: " + line;
+  return lines;
+}
+
 }  // namespace
 
 std::span<const FormatInfo> file_formats() {
@@ -139,7 +147,7 @@ Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesyste
                                  std::vector<std::string>& warnings, Threads threads, const Progress& progress) {
   const auto format = format_for_writing(path);
   if (!format) return format.error();
-  if (format->format == FileFormat::Vox) return write_vox(loaded.scene, path, warnings);
+  if (format->format == FileFormat::Vox) return write_vox(loaded, path, warnings);
   if (format->format != FileFormat::Scene) {
     return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
   }
@@ -147,7 +155,17 @@ Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesyste
   if (!file) return file.error();
   file->sun = loaded.sun;
   file->camera = loaded.camera;
+  const std::vector<std::string> lost = lost_with_source(loaded);
+  warnings.insert(warnings.end(), lost.begin(), lost.end());
   return write_scene_file(*file, path, threads, progress);
+}
+
+Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, const std::filesystem::path& path) {
+  const auto format = format_for_writing(path);
+  if (!format) return format.error();
+  if (format->format == FileFormat::Vox) return with_path(losses_of_vox(loaded), path);
+  if (format->is_mesh) return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
+  return lost_with_source(loaded);
 }
 
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {

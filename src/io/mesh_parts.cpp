@@ -122,6 +122,22 @@ Status check_part(const MeshPart& part, std::size_t types, std::vector<DBox>& bo
 
 }  // namespace
 
+namespace {
+
+Status check_groups(const std::vector<MeshGroup>& groups) {
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const Similarity& place = groups[i].world_from_group;
+    const DQuat& q = place.rotation;
+    const bool is_sound = is_finite(place.position) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w);
+    if (is_sound && (!groups[i].parent || *groups[i].parent < i)) continue;
+    const char* what = is_sound ? "is in a group that does not stand before it" : "has a place that is not finite";
+    return make_error(ErrorCode::InvalidArgument, "group \"" + groups[i].name + "\" " + what);
+  }
+  return {};
+}
+
+}  // namespace
+
 Status check_meshes(const SceneMeshes& meshes) {
   std::vector<DBox> bounds;
   for (const MeshPart& part : meshes.parts) {
@@ -135,8 +151,12 @@ Status check_meshes(const SceneMeshes& meshes) {
     const MeshPart& part = meshes.parts[placement.part];
     const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());
     if (fault != nullptr) return unsound(part, fault);
+    if (placement.group && *placement.group >= meshes.groups.size()) {
+      return make_error(ErrorCode::InvalidArgument,
+                        "placement \"" + placement.name + "\" is in a group that is not there");
+    }
   }
-  return {};
+  return check_groups(meshes.groups);
 }
 
 DBox bounds_of(const MeshView& view) {

@@ -39,6 +39,11 @@ class AtomicFile {
   bool failed_ = false;
 };
 
+/// Keeps what a file holds now as NAME~ beside it, in place of an older one, before something else is put there. Where
+/// there is no file, nothing is kept. Links are followed. Cost: none, where the file system has links; else a copy.
+/// Errors: CannotWrite, CannotRead: nothing was changed.
+[[nodiscard]] Status keep_backup(const std::filesystem::path& path);
+
 /// Writes all of `bytes` to `path` by way of an AtomicFile.
 [[nodiscard]] Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 

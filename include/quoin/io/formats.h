@@ -64,12 +64,17 @@ struct FormatInfo {
                                              const Progress& progress = {});
 
 /// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss, with
-/// sun and camera) or .vox (write_vox). It appears whole or not at all; returns its size.
+/// sun and camera) or .vox (write_vox, which keeps what `source` holds). It appears whole or not at all; returns its size.
 ///
 /// Warnings: one line each of what the format does not hold, added to `warnings`.
 /// Errors:   Unsupported for other endings; those of the format's writer; `path` is set in all.
 [[nodiscard]] Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
                                                std::vector<std::string>& warnings, Threads threads = {},
                                                const Progress& progress = {});
+
+/// What `save_scene` would warn of, for who wants to ask before: nothing when all is kept. Cost: little beside saving.
+/// Errors: those of `save_scene` that are known before anything is written.
+[[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded,
+                                                                const std::filesystem::path& path);
 
 }  // namespace quoin

@@ -36,10 +36,24 @@ struct SceneFile {
     double scale = 1.0;                  ///< positive
     bool mirrored = false;
     bool visible = true;
+    std::optional<std::size_t> group = {};  ///< an index into `groups`
+    std::optional<std::size_t> layer = {};  ///< an index into `layers`
+  };
+  /// As SceneGroup.
+  struct Group {
+    std::string name;
+    std::optional<std::size_t> parent = {};  ///< an index into `groups`, of one before it
+    std::optional<std::size_t> layer = {};   ///< an index into `layers`
+    DVec3 position{0.0};
+    DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length
+    bool mirrored = false;
+    bool visible = true;
   };
   VoxelRegistry types;  ///< of the voxels of `grids`
   std::vector<SceneGrid> grids;
   std::vector<Source> sources;
+  std::vector<SceneLayer> layers = {};
+  std::vector<Group> groups = {};
   std::vector<Placement> placements;
   std::vector<Lamp> lamps;
   std::optional<DVec3> sun;  ///< not 0
@@ -77,7 +91,7 @@ struct SceneFile {
                                                      Threads threads = {}, const Progress& progress = {});
 
 /// Reads a scene file and everything that it names. Each file is read once, however often it is placed; its own
-/// instances are placed as one body. Types of the files that equal one that there is in everything become that.
+/// instances are placed as one body, which is a group of its own where they are several. Types of the files that equal one that there is in everything become that.
 ///
 /// Errors: those of `parse_scene_file` and of reading the files (with their paths); Unsupported when one of them is a
 ///         scene file itself or a volume; LimitExceeded when all files together have more types than a registry holds.

@@ -27,6 +27,14 @@ struct Similarity {
   bool mirrored = false;               ///< x is negated before the rotation
 };
 
+/// A group of placements and other groups: SceneGroup, as files of meshes have it.
+struct MeshGroup {
+  std::string name;
+  std::optional<std::size_t> parent{};  ///< index into SceneMeshes::groups, of one before it
+  std::string layer{};                  ///< the name of its layer
+  Similarity world_from_group{};        ///< without a scale
+};
+
 /// One place of a part in the world.
 struct MeshPlacement {
   std::size_t part = 0;  ///< index into SceneMeshes::parts
@@ -34,6 +42,8 @@ struct MeshPlacement {
   /// Takes points of the part, relative to its pivot, to the world. A matrix must be affine; a negative determinant
   /// mirrors.
   std::variant<Similarity, glm::dmat4> world_from_part{Similarity{}};
+  std::optional<std::size_t> group{};  ///< index into SceneMeshes::groups; nothing at the top
+  std::string layer{};                 ///< the name of its layer
 
   [[nodiscard]] glm::dmat4 matrix() const;
 };
@@ -65,7 +75,8 @@ struct MeshStats {
 struct SceneMeshes {
   std::vector<MeshPart> parts;
   std::vector<MeshPlacement> placements;
-  VoxelRegistry types;  ///< the materials of blocks
+  std::vector<MeshGroup> groups{};  ///< parents first; of scenes those with a placement below
+  VoxelRegistry types;              ///< the materials of blocks
   MeshStats stats;
 };
 
@@ -75,7 +86,7 @@ struct BlockySceneOptions {
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
-/// grids' handles, a placement per drawn instance in that of theirs. After these come the surfaces of the grids'
+/// grids' handles, a placement per drawn instance in that of theirs, under the groups of the scene. After these come the surfaces of the grids'
 /// fields, as build_smooth_mesh makes them, with placements of their own.
 ///
 /// Order:  the same bytes at any thread count.

@@ -148,7 +148,9 @@ Json node_json(const GltfNode& node) {
   if (transform.translation != DVec3(0.0)) entry["translation"] = json_from(transform.translation);
   if (transform.rotation != DQuat(1, 0, 0, 0)) entry["rotation"] = json_from(transform.rotation);
   if (transform.scale != DVec3(1.0)) entry["scale"] = json_from(transform.scale);
-  if (!node.mesh) entry["extras"] = {{"voxels", 0}};
+  if (!node.children.empty()) entry["children"] = node.children;
+  if (!node.mesh && !node.is_group) entry["extras"]["voxels"] = 0;
+  if (!node.layer.empty()) entry["extras"]["layer"] = node.layer;
   return entry;
 }
 
@@ -156,7 +158,7 @@ void add_nodes(const GltfLayout& layout, Json& document) {
   Json nodes = Json::array();
   Json numbers = Json::array();
   for (const GltfNode& node : layout.nodes) {
-    numbers.push_back(nodes.size());
+    if (node.is_at_top) numbers.push_back(nodes.size());
     nodes.push_back(node_json(node));
   }
   Json scene = Json::object();

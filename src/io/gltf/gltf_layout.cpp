@@ -178,6 +178,40 @@ class MeshLayout {
   std::size_t variants_ = 0;            ///< meshes of that part
 };
 
+/// A rotation and a position as those of what is below a group's frame. Groups do not mirror.
+GltfTransform below(const Similarity& group, GltfTransform world) {
+  Instance frame;
+  frame.rotation = group.rotation;
+  world.translation = (world.translation - group.position) * world_axes(frame);
+  world.rotation = glm::normalize(glm::conjugate(unit_rotation(group.rotation)) * world.rotation);
+  // Of quarter turns, which rounding should not show.
+  constexpr double kRounding = 1e-15;
+  for (int i = 0; i < 4; ++i) {
+    const double nearest = std::round(world.rotation[i]);
+    if (std::abs(world.rotation[i] - nearest) < kRounding) world.rotation[i] = nearest;
+  }
+  return world;
+}
+
+/// Adds the groups' nodes; every node comes to be placed from the one above it.
+void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) {
+  const std::size_t first = nodes.size();
+  for (const MeshGroup& group : meshes.groups) {
+    GltfNode& node = nodes.emplace_back();
+    node.name = group.name;
+    node.transform = transform_of({group.world_from_group.position, group.world_from_group.rotation});
+    node.layer = group.layer;
+    node.is_group = true;
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const std::optional<std::size_t> above = i < first ? meshes.placements[i].group : meshes.groups[i - first].parent;
+    if (!above) continue;
+    nodes[i].transform = below(meshes.groups[*above].world_from_group, nodes[i].transform);
+    nodes[i].is_at_top = false;
+    nodes[first + *above].children.push_back(i);
+  }
+}
+
 }  // namespace
 
 Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion) {
@@ -187,8 +221,9 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion
   for (const MeshPlacement& placement : meshes.placements) {
     const auto transform = [](const auto& place) { return transform_of(place); };
     layout.nodes.push_back(
-        {name_of(meshes, placement), std::nullopt, std::visit(transform, placement.world_from_part)});
+        {name_of(meshes, placement), std::nullopt, std::visit(transform, placement.world_from_part), placement.layer});
   }
+  hang_below_groups(meshes, layout.nodes);
   MeshLayout(meshes, occlusion, layout).lay_out();
   if (!layout.palette.materials().empty() && !layout.meshes.empty()) {
     if (auto added = add_images(layout); !added) return added.error();

@@ -54,7 +54,11 @@ struct GltfTransform {
 struct GltfNode {
   std::string name;
   std::optional<std::size_t> mesh;  ///< none where there is nothing to draw
-  GltfTransform transform;
+  GltfTransform transform;          ///< from the node above, or the world
+  std::string layer{};
+  std::vector<std::size_t> children{};
+  bool is_group = false;
+  bool is_at_top = true;
 };
 
 struct GltfImage {
@@ -66,7 +70,7 @@ struct GltfImage {
 /// Where everything lies in the buffer of a glTF file; borrows the meshes' arrays.
 struct GltfLayout {
   MaterialPalette palette;
-  std::vector<GltfNode> nodes;  ///< in the order of the placements
+  std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
   std::vector<GltfImage> images;           ///< of blocks: base colour, metallic-roughness, perhaps emissive
   std::vector<MaterialSurfaces> surfaces;  ///< of every part

@@ -41,8 +41,13 @@ void renumber(SceneGrid& grid, const std::vector<VoxelType>& new_type_of) {
   }
 }
 
-/// A file that was read, its grids moved into the scene.
+/// A file that was read, its grids and layers moved into the scene.
 struct Body {
+  struct Group {
+    GroupHandle handle;  ///< in the file's own scene
+    SceneGroup group;    ///< its parent in that scene, its layer in the new one
+  };
+  std::vector<Group> groups;  ///< parents first
   std::vector<Instance> instances;
 };
 
@@ -60,27 +65,49 @@ Result<Body> take_over(Scene& from, Scene& into) {
     renumber(grid, new_type_of);
     new_grid_of[handle] = into.add_grid(std::move(grid));
   }
+  std::map<LayerHandle, LayerHandle> new_layer_of;
+  from.layers().for_each(
+      [&](LayerHandle handle, const SceneLayer& layer) { new_layer_of[handle] = into.add_layer(layer); });
+  const auto layer_of = [&](LayerHandle handle) {
+    const auto found = new_layer_of.find(handle);
+    return found == new_layer_of.end() ? LayerHandle{} : found->second;
+  };
   Body body;
-  for (const InstanceHandle handle : from.instances().handles()) {
+  for (const GroupHandle handle : groups_from_top(from)) {
+    SceneGroup group = from.groups()[handle];
+    group.parent = parent_of(from, handle);
+    group.layer = layer_of(group.layer);
+    body.groups.push_back({handle, std::move(group)});
+  }
+  const std::vector<InstanceHandle> handles = from.instances().handles();
+  for (const InstanceHandle handle : handles) {
     Instance instance = from.instances()[handle];
     instance.grid = new_grid_of.at(instance.grid);
+    // Alone it is placed without its groups.
+    if (handles.size() == 1) instance.visible = is_shown(from, instance);
+    instance.layer = layer_of(instance.layer);
     body.instances.push_back(std::move(instance));
   }
   return body;
 }
 
+/// Puts an instance or a group of a body where a placement puts the body.
+template <class Placed>
+void put(const SceneFile::Placement& outer, Placed& placed) {
+  const double side = outer.mirrored ? -1.0 : 1.0;
+  const DVec3 position = placed.position * DVec3(side, 1.0, 1.0);
+  placed.position = outer.position + outer.rotation * (position * outer.scale);
+  // A mirror before a rotation is the mirrored rotation before the mirror.
+  const DQuat q = placed.rotation;
+  placed.rotation = outer.rotation * DQuat(q.w, q.x, side * q.y, side * q.z);
+  placed.mirrored = placed.mirrored != outer.mirrored;
+}
+
 /// An instance of a body, where a placement puts the body.
 Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool is_alone) {
   Instance instance = inner;
-  const double side = outer.mirrored ? -1.0 : 1.0;
-  const DVec3 position = inner.position * DVec3(side, 1.0, 1.0);
-  instance.position = outer.position + outer.rotation * (position * outer.scale);
-  // A mirror before a rotation is the mirrored rotation before the mirror.
-  const DQuat& q = inner.rotation;
-  instance.rotation = outer.rotation * DQuat(q.w, q.x, side * q.y, side * q.z);
+  put(outer, instance);
   instance.voxel_size = inner.voxel_size * outer.scale;
-  instance.mirrored = inner.mirrored != outer.mirrored;
-  instance.visible = inner.visible && outer.visible;
   if (is_alone && !outer.name.empty()) {
     instance.name = outer.name;
   } else if (!outer.name.empty()) {
@@ -96,7 +123,9 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   if (*format == FileFormat::Scene) {
     return make_error(ErrorCode::Unsupported, "a scene file within a scene file", path.string());
   }
-  return load_scene(path, options, progress);
+  LoadOptions taken_over = options;
+  taken_over.keep_source = false;
+  return load_scene(path, taken_over, progress);
 }
 
 using Bodies = std::map<std::string, Body, std::less<>>;
@@ -138,20 +167,77 @@ LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
   return loaded;
 }
 
-void place(const std::vector<SceneFile::Placement>& placements, const std::vector<GridHandle>& grids,
-           const Bodies& bodies, Scene& scene) {
-  for (const SceneFile::Placement& placement : placements) {
-    if (placement.grid) {
-      scene.add_instance({placement.name, grids[*placement.grid], placement.position, placement.rotation,
-                          placement.scale, placement.mirrored, placement.visible});
-      continue;
+/// Places what a file says, once its grids are in the scene.
+class Placer {
+ public:
+  Placer(const SceneFile& file, const std::vector<GridHandle>& grids, const Bodies& bodies, Scene& scene)
+      : file_(file), grids_(grids), bodies_(bodies), scene_(scene) {}
+
+  void place() {
+    for (const SceneLayer& layer : file_.layers) layers_.push_back(scene_.add_layer(layer));
+    for (const SceneFile::Group& group : file_.groups) {
+      groups_.push_back(scene_.add_group({group.name, named(groups_, group.parent), named(layers_, group.layer),
+                                          group.position, group.rotation, group.mirrored, group.visible}));
     }
-    const Body& body = bodies.at(placement.source);
-    for (const Instance& inner : body.instances) {
-      scene.add_instance(placed(inner, placement, body.instances.size() == 1));
+    for (const SceneFile::Placement& placement : file_.placements) {
+      if (placement.grid) {
+        place_grid(placement);
+      } else {
+        place_body(placement, bodies_.at(placement.source));
+      }
     }
   }
-}
+
+ private:
+  template <class T>
+  static Handle<T> named(const std::vector<Handle<T>>& handles, const std::optional<std::size_t>& place) {
+    return place ? handles[*place] : Handle<T>{};
+  }
+
+  void place_grid(const SceneFile::Placement& placement) {
+    scene_.add_instance({placement.name, grids_[*placement.grid], placement.position, placement.rotation,
+                         placement.scale, placement.mirrored, placement.visible, named(groups_, placement.group),
+                         named(layers_, placement.layer)});
+  }
+
+  void place_body(const SceneFile::Placement& placement, const Body& body) {
+    const GroupHandle outer = named(groups_, placement.group);
+    const LayerHandle layer = named(layers_, placement.layer);
+    if (body.instances.size() == 1) {
+      Instance instance = placed(body.instances.front(), placement, true);
+      instance.visible = instance.visible && placement.visible;
+      instance.group = outer;
+      if (placement.layer) instance.layer = layer;
+      scene_.add_instance(std::move(instance));
+      return;
+    }
+    const GroupHandle whole = scene_.add_group(
+        {placement.name, outer, layer, placement.position, placement.rotation, placement.mirrored, placement.visible});
+    std::map<GroupHandle, GroupHandle> new_group_of;
+    const auto group_of = [&](GroupHandle handle) {
+      const auto found = new_group_of.find(handle);
+      return found == new_group_of.end() ? whole : found->second;
+    };
+    for (const Body::Group& inner : body.groups) {
+      SceneGroup group = inner.group;
+      group.parent = group_of(group.parent);
+      put(placement, group);
+      new_group_of[inner.handle] = scene_.add_group(std::move(group));
+    }
+    for (const Instance& inner : body.instances) {
+      Instance instance = placed(inner, placement, false);
+      instance.group = group_of(inner.group);
+      scene_.add_instance(std::move(instance));
+    }
+  }
+
+  const SceneFile& file_;
+  const std::vector<GridHandle>& grids_;
+  const Bodies& bodies_;
+  Scene& scene_;
+  std::vector<LayerHandle> layers_;
+  std::vector<GroupHandle> groups_;
+};
 
 }  // namespace
 
@@ -163,7 +249,7 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   LoadedScene loaded = begin_scene(*file, grids);
   const auto bodies = with_path(read_sources(file->sources, path.parent_path(), options, loaded, progress), path);
   if (!bodies) return bodies.error();
-  place(file->placements, grids, *bodies, loaded.scene);
+  Placer(*file, grids, *bodies, loaded.scene).place();
   return loaded;
 }
 
@@ -175,7 +261,8 @@ Result<LoadedScene> read_scene_file(std::span<const std::byte> text) {
   }
   std::vector<GridHandle> grids;
   LoadedScene loaded = begin_scene(*file, grids);
-  place(file->placements, grids, {}, loaded.scene);
+  const Bodies none;
+  Placer(*file, grids, none, loaded.scene).place();
   return loaded;
 }
 

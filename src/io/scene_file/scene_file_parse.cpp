@@ -23,7 +23,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 3;
+constexpr int kVersion = 4;
 
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
@@ -53,20 +53,22 @@ DQuat kept_rotation(const Object& instance, const Json& json) {
   return {q[3], q[0], q[1], q[2]};
 }
 
-// Whether there is such a grid is known once all is read.
-std::size_t grid_of(const Json& json, const Object& instance) {
-  if (json.is_number_unsigned()) return json.get<std::size_t>();
-  instance.faults().add(instance.place_of("grid"), "must be a place in the list of grids, from 0");
+// A place in another list; whether there is one is known once all is read.
+std::optional<std::size_t> place_in(const Object& object, std::string_view key, std::string_view list) {
+  const Json* json = object.find(key);
+  if (json == nullptr) return std::nullopt;
+  if (json->is_number_unsigned()) return json->get<std::size_t>();
+  object.faults().add(object.place_of(key), "must be a place in the list of " + std::string(list) + ", from 0");
   return 0;
 }
 
 SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
-  const Object instance(json, place, {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible"},
-                        faults);
+  const Object instance(
+      json, place, {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer"},
+      faults);
   SceneFile::Placement placement;
-  if (const Json* grid = instance.find("grid")) {
-    placement.grid = grid_of(*grid, instance);
-  } else if (instance.need("file") != nullptr) {
+  placement.grid = place_in(instance, "grid", "grids");
+  if (!placement.grid && instance.need("file") != nullptr) {
     instance.read("file", placement.source);
   }
   instance.read_text("name", placement.name);
@@ -78,6 +80,8 @@ SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& 
     placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
   }
   if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
+  placement.group = place_in(instance, "group", "groups");
+  placement.layer = place_in(instance, "layer", "layers");
   return placement;
 }
 
@@ -106,6 +110,27 @@ Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
   object.read("inner_angle", lamp.inner_angle);
   object.read("outer_angle", lamp.outer_angle);
   return lamp;
+}
+
+SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"name", "parent", "layer", "position", "rotation", "mirrored", "visible"}, faults);
+  SceneFile::Group group;
+  object.read_text("name", group.name);
+  group.parent = place_in(object, "parent", "groups");
+  group.layer = place_in(object, "layer", "layers");
+  object.read("position", group.position);
+  if (const Json* rotation = object.find("rotation")) group.rotation = kept_rotation(object, *rotation);
+  object.read("mirrored", group.mirrored);
+  object.read("visible", group.visible);
+  return group;
+}
+
+SceneLayer layer_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"name", "visible"}, faults);
+  SceneLayer layer;
+  object.read_text("name", layer.name);
+  object.read("visible", layer.visible);
+  return layer;
 }
 
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
@@ -165,37 +190,64 @@ Camera camera_of(const Json& json, Faults& faults) {
   return camera.value_or(Camera{});
 }
 
-// Sources' ids differ, and placements name one of them.
-void check_ids(const SceneFile& scene, Faults& faults) {
-  std::set<std::string_view> ids;
-  const auto add = [&](std::string_view list, std::size_t i, std::string_view key, const std::string& what) {
+// Faults of what names entries of other lists.
+class NameCheck {
+ public:
+  NameCheck(const SceneFile& scene, Faults& faults) : scene_(scene), faults_(faults) {}
+
+  // Sources' ids differ, and placements name one of them; groups and layers are there.
+  void check() {
+    for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
+      if (!ids_.insert(scene_.sources[i].id).second) {
+        add("files", i, "id", excerpt(scene_.sources[i].id) + " was given before");
+      }
+    }
+    for (std::size_t i = 0; i < scene_.groups.size(); ++i) {
+      const SceneFile::Group& group = scene_.groups[i];
+      if (group.parent && *group.parent >= i) {
+        add("groups", i, "parent", "there is no group " + std::to_string(*group.parent) + " before it");
+      }
+      check_layer("groups", i, group.layer);
+    }
+    for (std::size_t i = 0; i < scene_.placements.size(); ++i) check_placement(i, scene_.placements[i]);
+  }
+
+ private:
+  void check_placement(std::size_t i, const SceneFile::Placement& placement) {
+    if (const auto& grid = placement.grid) {
+      if (*grid >= scene_.grids.size()) add("instances", i, "grid", "there is no grid " + std::to_string(*grid));
+    } else if (!ids_.contains(placement.source)) {
+      add("instances", i, "file", "no file has the id " + excerpt(placement.source));
+    }
+    if (placement.group && *placement.group >= scene_.groups.size()) {
+      add("instances", i, "group", "there is no group " + std::to_string(*placement.group));
+    }
+    check_layer("instances", i, placement.layer);
+  }
+  void check_layer(std::string_view list, std::size_t i, const std::optional<std::size_t>& layer) {
+    if (layer && *layer >= scene_.layers.size()) add(list, i, "layer", "there is no layer " + std::to_string(*layer));
+  }
+  void add(std::string_view list, std::size_t i, std::string_view key, const std::string& what) {
     const Place whole{nullptr, list, std::nullopt};
     const Place entry{&whole, {}, i};
-    faults.add({&entry, key, std::nullopt}, what);
-  };
-  for (std::size_t i = 0; i < scene.sources.size(); ++i) {
-    if (!ids.insert(scene.sources[i].id).second) {
-      add("files", i, "id", excerpt(scene.sources[i].id) + " was given before");
-    }
+    faults_.add({&entry, key, std::nullopt}, what);
   }
-  for (std::size_t i = 0; i < scene.placements.size(); ++i) {
-    if (const auto& grid = scene.placements[i].grid) {
-      if (*grid >= scene.grids.size()) add("instances", i, "grid", "there is no grid " + std::to_string(*grid));
-    } else if (!ids.contains(scene.placements[i].source)) {
-      add("instances", i, "file", "no file has the id " + excerpt(scene.placements[i].source));
-    }
-  }
-}
+
+  const SceneFile& scene_;
+  Faults& faults_;
+  std::set<std::string_view> ids_;
+};
 
 void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene, Faults& faults) {
   const Place root;
-  const Object file(json, root, {"quoin_scene", "types", "grids", "files", "instances", "lamps", "sun", "camera"},
-                    faults);
+  const Object file(
+      json, root, {"quoin_scene", "types", "grids", "files", "layers", "groups", "instances", "lamps", "sun", "camera"},
+      faults);
   const Json* version = file.need("quoin_scene");
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 3 are",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 4 are",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
@@ -203,6 +255,14 @@ void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene
   if (file.find("grids") == nullptr || file.find("files") != nullptr) {
     read_list(file, "files", kMaxFiles,
               [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
+  }
+  if (file.find("layers") != nullptr) {
+    read_list(file, "layers", kMaxInstances,
+              [&](const Json& each, const Place& place) { scene.layers.push_back(layer_of(each, place, faults)); });
+  }
+  if (file.find("groups") != nullptr) {
+    read_list(file, "groups", kMaxInstances,
+              [&](const Json& each, const Place& place) { scene.groups.push_back(group_of(each, place, faults)); });
   }
   read_list(file, "instances", kMaxInstances, [&](const Json& each, const Place& place) {
     scene.placements.push_back(placement_of(each, place, faults));
@@ -216,7 +276,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene
     scene.sun = DVec3(v[0], v[1], v[2]);
   }
   if (const Json* camera = file.find("camera")) scene.camera = camera_of(*camera, faults);
-  if (!faults.error()) check_ids(scene, faults);
+  if (!faults.error()) NameCheck(scene, faults).check();
 }
 
 /// What a text has outside of its strings.

@@ -54,6 +54,8 @@ class SceneText {
         grids_.push_back(json_of(scene.grids[i], pieces.voxels[i], pieces.densities[i]));
         is_third_ |= !pieces.densities[i].empty();
       }
+      for (const SceneLayer& layer : scene.layers) layers_.push_back(json_of(layer));
+      for (const SceneFile::Group& group : scene.groups) groups_.push_back(json_of(group));
       for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(json_of(placement));
       for (const Lamp& lamp : scene.lamps) lamps_.push_back(json_of(lamp));
       is_second_ = is_second_ || !lamps_.empty();
@@ -116,6 +118,29 @@ class SceneText {
     if (!is_same(placement.scale, plain.scale)) json["scale"] = placement.scale;
     if (placement.mirrored) json["mirrored"] = true;
     if (!placement.visible) json["visible"] = false;
+    if (placement.group) json["group"] = *placement.group;
+    if (placement.layer) json["layer"] = *placement.layer;
+    return json;
+  }
+
+  Json json_of(const SceneFile::Group& group) {
+    const SceneFile::Group plain;
+    Json json = Json::object();
+    if (!group.name.empty()) json["name"] = text(group.name);
+    if (group.parent) json["parent"] = *group.parent;
+    if (group.layer) json["layer"] = *group.layer;
+    if (!is_same(group.position, plain.position)) json["position"] = triple(group.position);
+    const DQuat& q = group.rotation;
+    if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+    if (group.mirrored) json["mirrored"] = true;
+    if (!group.visible) json["visible"] = false;
+    return json;
+  }
+
+  Json json_of(const SceneLayer& layer) {
+    Json json = Json::object();
+    if (!layer.name.empty()) json["name"] = text(layer.name);
+    if (!layer.visible) json["visible"] = false;
     return json;
   }
 
@@ -171,13 +196,17 @@ class SceneText {
 
   [[nodiscard]] std::string text_of(const SceneFile& scene) const {
     const bool has_models = !types_.empty() || !grids_.empty();
-    std::string text = std::string("{\n  \"quoin_scene\": ") + (is_third_ ? "3" : has_models || is_second_ ? "2" : "1");
+    const bool is_fourth = !layers_.empty() || !groups_.empty();
+    std::string text = "{\n  \"quoin_scene\": ";
+    text += is_fourth ? "4" : is_third_ ? "3" : has_models || is_second_ ? "2" : "1";
     if (has_models) put_list(text, "types", types_);
     if (has_models) put_list(text, "grids", grids_);
     std::vector<Json> files;
     files.reserve(scene.sources.size());
     for (const SceneFile::Source& source : scene.sources) files.push_back({{"id", source.id}, {"path", source.file}});
     if (!has_models || !files.empty()) put_list(text, "files", files);
+    if (!layers_.empty()) put_list(text, "layers", layers_);
+    if (!groups_.empty()) put_list(text, "groups", groups_);
     put_list(text, "instances", instances_);
     if (!lamps_.empty()) put_list(text, "lamps", lamps_);
     if (scene.sun) text.append(",\n  \"sun\": ").append(triple(*scene.sun).dump());
@@ -187,6 +216,8 @@ class SceneText {
 
   std::vector<Json> types_;
   std::vector<Json> grids_;
+  std::vector<Json> layers_;
+  std::vector<Json> groups_;
   std::vector<Json> instances_;
   std::vector<Json> lamps_;
   Json camera_;
@@ -261,6 +292,12 @@ Status check_readable(const SceneFile& scene) {
   return make_error(is_limit ? ErrorCode::LimitExceeded : ErrorCode::InvalidArgument, read.error().message);
 }
 
+template <class T>
+std::optional<std::size_t> place_of(const std::map<Handle<T>, std::size_t>& places, Handle<T> handle) {
+  const auto found = places.find(handle);
+  return found == places.end() ? std::nullopt : std::optional(found->second);
+}
+
 }  // namespace
 
 Result<SceneFile> scene_file_of(const Scene& scene) {
@@ -272,6 +309,18 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
     index_of[handle] = file.grids.size();
     file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()});
   });
+  std::map<LayerHandle, std::size_t> layers;
+  scene.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) {
+    layers[handle] = file.layers.size();
+    file.layers.push_back(layer);
+  });
+  std::map<GroupHandle, std::size_t> groups;
+  for (const GroupHandle handle : groups_from_top(scene)) {
+    const SceneGroup& group = scene.groups()[handle];
+    groups[handle] = file.groups.size();
+    file.groups.push_back({group.name, place_of(groups, parent_of(scene, handle)), place_of(layers, group.layer),
+                           group.position, group.rotation, group.mirrored, group.visible});
+  }
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     const auto grid = index_of.find(instance.grid);
@@ -285,7 +334,9 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
                                .rotation = instance.rotation,
                                .scale = instance.voxel_size,
                                .mirrored = instance.mirrored,
-                               .visible = instance.visible});
+                               .visible = instance.visible,
+                               .group = place_of(groups, instance.group),
+                               .layer = place_of(layers, instance.layer)});
   }
   return file;
 }

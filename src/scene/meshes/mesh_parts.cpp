@@ -31,9 +31,38 @@ std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
   return grids;
 }
 
-MeshPlacement placement_of(const Instance& instance, std::size_t part) {
+std::string MeshHierarchy::layer_name(LayerHandle handle) const {
+  const SceneLayer* layer = scene_.layers().find(handle);
+  return layer == nullptr ? std::string() : layer->name;
+}
+
+std::optional<std::size_t> MeshHierarchy::group_of(GroupHandle handle) {
+  // From the lowest one that is not there yet upwards; then they are added from the top.
+  std::vector<GroupHandle> way;
+  for (GroupHandle each = handle; scene_.groups().find(each) != nullptr && !groups_.contains(each);
+       each = parent_of(scene_, each)) {
+    way.push_back(each);
+  }
+  for (auto each = way.rbegin(); each != way.rend(); ++each) {
+    const SceneGroup& group = scene_.groups()[*each];
+    const auto parent = groups_.find(parent_of(scene_, *each));
+    MeshGroup made{group.name, std::nullopt, layer_name(group.layer), {}};
+    if (parent != groups_.end()) made.parent = parent->second;
+    made.world_from_group = {group.position, unit_rotation(group.rotation), 1.0, group.mirrored};
+    groups_[*each] = meshes_.groups.size();
+    meshes_.groups.push_back(std::move(made));
+  }
+  const auto found = groups_.find(handle);
+  return found == groups_.end() ? std::nullopt : std::optional(found->second);
+}
+
+MeshPlacement MeshHierarchy::place(const Instance& instance, std::size_t part) {
   const DQuat rotation = unit_rotation(instance.rotation);
-  return {part, instance.name, Similarity{instance.position, rotation, instance.voxel_size, instance.mirrored}};
+  MeshPlacement placement{part, instance.name,
+                          Similarity{instance.position, rotation, instance.voxel_size, instance.mirrored}};
+  placement.group = group_of(instance.group);
+  placement.layer = layer_name(instance.layer);
+  return placement;
 }
 
 Progress part_of(const Progress& whole, double begin, double end) {
@@ -63,7 +92,8 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
 }
 
 Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
-                  const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads, const Progress& progress) {
+                  const SurfaceOptions& wanted, MeshHierarchy& hierarchy, SceneMeshes& meshes, Threads threads,
+                  const Progress& progress) {
   const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(grids.size()); };
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const GridHandle handle = grids[i];
@@ -76,7 +106,7 @@ Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, Inst
     for (const InstanceHandle placed : scene.instances().handles()) {
       const Instance& instance = scene.instances()[placed];
       if (instance.grid != handle || !is_drawn(scene, instance, filter)) continue;
-      meshes.placements.push_back(placement_of(instance, meshes.parts.size()));
+      meshes.placements.push_back(hierarchy.place(instance, meshes.parts.size()));
     }
     meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
   }

@@ -2,7 +2,9 @@
 
 // What blocky and smooth meshes of scenes are put together from.
 
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <quoin/scene/scene_meshes.h>
@@ -15,8 +17,21 @@ namespace quoin {
 /// The grids that drawn instances place, each once, in the order of their handles.
 [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter);
 
-/// Where an instance stands, of a part.
-[[nodiscard]] MeshPlacement placement_of(const Instance& instance, std::size_t part);
+/// Places instances, and takes the groups above them into the meshes.
+class MeshHierarchy {
+ public:
+  MeshHierarchy(const Scene& scene, SceneMeshes& meshes) : scene_(scene), meshes_(meshes) {}
+  /// Where an instance stands, of a part.
+  [[nodiscard]] MeshPlacement place(const Instance& instance, std::size_t part);
+
+ private:
+  [[nodiscard]] std::optional<std::size_t> group_of(GroupHandle handle);
+  [[nodiscard]] std::string layer_name(LayerHandle handle) const;
+
+  const Scene& scene_;
+  SceneMeshes& meshes_;
+  std::map<GroupHandle, std::size_t> groups_;
+};
 
 /// A listener for the stretch from `begin` to `end` of another's work. Lifetime: `whole` must outlive it.
 [[nodiscard]] Progress part_of(const Progress& whole, double begin, double end);
@@ -38,7 +53,7 @@ struct SurfaceOptions {
 /// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
 /// instances, in their order.
 [[nodiscard]] Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
-                                const SurfaceOptions& wanted, SceneMeshes& meshes, Threads threads,
-                                const Progress& progress);
+                                const SurfaceOptions& wanted, MeshHierarchy& hierarchy, SceneMeshes& meshes,
+                                Threads threads, const Progress& progress);
 
 }  // namespace quoin

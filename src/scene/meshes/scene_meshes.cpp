@@ -135,17 +135,17 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
       if (!options.mesh.occlusion) view.block_occlusion = {};
     }
   }
+  MeshHierarchy hierarchy(scene, meshes);
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, options.instances)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    meshes.placements.push_back(placement_of(instance, static_cast<std::size_t>(part)));
+    meshes.placements.push_back(hierarchy.place(instance, static_cast<std::size_t>(part)));
   }
   SmoothMeshOptions smooth;
   if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;
-  if (auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, meshes, threads, {}); !done) {
-    return done.error();
-  }
+  auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, hierarchy, meshes, threads, {});
+  if (!done) return done.error();
   return meshes;
 }
 

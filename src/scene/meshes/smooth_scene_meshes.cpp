@@ -275,10 +275,11 @@ std::vector<Unit> units_of(const Scene& scene, const SmoothSceneOptions& options
 }
 
 /// Adds a part, unless it is empty, and its placements.
-void add_part(const Scene& scene, MeshPart part, std::span<const LatticeMember> members, SceneMeshes& meshes) {
+void add_part(const Scene& scene, MeshPart part, std::span<const LatticeMember> members, MeshHierarchy& hierarchy,
+              SceneMeshes& meshes) {
   if (part.surfaces.empty()) return;
   for (const LatticeMember& member : members) {
-    MeshPlacement placement = placement_of(scene.instances()[member.instance], meshes.parts.size());
+    MeshPlacement placement = hierarchy.place(scene.instances()[member.instance], meshes.parts.size());
     // As a matrix: of two rotations that are the same, files then have the one with a positive w.
     placement.world_from_part = placement.matrix();
     meshes.placements.push_back(std::move(placement));
@@ -286,7 +287,8 @@ void add_part(const Scene& scene, MeshPart part, std::span<const LatticeMember> 
   meshes.parts.push_back(std::move(part));
 }
 
-Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progress& progress, SceneMeshes& meshes) {
+Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progress& progress, MeshHierarchy& hierarchy,
+                SceneMeshes& meshes) {
   const auto grid_of = [&](const LatticeMember& member) -> const SceneGrid& {
     return scene.grids()[scene.instances()[member.instance].grid];
   };
@@ -295,7 +297,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
     auto bodies = mesher.mesh(grid.grid, nullptr, progress);
     if (!bodies) return bodies.error();
     MeshPart part = part_of_bodies(grid, {std::move((*bodies)[0].mesh), std::move((*bodies)[1].mesh)});
-    add_part(scene, std::move(part), unit.members, meshes);
+    add_part(scene, std::move(part), unit.members, hierarchy, meshes);
     return {};
   }
   UnitedGrid united(scene, std::move(unit.members));
@@ -306,7 +308,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
   for (std::size_t i = 0; i < united.members().size(); ++i) {
     const LatticeMember& member = united.members()[i];
     MeshPart part = part_of_bodies(grid_of(member), {std::move(opaque[i]), std::move(transparent[i])});
-    add_part(scene, std::move(part), {&member, 1}, meshes);
+    add_part(scene, std::move(part), {&member, 1}, hierarchy, meshes);
   }
   return {};
 }
@@ -324,6 +326,7 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
                                         const Progress& progress) {
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   SceneMeshes meshes;
+  MeshHierarchy hierarchy(scene, meshes);
   const Mesher mesher(scene, options, threads, meshes.stats);
   std::vector<Unit> units = units_of(scene, options);
   const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
@@ -335,7 +338,7 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
       return share_of_voxels * static_cast<double>(done) / static_cast<double>(units.size());
     };
     const Progress part = part_of(progress, share(i), share(i + 1));
-    if (auto done = add_unit(scene, std::move(units[i]), mesher, part, meshes); !done) return done.error();
+    if (auto done = add_unit(scene, std::move(units[i]), mesher, part, hierarchy, meshes); !done) return done.error();
   }
   SmoothMeshOptions of_fields;
   of_fields.occlusion = options.mesh.occlusion;
@@ -343,7 +346,7 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
   of_fields.level_of = options.mesh.level_of;
   const SurfaceOptions wanted{of_fields, options.simplify_error};
   const Progress left = part_of(progress, share_of_voxels, 1.0);
-  if (auto done = add_fields(scene, grids, options.instances, wanted, meshes, threads, left); !done) {
+  if (auto done = add_fields(scene, grids, options.instances, wanted, hierarchy, meshes, threads, left); !done) {
     return done.error();
   }
   return meshes;
