@@ -37,7 +37,9 @@ CLI::Validator file_name() {
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("IN", options.input, "File to read")->required()->check(file_name());
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
-  command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")->check(not_negative_whole());
+  command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
+      ->check(not_negative_whole())
+      ->each([&options](const std::string&) { options.takes_frame = true; });
   command.add_flag("--json", options.json, "Print one JSON object instead of text");
   command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));
 }

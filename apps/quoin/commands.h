@@ -19,6 +19,7 @@ struct CommonOptions {
   LoadOptions load;
   Threads threads;
   bool json = false;
+  bool takes_frame = false;  ///< --frame was given
 
   [[nodiscard]] InstanceFilter instances() const {
     return load.show_hidden ? InstanceFilter::All : InstanceFilter::Visible;

@@ -65,28 +65,80 @@ DVec3 signed_scale(const Instance& instance) {
   return scale;
 }
 
-Json instance_json(const Instance& instance) {
-  const DQuat& q = instance.rotation;
-  return {{"name", instance.name},
-          {"position", triple(instance.position)},
-          {"rotation", {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0}},
-          {"scale", triple(signed_scale(instance))},
-          {"visible", instance.visible}};
+/// Which entry of the lists of groups and layers a handle is; null for none.
+template <class T>
+Json place_in(const std::map<Handle<T>, std::size_t>& places, Handle<T> handle) {
+  const auto found = places.find(handle);
+  return found == places.end() ? Json() : Json(found->second);
 }
 
-Json grid_json(const GridReport& report) {
+/// The scene's groups, parents first, and its layers.
+class Hierarchy {
+ public:
+  explicit Hierarchy(const Scene& scene) : scene_(scene) {
+    for (const LayerHandle handle : scene.layers().handles()) layers_.emplace(handle, layers_.size());
+    for (const GroupHandle handle : groups_from_top(scene)) {
+      groups_.emplace(handle, groups_.size());
+      sorted_.push_back(handle);
+    }
+  }
+
+  [[nodiscard]] Json groups() const {
+    Json list = Json::array();
+    for (const GroupHandle handle : sorted_) {
+      const SceneGroup& group = scene_.groups()[handle];
+      list.push_back({{"name", group.name},
+                      {"parent", place_in(groups_, parent_of(scene_, handle))},
+                      {"layer", place_in(layers_, group.layer)},
+                      {"position", triple(group.position)},
+                      {"visible", is_shown(scene_, group)}});
+    }
+    return list;
+  }
+  [[nodiscard]] Json layers() const {
+    Json list = Json::array();
+    for (const LayerHandle handle : scene_.layers().handles()) {
+      const SceneLayer& layer = scene_.layers()[handle];
+      list.push_back({{"name", layer.name}, {"visible", layer.visible}});
+    }
+    return list;
+  }
+  [[nodiscard]] Json of(const Instance& instance) const {
+    const DQuat& q = instance.rotation;
+    return {{"name", instance.name},
+            {"position", triple(instance.position)},
+            {"rotation", {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0}},
+            {"scale", triple(signed_scale(instance))},
+            {"visible", is_shown(scene_, instance)},
+            {"group", place_in(groups_, instance.group)},
+            {"layer", place_in(layers_, instance.layer)}};
+  }
+
+ private:
+  const Scene& scene_;
+  std::map<GroupHandle, std::size_t> groups_;
+  std::map<LayerHandle, std::size_t> layers_;
+  std::vector<GroupHandle> sorted_;
+};
+
+std::vector<std::string> kept_by(const LoadedScene& loaded) {
+  return loaded.source == nullptr ? std::vector<std::string>{} : only_in_source(*loaded.source);
+}
+
+Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
   const IBox bounds = report.grid->grid.bounds();
   Json entry = {{"name", report.grid->name},
                 {"voxels", report.grid->grid.voxel_count()},
                 {"size", triple(report.grid->declared_box().size())},
                 {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
                 {"instances", Json::array()}};
-  for (const Instance* instance : report.instances) entry["instances"].push_back(instance_json(*instance));
+  for (const Instance* instance : report.instances) entry["instances"].push_back(hierarchy.of(*instance));
   if (report.grid->field.chunk_count() != 0) entry["solid_samples"] = report.grid->field.solid_count();
   return entry;
 }
 
 Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCounts& faces) {
+  const Hierarchy hierarchy(loaded.scene);
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
                  {"types", distinct_types(loaded.scene)},
@@ -97,8 +149,11 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"sun", loaded.sun ? triple(*loaded.sun) : Json()},
                  {"camera", loaded.camera ? triple(loaded.camera->position) : Json()},
                  {"grids", Json::array()},
+                 {"groups", hierarchy.groups()},
+                 {"layers", hierarchy.layers()},
+                 {"kept", kept_by(loaded)},
                  {"warnings", loaded.warnings}};
-  for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report));
+  for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report, hierarchy));
   return object;
 }
 
@@ -114,18 +169,18 @@ std::string count_of(std::int64_t count, const std::string& singular) {
   return with_thousands(count) + " " + singular + (count == 1 ? "" : "s");
 }
 
-std::string instance_text(const Instance& instance) {
+std::string instance_text(const Scene& scene, const Instance& instance) {
   std::string line = "    at " + three(instance.position, ", ");
   const DQuat& q = instance.rotation;
   if (q != DQuat(1, 0, 0, 0)) line += "  turned (" + three({q.x, q.y, q.z}, ", ") + "; " + number_for_people(q.w) + ")";
   if (instance.voxel_size != 1.0) line += "  scale " + number_for_people(instance.voxel_size);
   if (instance.mirrored) line += "  mirrored";
-  if (!instance.visible) line += "  hidden";
+  if (!is_shown(scene, instance)) line += "  hidden";
   if (!instance.name.empty()) line += "  " + quoted(instance.name);
   return line + "\n";
 }
 
-std::string grid_text(const GridReport& report) {
+std::string grid_text(const Scene& scene, const GridReport& report) {
   std::string text = "  " + quoted(report.grid->name) + "  " + three(DVec3(report.grid->declared_box().size()), " x ") +
                      ", " + count_of(report.grid->grid.voxel_count(), "voxel");
   if (report.grid->field.chunk_count() != 0) {
@@ -133,8 +188,28 @@ std::string grid_text(const GridReport& report) {
   }
   text += "\n";
   if (report.instances.empty()) text += "    not placed\n";
-  for (const Instance* instance : report.instances) text += instance_text(*instance);
+  for (const Instance* instance : report.instances) text += instance_text(scene, *instance);
   return text;
+}
+
+/// Names that say something; how many there are, where none does.
+template <class T>
+std::string names_text(const char* what, const SlotMap<T>& all) {
+  if (all.empty()) return {};
+  std::string names;
+  for (const Handle<T> handle : all.handles()) {
+    const T& each = all[handle];
+    if (!each.name.empty())
+      names += (names.empty() ? ": " : ", ") + quoted(each.name) + (each.visible ? "" : " (hidden)");
+  }
+  return std::string(what) + ": " + std::to_string(all.size()) + names + "\n";
+}
+
+std::string hierarchy_text(const LoadedScene& loaded) {
+  std::string text = names_text("Groups", loaded.scene.groups()) + names_text("Layers", loaded.scene.layers());
+  std::string kept;
+  for (const std::string& line : kept_by(loaded)) kept += (kept.empty() ? "" : "; ") + line;
+  return kept.empty() ? text : text + "Kept when saved as .vox: " + kept + "\n";
 }
 
 std::string info_text(const CommonOptions& options, const LoadedScene& loaded, const FaceCounts& faces) {
@@ -150,7 +225,8 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded, c
   if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
   if (loaded.sun) text += "Sun: towards " + three(*loaded.sun, ", ") + "\n";
   if (loaded.camera) text += "Camera: at " + three(loaded.camera->position, ", ") + "\n";
-  for (const GridReport& report : report_grids(scene)) text += grid_text(report);
+  text += hierarchy_text(loaded);
+  for (const GridReport& report : report_grids(scene)) text += grid_text(scene, report);
   return text;
 }
 

@@ -71,6 +71,7 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
 
 Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume) {
   LoadOptions options = arguments.common.load;
+  options.keep_source = false;
   options.threads = arguments.common.threads;
   if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
   ProgressBar bar;

@@ -324,7 +324,7 @@ TEST(Saver, WritesWhatTheDocumentHolds) {
   const Document document = small_document();
   Bell bell;
   {
-    Saver saver(document, folder.file("a.glb"), [&bell] { bell.ring(); });
+    Saver saver(document, folder.file("a.glb"), true, [&bell] { bell.ring(); });
     ASSERT_TRUE(bell.wait());
     ASSERT_TRUE(saver.is_done());
     EXPECT_TRUE(saver.status());

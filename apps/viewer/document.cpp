@@ -6,6 +6,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 
@@ -54,16 +55,30 @@ bool can_write(const std::filesystem::path& path) {
   return format_to_write(path).has_value();
 }
 
+std::optional<FileStamp> FileStamp::of(const std::filesystem::path& path) {
+  std::error_code failed;
+  FileStamp stamp;
+  stamp.time = std::filesystem::last_write_time(path, failed);
+  if (!failed) stamp.bytes = std::filesystem::file_size(path, failed);
+  return failed ? std::nullopt : std::optional(stamp);
+}
+
 Document::Document(LoadedScene loaded, std::filesystem::path path)
-    : loaded_(std::move(loaded)), path_(std::move(path)) {
+    : loaded_(std::move(loaded)), path_(std::move(path)), stamp_(FileStamp::of(path_)) {
   faces_.update(loaded_.scene);
 }
 
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
                                                  const Progress& progress) {
-  auto loaded = load_scene(path, options, progress);
+  LoadOptions as_saved = options;
+  as_saved.show_hidden = false;
+  // Before it is read: what is written meanwhile is not what was read.
+  const auto stamp = FileStamp::of(path);
+  auto loaded = load_scene(path, as_saved, progress);
   if (!loaded) return loaded.error();
-  return std::make_unique<Document>(std::move(*loaded), path);
+  auto document = std::make_unique<Document>(std::move(*loaded), path);
+  document->stamp_ = stamp;
+  return document;
 }
 
 bool Document::can_save_in_place() const {
@@ -176,6 +191,12 @@ bool Document::redo() {
   return !stroke_ && history_.redo(loaded_.scene);
 }
 
+bool Document::show(const SceneNode& node, bool is_visible) {
+  if (stroke_ || visibility_of(loaded_.scene, node).value_or(is_visible) == is_visible) return false;
+  history_.show(loaded_.scene, node, is_visible);
+  return true;
+}
+
 Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   for (std::size_t type = 1; type < loaded_.scene.types.size(); ++type) {
     const VoxelProperties& known = loaded_.scene.types[static_cast<VoxelType>(type)];
@@ -189,11 +210,30 @@ Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   return loaded_.scene.types.add(std::move(properties));
 }
 
+Result<std::vector<std::string>> Document::losses(const std::filesystem::path& path) const {
+  const auto format = format_to_write(path);
+  if (!format) return format.error();
+  std::vector<std::string> all;
+  if (*format == FileFormat::Glb) return all;  // a copy
+  auto of_format = losses_of_saving(loaded_, path);
+  if (!of_format) return of_format.error();
+  all = std::move(*of_format);
+  std::error_code ignored;
+  const bool is_own = path == path_ || std::filesystem::equivalent(path, path_, ignored);
+  if (is_own && FileStamp::of(path) != stamp_ && std::filesystem::exists(path, ignored)) {
+    all.emplace_back("what another program put into the file since it was opened (kept as " + path.filename().string() +
+                     "~)");
+  }
+  std::erase_if(all, [&](const std::string& line) { return accepted_losses_.contains(line); });
+  return all;
+}
+
 Status Document::write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                        const Progress& progress) const {
   const auto format = format_to_write(path);
   if (!format) return format.error();
   if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
+  if (Status kept = keep_backup(path); !kept) return kept;
   const auto written = save_scene(loaded_, path, warnings, {}, progress);
   if (!written) return written.error();
   return {};
@@ -203,6 +243,7 @@ void Document::note_written(const std::filesystem::path& path, std::uint64_t sta
   const auto format = format_to_write(path);
   if (!format || *format == FileFormat::Glb) return;
   path_ = path;
+  stamp_ = FileStamp::of(path);
   loaded_.names_files = false;
   saved_state_ = state;
 }

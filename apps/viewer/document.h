@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,15 @@
 
 namespace quoin::viewer {
 
+/// What tells a file from a later one of the same name: nothing where there is none.
+struct FileStamp {
+  std::filesystem::file_time_type time{};
+  std::uintmax_t bytes = 0;
+  bool operator==(const FileStamp&) const = default;
+
+  [[nodiscard]] static std::optional<FileStamp> of(const std::filesystem::path& path);
+};
+
 /// A scene under edit, where it came from, and what can be undone.
 ///
 /// Edits need the scene to themselves; whoever draws it must have stopped (ViewBackend::pause).
@@ -26,7 +37,8 @@ class Document {
   Document() = default;
   Document(LoadedScene loaded, std::filesystem::path path);
 
-  /// Reads any file that `load_scene` reads. Errors: those of load_scene.
+  /// Reads any file that `load_scene` reads. What is hidden stays so, whatever the options say: who draws looks at all
+  /// instances, or not. Errors: those of load_scene.
   [[nodiscard]] static Result<std::unique_ptr<Document>> open(const std::filesystem::path& path,
                                                               const LoadOptions& options = {},
                                                               const Progress& progress = {});
@@ -63,11 +75,23 @@ class Document {
   bool undo();
   bool redo();
 
+  /// Shows or hides an instance, a group or a layer; a step to undo. False when it is not there, is so already, or in
+  /// a stroke.
+  bool show(const SceneNode& node, bool is_visible);
+
   /// An opaque type of that colour and emission, new if there is none. Errors: LimitExceeded.
   [[nodiscard]] Result<VoxelType> type_of_colour(Rgba8 colour, float emission = 0.0F);
 
-  /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. Errors: Unsupported for other endings;
-  /// those of save_scene, mesh_scene and write_mesh; Cancelled.
+  /// What saving under that name would lose, a line each, of what was not accepted before: what the format does not
+  /// hold, and what another program put into the document's own file since it was read. Errors: those of
+  /// losses_of_saving.
+  [[nodiscard]] Result<std::vector<std::string>> losses(const std::filesystem::path& path) const;
+  /// The user knows what is lost, and does not want to be asked again.
+  void accept_losses(const std::vector<std::string>& losses) { accepted_losses_.insert(losses.begin(), losses.end()); }
+
+  /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. A file that is there already is kept
+  /// as NAME~, unless it is a mesh.
+  /// Errors: Unsupported for other endings; those of save_scene, keep_backup, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
   /// What was written is what the state `state` held: not dirty while it is in force. A .vox or .json becomes the
@@ -95,6 +119,8 @@ class Document {
   std::filesystem::path path_;
   EditHistory history_;
   std::uint64_t saved_state_ = 0;
+  std::optional<FileStamp> stamp_;  ///< of `path_`, as it was read or written
+  std::set<std::string> accepted_losses_;
   std::optional<Stroke> stroke_;
 };
 

@@ -33,7 +33,29 @@ bool is_same(const DensityChunk& a, const DensityChunk& b) {
   return a.shares_storage_with(b) || a.content_hash() == b.content_hash();
 }
 
+void set_visibility(Scene& scene, const SceneNode& node, bool is_visible) {
+  if (!visibility_of(scene, node)) return;
+  std::visit([&](const auto& handle) { scene.edit(handle).visible = is_visible; }, node);
+}
+
 }  // namespace
+
+std::optional<bool> visibility_of(const Scene& scene, const SceneNode& node) {
+  const auto of = [](const auto* found) { return found == nullptr ? std::nullopt : std::optional(found->visible); };
+  if (const auto* instance = std::get_if<InstanceHandle>(&node)) return of(scene.instances().find(*instance));
+  if (const auto* group = std::get_if<GroupHandle>(&node)) return of(scene.groups().find(*group));
+  return of(scene.layers().find(std::get<LayerHandle>(node)));
+}
+
+void EditHistory::show(Scene& scene, const SceneNode& node, bool is_visible) {
+  QUOIN_ASSERT(!open_ && visibility_of(scene, node), "no step is under way, and it is there");
+  Step step;
+  step.name = is_visible ? "show" : "hide";
+  step.switched = node;
+  step.is_visible_after = is_visible;
+  set_visibility(scene, node, is_visible);
+  keep(std::move(step));
+}
 
 void EditHistory::begin(std::string name) {
   QUOIN_ASSERT(!open_, "the step before has ended");
@@ -125,6 +147,7 @@ void EditHistory::put(Scene& scene, const Step& step, bool after) {
     if (scene.grids().find(chunk.grid) == nullptr) continue;
     scene.edit(chunk.grid).grid.put_chunk(chunk.place, after ? chunk.after : chunk.before);
   }
+  if (step.switched) set_visibility(scene, *step.switched, after == step.is_visible_after);
   for (const ChangedSamples& chunk : step.samples) {
     if (scene.grids().find(chunk.grid) == nullptr) continue;
     scene.edit(chunk.grid).field.put_chunk(chunk.place, after ? chunk.after : chunk.before);

@@ -4,13 +4,21 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <quoin/scene/scene.h>
 
 namespace quoin::viewer {
 
-/// What edits to the grids of a scene replaced, a step a stroke of the brush, so that they can be undone and redone.
+/// Something of a scene that can be shown and hidden.
+using SceneNode = std::variant<InstanceHandle, GroupHandle, LayerHandle>;
+
+/// Its own switch; nothing when it is not there.
+[[nodiscard]] std::optional<bool> visibility_of(const Scene& scene, const SceneNode& node);
+
+/// What edits to the grids of a scene replaced, a step a stroke of the brush, and what was shown and
+/// hidden, so that they can be undone and redone.
 ///
 /// Kept are the chunks that a step changed, before and after; the oldest steps go when they take more than the limit.
 class EditHistory {
@@ -25,6 +33,8 @@ class EditHistory {
   void touch(GridHandle handle, const DensityGrid& field, const IBox& box);
   /// Ends the step; one that changed nothing leaves no trace. Steps that were undone before are forgotten otherwise.
   void end(const Scene& scene);
+  /// Shows or hides it: a step of its own. Requires: no step is under way, it is there.
+  void show(Scene& scene, const SceneNode& node, bool is_visible);
   [[nodiscard]] bool is_under_way() const { return open_.has_value(); }
 
   [[nodiscard]] bool can_undo() const { return done_ > 0; }
@@ -57,6 +67,8 @@ class EditHistory {
     std::uint64_t state = 0;
     std::vector<ChangedChunk> chunks;
     std::vector<ChangedSamples> samples;
+    std::optional<SceneNode> switched;  // shown or hidden
+    bool is_visible_after = false;
     std::size_t bytes = 0;
   };
 

@@ -68,19 +68,29 @@ Result<OpenDocument> Loader::take() {
   return taken;
 }
 
-Saver::Saver(const Document& document, std::filesystem::path path, std::function<void()> on_done)
+Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done)
     : path_(std::move(path)), state_(document.history().state()) {
-  thread_ = std::thread([this, &document, done = std::move(on_done)] {
+  thread_ = std::thread([this, &document, accepts_losses, done = std::move(on_done)] {
     try {
-      status_ = document.write(path_, warnings_, [this](double fraction) {
-        fraction_ = fraction;
-        return !is_cancelled_;
-      });
+      status_ = work(document, accepts_losses);
     } catch (const std::bad_alloc&) {
       status_ = out_of_memory(path_);
     }
     is_done_ = true;
     if (done) done();
+  });
+}
+
+Status Saver::work(const Document& document, bool accepts_losses) {
+  if (!accepts_losses) {
+    auto losses = document.losses(path_);
+    if (!losses) return losses.error();
+    losses_ = std::move(*losses);
+    if (!losses_.empty()) return {};
+  }
+  return document.write(path_, warnings_, [this](double fraction) {
+    fraction_ = fraction;
+    return !is_cancelled_;
   });
 }
 

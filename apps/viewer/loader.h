@@ -62,7 +62,8 @@ class Loader {
 /// Writes a document on a thread of its own. The document must not be edited meanwhile.
 class Saver {
  public:
-  Saver(const Document& document, std::filesystem::path path, std::function<void()> on_done);
+  /// Where something would be lost and `accepts_losses` is false, nothing is written: `losses` tells.
+  Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done);
   Saver(const Saver&) = delete;
   Saver& operator=(const Saver&) = delete;
   /// Cancels, and waits.
@@ -77,8 +78,12 @@ class Saver {
   /// Requires: is_done().
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+  /// What saving would lose, where that was not accepted: then nothing was written. Requires: is_done().
+  [[nodiscard]] const std::vector<std::string>& losses() const { return losses_; }
 
  private:
+  [[nodiscard]] Status work(const Document& document, bool accepts_losses);
+
   std::filesystem::path path_;
   std::uint64_t state_;
   std::atomic<double> fraction_{0.0};
@@ -86,6 +91,7 @@ class Saver {
   std::atomic<bool> is_cancelled_{false};
   Status status_;
   std::vector<std::string> warnings_;
+  std::vector<std::string> losses_;
   std::thread thread_;
 };
 

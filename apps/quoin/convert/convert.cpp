@@ -38,10 +38,25 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
   return write_meshes(*meshes, options, bar, outcome);
 }
 
+/// From .vox to .vox all is kept, so what reading skipped is not lost; unless one frame is asked for, which then is all.
+void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& format, LoadedScene& loaded,
+                            std::vector<std::string>& warnings) {
+  if (loaded.source == nullptr || format.format != FileFormat::Vox) return;
+  if (!options.common.takes_frame) {
+    warnings.clear();
+    return;
+  }
+  for (const std::string& line : only_in_source(*loaded.source)) {
+    warnings.push_back("left out, since --frame takes one: " + line);
+  }
+  loaded.source = nullptr;
+}
+
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.threads = options.common.threads;
+  load.keep_source = !format.is_mesh;
   auto loaded = load_scene(options.common.input, load);
   if (!loaded) return loaded.error();
   Outcome outcome;
@@ -54,6 +69,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     if (auto done = convert(loaded->scene, options, outcome); !done) return done.error();
     return outcome;
   }
+  keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
@@ -411,6 +427,7 @@ void add_convert_command(CLI::App& app, int& status) {
       "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
       "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
+      "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"
       "IN and OUT may be -: standard input and output.\n"
       "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
       "Example: quoin convert castle.vox castle.glb\n"

@@ -8,9 +8,9 @@
 #include "file_chooser.h"
 #include "gui.h"
 #include "input.h"
-#include "panels.h"
 #include "screen.h"
 #include "viewer.h"
+#include "viewer/window/panel/panels.h"
 
 namespace quoin::viewer {
 
@@ -55,6 +55,7 @@ class App {
   void draw_bare();
   void draw_loading();
   void draw_saving();
+  void draw_losses();
   void draw_leaving();
   void update_hover();
   void update_title();
@@ -75,11 +76,17 @@ class App {
   void load(const std::filesystem::path& path);
   void take_loaded();
   void adopt(OpenDocument opened);
-  void save(const std::filesystem::path& path);
+  void save(const std::filesystem::path& path, bool accepts_losses = false);
   void take_saved();
   void ask_where_to_save();
   void save_screenshot();
   void write_screenshot(const std::filesystem::path& path);
+
+  /// A save that was not done, since it would lose something: the user is asked.
+  struct LossySave {
+    std::filesystem::path path;
+    std::vector<std::string> losses;
+  };
 
   /// What a look at the levels of detail changed.
   struct BeforeDetail {
@@ -96,6 +103,7 @@ class App {
   FileChooser chooser_;
   std::optional<BeforeDetail> before_detail_;
   std::optional<Leaving> leaving_;
+  std::optional<LossySave> lossy_save_;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
   bool is_screenshot_wanted_ = false;

@@ -104,6 +104,7 @@ void App::adopt(OpenDocument opened) {
   state_.message.reset();
   told_fault_.clear();
   asked_.reset();
+  lossy_save_.reset();
   screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
@@ -131,10 +132,10 @@ void App::ask_where_to_save() {
   chooser_.show(FileChooser::Purpose::Save, start);
 }
 
-void App::save(const std::filesystem::path& path) {
+void App::save(const std::filesystem::path& path, bool accepts_losses) {
   if (!state_.can_edit()) return;
   input_.editing.abandon(state_);
-  state_.saver = std::make_unique<Saver>(*state_.open.document, path, wake_window);
+  state_.saver = std::make_unique<Saver>(*state_.open.document, path, accepts_losses, wake_window);
 }
 
 void App::take_saved() {
@@ -145,6 +146,10 @@ void App::take_saved() {
     state_.tell(saver->status().error());
     // With the name still there, to be mended.
     if (saver->status().error().code != ErrorCode::Cancelled) chooser_.show(FileChooser::Purpose::Save, saver->path());
+    return;
+  }
+  if (!saver->losses().empty()) {
+    lossy_save_ = LossySave{saver->path(), saver->losses()};
     return;
   }
   state_.open.document->note_written(saver->path(), saver->state());

@@ -30,6 +30,14 @@ void end_box() {
   ImGui::PopStyleVar();
 }
 
+/// Begins a question in the middle of the window, which has to be answered before anything else.
+bool begin_question(const char* title) {
+  if (!ImGui::IsPopupOpen(title)) ImGui::OpenPopup(title);
+  const ImVec2 room = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Always, {0.5F, 0.5F});
+  return ImGui::BeginPopupModal(title, nullptr, ImGuiWindowFlags_AlwaysAutoResize);
+}
+
 /// A bar for work that does not say how far it has come.
 void waiting_bar(double seconds, float width) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -56,6 +64,7 @@ void App::draw_gui() {
   if (!options_.is_bare && state_.tool != Tool::Look) draw_outline(state_);
   draw_loading();
   draw_saving();
+  draw_losses();
   draw_leaving();
   if (const auto path = chooser_.draw(static_cast<float>(gui_->scale()))) {
     chooser_.purpose() == FileChooser::Purpose::Open ? load(*path) : save(*path);
@@ -113,14 +122,38 @@ void App::draw_saving() {
   end_box();
 }
 
+void App::draw_losses() {
+  if (!lossy_save_ || state_.saver) return;
+  const LossySave lossy = *lossy_save_;
+  if (!begin_question("Saving would lose something")) return;
+  ImGui::Text("%s would not keep:", lossy.path.filename().string().c_str());
+  for (const std::string& line : lossy.losses) ImGui::BulletText("%s", line.c_str());
+  ImGui::Spacing();
+  ImGui::TextDisabled("The file that is there now is kept as %s~.", lossy.path.filename().string().c_str());
+  ImGui::Spacing();
+  enum class Answer { None, SaveAs, Save, Stay } answer = Answer::None;
+  if (ImGui::Button("Save as...")) answer = Answer::SaveAs;
+  ImGui::SameLine();
+  if (ImGui::Button("Save all the same")) answer = Answer::Save;
+  ImGui::SameLine();
+  if (ImGui::Button("Cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) answer = Answer::Stay;
+  if (answer != Answer::None) {
+    ImGui::CloseCurrentPopup();
+    lossy_save_.reset();
+  }
+  ImGui::EndPopup();
+  if (answer == Answer::SaveAs) ask_where_to_save();
+  if (answer == Answer::Stay) leaving_.reset();
+  if (answer == Answer::Save) {
+    state_.open.document->accept_losses(lossy.losses);
+    save(lossy.path, true);
+  }
+}
+
 void App::draw_leaving() {
-  if (!leaving_ || state_.saver || chooser_.is_shown()) return;
-  constexpr const char* kTitle = "Unsaved changes";
+  if (!leaving_ || state_.saver || lossy_save_ || chooser_.is_shown()) return;
   // Again, too, when the user thought better of saving.
-  if (!ImGui::IsPopupOpen(kTitle)) ImGui::OpenPopup(kTitle);
-  const ImVec2 room = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({room.x * 0.5F, room.y * 0.5F}, ImGuiCond_Always, {0.5F, 0.5F});
-  if (!ImGui::BeginPopupModal(kTitle, nullptr, ImGuiWindowFlags_AlwaysAutoResize)) return;
+  if (!begin_question("Unsaved changes")) return;
   ImGui::Text("%s has changes that are not saved.", state_.open.document->name().c_str());
   ImGui::Spacing();
   enum class Answer { None, Save, Discard, Stay } answer = Answer::None;

@@ -178,6 +178,7 @@ float draw_panel(ViewState& state, float scale, float top, float bottom, MenuCho
   ImGui::Begin("panel", nullptr, bar_flags() & ~ImGuiWindowFlags_NoScrollbar);
   ImGui::PushItemWidth(-0.36F * width);
   draw_tool_part(state, choice);
+  draw_scene_part(state);
   draw_picture_part(state);
   draw_camera_part(state, choice);
   draw_light_part(state);

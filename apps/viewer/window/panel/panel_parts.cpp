@@ -16,11 +16,6 @@ namespace quoin::viewer {
 
 namespace {
 
-/// A heading that can be folded. Returns whether what follows is shown.
-bool heading(const char* name) {
-  return ImGui::CollapsingHeader(name, ImGuiTreeNodeFlags_DefaultOpen);
-}
-
 bool command_button(Command command, const char* label, MenuChoice& choice) {
   const bool is_pressed = ImGui::Button(label);
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s (%s)", info_of(command).name, info_of(command).keys);
@@ -135,6 +130,10 @@ void draw_sun(LightOptions& light) {
 }
 
 }  // namespace
+
+bool heading(const char* name, bool is_open) {
+  return ImGui::CollapsingHeader(name, is_open ? ImGuiTreeNodeFlags_DefaultOpen : ImGuiTreeNodeFlags_None);
+}
 
 void draw_tool_part(ViewState& state, MenuChoice& choice) {
   if (!heading("Tool")) return;

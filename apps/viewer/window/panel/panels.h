@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "commands.h"
-#include "view_state.h"
+#include "viewer/window/commands.h"
+#include "viewer/window/view_state.h"
 
 namespace quoin::viewer {
 
