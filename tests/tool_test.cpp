@@ -6,6 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/io/file.h>
+
+#include "io/vox/vox_for_tests.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {
@@ -103,6 +106,41 @@ TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
   EXPECT_EQ(instances.at(1)["scale"], Json({-0.45, 0.45, 0.45}));
   ASSERT_EQ(run("convert whole.json again.json").status, 0);
   EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
+}
+
+// What an artist's file holds beside voxels goes along from .vox to .vox, and is told where it cannot.
+TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
+  vox_test::FileBuilder file;
+  file.model(4, 4, 4, {{0, 0, 0, 1}}).model(2, 2, 2, {{0, 0, 0, 3}});
+  file.transform(0, 1, {{}}, {}, -1).group(1, {2});
+  file.transform(2, 3, {{}}, {{"_name", "crew"}}, 1).group(3, {4});
+  file.transform(4, 5, {{}}, {{"_name", "walker"}}, 0).shape(5, {{0, {{"_f", "0"}}}, {1, {{"_f", "3"}}}});
+  file.layer(0, {}).layer(1, {{"_name", "people"}});
+  file.with("rCAM", [](auto& out) { out.dict({}); });
+  const auto bytes = file.file();
+  ASSERT_TRUE(write_file(folder_.file("crew.vox"), bytes));
+  const ToolRun same = run("convert crew.vox same.vox");
+  EXPECT_EQ(same.status, 0);
+  EXPECT_EQ(same.err, "") << "nothing is lost";
+  EXPECT_EQ(read_file(folder_.file("same.vox")).value(), bytes);
+  const ToolRun still = run("convert crew.vox still.vox --frame 3");
+  EXPECT_EQ(still.status, 0);
+  EXPECT_NE(still.err.find("left out, since --frame takes one: animation: frames 0 to 3"), std::string::npos);
+  EXPECT_EQ(Json::parse(run("info still.vox --json").out)["voxels"], 3) << "models stay, placed or not";
+  const ToolRun scene = run("convert crew.vox crew.json");
+  EXPECT_NE(scene.err.find("left out, which only .vox keeps: cameras: 1"), std::string::npos);
+  const Json info = Json::parse(run("info crew.vox --json").out);
+  EXPECT_EQ(info["groups"].at(0)["name"], "crew");
+  EXPECT_EQ(info["groups"].at(0)["parent"], Json());
+  EXPECT_EQ(info["groups"].at(0)["layer"], 1);
+  EXPECT_EQ(info["layers"].at(1), Json({{"name", "people"}, {"visible", true}}));
+  EXPECT_EQ(info["kept"], Json({"animation: frames 0 to 3", "cameras: 1"}));
+  EXPECT_EQ(info["grids"].at(0)["instances"].at(0)["group"], 0);
+  const ToolRun text = run("info crew.vox");
+  EXPECT_NE(text.out.find("Groups: 1: \"crew\"\nLayers: 2: \"people\"\nKept when saved as .vox: animation"),
+            std::string::npos)
+      << text.out;
+  EXPECT_EQ(Json::parse(run("info crew.json --json").out)["groups"], info["groups"]);
 }
 
 TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {

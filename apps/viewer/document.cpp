@@ -233,10 +233,11 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
   const auto format = format_to_write(path);
   if (!format) return format.error();
   if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
-  if (Status kept = keep_backup(path); !kept) return kept;
+  auto before = FileBackup::of(path);
+  if (!before) return before.error();
   const auto written = save_scene(loaded_, path, warnings, {}, progress);
   if (!written) return written.error();
-  return {};
+  return before->keep();
 }
 
 void Document::note_written(const std::filesystem::path& path, std::uint64_t state) {

@@ -91,7 +91,7 @@ class Document {
 
   /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. A file that is there already is kept
   /// as NAME~, unless it is a mesh.
-  /// Errors: Unsupported for other endings; those of save_scene, keep_backup, mesh_scene and write_mesh; Cancelled.
+  /// Errors: Unsupported for other endings; those of save_scene, FileBackup, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
   /// What was written is what the state `state` held: not dirty while it is in force. A .vox or .json becomes the

@@ -1,8 +1,12 @@
 #include "document.h"
 
 #include <algorithm>
+#include <chrono>
 #include <random>
 #include <set>
+#include <span>
+#include <string_view>
+#include <thread>
 
 #include <fstream>
 #include <glm/common.hpp>
@@ -12,6 +16,8 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
+#include "io/vox/vox_for_tests.h"
+#include "loader.h"
 #include "viewer_fixture.h"
 
 namespace quoin::viewer {
@@ -338,6 +344,100 @@ TEST(Document, SavesAndKnowsWhatIsSaved) {
   ASSERT_TRUE(again) << to_string(again.error());
   EXPECT_EQ((*again)->scene().voxel_count(), document.scene().voxel_count());
   EXPECT_EQ((*again)->scene().bounds().max, document.scene().bounds().max);
+}
+
+/// A .vox file with a group, a hidden layer, two frames and a camera.
+std::filesystem::path write_layered(const ScratchFolder& folder) {
+  vox_test::FileBuilder file;
+  file.model(4, 4, 4, {{0, 0, 0, 1}, {1, 1, 1, 2}}).model(2, 2, 2, {{0, 0, 0, 3}});
+  file.transform(0, 1, {{}}, {}, -1).group(1, {2, 6});
+  file.transform(2, 3, {{}}, {{"_name", "group"}}).group(3, {4});
+  file.transform(4, 5, {{}}, {{"_name", "walker"}}, 0).shape(5, {{0, {{"_f", "0"}}}, {1, {{"_f", "3"}}}});
+  file.transform(6, 7, {{{"_t", "9 0 0"}}}, {{"_name", "hidden"}}, 1).shape(7, 1);
+  file.layer(0, {{"_name", "shown"}}).layer(1, {{"_hidden", "1"}});
+  file.with("rCAM", [](auto& out) { out.dict({}); });
+  const auto path = folder.file("layered.vox");
+  EXPECT_TRUE(write_file(path, file.file()));
+  return path;
+}
+
+TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
+  const ScratchFolder folder("keeping");
+  const auto path = write_layered(folder);
+  const auto before = read_file(path).value();
+  // What is hidden is looked at, and stays hidden.
+  const auto document = Document::open(path, {.show_hidden = true});
+  ASSERT_TRUE(document);
+  const InstanceHandle walker = (*document)->scene().instances().handles().front();
+  SceneHit hit;
+  hit.instance = walker;
+  hit.voxel = {0, 0, 3};
+  hit.face = Direction::PosX;
+  ASSERT_TRUE((*document)->begin_stroke({BrushAction::Paint, BrushShape::Box, 0, 7}, hit));
+  (*document)->end_stroke();
+  EXPECT_TRUE((*document)->losses(path).value().empty());
+  std::vector<std::string> warnings;
+  ASSERT_TRUE((*document)->write(path, warnings));
+  EXPECT_TRUE(warnings.empty());
+  (*document)->note_written(path, (*document)->history().state());
+  const auto after = read_file(path).value();
+  ASSERT_EQ(after.size(), before.size());
+  int different = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) different += before[i] != after[i] ? 1 : 0;
+  EXPECT_EQ(different, 1);
+  EXPECT_EQ(read_file(folder.file("layered.vox~")).value(), before);
+  EXPECT_TRUE((*document)->losses(path).value().empty()) << "it was written by this one";
+}
+
+TEST(Document, WhatSavingWouldLoseIsToldOnce) {
+  const ScratchFolder folder("losing");
+  const auto path = write_layered(folder);
+  const auto document = Document::open(path);
+  ASSERT_TRUE(document);
+  const auto losses = (*document)->losses(folder.file("as.json"));
+  ASSERT_TRUE(losses);
+  EXPECT_EQ(*losses, (std::vector<std::string>{"left out, which only .vox keeps: animation: frames 0 to 3",
+                                               "left out, which only .vox keeps: cameras: 1"}));
+  {
+    Saver saver(**document, folder.file("as.json"), false, nullptr);
+    while (!saver.is_done()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_TRUE(saver.status());
+    EXPECT_EQ(saver.losses(), *losses);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.file("as.json"))) << "the user is asked first";
+  (*document)->accept_losses(*losses);
+  EXPECT_TRUE((*document)->losses(folder.file("as.json")).value().empty());
+  EXPECT_TRUE((*document)->losses(folder.file("mesh.glb")).value().empty()) << "a copy";
+  // Another program's work.
+  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("VOX another")))));
+  const auto of_others = (*document)->losses(path);
+  ASSERT_TRUE(of_others);
+  ASSERT_EQ(of_others->size(), 1U);
+  EXPECT_NE(of_others->front().find("another program"), std::string::npos);
+}
+
+TEST(Document, WhatIsShownAndHiddenCanBeUndoneAndSaved) {
+  const ScratchFolder folder("switches");
+  const auto path = write_layered(folder);
+  const auto document = Document::open(path);
+  ASSERT_TRUE(document);
+  const GroupHandle group = (*document)->scene().groups().handles().front();
+  const LayerHandle layer = (*document)->scene().layers().handles()[1];
+  EXPECT_FALSE((*document)->show(layer, false)) << "it is hidden";
+  EXPECT_TRUE((*document)->show(layer, true));
+  EXPECT_TRUE((*document)->show(group, false));
+  EXPECT_TRUE((*document)->is_dirty());
+  EXPECT_EQ((*document)->history().undo_name(), "hide");
+  EXPECT_TRUE((*document)->undo());
+  EXPECT_TRUE((*document)->scene().groups()[group].visible);
+  EXPECT_TRUE((*document)->redo());
+  std::vector<std::string> warnings;
+  ASSERT_TRUE((*document)->write(path, warnings));
+  const auto again = Document::open(path);
+  ASSERT_TRUE(again);
+  EXPECT_FALSE((*again)->scene().groups()[group].visible);
+  EXPECT_TRUE((*again)->scene().layers()[layer].visible);
+  EXPECT_FALSE((*document)->show(GroupHandle{9, 9}, true)) << "there is none";
 }
 
 TEST(Document, WhatCannotBeDoneIsAnError) {

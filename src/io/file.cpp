@@ -220,28 +220,46 @@ Status AtomicFile::commit() {
   return {};
 }
 
-Status keep_backup(const std::filesystem::path& path) {
+Result<FileBackup> FileBackup::of(const std::filesystem::path& path) {
+  FileBackup backup;
   const std::filesystem::path file = behind_links(path);
   struct stat info {};
-  if (::stat(file.c_str(), &info) != 0 && errno == ENOENT) return {};
-  std::filesystem::path backup = file;
-  backup += "~";
+  if (::stat(file.c_str(), &info) != 0 && errno == ENOENT) return backup;
+  std::filesystem::path beside = file;
+  beside += "~";
   std::optional<mode_t> mode;
-  if (Status free = check_replaceable(backup, mode); !free) return free;
+  if (Status free = check_replaceable(beside, mode); !free) return free.error();
   const std::filesystem::path second_name = temporary_name(file, 0);
-  if (::link(file.c_str(), second_name.c_str()) == 0) {
-    if (::rename(second_name.c_str(), backup.c_str()) == 0) {
-      // Where both were the same file already, renaming does nothing.
-      ::unlink(second_name.c_str());
-      return {};
-    }
-    const int error = errno;
-    ::unlink(second_name.c_str());
-    return cannot_write(reason(error), backup);
+  if (::link(file.c_str(), second_name.c_str()) != 0) {
+    const auto bytes = read_file(file);
+    if (!bytes) return bytes.error();
+    if (Status copied = write_file(second_name, *bytes); !copied) return copied.error();
   }
-  const auto bytes = read_file(file);
-  if (!bytes) return bytes.error();
-  return write_file(backup, *bytes);
+  backup.second_name_ = second_name;
+  backup.backup_ = beside;
+  return backup;
+}
+
+FileBackup::FileBackup(FileBackup&& other) noexcept
+    : second_name_(std::exchange(other.second_name_, {})), backup_(std::move(other.backup_)) {}
+
+FileBackup& FileBackup::operator=(FileBackup&& other) noexcept {
+  std::swap(second_name_, other.second_name_);
+  std::swap(backup_, other.backup_);
+  return *this;
+}
+
+FileBackup::~FileBackup() {
+  if (!second_name_.empty()) ::unlink(second_name_.c_str());
+}
+
+Status FileBackup::keep() {
+  if (second_name_.empty()) return {};
+  if (::rename(second_name_.c_str(), backup_.c_str()) != 0) return cannot_write(reason(errno), backup_);
+  // Where both were the same file already, renaming does nothing.
+  ::unlink(std::exchange(second_name_, {}).c_str());
+  sync_folder(backup_.parent_path());
+  return {};
 }
 
 Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {

@@ -96,6 +96,47 @@ TEST_F(FileTest, DoesNotWaitForAFifo) {
   EXPECT_FALSE(write_file(fifo, bytes_of("x")));
 }
 
+TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
+  const fs::path path = folder_ / "world.vox";
+  const fs::path beside = folder_ / "world.vox~";
+  {
+    auto nothing = FileBackup::of(path);
+    ASSERT_TRUE(nothing);
+    EXPECT_TRUE(nothing->keep());
+  }
+  EXPECT_EQ(entries(), 0U) << "there was no file";
+  ASSERT_TRUE(write_file(path, bytes_of("first")));
+  for (const std::string next : {"second", "third"}) {
+    const std::string before = content(path);
+    auto backup = FileBackup::of(path);
+    ASSERT_TRUE(backup);
+    ASSERT_TRUE(write_file(path, bytes_of(next)));
+    EXPECT_TRUE(backup->keep());
+    EXPECT_EQ(content(path), next);
+    EXPECT_EQ(content(beside), before);
+    EXPECT_EQ(entries(), 2U);
+  }
+  {
+    const auto unused = FileBackup::of(path);
+    ASSERT_TRUE(unused);
+  }
+  EXPECT_EQ(content(beside), "second") << "what was not written replaces no backup";
+  EXPECT_EQ(entries(), 2U);
+}
+
+TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
+  const fs::path path = folder_ / "a";
+  ASSERT_TRUE(write_file(path, bytes_of("kept")));
+  fs::create_directory(folder_ / "a~");
+  EXPECT_EQ(FileBackup::of(path).error().code, ErrorCode::CannotWrite);
+  fs::remove(folder_ / "a~");
+  fs::create_symlink("a", folder_ / "link");
+  auto backup = FileBackup::of(folder_ / "link");
+  ASSERT_TRUE(backup);
+  EXPECT_TRUE(backup->keep());
+  EXPECT_EQ(content(folder_ / "a~"), "kept");
+}
+
 TEST_F(FileTest, AMoveCarriesTheFileAlong) {
   const fs::path path = folder_ / "a";
   auto first = AtomicFile::create(path);

@@ -39,10 +39,28 @@ class AtomicFile {
   bool failed_ = false;
 };
 
-/// Keeps what a file holds now as NAME~ beside it, in place of an older one, before something else is put there. Where
-/// there is no file, nothing is kept. Links are followed. Cost: none, where the file system has links; else a copy.
-/// Errors: CannotWrite, CannotRead: nothing was changed.
-[[nodiscard]] Status keep_backup(const std::filesystem::path& path);
+/// What a file holds now, kept under another name while something else is put there. Links are followed.
+///
+///   auto before = FileBackup::of(path);            // nothing to keep where there is no file
+///   if (write(path)) before->keep();               // as NAME~, in place of an older one
+///
+/// Destroyed without `keep`, it leaves nothing behind and an older NAME~ as it was.
+class FileBackup {
+ public:
+  /// Cost: none, where the file system has links; else a copy. Errors: CannotWrite, CannotRead: nothing was changed.
+  [[nodiscard]] static Result<FileBackup> of(const std::filesystem::path& path);
+  FileBackup(FileBackup&& other) noexcept;
+  FileBackup& operator=(FileBackup&& other) noexcept;
+  ~FileBackup();
+
+  /// Errors: CannotWrite.
+  [[nodiscard]] Status keep();
+
+ private:
+  FileBackup() = default;
+  std::filesystem::path second_name_;  // empty: there is nothing to keep
+  std::filesystem::path backup_;
+};
 
 /// Writes all of `bytes` to `path` by way of an AtomicFile.
 [[nodiscard]] Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 #include <set>
@@ -224,6 +225,57 @@ TEST_F(Gltf, HiddenInstancesAreLeftOutUnlessAskedFor) {
   ASSERT_TRUE(all);
   EXPECT_EQ(write(*all).document["nodes"].size(), 2U);
   EXPECT_EQ(all->parts.size(), 2U);
+}
+
+/// The matrix of a node as glTF puts it together.
+glm::dmat4 matrix_of(const nlohmann::json& node) {
+  glm::dmat4 matrix(1.0);
+  if (node.contains("rotation")) {
+    const auto& q = node["rotation"];
+    matrix = glm::mat4_cast(DQuat(q[3], q[0], q[1], q[2]));
+  }
+  if (node.contains("scale")) {
+    for (int axis = 0; axis < 3; ++axis) matrix[axis] *= node["scale"][static_cast<std::size_t>(axis)].get<double>();
+  }
+  if (node.contains("translation")) {
+    for (int axis = 0; axis < 3; ++axis) matrix[3][axis] = node["translation"][static_cast<std::size_t>(axis)];
+  }
+  return matrix;
+}
+
+TEST_F(Gltf, GroupsAreNodesAndNothingMovesByThem) {
+  const double half = std::sqrt(0.5);
+  const GridHandle grid = add_asymmetric_grid(scene_, "crane");
+  const LayerHandle layer = scene_.add_layer({"harbour"});
+  const GroupHandle ship = scene_.add_group({.name = "ship", .position = {10, 0, 0}, .rotation = {half, 0, half, 0}});
+  const GroupHandle deck = scene_.add_group({.name = "deck", .parent = ship, .layer = layer, .position = {10, 4, 0}});
+  scene_.add_group({.name = "nothing below", .parent = ship});
+  std::vector<InstanceHandle> placed = {place(scene_, grid, {1, 2, 3}, "on deck"),
+                                        place(scene_, grid, {9, 9, 9}, "free")};
+  scene_.edit(placed[0]).group = deck;
+  scene_.edit(placed[0]).layer = layer;
+  scene_.edit(placed[0]).rotation = {half, half, 0, 0};
+  scene_.edit(placed[0]).mirrored = true;
+  const nlohmann::json document = write().document;
+  const auto& nodes = document["nodes"];
+  ASSERT_EQ(nodes.size(), 4U);
+  EXPECT_EQ(document["scenes"][0]["nodes"], nlohmann::json({1, 2}));
+  EXPECT_EQ(nodes[2]["name"], "ship");
+  EXPECT_EQ(nodes[2]["children"], nlohmann::json({3}));
+  EXPECT_EQ(nodes[3]["name"], "deck");
+  EXPECT_EQ(nodes[3]["children"], nlohmann::json({0}));
+  EXPECT_EQ(nodes[3]["extras"]["layer"], "harbour");
+  EXPECT_EQ(nodes[0]["extras"]["layer"], "harbour");
+  EXPECT_FALSE(nodes[1].contains("extras"));
+  const glm::dmat4 whole = matrix_of(nodes[2]) * matrix_of(nodes[3]) * matrix_of(nodes[0]);
+  Instance alone = scene_.instances()[placed[0]];
+  alone.mirrored = false;  // which is baked into the mesh
+  for (int axis = 0; axis < 3; ++axis) {
+    DVec3 unit(0.0);
+    unit[axis] = 1.0;
+    EXPECT_LT(glm::length(DVec3(whole[axis]) - world_from_grid_direction(alone, unit)), 1e-12);
+  }
+  EXPECT_LT(glm::length(DVec3(whole[3]) - alone.position), 1e-12);
 }
 
 TEST_F(Gltf, NamesThatAreNoUtf8AreRepaired) {

@@ -199,11 +199,22 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
             "instances[0].position[1]: must be a number");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 4, "files": [], "instances": []})"),
-            "quoin_scene: version 4 is not known; 1 to 3 are");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 5, "files": [], "instances": []})"),
+            "quoin_scene: version 5 is not known; 1 to 4 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not known; 1 to 3 are");
+            "quoin_scene: version 0 is not known; 1 to 4 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
+  const auto hierarchy = [](const std::string& lists, const std::string& instance) {
+    return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +
+           instance + "}]}";
+  };
+  EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"parent": 0}], )", "")),
+            "groups[0].parent: there is no group 0 before it");
+  EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"layer": 1}], "layers": [{}], )", "")),
+            "groups[0].layer: there is no layer 1");
+  EXPECT_EQ(fault_of(hierarchy("", R"(, "group": 0)")), "instances[0].group: there is no group 0");
+  EXPECT_EQ(fault_of(hierarchy("", R"(, "layer": -1)")),
+            "instances[0].layer: must be a place in the list of layers, from 0");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
             "files[0].path: must name a file");
   EXPECT_EQ(

@@ -35,8 +35,13 @@ class RandomScene {
       scene.remove_grid(grids[1]);
       grids.erase(grids.begin() + 1);
     }
-    for (int i = below(9); i > 0; --i)
-      scene.add_instance(instance(grids[static_cast<std::size_t>(below(grids.size()))]));
+    add_hierarchy(scene);
+    for (int i = below(9); i > 0; --i) {
+      Instance made = instance(grids[static_cast<std::size_t>(below(grids.size()))]);
+      made.group = any(scene.groups());
+      made.layer = any(scene.layers());
+      scene.add_instance(made);
+    }
     for (int i = is_rare() ? 3 : 0; i > 0; --i) scene.lamps.push_back(lamp());
     return scene;
   }
@@ -58,6 +63,26 @@ class RandomScene {
     const std::vector<std::string> texts = {
         "", "hull", "a \"b\"\\\n", "\xC3\xA9\xE6\x97\xA5", "\xFF\xFE", std::string("\0x", 2)};
     return texts[static_cast<std::size_t>(below(texts.size()))];
+  }
+  template <class T>
+  Handle<T> any(const SlotMap<T>& all) {
+    if (all.empty() || is_rare()) return {};
+    return all.handles()[static_cast<std::size_t>(below(all.size()))];
+  }
+  void add_hierarchy(Scene& scene) {
+    if (is_rare()) return;  // files of before
+    for (int i = below(4); i > 0; --i) scene.add_layer({text(), !is_rare()});
+    for (int i = below(6); i > 0; --i) {
+      SceneGroup group;
+      group.name = text();
+      group.parent = any(scene.groups());
+      group.layer = any(scene.layers());
+      if (!is_rare()) group.position = {number(), number(), number()};
+      if (!is_rare()) group.rotation = DQuat(number(), number(), number(), number());
+      group.mirrored = is_rare();
+      group.visible = !is_rare();
+      scene.add_group(group);
+    }
   }
   VoxelProperties properties() {
     VoxelProperties made;
@@ -132,6 +157,35 @@ void expect_equal(const Grid& a, const Grid& b) {
   for (const IVec3 chunk : a.chunks()) EXPECT_TRUE(*a.find_chunk(chunk) == *b.find_chunk(chunk));
 }
 
+template <class T>
+std::ptrdiff_t place_of(const std::vector<Handle<T>>& all, Handle<T> handle) {
+  return std::find(all.begin(), all.end(), handle) - all.begin();
+}
+
+void expect_equal_hierarchy(const Scene& a, const Scene& b) {
+  const auto layers_a = a.layers().handles();
+  const auto layers_b = b.layers().handles();
+  ASSERT_EQ(layers_a.size(), layers_b.size());
+  for (std::size_t i = 0; i < layers_a.size(); ++i) {
+    EXPECT_EQ(a.layers()[layers_a[i]].name, b.layers()[layers_b[i]].name);
+    EXPECT_EQ(a.layers()[layers_a[i]].visible, b.layers()[layers_b[i]].visible);
+  }
+  const auto groups_a = groups_from_top(a);
+  const auto groups_b = groups_from_top(b);
+  ASSERT_EQ(groups_a.size(), groups_b.size());
+  for (std::size_t i = 0; i < groups_a.size(); ++i) {
+    const SceneGroup& group = a.groups()[groups_a[i]];
+    const SceneGroup& other = b.groups()[groups_b[i]];
+    EXPECT_EQ(group.name, other.name);
+    EXPECT_EQ(place_of(groups_a, group.parent), place_of(groups_b, other.parent));
+    EXPECT_EQ(place_of(layers_a, group.layer), place_of(layers_b, other.layer));
+    EXPECT_EQ(bits_of(group.position, 3), bits_of(other.position, 3));
+    EXPECT_EQ(bits_of(group.rotation, 4), bits_of(other.rotation, 4));
+    EXPECT_EQ(group.mirrored, other.mirrored);
+    EXPECT_EQ(group.visible, other.visible);
+  }
+}
+
 // To the last bit, whatever the handles.
 void expect_equal(const Scene& a, const Scene& b) {
   ASSERT_EQ(a.types.size(), b.types.size());
@@ -166,7 +220,10 @@ void expect_equal(const Scene& a, const Scene& b) {
     EXPECT_EQ(bits(instance.voxel_size), bits(other.voxel_size));
     EXPECT_EQ(instance.mirrored, other.mirrored);
     EXPECT_EQ(instance.visible, other.visible);
+    EXPECT_EQ(place_of(groups_from_top(a), instance.group), place_of(groups_from_top(b), other.group));
+    EXPECT_EQ(place_of(a.layers().handles(), instance.layer), place_of(b.layers().handles(), other.layer));
   }
+  expect_equal_hierarchy(a, b);
 }
 
 std::vector<std::byte> written(const Scene& scene, Threads threads = {}) {

@@ -1,5 +1,6 @@
 #include <imgui.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
@@ -126,7 +127,8 @@ void draw_scene_part(ViewState& state) {
   const bool says_something = scene.instances().size() > 1 || !scene.groups().empty() || !scene.layers().empty();
   if (!says_something || !heading("Scene", !scene.groups().empty())) return;
   SceneList list(scene);
-  const float rows = 10.0F;
+  const std::size_t entries = scene.instances().size() + scene.groups().size() + (scene.layers().empty() ? 1 : 2);
+  const auto rows = static_cast<float>(std::clamp<std::size_t>(entries, 4, 10));
   ImGui::BeginChild("scene", {0.0F, rows * ImGui::GetFrameHeightWithSpacing()}, true);
   list.draw_layers();
   list.draw_below({});

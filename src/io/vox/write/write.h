@@ -37,8 +37,8 @@ struct RevisedTypes {
 };
 
 /// The same for a scene that was read from a file: the types that were its palette stay where they were. Others that
-/// occur take entries of the same look, else some whose type does not occur, those first that say least: of a colour
-/// that is there twice, or the default palette's.
+/// occur take entries of the same look, else some whose type does not occur, those first that say least: a plain
+/// colour that is there twice, or of the default palette.
 ///
 /// Errors: LimitExceeded when more than 255 types occur.
 [[nodiscard]] Result<RevisedTypes> revise_type_table(const Scene& scene, const VoxSource& source);

@@ -124,12 +124,11 @@ class PaletteRoom {
   [[nodiscard]] std::int64_t replaced() const { return replaced_; }
 
  private:
+  /// A plain colour that MagicaVoxel's own palette has, or that is there twice.
   [[nodiscard]] bool says_little(std::size_t index) const {
     const VoxelProperties& entry = table_.by_index[index];
-    VoxelProperties plain;
-    plain.colour = entry.colour;
-    if (!looks_the_same(entry, plain)) return false;
-    if (entry.colour == default_palette()[index]) return true;
+    if (entry.visibility != Visibility::Opaque || entry.emission > 0.0F || entry.metalness > 0.0F) return false;
+    if (std::ranges::find(usual_, entry.colour) != usual_.end()) return true;
     for (std::size_t other = 1; other < kColours; ++other) {
       if (other != index && table_.by_index[other].colour == entry.colour) return true;
     }
@@ -150,6 +149,7 @@ class PaletteRoom {
 
   const VoxSource& source_;
   TypeTable& table_;
+  const std::array<Rgba8, kColours> usual_ = default_palette();
   std::array<bool, kColours> occurs_{true};
   std::vector<VoxelType> strangers_;
   std::int64_t replaced_ = 0;
