@@ -154,7 +154,7 @@ std::vector<std::byte> house() {
     });
   }
   file.with("RGBA", [](auto& out) {
-    for (int i = 0; i < 256; ++i) out.u32(static_cast<std::uint32_t>(i * 0x010203));
+    for (int i = 0; i < 256; ++i) out.u32(static_cast<std::uint32_t>(i | (255 - i) << 8 | 7 << 16));
   });
   file.material(5, {{"_type", "_glass"}, {"_unknown", "kept"}, {"_alpha", "0.5"}}).material(6, {{"_type", "_emit"}});
   file.chunk("rOBJ", kSecret).chunk("NOTE", kSecret).chunk("QQQQ", kSecret);
@@ -301,6 +301,19 @@ TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
   const VoxelType read = again.scene.grids()[again.scene.grids().handles()[3]].grid.get({0, 0, 0});
   EXPECT_EQ(again.scene.types[read].colour, gold.colour);
   EXPECT_EQ(again.scene.types[read].emission, 2.0F);
+  // Of a palette with colours that are there twice, one of these goes, and nothing is lost.
+  FileBuilder twice;
+  twice.model(1, 1, 1, {{0, 0, 0, 1}});
+  twice.with("RGBA", [](auto& out) {
+    for (int i = 0; i < 256; ++i) out.u32(static_cast<std::uint32_t>(std::max(i, 2) | 7 << 16));
+  });
+  const auto twice_bytes = twice.file();
+  LoadedScene with_room = load(twice_bytes);
+  ASSERT_TRUE(with_room.scene.types.add(gold));
+  with_room.scene.edit(with_room.scene.grids().handles()[0]).grid.set({0, 0, 0}, 256);
+  warnings.clear();
+  EXPECT_EQ(changed_chunks(twice_bytes, save(with_room, &warnings)), " ~XYZI ~RGBA +MATL");
+  EXPECT_TRUE(warnings.empty());
   // A type that looks like one of the palette is that one.
   VoxelProperties known = loaded.scene.types[3];
   known.name = "mine";
