@@ -96,7 +96,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
 std::vector<std::string> lost_with_source(const LoadedScene& loaded) {
   if (loaded.source == nullptr) return {};
   std::vector<std::string> lines = only_in_source(*loaded.source);
-  for (std::string& line : lines) line = "left out, which only .vox keeps: " + line;
+  for (std::string& line : lines) line.insert(0, "left out, which only .vox keeps: ");
   return lines;
 }
 

@@ -134,6 +134,8 @@ TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
   std::vector<LayerHandle> layers{LayerHandle{}};
   std::vector<InstanceHandle> instances;
   const auto any = [&](const auto& of) { return of[random() % of.size()]; };
+  layers.reserve(5);
+  groups.reserve(13);
   for (int i = 0; i < 4; ++i) layers.push_back(scene.add_layer({"layer", random() % 4 != 0}));
   for (int i = 0; i < 12; ++i)
     groups.push_back(scene.add_group({.name = "", .parent = any(groups), .layer = any(layers)}));
@@ -143,6 +145,7 @@ TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
   ChangeCursor cursor = scene.cursor();
   for (int round = 0; round < 800; ++round) {
     std::vector<bool> before;
+    before.reserve(instances.size());
     for (const InstanceHandle each : instances) before.push_back(slowly_shown(scene, scene.instances()[each]));
     const GroupHandle group = groups[1 + random() % (groups.size() - 1)];
     const LayerHandle layer = layers[1 + random() % (layers.size() - 1)];

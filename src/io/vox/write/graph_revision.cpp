@@ -653,6 +653,7 @@ void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
   }
   if (has_others) {
     std::vector<std::uint32_t> shown;
+    shown.reserve(before.models.size());
     for (const auto& [model, key] : before.models) shown.push_back(model);
     shown[now.place] = nothing;
     hang({}, shown);
@@ -696,7 +697,7 @@ Status GraphRevision::revise_instances() {
     const Instance& instance = scene_.instances()[handle];
     if (models_.find(instance.grid) == nullptr) continue;
     const Instance* before = keeps_graph_ ? source_.scene.instances().find(handle) : nullptr;
-    const Status done = before != nullptr ? revise_instance(instance, source_.placements.all[handle.index], *before)
+    Status done = before != nullptr ? revise_instance(instance, source_.placements.all[handle.index], *before)
                                           : add_instance(handle, instance);
     if (!done) return done;
   }
