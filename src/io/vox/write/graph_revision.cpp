@@ -698,7 +698,7 @@ Status GraphRevision::revise_instances() {
     if (models_.find(instance.grid) == nullptr) continue;
     const Instance* before = keeps_graph_ ? source_.scene.instances().find(handle) : nullptr;
     Status done = before != nullptr ? revise_instance(instance, source_.placements.all[handle.index], *before)
-                                          : add_instance(handle, instance);
+                                    : add_instance(handle, instance);
     if (!done) return done;
   }
   return {};

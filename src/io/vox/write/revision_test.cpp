@@ -87,7 +87,7 @@ std::multiset<std::string> said_by(const Scene& scene) {
     std::string way;
     for (; scene.groups().find(from) != nullptr; from = parent_of(scene, from)) {
       const SceneGroup& group = scene.groups()[from];
-      way = "/" + group.name + (group.visible ? "" : "(hidden)") + layer_text(group.layer) + way;
+      way.insert(0, "/" + group.name + (group.visible ? "" : "(hidden)") + layer_text(group.layer));
     }
     return way;
   };
