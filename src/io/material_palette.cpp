@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "io/glass_bodies.h"
 #include "io/mesh_parts.h"
 
 namespace quoin {
@@ -84,6 +85,7 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.type
   }
   find_bands(used);
   make_materials(used);
+  find_glass(meshes);
 }
 
 void MaterialPalette::find_bands(const Usage& used) {
@@ -107,33 +109,53 @@ void MaterialPalette::find_bands(const Usage& used) {
   }
 }
 
-std::size_t MaterialPalette::band_of(SurfaceClass surface, VoxelType type) const {
+// What has a material of its own: a transparent type, or a band of strengths of opaque ones.
+std::size_t MaterialPalette::group_of(SurfaceClass surface, VoxelType type) const {
+  if (is_transparent(surface)) return type;
   return emits(surface) ? band_of_type_[type] : 0;
+}
+
+float MaterialPalette::strength_of(SurfaceClass surface, VoxelType type) const {
+  return emits(surface) && !bands_.empty() ? bands_[band_of_type_[type]] : 0.0F;
 }
 
 void MaterialPalette::make_materials(const Usage& used) {
   for (std::size_t index = 0; index < kSurfaceClasses; ++index) {
     const auto surface = static_cast<SurfaceClass>(index);
-    std::vector<bool> bands(std::max<std::size_t>(bands_.size(), 1));
+    std::map<std::size_t, VoxelType> groups;
     for (std::size_t type = 0; type < types_.size(); ++type) {
-      if (used[index][type]) bands[band_of(surface, static_cast<VoxelType>(type))] = true;
+      const auto id = static_cast<VoxelType>(type);
+      if (used[index][type]) groups.try_emplace(group_of(surface, id), id);
     }
-    const auto count = std::count(bands.begin(), bands.end(), true);
     int number = 0;
-    for (std::size_t band = 0; band < bands.size(); ++band) {
-      if (!bands[band]) continue;
-      SurfaceMaterial material{material_name(surface), surface, 0.0F};
-      if (emits(surface) && !bands_.empty()) material.emission = bands_[band];
-      if (count > 1) material.name.append(1, ' ').append(std::to_string(++number));
-      by_class_and_band_[{surface, band}] = materials_.size();
+    for (const auto& [group, type] : groups) {
+      SurfaceMaterial material;
+      material.name = material_name(surface);
+      material.surface = surface;
+      material.emission = strength_of(surface, type);
+      if (is_transparent(surface)) material.type = type;
+      if (groups.size() > 1) material.name.append(1, ' ').append(std::to_string(++number));
+      by_class_and_group_[{surface, group}] = materials_.size();
       materials_.push_back(std::move(material));
     }
   }
 }
 
+void MaterialPalette::find_glass(const SceneMeshes& meshes) {
+  GlassBodies bodies(meshes);
+  smooth_thickness_ = bodies.thickness_of_smooth();
+  const Surfaces looks(types_);
+  for (SurfaceMaterial& material : materials_) {
+    if (!material.is_transparent()) continue;
+    const auto [thickness, unit] = bodies.typical(material.type);
+    material.glass = glass_material(looks[material.type], thickness);
+    material.unit = unit;
+  }
+}
+
 std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) const {
-  const auto found = by_class_and_band_.find({surface, band_of(surface, type)});
-  QUOIN_ASSERT(found != by_class_and_band_.end(), "a class and type that the meshes have");
+  const auto found = by_class_and_group_.find({surface, group_of(surface, type)});
+  QUOIN_ASSERT(found != by_class_and_group_.end(), "a class and type that the meshes have");
   return found->second;
 }
 
@@ -146,14 +168,28 @@ PngImage MaterialPalette::blank(std::uint32_t channels) const {
 }
 
 PngImage MaterialPalette::base_colour() const {
-  PngImage image = blank(4);
+  PngImage image = opaque_colour();
   for (std::size_t type = 1; type < types_.size(); ++type) {
     const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
+    if (properties.visibility == Visibility::Transparent) image.pixels[type * 4 + 3] = properties.colour.a;
+  }
+  for (const SurfaceMaterial& material : materials_) {
+    if (material.is_transparent()) {
+      image.pixels[std::size_t{material.type} * 4 + 3] = byte_from_unit(static_cast<double>(material.glass.alpha));
+    }
+  }
+  return image;
+}
+
+PngImage MaterialPalette::opaque_colour() const {
+  PngImage image = blank(4);
+  for (std::size_t type = 1; type < types_.size(); ++type) {
+    const Rgba8 colour = types_[static_cast<VoxelType>(type)].colour;
     std::uint8_t* texel = image.pixels.data() + type * 4;
-    texel[0] = properties.colour.r;
-    texel[1] = properties.colour.g;
-    texel[2] = properties.colour.b;
-    texel[3] = properties.visibility == Visibility::Transparent ? properties.colour.a : 255;
+    texel[0] = colour.r;
+    texel[1] = colour.g;
+    texel[2] = colour.b;
+    texel[3] = 255;
   }
   return image;
 }
@@ -194,7 +230,7 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
     return surfaces_.push_back({view, palette.smooth_material(is_transparent(view.surface))});
   }
   std::map<std::size_t, BlockyTriangles*> by_material;
-  if (emits(view.surface)) {
+  if (emits(view.surface) || is_transparent(view.surface)) {
     for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
   }
   if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});

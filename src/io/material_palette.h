@@ -12,6 +12,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene_meshes.h>
 
+#include "io/glass_material.h"
 #include "io/image/png.h"
 
 namespace quoin {
@@ -23,6 +24,9 @@ struct SurfaceMaterial {
   std::string name;  ///< unique in the file
   SurfaceClass surface = SurfaceClass::Opaque;
   float emission = 0.0F;  ///< what a full texel of the emissive palette stands for; 0 when nothing is emitted
+  VoxelType type = kAir;  ///< a transparent material's only one
+  GlassMaterial glass{};  ///< of it
+  float unit = 1.0F;      ///< of it: the size of its voxels in the world, the mean of its placements
 
   [[nodiscard]] bool is_transparent() const {
     return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
@@ -35,6 +39,8 @@ struct SurfaceMaterial {
 /// The voxel types of a scene's meshes as mesh formats say it: textures with one texel a type, and the few materials
 /// that use them.
 ///
+/// Transparent types have a material each, with what glass of the type's typical thickness does to light.
+///
 /// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
 /// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
 /// strength, or with strengths more than twice apart, has its colours unscaled.
@@ -44,6 +50,7 @@ class MaterialPalette {
   /// Requires: the meshes are sound, and their types outlive this.
   explicit MaterialPalette(const SceneMeshes& meshes);
 
+  [[nodiscard]] const VoxelRegistry& types() const { return types_; }
   [[nodiscard]] const std::vector<SurfaceMaterial>& materials() const { return materials_; }
   /// Requires: the meshes have a triangle of this class and type.
   [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
@@ -66,8 +73,14 @@ class MaterialPalette {
             (static_cast<float>(row) + 0.5F) * row_height_};
   }
 
-  /// sRGB colour and linear alpha (255 for opaque types).
+  /// How thick the bodies of all smooth transparent surfaces are, in voxels or samples.
+  [[nodiscard]] float smooth_thickness() const { return smooth_thickness_; }
+
+  /// sRGB colour and linear alpha: of transparent types that blocks of the meshes use that of their glass, 255 of
+  /// opaque types.
   [[nodiscard]] PngImage base_colour() const;
+  /// The same without alpha.
+  [[nodiscard]] PngImage opaque_colour() const;
   /// Roughness in green, metalness in blue, both linear.
   [[nodiscard]] PngImage metallic_roughness() const;
   /// sRGB; black where nothing is emitted.
@@ -78,7 +91,10 @@ class MaterialPalette {
 
   void find_bands(const Usage& used);
   void make_materials(const Usage& used);
-  [[nodiscard]] std::size_t band_of(SurfaceClass surface, VoxelType type) const;
+  void add_material(SurfaceClass surface, std::size_t group, std::string name);
+  void find_glass(const SceneMeshes& meshes);
+  [[nodiscard]] float strength_of(SurfaceClass surface, VoxelType type) const;
+  [[nodiscard]] std::size_t group_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] PngImage blank(std::uint32_t channels) const;
 
   const VoxelRegistry& types_;
@@ -88,7 +104,8 @@ class MaterialPalette {
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;
   std::array<bool, 2> has_smooth_{};  // opaque, transparent
-  std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_band_;
+  float smooth_thickness_ = 1.0F;
+  std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
 };
 
 /// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied; smooth ones have

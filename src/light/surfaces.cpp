@@ -12,6 +12,14 @@ Vec3 linear_colour(Rgba8 colour) {
   return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
 }
 
+void set_absorption(float alpha, Surface& surface) {
+  // One voxel covers `alpha` of what lies behind it and tints the rest, the more the more it covers.
+  surface.log_clarity = std::log(1.0F - alpha);
+  for (int channel = 0; channel < 3; ++channel) {
+    surface.log_transmittance[channel] = std::log((1.0F - alpha) * (1.0F - alpha * (1.0F - surface.colour[channel])));
+  }
+}
+
 namespace {
 
 Surface surface_of(const VoxelProperties& properties) {
@@ -23,12 +31,7 @@ Surface surface_of(const VoxelProperties& properties) {
       properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
   surface.emitted = surface.colour * emission;
   if (properties.visibility != Visibility::Transparent) return surface;
-  // One voxel covers `alpha` of what lies behind it and tints the rest, the more the more it covers.
-  const float alpha = static_cast<float>(c.a) / 255.0F;
-  surface.log_clarity = std::log(1.0F - alpha);
-  for (int channel = 0; channel < 3; ++channel) {
-    surface.log_transmittance[channel] = std::log((1.0F - alpha) * (1.0F - alpha * (1.0F - surface.colour[channel])));
-  }
+  set_absorption(static_cast<float>(c.a) / 255.0F, surface);
   return surface;
 }
 

@@ -20,6 +20,9 @@ struct Surface {
 /// Without its alpha.
 [[nodiscard]] Vec3 linear_colour(Rgba8 colour);
 
+/// Sets what a voxel's length of a transparent surface lets through, by its colour and alpha.
+void set_absorption(float alpha, Surface& surface);
+
 /// Surfaces by type; an id that is not registered gives a magenta that shows.
 class Surfaces {
  public:

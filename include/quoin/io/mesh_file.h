@@ -38,16 +38,19 @@ struct MeshFileOptions {
 ///            beside it (none when nothing is drawn).
 ///            Blocks have a palette texture, 256 texels wide, with one texel a voxel type (nearest, clamped), and one
 ///            with roughness (green) and metalness (blue); occlusion is grey in COLOR_0. Materials are opaque,
-///            transparent (blended, alpha in the palette), and emissive: texture times emissiveFactor times
+///            transparent, and emissive: texture times emissiveFactor times
 ///            KHR_materials_emissive_strength; strengths within a factor of two share a material and are scaled in the
-///            texture, so that its 8 bits cost them at most one more bit.
+///            texture, so that its 8 bits cost them at most one more bit. Transparent types have a material each,
+///            blended, with KHR_materials_transmission, KHR_materials_volume and KHR_materials_ior; those and alpha say
+///            what pictures show through the type's bodies of typical thickness (MeshPart::thickness).
 ///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
 ///            and one rough, opaque material.
 ///            OcclusionIn::Attribute: a scalar _AO (blocks have 1 - occlusion / 4: 1, 0.75, 0.5 or 0.25) of every
 ///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
-///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Smooth meshes: nine
+///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Transparent
+///            types have a material each, with d, Tf and Ni. Smooth meshes: nine
 ///            digits, sRGB colours after the coordinates, no materials. Has no place for OcclusionIn::Attribute.
 /// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
@@ -62,8 +65,8 @@ struct MeshFileOptions {
 ///            floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
 ///            are not registered, numbers that are not finite). Each file appears whole or not at all; of several,
 ///            those before one that fails stay.
-/// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength; Alias/Wavefront's
-///            OBJ and MTL.
+/// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission, _volume
+///            and _ior; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 

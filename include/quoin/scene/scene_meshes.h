@@ -48,12 +48,21 @@ struct MeshPlacement {
   [[nodiscard]] glm::dmat4 matrix() const;
 };
 
+/// How far it is through a part's bodies of a transparent type, straight in from their faces: the median, by area.
+struct GlassThickness {
+  VoxelType type = kAir;
+  float voxels = 1.0F;
+};
+
 /// A body that is placed as one, any number of times.
 struct MeshPart {
   std::string name;
   std::vector<MeshView> surfaces{};     ///< all of one kind; may be none
   DVec3 pivot{0.0};                     ///< the point that placements take to their translation
   std::shared_ptr<const void> owner{};  ///< of the arrays of `surfaces`; null: they must outlive the part
+  /// By type, of blocks: files have one alpha a type, for bodies of that thickness. For types without, and for smooth
+  /// surfaces, they are taken from the volume where the surface is closed, and else as one voxel thick.
+  std::vector<GlassThickness> thickness{};
 };
 
 /// A part that owns its mesh. Surfaces without a triangle are left out.

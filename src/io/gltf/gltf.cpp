@@ -39,10 +39,23 @@ void write_normals(const VertexTransform& transform, const MeshView& view, Block
   for (const Direction direction : view.directions) out.put(normals[static_cast<std::size_t>(direction)]);
 }
 
-void write_colours(const MeshView& view, BlockWriter& out) {
-  if (view.has_albedo()) {
-    for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(linear_colour(view, i));
+/// Glass has the alpha of its body.
+void write_smooth_colours(const GltfLayout& layout, const MeshView& view, BlockWriter& out) {
+  const float thickness = layout.palette.smooth_thickness();
+  std::uint16_t alpha = 0;
+  for (std::size_t i = 0; i < view.positions.size(); ++i) {
+    LinearRgba16 colour = linear_colour(view, i);
+    if (is_transparent(view.surface)) {
+      // Neighbours are mostly of one type.
+      if (i == 0 || view.albedo[i] != view.albedo[i - 1]) alpha = glass_alpha(view.albedo[i], thickness);
+      colour[3] = alpha;
+    }
+    out.put(colour);
   }
+}
+
+void write_colours(const GltfLayout& layout, const MeshView& view, BlockWriter& out) {
+  if (view.has_albedo()) write_smooth_colours(layout, view, out);
   std::array<std::array<std::uint8_t, 4>, 4> greys;
   for (std::size_t i = 0; i < greys.size(); ++i) {
     const std::uint8_t grey = occlusion_grey(static_cast<std::uint8_t>(i));
@@ -68,9 +81,9 @@ void write_primitive(const GltfLayout& layout, const VertexTransform& transform,
     for (const VoxelType type : view.types) out.put(layout.palette.texel_centre(type));
   }
   if (primitive.occlusion.bytes == 0) {
-    write_colours(view, out);
+    write_colours(layout, view, out);
   } else {
-    write_colours(without_occlusion(view), out);
+    write_colours(layout, without_occlusion(view), out);
     for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(openness_at(view, i));
   }
   if (primitive.wide_indices) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -21,6 +22,9 @@ constexpr int kNearest = 9728;
 constexpr int kClampToEdge = 33071;
 
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+constexpr const char* kIor = "KHR_materials_ior";
+constexpr const char* kTransmission = "KHR_materials_transmission";
+constexpr const char* kVolume = "KHR_materials_volume";
 
 Json json_from(const Vec3& v) {
   return {v.x, v.y, v.z};
@@ -105,6 +109,23 @@ void add_emission(const SurfaceMaterial& material, Json& entry) {
   entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
 }
 
+/// Whether it is one that glTF can say.
+bool has_glass_ior(const VoxelProperties& properties) {
+  return properties.ior >= 1.0F && std::isfinite(properties.ior);
+}
+
+/// Beside the alpha of the texel, as GlassMaterial has it. Thickness counts in the mesh's units, distance in the world's.
+void add_glass(const SurfaceMaterial& material, const VoxelProperties& properties, Json& entry) {
+  const GlassMaterial& glass = material.glass;
+  entry["alphaMode"] = "BLEND";
+  Json& extensions = entry["extensions"];
+  extensions[kTransmission] = {{"transmissionFactor", glass.transmission}};
+  extensions[kVolume] = {{"thicknessFactor", glass.thickness},
+                         {"attenuationDistance", glass.thickness * material.unit},
+                         {"attenuationColor", json_from(glass.attenuation)}};
+  if (has_glass_ior(properties)) extensions[kIor] = {{"ior", properties.ior}};
+}
+
 Json materials_json(const GltfLayout& layout) {
   Json materials = Json::array();
   for (const SurfaceMaterial& material : layout.palette.materials()) {
@@ -114,7 +135,7 @@ Json materials_json(const GltfLayout& layout) {
                                      {"roughnessFactor", 1.0},
                                      {"metallicRoughnessTexture", {{"index", 1}}}};
     if (material.is_emissive()) add_emission(material, entry);
-    if (material.is_transparent()) entry["alphaMode"] = "BLEND";
+    if (material.is_transparent()) add_glass(material, layout.palette.types()[material.type], entry);
     materials.push_back(std::move(entry));
   }
   for (const bool transparent : {false, true}) {
@@ -181,12 +202,26 @@ void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& doc
   document["buffers"] = Json::array({std::move(buffer)});
 }
 
+void add_extensions(const MaterialPalette& palette, Json& document) {
+  Json used = Json::array();
+  if (palette.has_emission()) used.push_back(kEmissiveStrength);
+  bool has_ior = false;
+  bool has_glass = false;
+  for (const SurfaceMaterial& material : palette.materials()) {
+    has_glass |= material.is_transparent();
+    has_ior |= material.is_transparent() && has_glass_ior(palette.types()[material.type]);
+  }
+  if (has_glass) used.insert(used.end(), {kTransmission, kVolume});
+  if (has_ior) used.push_back(kIor);
+  if (!used.empty()) document["extensionsUsed"] = std::move(used);
+}
+
 }  // namespace
 
 std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri) {
   Json document;
   document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
-  if (layout.palette.has_emission()) document["extensionsUsed"] = Json::array({kEmissiveStrength});
+  add_extensions(layout.palette, document);
   add_nodes(layout, document);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "io/gltf/gltf_for_tests.h"
+#include "io/material_palette.h"
 
 namespace quoin {
 
@@ -92,7 +93,109 @@ TEST_F(GltfMaterials, TransparentTypesBlendWithAlphaInThePalette) {
   const PngImage palette = glb.image(0);
   EXPECT_EQ(glb.texel(palette, primitives[0], 0), (std::array<int, 4>{90, 90, 90, 255}))
       << "opaque whatever alpha says";
-  EXPECT_EQ(glb.texel(palette, primitives[1], 0), (std::array<int, 4>{10, 200, 220, 90}));
+  EXPECT_EQ(glb.texel(palette, primitives[1], 0), (std::array<int, 4>{10, 200, 220, 116}))
+      << "a voxel that covers 90 of 255 and tints the rest";
+}
+
+/// A cube of glass, a deep pool of water in stone, and a lone voxel of each.
+void add_glass_and_water(Scene& scene) {
+  VoxelProperties glass;
+  glass.colour = {190, 230, 235, 12};
+  glass.visibility = Visibility::Transparent;
+  glass.ior = 1.5F;
+  VoxelProperties water;
+  water.colour = {30, 90, 170, 60};
+  water.visibility = Visibility::Transparent;
+  water.ior = 1.25F;
+  const VoxelType glass_type = *scene.types.add(glass);
+  const VoxelType water_type = *scene.types.add(water);
+  SceneGrid grid;
+  grid.grid.fill_box({{0, 0, 0}, {6, 6, 6}}, glass_type);
+  grid.grid.fill_box({{20, 0, 0}, {40, 12, 20}}, add_type(scene, "stone", {90, 90, 90, 255}));
+  grid.grid.fill_box({{21, 3, 1}, {39, 12, 19}}, water_type);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  scene.edit(place(scene, handle, {0, 0, 0})).voxel_size = 0.5;
+}
+
+const Json& material_of(const ParsedGlb& glb, float ior) {
+  for (const Json& material : glb.document["materials"]) {
+    if (material.contains("extensions") && material["extensions"]["KHR_materials_ior"]["ior"] == ior) return material;
+  }
+  ADD_FAILURE() << "no material of index " << ior;
+  return glb.document["materials"][0];
+}
+
+TEST_F(GltfMaterials, GlassSaysWhatABodyOfItsThicknessDoesToLight) {
+  add_glass_and_water(scene_);
+  const ParsedGlb glb = write();
+  EXPECT_EQ(glb.document["extensionsUsed"],
+            Json({"KHR_materials_transmission", "KHR_materials_volume", "KHR_materials_ior"}));
+  const Json& water = material_of(glb, 1.25F);
+  const Json& volume = water["extensions"]["KHR_materials_volume"];
+  EXPECT_EQ(volume["thicknessFactor"], 9.0F) << "voxels, as the mesh has them";
+  EXPECT_EQ(volume["attenuationDistance"], 4.5F) << "in the world";
+  EXPECT_EQ(water["alphaMode"], "BLEND");
+  EXPECT_EQ(material_of(glb, 1.5F)["extensions"]["KHR_materials_volume"]["thicknessFactor"], 6.0F);
+}
+
+// What of the light behind passes and what of its own colour a body shows, for clients that know transmission and for
+// those that do not, beside what Quoin's pictures have.
+TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToPictures) {
+  add_glass_and_water(scene_);
+  const auto meshes = mesh_scene(scene_);
+  const MaterialPalette palette(*meshes);
+  const Surfaces surfaces(scene_.types);
+  int seen = 0;
+  for (const SurfaceMaterial& material : palette.materials()) {
+    if (!material.is_transparent()) continue;
+    ++seen;
+    const GlassMaterial& glass = material.glass;
+    const Surface& surface = surfaces[material.type];
+    const float own = 1.0F - std::exp(surface.log_clarity * glass.thickness);
+    EXPECT_NEAR(glass.alpha * (1.0F - glass.transmission), own, 1e-5F);
+    for (int channel = 0; channel < 3; ++channel) {
+      const float passed = std::exp(surface.log_transmittance[channel] * glass.thickness);
+      const float colour = surface.colour[channel];
+      const float through = 1.0F - glass.alpha + glass.alpha * glass.transmission * colour * glass.attenuation[channel];
+      EXPECT_NEAR(through, passed, 0.1F);
+      EXPECT_NEAR(1.0F - glass.alpha, passed, 0.1F);
+      EXPECT_NEAR(glass.alpha * colour, own * colour, 0.1F);
+    }
+  }
+  EXPECT_EQ(seen, 2);
+}
+
+TEST(GlassMaterial, IsClearOrClosedAtTheEnds) {
+  Surface clear;
+  clear.colour = {0.5F, 0.2F, 1.0F};
+  set_absorption(0.0F, clear);
+  EXPECT_EQ(glass_material(clear, 7.0F).alpha, 0.0F);
+  Surface closed = clear;
+  set_absorption(1.0F, closed);
+  EXPECT_EQ(glass_material(closed, 7.0F).alpha, 1.0F);
+  EXPECT_EQ(glass_material(closed, 7.0F).transmission, 0.0F);
+  float last = 0.0F;
+  Surface water = clear;
+  set_absorption(0.1F, water);
+  for (const float thickness : {0.5F, 1.0F, 3.0F, 10.0F, 40.0F}) {
+    EXPECT_GT(glass_material(water, thickness).alpha, last) << "the deeper the less shows";
+    last = glass_material(water, thickness).alpha;
+  }
+  EXPECT_GT(last, 0.98F);
+}
+
+TEST_F(GltfMaterials, ABodyWithoutGridIsAsThickAsItsVolumeSays) {
+  add_glass_and_water(scene_);
+  auto meshes = *mesh_scene(scene_);
+  for (MeshPart& part : meshes.parts) part.thickness.clear();
+  const MaterialPalette palette(meshes);
+  std::vector<float> thickness;
+  for (const SurfaceMaterial& material : palette.materials()) {
+    if (material.is_transparent()) thickness.push_back(material.glass.thickness);
+  }
+  ASSERT_EQ(thickness.size(), 2U);
+  EXPECT_NEAR(thickness[0], 6.0F, 1e-4F);
+  EXPECT_EQ(thickness[1], 1.0F) << "the pool's surface is open: its walls are the stone's";
 }
 
 double linear_from_srgb(int srgb) {

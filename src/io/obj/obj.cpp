@@ -109,13 +109,27 @@ std::string mtl_name(const SurfaceMaterial& material) {
   return name;
 }
 
+/// How much covers what lies behind, what it does to colours there, and how it bends light. `d` is what most clients
+/// read; none agree on alpha in a texture.
+std::string mtl_glass(const SurfaceMaterial& material, const VoxelProperties& properties) {
+  constexpr float kThousand = 1000.0F;
+  const auto rounded = [](float value) { return shortest(std::round(value * kThousand) / kThousand); };
+  std::string text("d ");
+  text.append(rounded(material.glass.alpha)).append("\nTf");
+  for (int channel = 0; channel < 3; ++channel) text.append(" ").append(rounded(material.glass.tint[channel]));
+  if (std::isfinite(properties.ior) && properties.ior > 0.0F) text.append("\nNi ").append(rounded(properties.ior));
+  text.append("\n");
+  return text;
+}
+
 /// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
-std::string mtl_text(const MaterialPalette& palette, const std::string& texture, const std::string& emissive_texture) {
+std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const std::string& texture,
+                     const std::string& emissive_texture) {
   std::string text = "# Quoin " QUOIN_VERSION "\n";
   for (const SurfaceMaterial& material : palette.materials()) {
     text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
     text.append("map_Kd ").append(texture).append("\n");
-    if (material.is_transparent()) text.append("map_d -imfchan m ").append(texture).append("\n");
+    if (material.is_transparent()) text.append(mtl_glass(material, meshes.types[material.type]));
     if (material.is_emissive()) {
       const std::string strength = shortest(material.emission);
       text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
@@ -291,7 +305,7 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
   const ObjNames names = names_beside(path);
   std::vector<MeshFile> files;
   if (has_materials(meshes)) {
-    if (auto added = add_image(names.palette, palette->base_colour(), files); !added) {
+    if (auto added = add_image(names.palette, palette->opaque_colour(), files); !added) {
       return added.error();
     }
     if (palette->has_emission()) {
@@ -299,7 +313,8 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
         return added.error();
       }
     }
-    std::string text = mtl_text(*palette, names.palette.filename().string(), names.emissive.filename().string());
+    std::string text =
+        mtl_text(meshes, *palette, names.palette.filename().string(), names.emissive.filename().string());
     files.push_back({names.library, 0, [text = std::move(text)](BlockWriter& out) { out.put_text(text); }});
   }
   const auto write = [&meshes, palette, library = names.library.filename().string()](BlockWriter& out) {

@@ -157,6 +157,22 @@ TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {
   EXPECT_EQ(folder_.count(), 4U);
 }
 
+TEST_F(Obj, GlassHasOneAlphaAMaterialThatEveryClientReads) {
+  place({0, 0, 0});
+  write();
+  const std::string library = text_of(folder_.file("my model.mtl"));
+  EXPECT_EQ(library.find("map_d"), std::string::npos);
+  EXPECT_EQ(library.find("imfchan"), std::string::npos);
+  const auto at = library.find("newmtl voxels_transparent\n");
+  ASSERT_NE(at, std::string::npos);
+  const std::string glass = library.substr(at, library.find("\n\n", at) - at);
+  EXPECT_NE(glass.find("\nd 0.454\n"), std::string::npos) << glass;
+  EXPECT_NE(glass.find("\nTf 0.648 "), std::string::npos) << glass;
+  EXPECT_NE(glass.find("\nNi 1.5"), std::string::npos) << glass;
+  const PngImage palette = *decode_png(*read_file(folder_.file("my model_palette.png")));
+  for (std::size_t i = 7; i < 16; i += 4) EXPECT_EQ(palette.pixels[i], 255) << "some clients multiply it";
+}
+
 TEST_F(Obj, OcclusionIsAColourOfVerticesOnlyWhenThereIsAny) {
   place({0, 0, 0});
   const ParsedObj shaded = write();

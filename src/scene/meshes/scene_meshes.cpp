@@ -7,6 +7,7 @@
 
 #include <quoin/grid/voxel_field.h>
 
+#include "scene/glass_thickness.h"
 #include "scene/instance_axes.h"
 #include "scene/meshes/mesh_parts.h"
 
@@ -131,6 +132,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     const SceneGrid& grid = scene.grids()[grids[i]];
     add_stats(**results[i], meshes.stats);
     MeshPart& part = meshes.parts.emplace_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
+    part.thickness = glass_thickness(grid.grid, part.surfaces);
     for (MeshView& view : part.surfaces) {
       if (!options.mesh.occlusion) view.block_occlusion = {};
     }
