@@ -1,7 +1,9 @@
 #include <array>
 #include <cstdlib>
 #include <fstream>
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -141,6 +143,87 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
             std::string::npos)
       << text.out;
   EXPECT_EQ(Json::parse(run("info crew.json --json").out)["groups"], info["groups"]);
+}
+
+/// The corners of the vertices of a .obj.
+std::pair<DVec3, DVec3> extent_of_obj(const std::string& text) {
+  std::istringstream lines(text);
+  DVec3 min(1e9);
+  DVec3 max(-1e9);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("v ")) continue;
+    std::istringstream numbers(line.substr(2));
+    DVec3 at(0.0);
+    numbers >> at.x >> at.y >> at.z;
+    min = glm::min(min, at);
+    max = glm::max(max, at);
+  }
+  return {min, max};
+}
+
+TEST_F(Tool, MeshesAreScaledAndTurnedUpright) {
+  ASSERT_EQ(run("convert tiny.vox plain.obj").status, 0);
+  ASSERT_EQ(run("convert tiny.vox turned.obj --scale 0.25 --up z").status, 0);
+  const auto [min, max] = extent_of_obj(text_of(folder_.file("plain.obj")));
+  const auto [low, high] = extent_of_obj(text_of(folder_.file("turned.obj")));
+  EXPECT_EQ(low, DVec3(min.x, -max.z, min.y) * 0.25);
+  EXPECT_EQ(high, DVec3(max.x, -min.z, max.y) * 0.25);
+  for (const std::string name : {"a.glb", "a.gltf", "a.ply"}) {
+    EXPECT_EQ(run("convert tiny.vox " + name + " --scale 2 --up y").status, 0) << name;
+  }
+  EXPECT_EQ(run("convert tiny.vox upright.ply").status, 0);
+  EXPECT_NE(read_file(folder_.file("a.ply")).value(), read_file(folder_.file("upright.ply")).value());
+  for (const std::string wrong : {"--scale 0", "--scale -1", "--scale nan", "--scale x", "--up x"}) {
+    EXPECT_EQ(run("convert tiny.vox b.obj " + wrong).status, 2) << wrong;
+  }
+  EXPECT_EQ(run("convert tiny.vox b.vox --scale 2 --force").status, 2) << "voxels have no scale";
+}
+
+TEST_F(Tool, QuietLeavesErrorsAndJson) {
+  std::ofstream(folder_.file("hidden.vox"), std::ios::binary) << vox_with_hidden(1);
+  const ToolRun quiet = run("convert hidden.vox a.glb -q");
+  EXPECT_EQ(quiet.status, 0);
+  EXPECT_EQ(quiet.out + quiet.err, "");
+  EXPECT_EQ(run("render tiny.vox -o a.png --size 8x8 --quiet").out, "");
+  EXPECT_EQ(run("generate terrain t.vox --chunks 1x1x1 -q").out, "");
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("t.vox")));
+  EXPECT_EQ(Json::parse(run("convert tiny.vox b.glb -q --json").out)["voxels"], 4);
+  EXPECT_NE(run("convert none.vox b.glb -q").err, "") << "errors are told";
+  EXPECT_NE(run("info tiny.vox -q").out, "") << "which is what it is for";
+}
+
+// What is completed is what the help says: the shells are asked where they are.
+TEST_F(Tool, ShellsCompleteCommandsOptionsAndChoices) {
+  const std::string script = run("completions bash").out;
+  std::ofstream(folder_.file("quoin.bash")) << script;
+  const auto reply = [&](const std::string& words) {
+    const std::string command = "cd '" + folder_.file(".").string() +
+                                "' && bash -c 'source ./quoin.bash; COMP_WORDS=(" + words +
+                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _quoin; echo ${COMPREPLY[@]}' > reply";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return text_of(folder_.file("reply"));
+  };
+  EXPECT_EQ(reply("quoin conv"), "convert\n");
+  EXPECT_EQ(reply("quoin generate te"), "terrain\n");
+  EXPECT_EQ(reply("quoin render --view le"), "left\n");
+  EXPECT_EQ(reply("quoin convert a.vox b.glb --smoothn"), "--smoothness\n");
+  EXPECT_EQ(reply("quoin render a.vox -o "), "\n") << "files are the shell's own matter";
+  for (const std::string shell : {"zsh", "fish"}) {
+    std::ofstream(folder_.file("script")) << run("completions " + shell).out;
+    const std::string has = "command -v " + shell + " > /dev/null";
+    if (std::system(has.c_str()) != 0) continue;
+    EXPECT_EQ(std::system((shell + " -n '" + folder_.file("script").string() + "'").c_str()), 0) << shell;
+  }
+  EXPECT_EQ(run("completions tcsh").status, 2);
+}
+
+TEST_F(Tool, TheManualPageHasEveryCommandAndOption) {
+  const std::string page = run("man").out;
+  EXPECT_TRUE(page.starts_with(".TH QUOIN 1"));
+  for (const std::string what :
+       {".SS quoin convert", ".SS quoin generate terrain", "\\-\\-smoothness", "EXIT STATUS"}) {
+    EXPECT_NE(page.find(what), std::string::npos) << what;
+  }
 }
 
 TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {

@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "commands.h"
+#include "output.h"
+#include "parse.h"
 
 namespace quoin::tool {
 
@@ -29,9 +31,22 @@ CLI::Validator not_negative_whole() {
   return {[](std::string& text) { return fault_of_number<int>(text); }, ""};
 }
 
+CLI::Validator positive() {
+  return {[](std::string& text) {
+            const auto number = parse_number(text);
+            return number && *number > 0.0 ? std::string() : "must be a number above 0, not \"" + text + "\"";
+          },
+          ""};
+}
+
 CLI::Validator file_name() {
   return {[](std::string& text) { return std::string(text.empty() ? "must be the name of a file, not \"\"" : ""); },
           ""};
+}
+
+void add_quiet_option(CLI::App& command) {
+  command.add_flag_callback(
+      "-q,--quiet", [] { be_quiet(); }, "Print errors alone, and what --json prints; no progress, no warnings");
 }
 
 void add_common_options(CLI::App& command, CommonOptions& options) {
@@ -41,6 +56,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });
   command.add_flag("--json", options.json, "Print one JSON object instead of text");
+  add_quiet_option(command);
   command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));
 }
 

@@ -35,6 +35,8 @@ inline constexpr const char* kForceHelp = "Replace OUT even where it holds a mod
 /// Refuses what is not a number of at least 0 (a whole one), in words for a person.
 [[nodiscard]] CLI::Validator not_negative();
 [[nodiscard]] CLI::Validator not_negative_whole();
+/// Refuses what is not a number above 0.
+[[nodiscard]] CLI::Validator positive();
 /// Refuses an empty name of a file.
 [[nodiscard]] CLI::Validator file_name();
 
@@ -44,5 +46,10 @@ void add_convert_command(CLI::App& app, int& status);
 void add_render_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
 void add_view_command(CLI::App& app, int& status);
+/// `completions` and `man`, which tell of all commands.
+void add_shell_commands(CLI::App& app, int& status);
+
+/// Adds -q.
+void add_quiet_option(CLI::App& command);
 
 }  // namespace quoin::tool

@@ -163,7 +163,7 @@ int run_generate(GenerateOptions& options) {
   }
   if (options.json) return print_json(outcome_json(options, *outcome));
   print_warnings(outcome->warnings);
-  return print(outcome_text(options, *outcome));
+  return print_summary(outcome_text(options, *outcome));
 }
 
 std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, const char* chunks, int& status) {
@@ -173,6 +173,7 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   command.add_option("--chunks", options->chunks, chunks);
   command.add_flag("--force", options->force, kForceHelp);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
+  add_quiet_option(command);
   command.add_option("--threads", options->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command.callback([options, &status] { status = run_generate(*options); });

@@ -99,6 +99,7 @@ int run(int argc, char** argv) {
   add_render_command(app, status);
   add_generate_command(app, status);
   add_view_command(app, status);
+  add_shell_commands(app, status);
   const Arguments arguments = readable_arguments(argc, argv);
   try {
     app.parse(Arguments(arguments.rbegin(), arguments.rend()));

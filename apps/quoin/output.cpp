@@ -9,6 +9,12 @@
 
 namespace quoin::tool {
 
+namespace {
+
+bool quiet = false;
+
+}  // namespace
+
 std::string on_one_line(std::string_view text) {
   std::string line(text);
   for (char& c : line) {
@@ -52,7 +58,16 @@ void print_error(const Error& error) {
   print_error(to_string(error));
 }
 
+void be_quiet() {
+  quiet = true;
+}
+
+bool is_quiet() {
+  return quiet;
+}
+
 void print_warnings(const std::vector<std::string>& warnings) {
+  if (is_quiet()) return;
   for (const std::string& warning : warnings) print_error("warning: " + warning);
 }
 
@@ -63,6 +78,10 @@ int print(std::string_view text) {
   if (errno == EPIPE) return kFailed;
   print_error("standard output cannot be written");
   return kFailed;
+}
+
+int print_summary(std::string_view text) {
+  return is_quiet() ? kDone : print(text);
 }
 
 int print_json(const Json& object) {

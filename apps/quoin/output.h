@@ -30,6 +30,13 @@ void print_error(std::string_view message);
 void print_error(const Error& error);
 void print_warnings(const std::vector<std::string>& warnings);
 
+/// From now on summaries, warnings and progress are not shown.
+void be_quiet();
+[[nodiscard]] bool is_quiet();
+
+/// Prints what a command did, unless it is to be quiet; returns the exit status as `print` does.
+[[nodiscard]] int print_summary(std::string_view text);
+
 /// Prints text, or one JSON object and a line end, on standard output; returns the exit status: kFailed when that
 /// cannot be written.
 [[nodiscard]] int print(std::string_view text);

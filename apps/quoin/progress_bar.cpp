@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "interrupt.h"
+#include "output.h"
 
 namespace quoin::tool {
 
@@ -19,7 +20,8 @@ constexpr auto kInterval = std::chrono::milliseconds(100);
 
 }  // namespace
 
-ProgressBar::ProgressBar(bool shows) : terminal_(shows && isatty(STDERR_FILENO) == 1), next_(start_ + kPatience) {}
+ProgressBar::ProgressBar(bool shows)
+    : terminal_(shows && !is_quiet() && isatty(STDERR_FILENO) == 1), next_(start_ + kPatience) {}
 
 ProgressBar::~ProgressBar() {
   if (shown_) std::fputs("\r\033[K", stderr);

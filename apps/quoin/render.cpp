@@ -219,7 +219,7 @@ int run_render(const RenderArguments& arguments) {
   }
   if (arguments.common.json) return print_json(outcome_json(arguments, *outcome));
   print_warnings(outcome->warnings);
-  return print(outcome_text(*outcome));
+  return print_summary(outcome_text(*outcome));
 }
 
 }  // namespace

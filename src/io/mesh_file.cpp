@@ -1,6 +1,9 @@
 #include <quoin/io/mesh_file.h>
 
+#include <cmath>
+#include <numbers>
 #include <utility>
+#include <variant>
 
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
@@ -50,6 +53,49 @@ SceneMeshes without_occlusion(SceneMeshes meshes) {
   return meshes;
 }
 
+/// (x, y, z) as (x, -z, y): +Y becomes +Z.
+DVec3 turned(const DVec3& v) {
+  return {v.x, -v.z, v.y};
+}
+
+Similarity placed_in(const MeshFileOptions& options, Similarity place) {
+  if (options.up == UpAxis::Z) {
+    const double half = std::numbers::sqrt2 / 2.0;
+    place.position = turned(place.position);
+    place.rotation = DQuat(half, half, 0.0, 0.0) * place.rotation;
+  }
+  place.position *= options.scale;
+  return place;
+}
+
+/// The same meshes in the units and axes of the file.
+Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& options) {
+  if (!(options.scale > 0.0) || !std::isfinite(options.scale)) {
+    return make_error(ErrorCode::InvalidArgument, "the scale must be more than 0");
+  }
+  if (options.scale == 1.0 && options.up == UpAxis::Y) return meshes;
+  for (MeshGroup& group : meshes.groups) group.world_from_group = placed_in(options, group.world_from_group);
+  for (MeshPlacement& placement : meshes.placements) {
+    if (auto* place = std::get_if<Similarity>(&placement.world_from_part)) {
+      *place = placed_in(options, *place);
+      place->scale *= options.scale;
+      continue;
+    }
+    auto& matrix = std::get<glm::dmat4>(placement.world_from_part);
+    for (int column = 0; column < 4; ++column) {
+      const DVec3 axis(matrix[column]);
+      const DVec3 written = (options.up == UpAxis::Z ? turned(axis) : axis) * options.scale;
+      matrix[column] = glm::dvec4(written, matrix[column].w);
+    }
+  }
+  return meshes;
+}
+
+/// As the options want them.
+Result<SceneMeshes> as_written(const SceneMeshes& meshes, const MeshFileOptions& options) {
+  return in_axes_of_file(options.occlusion ? meshes : without_occlusion(meshes), options);
+}
+
 const Progress kNobody;
 
 /// Calls `file.write` with a writer that ends in `sink`; returns the bytes.
@@ -91,18 +137,16 @@ Result<std::uint64_t> write_checked(const SceneMeshes& meshes, const std::filesy
 
 Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                  const MeshFileOptions& options, const Progress& progress) {
-  if (options.occlusion) return with_path(write_checked(meshes, path, options, progress), path);
-  return with_path(write_checked(without_occlusion(meshes), path, options, progress), path);
+  const auto written = as_written(meshes, options);
+  if (!written) return with_path(Result<std::uint64_t>(written.error()), path);
+  return with_path(write_checked(*written, path, options, progress), path);
 }
 
 Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options,
                                           const Progress& progress) {
-  if (!options.occlusion) {
-    MeshFileOptions plain = options;
-    plain.occlusion = true;
-    return write_mesh(without_occlusion(meshes), format, plain, progress);
-  }
-  const auto files = plan(meshes, format, "", options.occlusion_in);
+  const auto wanted = as_written(meshes, options);
+  if (!wanted) return wanted.error();
+  const auto files = plan(*wanted, format, "", options.occlusion_in);
   if (!files) return files.error();
   if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
   std::vector<std::byte> bytes;

@@ -207,7 +207,7 @@ int run_one(ConvertOptions& options, const ManyOptions& many) {
   if (!outcome) return failed(outcome.error());
   if (options.common.json) return print_json(outcome_json(*outcome));
   print_warnings(outcome->warnings);
-  if (!is_to_stream) return print(outcome_text(*outcome));
+  if (!is_to_stream) return print_summary(outcome_text(*outcome));
   if (Status written = streams.write_output(); !written) return failed(written.error());
   return kDone;
 }
@@ -238,6 +238,12 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
                    "Mesh models that touch on one lattice each by itself, not as one body (smooth only)");
   command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
+  command.add_option("--scale", options.scale, "Units of the mesh a voxel (default 1; 0.1: ten voxels are a metre)")
+      ->check(positive());
+  command
+      .add_option("--up", options.up,
+                  "Which axis of the mesh points up: y or z (default y; z in .ply, as Blender has it)")
+      ->check(CLI::IsMember({"y", "z"}));
 }
 
 /// Texts to CLI11, which are read once all are there.
@@ -392,6 +398,10 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   }
   MeshFileOptions file;
   if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
+  if (options.scale) file.scale = *options.scale;
+  const auto format = format_for_writing(options.output);
+  const bool is_ply = format && format->format == FileFormat::Ply;
+  if (options.up == "z" || (options.up.empty() && is_ply)) file.up = UpAxis::Z;
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
@@ -439,7 +449,7 @@ void add_convert_command(CLI::App& app, int& status) {
   command->callback([command, options, texts, many, rest, &status] {
     std::size_t given = 0;
     for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
-                             "--no-unite", "--iso", "--simplify"}) {
+                             "--no-unite", "--iso", "--simplify", "--scale", "--up"}) {
       given += command->count(name);
     }
     options->has_field_occlusion = given_field_occlusion(*command) != nullptr;

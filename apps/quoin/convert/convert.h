@@ -37,7 +37,9 @@ struct ConvertOptions {
   std::optional<std::string> colours;
   bool apart = false;            ///< instances are not united
   std::optional<RawVolume> raw;  ///< the input is a file of values alone
-  bool mesh_only = false;        ///< any option that only meshes heed was given
+  std::optional<double> scale;
+  std::string up;          ///< "y", "z"; empty: z for .ply, else y
+  bool mesh_only = false;  ///< any option that only meshes heed was given
 };
 
 struct Seconds {

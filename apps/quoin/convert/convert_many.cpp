@@ -195,7 +195,7 @@ int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors,
   const auto count = [](std::size_t n) { return with_thousands(static_cast<std::int64_t>(n)); };
   text += "Converted " + count(totals.converted) + " of " + count(tasks.size() + errors.size()) + ", " +
           bytes_for_people(totals.bytes) + " in " + number_for_people(totals.seconds) + " s\n";
-  const int printed = print(text);
+  const int printed = print_summary(text);
   for (const Error& error : errors) print_error(error);
   for (const Task& task : tasks) {
     if (task.error) print_error(*task.error);

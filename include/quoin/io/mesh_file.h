@@ -20,10 +20,15 @@ enum class OcclusionIn : std::uint8_t {
               ///< dark, as in glTF's occlusion textures; for a shader that dims ambient light alone
 };
 
+/// Which axis of a file points up. glTF knows +Y alone; programs that read other formats differ.
+enum class UpAxis : std::uint8_t { Y, Z };
+
 struct MeshFileOptions {
   std::optional<FileFormat> format{};  ///< of the mesh formats; without, that of the path's extension
   bool occlusion = true;               ///< without, the meshes' occlusion is left out
   OcclusionIn occlusion_in = OcclusionIn::Colour;
+  double scale = 1.0;     ///< units of the file a world unit; positive
+  UpAxis up = UpAxis::Y;  ///< Z: what is at (x, y, z) is written at (x, -z, y)
 };
 
 /// Writes meshes as a file; returns the size of all that was written.
@@ -61,7 +66,7 @@ struct MeshFileOptions {
 ///            copy of surfaces whose emission takes several materials.
 /// Errors:    Unsupported for a format that is none of meshes, and for OcclusionIn::Attribute in OBJ; CannotWrite;
 ///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
-///            when a transform is not finite, not affine or singular, when a vertex comes to lie beyond the range of
+///            when a transform is not finite, not affine or singular, or the scale not positive, when a vertex comes to lie beyond the range of
 ///            floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
 ///            are not registered, numbers that are not finite). Each file appears whole or not at all; of several,
 ///            those before one that fails stay.
