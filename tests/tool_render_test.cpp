@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/io/file.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
+#include "io/vox/vox_for_tests.h"
 #include "tests/tool_for_tests.h"
 
 namespace quoin {
@@ -384,6 +386,48 @@ TEST_F(ToolRender, ItsHelpHasAnExample) {
   const ToolRun help = run("render --help");
   EXPECT_EQ(help.status, 0);
   EXPECT_NE(help.out.find("Example: quoin render"), std::string::npos) << help.out;
+}
+
+// A film's pictures are framed alike: what does not move stays where it is.
+TEST_F(ToolRender, FilmsAreFramedAlike) {
+  vox_test::FileBuilder file;
+  file.model(1, 1, 1, {{0, 0, 0, 1}});
+  file.transform(0, 1, {{}}, {}, -1).group(1, {2, 4});
+  file.transform(2, 3, {{{"_t", "0 0 0"}, {"_f", "0"}}, {{"_t", "40 0 0"}, {"_f", "10"}}}).shape(3, 0);
+  file.transform(4, 5, {{}}).shape(5, 0);
+  ASSERT_TRUE(write_file(folder_.file("film.vox"), file.file()));
+  const ToolRun said = run("render film.vox -o film.png --frames 8:10 --size 64x48 --json");
+  ASSERT_EQ(said.status, 0) << said.err;
+  const Json object = Json::parse(said.out);
+  EXPECT_EQ(object["files"], Json({"film-08.png", "film-09.png", "film-10.png"}));
+  const Json one = Json::parse(run("render film.vox -o one.png --frame 8 --size 64x48 --json").out);
+  EXPECT_NE(one["camera"], object["camera"]) << "alone it is closer";
+  // The widest frame alone needs the camera of the film.
+  const Json widest = Json::parse(run("render film.vox -o ten.png --frame 10 --size 64x48 --json").out);
+  for (const char* axis : {"position", "forward"}) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(widest["camera"][axis][i].get<double>(), object["camera"][axis][i].get<double>(), 1e-9) << axis;
+    }
+  }
+  EXPECT_EQ(bytes("ten.png"), bytes("film-10.png"));
+  EXPECT_EQ(run("render film.vox -o b.png --frames 5:12").status, 1) << "there is no frame 12";
+  EXPECT_EQ(run("render film.vox -o b.png --frames 5:2").status, 2);
+  EXPECT_EQ(run("render film.vox -o b.png --frames 0:1 --frame 0").status, 2);
+}
+
+TEST_F(ToolRender, ATurntableGoesRoundAtOneDistance) {
+  const ToolRun said = run("render tiny.vox -o round.png --turntable 12 --size 32x24 --elevation 10 --json");
+  ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_EQ(Json::parse(said.out)["files"].size(), 12U);
+  EXPECT_EQ(Json::parse(said.out)["files"][11], "round-11.png");
+  EXPECT_EQ(run("render tiny.vox -o round.png --turntable 1").status, 2);
+  EXPECT_EQ(run("render tiny.vox -o b.png --turntable 4 --frames 0:0").status, 2);
+  EXPECT_EQ(run("render tiny.vox -o b.png --azimuth 20 --view left").status, 2);
+  EXPECT_EQ(run("render tiny.vox -o b.png --elevation 91").status, 2);
+  // The views are directions like any other.
+  ASSERT_EQ(run("render tiny.vox -o right.png --view right --size 64x48").status, 0);
+  ASSERT_EQ(run("render tiny.vox -o ninety.png --azimuth 90 --elevation 0 --size 64x48").status, 0);
+  EXPECT_EQ(bytes("right.png"), bytes("ninety.png"));
 }
 
 }  // namespace

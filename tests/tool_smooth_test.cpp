@@ -31,9 +31,17 @@ class ToolSmooth : public ToolTest {
     return result.status == 0 ? Json::parse(result.out) : Json();
   }
 
+  /// The tool's .ply files have +Z up.
+  static WorldMesh with_y_up(WorldMesh mesh) {
+    for (auto* vectors : {&mesh.positions, &mesh.normals}) {
+      for (DVec3& v : *vectors) v = {v.x, v.z, -v.y};
+    }
+    return mesh;
+  }
+
   WorldMesh read(const std::string& name) {
     const auto bytes = read_file(folder_.file(name)).value_or(std::vector<std::byte>{});
-    if (name.ends_with(".ply")) return world_of_ply(bytes);
+    if (name.ends_with(".ply")) return with_y_up(world_of_ply(bytes));
     return name.ends_with(".obj") ? world_of_obj(bytes) : world_of(parse_glb(bytes));
   }
 

@@ -207,7 +207,7 @@ TEST_F(Tool, ShellsCompleteCommandsOptionsAndChoices) {
   EXPECT_EQ(reply("quoin generate te"), "terrain\n");
   EXPECT_EQ(reply("quoin render --view le"), "left\n");
   EXPECT_EQ(reply("quoin convert a.vox b.glb --smoothn"), "--smoothness\n");
-  EXPECT_EQ(reply("quoin render a.vox -o "), "\n") << "files are the shell's own matter";
+  EXPECT_EQ(reply("quoin render a.vox -o \"\""), "\n") << "files are the shell's own matter";
   for (const std::string shell : {"zsh", "fish"}) {
     std::ofstream(folder_.file("script")) << run("completions " + shell).out;
     const std::string has = "command -v " + shell + " > /dev/null";

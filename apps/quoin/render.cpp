@@ -24,8 +24,8 @@ namespace quoin::tool {
 namespace {
 
 struct Outcome {
-  Picture picture;
-  Camera camera;
+  Picture picture;              ///< the last one
+  Camera camera;                ///< likewise
   std::optional<double> slice;  ///< where it lies on its axis, instead of a camera
   FaceCounts faces;
   bool is_volume = false;
@@ -34,15 +34,38 @@ struct Outcome {
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
+  std::int64_t rays = 0;  ///< of all pictures
 };
+
+/// A picture to take.
+struct Shot {
+  Camera camera;
+  std::filesystem::path output;
+};
+
+/// OUT.png as OUT-007.png: with as many digits as the last of them has.
+std::filesystem::path numbered(const std::filesystem::path& output, int number, int last) {
+  std::string digits = std::to_string(number);
+  const std::size_t width = std::max<std::size_t>(std::to_string(last).size(), 2);
+  digits.insert(0, width - std::min(width, digits.size()), '0');
+  return output.parent_path() / (output.stem().string() + "-" + digits + output.extension().string());
+}
+
+double aspect_of(const RenderArguments& arguments) {
+  return static_cast<double>(arguments.render.width) / arguments.render.height;
+}
 
 Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& arguments) {
   if (loaded.camera && !arguments.has_view && !arguments.position) return *loaded.camera;
   if (arguments.position) {
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
   }
-  const double aspect = static_cast<double>(arguments.render.width) / arguments.render.height;
-  return frame_scene(loaded.scene, arguments.view, aspect, arguments.common.instances());
+  if (!arguments.azimuth && !arguments.elevation) {
+    return frame_scene(loaded.scene, arguments.view, aspect_of(arguments), arguments.common.instances());
+  }
+  SceneFraming framing(arguments.forward(), aspect_of(arguments));
+  framing.add(loaded.scene, arguments.common.instances());
+  return framing.camera();
 }
 
 void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Picture& picture,
@@ -54,12 +77,12 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
   }
 }
 
-Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
-  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.output.string());
-  const auto png = write_png(outcome.picture.colour, arguments.output);
+Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, Outcome& outcome) {
+  if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
+  const auto png = write_png(outcome.picture.colour, output);
   if (!png) return png.error();
-  outcome.files.push_back(arguments.output);
-  outcome.bytes = *png;
+  outcome.files.push_back(output);
+  outcome.bytes += *png;
   if (arguments.depth.empty()) return {};
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
   const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
@@ -69,8 +92,9 @@ Status write_outputs(const RenderArguments& arguments, Outcome& outcome) {
   return {};
 }
 
-Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume) {
+Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int frame) {
   LoadOptions options = arguments.common.load;
+  options.frame = frame;
   options.keep_source = false;
   options.threads = arguments.common.threads;
   if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
@@ -82,26 +106,38 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume) {
   return loaded;
 }
 
-// Takes the picture and puts it, with its times, into the outcome.
+// Takes the pictures and writes them, with the times into the outcome.
 template <class Renderer>
-Status take_picture(Renderer& renderer, const RenderOptions& options, Stopwatch& watch, Outcome& outcome) {
-  outcome.build = watch.lap();
+Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const RenderOptions& options,
+                     const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
+  outcome.build += watch.lap();
   ProgressBar bar;
-  auto picture = renderer.render(outcome.camera, options, bar.listener("tracing"));
-  if (!picture) return picture.error();
-  outcome.picture = std::move(*picture);
-  outcome.trace = watch.lap();
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const auto share = [&](double fraction) {
+      return (static_cast<double>(i) + fraction) / static_cast<double>(shots.size());
+    };
+    const Progress listener = bar.listener("tracing");
+    auto picture =
+        renderer.render(shots[i].camera, options, [&](double fraction) { return listener(share(fraction)); });
+    if (!picture) return picture.error();
+    outcome.camera = shots[i].camera;
+    outcome.picture = std::move(*picture);
+    outcome.rays += outcome.picture.rays;
+    outcome.trace += watch.lap();
+    if (auto written = write_outputs(arguments, shots[i].output, outcome); !written) return written;
+    outcome.write += watch.lap();
+  }
   return {};
 }
 
-Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options, Stopwatch& watch,
-                   Outcome& outcome) {
+Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
+                   const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const CpuRenderer renderer(scene, arguments.common.instances(), arguments.common.threads);
-  return take_picture(renderer, options, watch, outcome);
+  return take_pictures(renderer, arguments, options, shots, watch, outcome);
 }
 
 Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
-                      Stopwatch& watch, Outcome& outcome) {
+                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   VulkanOptions vulkan;
   vulkan.device = arguments.device;
   auto renderer = VulkanRenderer::create(vulkan);
@@ -110,18 +146,56 @@ Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, cons
   if (auto updated = renderer->update(scene, arguments.common.instances(), arguments.common.threads); !updated) {
     return updated;
   }
-  return take_picture(*renderer, options, watch, outcome);
+  return take_pictures(*renderer, arguments, options, shots, watch, outcome);
 }
 
-/// Draws what the camera sees.
-Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
-  const auto camera = camera_for(loaded, arguments);
-  if (!camera) return camera.error();
-  outcome.camera = *camera;
+Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, const std::vector<Shot>& shots,
+                  Stopwatch& watch, Outcome& outcome) {
   RenderOptions options = arguments.render;
   if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
   const bool is_vulkan = arguments.backend == "vulkan";
-  return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, watch, outcome);
+  return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);
+}
+
+/// Draws what the camera sees, or all that it sees once round the scene.
+Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
+  std::vector<Shot> shots;
+  if (arguments.turns > 1) {
+    SceneFraming framing(arguments.forward(), aspect_of(arguments), arguments.turns);
+    framing.add(loaded.scene, arguments.common.instances());
+    for (int turn = 0; turn < arguments.turns; ++turn) {
+      shots.push_back({framing.camera(turn), numbered(arguments.output, turn, arguments.turns - 1)});
+    }
+  } else {
+    const auto camera = camera_for(loaded, arguments);
+    if (!camera) return camera.error();
+    shots.push_back({*camera, arguments.output});
+  }
+  return draw_shots(loaded, arguments, shots, watch, outcome);
+}
+
+/// Draws the frames after the first one, which is loaded, and that; all from where the whole film is in the picture.
+Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
+  const FrameRange& frames = *arguments.frames;
+  const InstanceFilter filter = arguments.common.instances();
+  const bool has_camera = arguments.position || (first.camera && !arguments.has_view);
+  SceneFraming framing(arguments.forward(), aspect_of(arguments));
+  framing.add(first.scene, filter);
+  for (int frame = frames.first + 1; frame <= frames.last && !has_camera; ++frame) {
+    const auto loaded = load(arguments, false, frame);
+    if (!loaded) return loaded.error();
+    framing.add(loaded->scene, filter);
+  }
+  Result<Camera> camera = has_camera ? camera_for(first, arguments) : framing.camera();
+  if (!camera) return camera.error();
+  for (int frame = frames.first; frame <= frames.last; ++frame) {
+    const auto loaded = load(arguments, false, frame);
+    if (!loaded) return loaded.error();
+    outcome.read += watch.lap();
+    const std::vector<Shot> shots = {{*camera, numbered(arguments.output, frame, frames.last)}};
+    if (auto drawn = draw_shots(*loaded, arguments, shots, watch, outcome); !drawn) return drawn;
+  }
+  return {};
 }
 
 Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
@@ -131,7 +205,9 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
   outcome.picture.colour = std::move(slice->colour);
   outcome.picture.pixels_hit = slice->pixels_solid;
   outcome.trace = watch.lap();
-  return {};
+  auto written = write_outputs(arguments, arguments.output, outcome);
+  outcome.write = watch.lap();
+  return written;
 }
 
 Result<Outcome> render(const RenderArguments& arguments) {
@@ -139,23 +215,26 @@ Result<Outcome> render(const RenderArguments& arguments) {
   Stopwatch watch;
   if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common.input);
-  auto loaded = load(arguments, is_volume);
+  if (is_volume && arguments.frames) {
+    return make_error(ErrorCode::InvalidArgument, "--frames is for voxels, and the input is a volume");
+  }
+  const int frame = arguments.frames ? arguments.frames->first : arguments.common.load.frame;
+  auto loaded = load(arguments, is_volume, frame);
   if (!loaded) return loaded.error();
   const Scene& scene = loaded->scene;
   Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
+  if (arguments.frames) std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
   outcome.read = watch.lap();
   outcome.is_volume = is_volume;
   catch_interrupts();
   outcome.faces = count_faces(scene, filter, arguments.common.threads);
   const bool is_slice = arguments.preset == "density";
-  Status drawn =
-      is_slice ? draw_slice(scene, arguments, watch, outcome) : draw_view(*loaded, arguments, watch, outcome);
+  const auto draw = arguments.frames ? draw_frames : draw_view;
+  Status drawn = is_slice ? draw_slice(scene, arguments, watch, outcome) : draw(*loaded, arguments, watch, outcome);
   if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
   if (!is_slice) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
-  if (auto written = write_outputs(arguments, outcome); !written) return written.error();
-  outcome.write = watch.lap();
   return outcome;
 }
 
@@ -174,7 +253,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
   Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
-               {"rays", outcome.picture.rays},
+               {"rays", outcome.rays},
                {"pixels_hit", outcome.picture.pixels_hit},
                {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
                {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
@@ -193,7 +272,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
 
 std::string outcome_text(const Outcome& outcome) {
   const Picture& picture = outcome.picture;
-  const double per_second = static_cast<double>(picture.rays) / std::max(outcome.trace, 1e-9);
+  const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);
   std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
                      std::to_string(picture.colour.height) + ", " + with_thousands(picture.pixels_hit) +
                      (outcome.slice       ? " pixels lie in the solid\n"
@@ -201,11 +280,17 @@ std::string outcome_text(const Outcome& outcome) {
                                           : " pixels show voxels\n");
   if (!outcome.is_volume && !outcome.slice) text += to_string(outcome.faces) + "\n";
   if (!outcome.slice)
-    text += "Rays: " + with_thousands(picture.rays) + " in " + number_for_people(outcome.trace) + " s, " +
+    text += "Rays: " + with_thousands(outcome.rays) + " in " + number_for_people(outcome.trace) + " s, " +
             with_thousands(std::llround(per_second)) + " a second\n";
   if (!outcome.device.empty()) text += "Drawn by " + outcome.device + "\n";
   text += "Wrote ";
-  for (const auto& file : outcome.files) text += file.string() + ", ";
+  constexpr std::size_t kNamed = 3;
+  if (outcome.files.size() > kNamed) {
+    text += std::to_string(outcome.files.size()) + " pictures, " + outcome.files.front().string() + " to " +
+            outcome.files.back().string() + ", ";
+  } else {
+    for (const auto& file : outcome.files) text += file.string() + ", ";
+  }
   const double seconds = outcome.read + outcome.build + outcome.trace + outcome.write;
   return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
@@ -232,6 +317,8 @@ void add_render_command(CLI::App& app, int& status) {
                   ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
+                  "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"
+                  "Example: quoin render walk.vox -o walk.png --frames 0:24 --view left\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
                   "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5");
   command->callback([command, arguments, &status] {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include "field_occlusion.h"
 #include "parse.h"
@@ -64,6 +65,14 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
       .add_option("--view", arguments.view_name,
                   "Frame the whole scene, seen from there: front, back, left, right, top or iso (default iso)")
       ->check(CLI::IsMember({"front", "back", "left", "right", "top", "iso"}));
+  add_text_option(command, "--azimuth", "DEGREES",
+                  "Frame the whole scene from so far to the right of the front (default 45)");
+  add_text_option(command, "--elevation", "DEGREES", "From so far above the horizon (default 35.26)");
+  command
+      .add_option("--turntable", arguments.turns,
+                  "That many pictures once round the scene, framed alike: OUT-01.png, ...")
+      ->check(CLI::Range(2, 100'000));
+  add_text_option(command, "--frames", "A:B", "A picture of each of these frames of an animation, framed alike");
   add_text_option(command, "--camera", "X,Y,Z", "Where the camera stands; with --look-at, instead of --view");
   add_text_option(command, "--look-at", "X,Y,Z", "The point in the middle of the picture");
   add_text_option(command, "--fov", "DEGREES", "Vertical field of view of --camera (default 45)");
@@ -174,6 +183,39 @@ std::string fault_of_files(const RenderArguments& arguments) {
   return "";
 }
 
+/// "0:24".
+std::optional<FrameRange> read_frames(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) return std::nullopt;
+  const auto first = parse_number(std::string_view(text).substr(0, colon));
+  const auto last = parse_number(std::string_view(text).substr(colon + 1));
+  const auto is_frame = [](const std::optional<double>& number) {
+    return number && *number >= 0.0 && *number <= 1e6 && *number == std::floor(*number);
+  };
+  if (!is_frame(first) || !is_frame(last) || *last < *first) return std::nullopt;
+  return FrameRange{static_cast<int>(*first), static_cast<int>(*last)};
+}
+
+std::optional<double> read_elevation(const std::string& text) {
+  const auto degrees = parse_number(text);
+  return degrees && std::abs(*degrees) <= 90.0 ? degrees : std::nullopt;
+}
+
+std::string fault_of_films(const CLI::App& command) {
+  const auto has = [&](const char* option) { return command.count(option) > 0; };
+  for (const char* option : {"--azimuth", "--elevation"}) {
+    if (has(option) && has("--view")) return std::string("--view and ") + option + " exclude each other";
+    if (has(option) && has("--camera")) return std::string("--camera and ") + option + " exclude each other";
+  }
+  if (has("--turntable") && has("--camera")) return "--turntable goes round by itself: no --camera";
+  if (has("--turntable") && has("--frames")) return "--turntable and --frames exclude each other";
+  if (has("--frames") && has("--frame")) return "--frame and --frames exclude each other";
+  for (const char* option : {"--turntable", "--frames"}) {
+    if (has(option) && has("--depth")) return std::string(option) + ": --depth is for one picture";
+  }
+  return "";
+}
+
 std::string fault_of_camera(const CLI::App& command, const RenderArguments& arguments) {
   const bool has_position = command.count("--camera") > 0;
   const bool has_target = command.count("--look-at") > 0;
@@ -225,12 +267,12 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
   }
-  for (const char* option :
-       {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
-        "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
-        "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
-        "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
-        "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky"}) {
+  for (const char* option : {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
+                             "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
+                             "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
+                             "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
+                             "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky",
+                             "--azimuth",        "--elevation",       "--turntable",       "--frames"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -276,6 +318,9 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
       read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
+      read_option(command, "--azimuth", parse_number, "a number", arguments.azimuth),
+      read_option(command, "--elevation", read_elevation, "from -90 to 90", arguments.elevation),
+      read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth),
       read_option(command, "--iso", read_float, "a number", arguments.iso)};
@@ -289,6 +334,12 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
 }
 
 }  // namespace
+
+DVec3 RenderArguments::forward() const {
+  if (!azimuth && !elevation) return direction_of(view);
+  const double iso_elevation = std::asin(std::sqrt(1.0 / 3.0)) * 180.0 / std::numbers::pi;
+  return direction_of_view(azimuth.value_or(45.0), elevation.value_or(iso_elevation));
+}
 
 void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_common_options(command, arguments.common);
@@ -311,9 +362,9 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
 }
 
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
-  for (const std::string& fault :
-       {read_texts(command, arguments), fault_of_files(arguments), fault_of_camera(command, arguments),
-        fault_of_slice(command, arguments), fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
+  for (const std::string& fault : {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command),
+                                   fault_of_camera(command, arguments), fault_of_slice(command, arguments),
+                                   fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
     if (!fault.empty()) return fault;
   }
   if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";
@@ -322,7 +373,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
         arguments.detail == "radius" ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
   arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
-  arguments.has_view = command.count("--view") > 0;
+  arguments.has_view = command.count("--view") > 0 || arguments.azimuth || arguments.elevation || arguments.turns > 1;
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
   if (is_sun_off(command)) light.sun_brightness = 0.0;

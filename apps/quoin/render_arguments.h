@@ -12,6 +12,12 @@
 
 namespace quoin::tool {
 
+/// Frames of an animation, both included.
+struct FrameRange {
+  int first = 0;
+  int last = 0;
+};
+
 /// What `quoin render` was asked for.
 struct RenderArguments {
   CommonOptions common;
@@ -23,8 +29,12 @@ struct RenderArguments {
   std::optional<DVec3> position;  ///< with `target`, instead of the view
   std::optional<DVec3> target;
   double fov_degrees = 45.0;
-  bool has_view = false;  ///< --view was given: a scene file's camera does not count
-  bool has_sun = false;   ///< likewise
+  std::optional<double> azimuth;  ///< with or without `elevation`, instead of the view
+  std::optional<double> elevation;
+  int turns = 1;                     ///< pictures once round the scene
+  std::optional<FrameRange> frames;  ///< a picture of each
+  bool has_view = false;             ///< --view was given: a scene file's camera does not count
+  bool has_sun = false;              ///< likewise
   bool has_fixed_sky = false;
   std::string preset = "full";
   std::string occlusion = "rays";
@@ -34,6 +44,9 @@ struct RenderArguments {
   std::string detail = "near";
   std::optional<double> iso;  ///< of a volume
   DensitySliceOptions slice;  ///< of the preset density
+
+  /// Where the camera of views and films looks first.
+  [[nodiscard]] DVec3 forward() const;
 };
 
 /// Adds the command's options, which fill in what CLI11 can read by itself.

@@ -107,11 +107,39 @@ std::optional<View> view_of_name(std::string_view name) {
   return std::nullopt;
 }
 
+DVec3 direction_of(View view) {
+  return kViews[static_cast<std::size_t>(view)].forward;
+}
+
+DVec3 direction_of_view(double azimuth, double elevation) {
+  const double a = azimuth * std::numbers::pi / 180.0;
+  const double e = elevation * std::numbers::pi / 180.0;
+  return glm::normalize(-DVec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e)));
+}
+
 Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
+  return frame(middle, reach, direction_of(view), aspect);
+}
+
+std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
+  // A middle and a reach that say nothing: what is asked for is what counts.
+  std::array<DVec3, 4> asked{};
+  std::size_t count = 0;
+  static_cast<void>(frame(
+      DVec3(0.0),
+      [&](DVec3 direction) {
+        asked[count++] = direction;
+        return 1.0;
+      },
+      forward, aspect));
+  return asked;
+}
+
+Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect) {
   QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
   Camera camera;
   camera.vertical_fov = kFramingFov;
-  turn(camera, kViews[static_cast<std::size_t>(view)].forward);
+  turn(camera, forward);
   const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
   const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);
   const Stand upright = stand_for(reach, camera.up, camera.forward, slope);

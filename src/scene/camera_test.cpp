@@ -268,5 +268,35 @@ TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
   }
 }
 
+// Every picture of a turn, and every scene, lies within the picture; at one distance from the axis.
+TEST(Framing, SeveralScenesAndTurnsAreFramedAlike) {
+  std::mt19937 random(18);
+  const auto number = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };
+  for (int round = 0; round < 20; ++round) {
+    std::array<Scene, 2> scenes;
+    for (Scene& scene : scenes) {
+      SceneGrid grid;
+      for (int i = 0; i < 30; ++i) grid.grid.set({number(40), number(20), number(30)}, 1);
+      const GridHandle handle = scene.add_grid(std::move(grid));
+      scene.add_instance({.name = "", .grid = handle});
+    }
+    const int turns = 1 + number(8);
+    const double aspect = 0.5 + 0.25 * number(8);
+    SceneFraming framing(direction_of_view(number(360), number(120) - 60), aspect, turns);
+    for (const Scene& scene : scenes) framing.add(scene);
+    const DBox first = scenes[0].bounds();
+    const DVec3 middle = first.min + 0.5 * (first.max - first.min);
+    const double distance = glm::length(framing.camera().position - middle);
+    for (int turn = 0; turn < turns; ++turn) {
+      const Camera camera = framing.camera(turn);
+      EXPECT_NEAR(glm::length(camera.position - middle), distance, 1e-9 * distance);
+      for (const Scene& scene : scenes) {
+        const Extent extent = extent_of(camera, aspect, scene, InstanceFilter::Visible);
+        EXPECT_LE(std::max({extent.left, extent.right, extent.low, extent.high}), 0.92 + 1e-6) << "round " << round;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace quoin

@@ -1,14 +1,18 @@
 #include "scene/framing.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/scene/scene.h>
 
 #include "scene/instance_axes.h"
@@ -109,6 +113,51 @@ Camera frame_scene(const Scene& scene, View view, double aspect, InstanceFilter 
   const DVec3 middle = bounds.min + 0.5 * (bounds.max - bounds.min);
   const auto reach = [&](DVec3 direction) { return reach_of(scene, filter, direction, middle); };
   return frame(middle, reach, view, aspect);
+}
+
+namespace {
+
+/// Turned to the right, seen from the front: +Z towards +X.
+DVec3 turned(DVec3 v, int turn, int turns) {
+  const double angle = 2.0 * std::numbers::pi * turn / turns;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  return {c * v.x + s * v.z, v.y, c * v.z - s * v.x};
+}
+
+}  // namespace
+
+SceneFraming::SceneFraming(DVec3 forward, double aspect, int turns)
+    : forward_(forward), aspect_(aspect), turns_(turns) {
+  QUOIN_ASSERT(turns > 0, "a positive number of turns");
+  reaches_.fill(-std::numeric_limits<double>::infinity());
+}
+
+void SceneFraming::add(const Scene& scene, InstanceFilter filter) {
+  const DBox bounds = scene.bounds(filter);
+  if (bounds.empty()) return;
+  if (!middle_) middle_ = bounds.min + 0.5 * (bounds.max - bounds.min);
+  const std::array<DVec3, 4> directions = framing_directions(forward_, aspect_);
+  for (int turn = 0; turn < turns_; ++turn) {
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      const double reach = reach_of(scene, filter, turned(directions[i], turn, turns_), *middle_);
+      reaches_[i] = std::max(reaches_[i], reach);
+    }
+  }
+}
+
+Camera SceneFraming::camera(int turn) const {
+  QUOIN_ASSERT(turn >= 0 && turn < turns_, "one of the turns");
+  const DVec3 middle = middle_.value_or(DVec3(0.5));
+  std::size_t asked = 0;
+  const auto reach = [&](DVec3 direction) {
+    const double of_cube = 0.5 * (std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z));
+    return middle_ ? reaches_[asked++] : of_cube;
+  };
+  Camera camera = frame(middle, reach, forward_, aspect_);
+  camera.position = middle + turned(camera.position - middle, turn, turns_);
+  for (DVec3* axis : {&camera.right, &camera.up, &camera.forward}) *axis = turned(*axis, turn, turns_);
+  return camera;
 }
 
 }  // namespace quoin

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 
 #include <quoin/scene/camera.h>
@@ -14,5 +15,11 @@ using Reach = std::function<double(DVec3 direction)>;
 ///
 /// Requires: it has an inside; everything is finite.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, View view, double aspect);
+
+/// The same where it looks along `forward`, a unit vector.
+[[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect);
+
+/// The four directions whose reaches `frame` asks for, in its order.
+[[nodiscard]] std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect);
 
 }  // namespace quoin

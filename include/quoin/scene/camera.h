@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -53,6 +54,12 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 /// The view of that name ("front", "iso" ...).
 [[nodiscard]] std::optional<View> view_of_name(std::string_view name);
 
+/// Where a camera of that view looks: unit.
+[[nodiscard]] DVec3 direction_of(View view);
+/// The same of a camera that stands `azimuth` degrees to the right of the front (90: towards +X) and `elevation` above
+/// the horizon. `iso` is 45 and 35.26.
+[[nodiscard]] DVec3 direction_of_view(double azimuth, double elevation);
+
 /// A perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
 ///
 /// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` is width / height.
@@ -64,5 +71,29 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 /// Cost: O(instances * chunks of their grids), and the voxels of the few chunks that touch the picture's margin.
 [[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect,
                                  InstanceFilter filter = InstanceFilter::Visible);
+
+/// Cameras that have several scenes in their pictures, frames of a film or one scene from all sides, framed alike: as
+/// `frame_scene` frames one, so closely that none leaves the picture and the camera keeps its distance.
+///
+///   SceneFraming framing(direction_of(View::Iso), aspect, 36);
+///   framing.add(scene);
+///   for (int i = 0; i < 36; ++i) render(scene, framing.camera(i));   // once round it
+class SceneFraming {
+ public:
+  /// `turns`: into how many equal turns to the right, about the vertical through the middle of the first scene, a full
+  /// one is divided. Requires: `forward` is unit, `aspect` (width / height) and `turns` are positive.
+  SceneFraming(DVec3 forward, double aspect, int turns = 1);
+  /// Cost: that of frame_scene, for each of the turns.
+  void add(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
+  /// Of all that was added. Nothing counts as the unit cube at the origin. Requires: 0 <= turn < turns.
+  [[nodiscard]] Camera camera(int turn = 0) const;
+
+ private:
+  DVec3 forward_;
+  double aspect_;
+  int turns_;
+  std::optional<DVec3> middle_;
+  std::array<double, 4> reaches_;
+};
 
 }  // namespace quoin
