@@ -62,6 +62,7 @@ std::vector<std::string> names_of_options(const CommandOfTool& command) {
 
 std::vector<std::string> names_of_commands(const CommandOfTool& command) {
   std::vector<std::string> names;
+  names.reserve(command.commands.size());
   for (const CommandOfTool& inner : command.commands) names.push_back(inner.name);
   return names;
 }
@@ -101,6 +102,7 @@ std::string bash_completion(const CommandOfTool& tool) {
     for (const OptionOfCommand& option : command.options) {
       if (option.value.empty()) continue;
       std::vector<std::string> patterns;
+      patterns.reserve(option.names.size());
       for (const std::string& name : option.names) patterns.push_back("'" + command.path + " " + name + "'");
       const std::string reply = option.choices.empty()
                                     ? ""
@@ -156,9 +158,8 @@ std::string zsh_options(const CommandOfTool& command) {
                               : option.choices.empty()
                                   ? ":" + zsh_text(option.value) + ":_files"
                                   : ":" + zsh_text(option.value) + ":(" + joined(option.choices, " ") + ")";
-    for (const std::string& name : option.names) {
-      text += "    '" + name + "[" + zsh_text(option.description) + "]" + value + "' \\\n";
-    }
+    const std::string rest = "[" + zsh_text(option.description) + "]" + value + "' \\\n";
+    for (const std::string& name : option.names) text.append("    '").append(name).append(rest);
   }
   return text;
 }
