@@ -38,6 +38,8 @@ struct MeshFileOptions {
 ///
 /// GLB, glTF: version 2.0. Quoin's axes are glTF's (+Y up, the front towards +Z); one world unit is a metre. A node per
 ///            placement carries translation, rotation and positive scale; vertices are relative to the part's pivot.
+///            A group is a node too, of translation and rotation, whose children are what belongs to it; the name of a
+///            layer is `extras.layer`.
 ///            Placements share the part's mesh, mirrored ones a second, reflected mesh, those that shear one that is
 ///            sheared, since nodes cannot. `.gltf` is the same as text, with a file of the same name ending in ".bin"
 ///            beside it (none when nothing is drawn).
