@@ -15,8 +15,8 @@ namespace quoin {
 /// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) with the normal's
 ///    sign along the normal: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four
 ///    diagonals; each further sample of a pixel turns them about the normal and leans the first one, or flat faces
-///    would keep bands at any number of samples. Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden
-///    angle apart; the whole is turned and shifted within the rings by a hash of the pixel.
+///    would keep bands at any number of samples. Any other number: cosine-weighted, one ray in each of as
+///    many rings of equal weight, a golden angle apart; the whole is turned and shifted within the rings by a hash of the pixel.
 class OcclusionDirections {
  public:
   explicit OcclusionDirections(int rays);

@@ -305,8 +305,8 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
 }
 
 /// As `visit_hits`, of a tree of transparent voxels, for whole blocks of voxels of one type at a time: a span is that
-/// of a block, entered at its voxel. Together the spans are those of the voxels. `largest`: returns, for that voxel, how
-/// long the block's edge may be.
+/// of a block, entered at its voxel. Together the spans are those of the voxels. `largest`: returns, for that voxel,
+/// how long the block's edge may be.
 template <class Largest, class Visit>
 void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Largest& largest, const Visit& visit) {
   visit_spans(

@@ -38,7 +38,8 @@ Status convert_blockily(const Scene& scene, const ConvertOptions& options, Outco
   return write_meshes(*meshes, options, bar, outcome);
 }
 
-/// From .vox to .vox all is kept, so what reading skipped is not lost; unless one frame is asked for, which then is all.
+/// From .vox to .vox all is kept, so what reading skipped is not lost; unless one frame is asked for, which then is
+/// all.
 void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& format, LoadedScene& loaded,
                             std::vector<std::string>& warnings) {
   if (loaded.source == nullptr || format.format != FileFormat::Vox) return;

@@ -64,7 +64,8 @@ struct FormatInfo {
                                              const Progress& progress = {});
 
 /// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss, with
-/// sun and camera) or .vox (write_vox, which keeps what `source` holds). It appears whole or not at all; returns its size.
+/// sun and camera) or .vox (write_vox, which keeps what `source` holds). It appears whole or not at all; returns its
+/// size.
 ///
 /// Warnings: one line each of what the format does not hold, added to `warnings`.
 /// Errors:   Unsupported for other endings; those of the format's writer; `path` is set in all.

@@ -68,12 +68,12 @@ struct MeshFileOptions {
 ///            copy of surfaces whose emission takes several materials.
 /// Errors:    Unsupported for a format that is none of meshes, and for OcclusionIn::Attribute in OBJ; CannotWrite;
 ///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
-///            when a transform is not finite, not affine or singular, or the scale not positive, when a vertex comes to lie beyond the range of
-///            floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
+///            when a transform is not finite, not affine or singular, the scale is not positive, a vertex comes to lie
+///            beyond the range of floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
 ///            are not registered, numbers that are not finite). Each file appears whole or not at all; of several,
 ///            those before one that fails stay.
-/// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission, _volume
-///            and _ior; Alias/Wavefront's OBJ and MTL.
+/// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
+///            _volume and _ior; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 

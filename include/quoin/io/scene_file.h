@@ -91,7 +91,8 @@ struct SceneFile {
                                                      Threads threads = {}, const Progress& progress = {});
 
 /// Reads a scene file and everything that it names. Each file is read once, however often it is placed; its own
-/// instances are placed as one body, which is a group of its own where they are several. Types of the files that equal one that there is in everything become that.
+/// instances are placed as one body, which is a group of its own where they are several. Types of the files that equal
+/// one that there is in everything become that.
 ///
 /// Errors: those of `parse_scene_file` and of reading the files (with their paths); Unsupported when one of them is a
 ///         scene file itself or a volume; LimitExceeded when all files together have more types than a registry holds.

@@ -84,8 +84,8 @@ struct LoadOptions {
 /// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1.
 /// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, turns of groups that are not
 ///           by quarter turns and lamps are left out, each with a warning.
-/// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or a
-///           grid holds a field of densities;
+/// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or
+///           a grid holds a field of densities;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
 /// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the
@@ -98,8 +98,8 @@ struct LoadOptions {
 /// same file. Without `source`: as above.
 ///
 /// Voxels:   of a model that was changed the file's order stays, new ones follow.
-/// Frames:   moving an instance or a group that moves by itself sets a key at the frame that was read; other frames stay.
-///           A shape that shows several models keeps those of other frames.
+/// Frames:   moving an instance or a group that moves by itself sets a key at the frame that was read; other frames
+///           stay. A shape that shows several models keeps those of other frames.
 /// Canvas:   a model that has outgrown its box becomes larger about its pivot where more than one key shows it.
 /// Types:    those of the file stay where they are in its palette. New ones take entries of the same look, else some
 ///           that no voxel uses.

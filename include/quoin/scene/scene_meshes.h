@@ -95,8 +95,8 @@ struct BlockySceneOptions {
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
-/// grids' handles, a placement per drawn instance in that of theirs, under the groups of the scene. After these come the surfaces of the grids'
-/// fields, as build_smooth_mesh makes them, with placements of their own.
+/// grids' handles, a placement per drawn instance in that of theirs, under the groups of the scene. After
+/// these come the surfaces of the grids' fields, as build_smooth_mesh makes them, with placements of their own.
 ///
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel

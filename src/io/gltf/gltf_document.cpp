@@ -114,7 +114,8 @@ bool has_glass_ior(const VoxelProperties& properties) {
   return properties.ior >= 1.0F && std::isfinite(properties.ior);
 }
 
-/// Beside the alpha of the texel, as GlassMaterial has it. Thickness counts in the mesh's units, distance in the world's.
+/// Beside the alpha of the texel, as GlassMaterial has it. Thickness counts in the mesh's units, distance in the
+/// world's.
 void add_glass(const SurfaceMaterial& material, const VoxelProperties& properties, Json& entry) {
   const GlassMaterial& glass = material.glass;
   entry["alphaMode"] = "BLEND";

@@ -134,7 +134,8 @@ void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filte
   instances.clear();
   scene->instances().for_each([&](InstanceHandle handle, const Instance& instance) {
     const SceneGrid* grid = scene->grids().find(instance.grid);
-    if (grid == nullptr || !passes(filter, of_scene, instance) || !has_place(instance) || !is_finite(grid->pivot)) return;
+    if (grid == nullptr || !passes(filter, of_scene, instance) || !has_place(instance) || !is_finite(grid->pivot))
+      return;
     vulkan::MeshInstance placed;
     placed.handle = handle;
     placed.mesh = {instance.grid, 0};

@@ -41,8 +41,7 @@ struct RevisedGraph {
 /// What a node of the source says.
 [[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
 
-/// Whether a file without a scene graph shows the scene no more, but would need one: it shows one model, where its reader
-/// places it.
+/// Whether a file without a scene graph needs one to show the scene: without, its reader shows one model at its place.
 [[nodiscard]] bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models);
 
 }  // namespace quoin::vox
