@@ -69,8 +69,9 @@ struct MeshFileOptions {
 /// Errors:    Unsupported for a format that is none of meshes, and for OcclusionIn::Attribute in OBJ; CannotWrite;
 ///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
 ///            when a transform is not finite, not affine or singular, the scale is not positive, a vertex comes to lie
-///            beyond the range of floats, or when a mesh contradicts itself (arrays of different lengths, indices of no vertex, types that
-///            are not registered, numbers that are not finite). Each file appears whole or not at all; of several,
+///            beyond the range of floats, or when a mesh contradicts itself (arrays of different lengths, indices of no
+///            vertex, types that are not registered, numbers that are not finite). Each file appears whole or not at
+///            all; of several,
 ///            those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume and _ior; Alias/Wavefront's OBJ and MTL.
