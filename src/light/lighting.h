@@ -44,7 +44,8 @@ struct SurfacePoint {
 /// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way, as is what lamps add; without
 /// occlusion the ambient term is 0.1. The ambient term and the sun's light are of the colours of daylight_of. Secondary
 /// rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was hit, of the full one also
-/// where a halved one is traced. Other shadings: see Shading. s Lighting {
+/// where a halved one is traced. Other shadings: see Shading.
+class Lighting {
  public:
   /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options.
   /// `lamps`: of the same placed grids; null: none shines. `detail_colours`: surfaces are of the colour of their grid's

@@ -17,7 +17,8 @@ namespace quoin {
 ///    diagonals; each further sample of a pixel turns them about the normal and leans the first one, or flat faces
 ///    would keep bands at any number of samples. Any other number: cosine-weighted, one ray in each of as
 ///    many rings of equal weight, a golden angle apart; the whole is turned and shifted within the rings by a hash of
-///    the pixel. cclusionDirections {
+///    the pixel.
+class OcclusionDirections {
  public:
   explicit OcclusionDirections(int rays);
 

@@ -178,7 +178,7 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
                                                const MeshPictureOptions& options) const {
   const std::string who = "vulkan: " + device->description().name;
   if (Status right = check(camera, options); !right) return right;
-  const auto refuse = [](std::string message) { return make_error(ErrorCode::InvalidArgument, std::move(message)); };
+  const auto refuse = [](const std::string& message) { return make_error(ErrorCode::InvalidArgument, message); };
   const auto largest = static_cast<std::int64_t>(pass->largest_edge());
   if (options.width > largest || options.height > largest) {
     const std::string edge = std::to_string(largest);
