@@ -269,6 +269,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--preset density --slice w:0.5", "--slice: must be"},
       {out + "--preset density --slice 0.5", "--slice: must be"},
       {out + "--preset unlit --fixed-sky", "--fixed-sky: the preset unlit has no light"},
+      {out + "--preset unlit --plain-glass", "--plain-glass: the preset unlit has no light"},
       {out + "--preset density --fixed-sky", "--fixed-sky: the preset density is a flat slice"},
       {out + "--preset density --samples 4", "--samples: the preset density is a flat slice"},
       {out + "--backend gpu", "--backend: "},

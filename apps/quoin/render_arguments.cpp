@@ -85,6 +85,8 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       "less than 0. Or off: no sun, and the sky as it is");
   command.add_flag("--fixed-sky", arguments.has_fixed_sky,
                    "The sky and the colour of light are a clear day's wherever the sun stands");
+  command.add_flag("--plain-glass", arguments.has_plain_glass,
+                   "Glass and water have no surfaces that mirror the sky: they only colour what lies behind them");
   add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
   command
       .add_option("--lamps", arguments.render.light.lamps,
@@ -247,7 +249,7 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
     return std::string(given) + " needs --ao smooth";
   }
   for (const char* option :
-       {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness", "--fixed-sky"}) {
+       {"--sun", "--exposure", "--lamps", "--lamp-brightness", "--sky-brightness", "--fixed-sky", "--plain-glass"}) {
     if (command.count(option) > 0 && (preset == "unlit" || preset == "ao")) {
       return std::string(option) + ": the preset " + preset + " has no light";
     }
@@ -267,12 +269,13 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
   }
-  for (const char* option : {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
-                             "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
-                             "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
-                             "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
-                             "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky",
-                             "--azimuth",        "--elevation",       "--turntable",       "--frames"}) {
+  for (const char* option :
+       {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
+        "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
+        "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
+        "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
+        "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky",
+        "--azimuth",        "--elevation",       "--turntable",       "--frames",    "--plain-glass"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -378,6 +381,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   LightOptions& light = arguments.render.light;
   if (is_sun_off(command)) light.sun_brightness = 0.0;
   if (arguments.has_fixed_sky) light.sky_follows_sun = false;
+  if (arguments.has_plain_glass) light.glass_surfaces = false;
   if (arguments.occlusion == "vertex") light.occlusion = OcclusionMode::Vertex;
   if (arguments.occlusion == "smooth") light.occlusion = OcclusionMode::Smooth;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;

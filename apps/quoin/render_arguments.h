@@ -36,6 +36,7 @@ struct RenderArguments {
   bool has_view = false;             ///< --view was given: a scene file's camera does not count
   bool has_sun = false;              ///< likewise
   bool has_fixed_sky = false;
+  bool has_plain_glass = false;
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";

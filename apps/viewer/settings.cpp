@@ -93,6 +93,7 @@ void read_light(const Json& object, LightOptions& light) {
   read_number(object, "sun_brightness", 0.0, 100.0, light.sun_brightness);
   read_number(object, "sky_brightness", 0.0, 100.0, light.sky_brightness);
   read_flag(object, "sky_follows_sun", light.sky_follows_sun);
+  read_flag(object, "glass_surfaces", light.glass_surfaces);
   read_whole(object, "lamps", 0, 1024, light.lamps);
   read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
@@ -191,6 +192,7 @@ std::string to_json(const Settings& settings) {
                    {"sun_brightness", light.sun_brightness},
                    {"sky_brightness", light.sky_brightness},
                    {"sky_follows_sun", light.sky_follows_sun},
+                   {"glass_surfaces", light.glass_surfaces},
                    {"lamps", light.lamps},
                    {"lamp_brightness", light.lamp_brightness},
                    {"exposure", light.exposure}}},

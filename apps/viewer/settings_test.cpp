@@ -33,6 +33,7 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.sun_brightness = 0.25;
   settings.light.sky_brightness = 0.0;
   settings.light.sky_follows_sun = false;
+  settings.light.glass_surfaces = false;
   settings.light.lamps = 12;
   settings.light.lamp_brightness = 8.0;
   settings.mode = DrawMode::Density;

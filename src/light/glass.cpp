@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "light/light_model.h"
 #include "trace/walk.h"
 
 namespace quoin {
@@ -20,7 +21,7 @@ constexpr double kLeastClosing = 1e-9;            // of what is clear
 constexpr double kTouching = 1e-6;
 
 bool continues(const GlassBody& body, const GlassBody& next) {
-  return next.type == body.type && next.t_enter <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
+  return next.type == body.type && reaches(body, next.t_enter);
 }
 
 // Puts bodies in the ray's order and makes those one that touch, of neighbouring grids.
@@ -31,7 +32,11 @@ void join_touching(std::vector<GlassBody>& bodies) {
   std::size_t kept = 0;
   for (std::size_t i = 1; i < bodies.size(); ++i) {
     if (continues(bodies[kept], bodies[i])) {
-      bodies[kept].t_exit = std::max(bodies[kept].t_exit, bodies[i].t_exit);
+      if (bodies[i].t_exit > bodies[kept].t_exit) {
+        bodies[kept].t_exit = bodies[i].t_exit;
+        bodies[kept].exit_placed = bodies[i].exit_placed;
+        bodies[kept].exit_face = bodies[i].exit_face;
+      }
       bodies[kept].voxels += bodies[i].voxels;
     } else {
       bodies[++kept] = bodies[i];
@@ -59,13 +64,15 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
       const double closing = -static_cast<double>(surfaces[type].log_clarity) * voxels_per_cell * kDiagonal;
       return (clarity - kClosed) / std::max(closing, kLeastClosing);
     };
-    trace::visit_blocks(*placed.transparent, ray, max_t, largest, [&](const VoxelSpan& span) {
+    trace::visit_blocks(*placed.transparent, ray, max_t, largest, [&](const trace::WalkSpan& span) {
       const double t_exit = std::min(span.t_exit, max_t);
       const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size * voxels_per_cell;
       if (!(voxels > 0.0)) return true;  // an edge that it only touches
-      const GlassBody next{index, span.voxel, span.face, type, span.starts_inside, span.t_enter, t_exit, voxels};
+      const GlassBody next{index,        span.voxel, span.face, type,  span.starts_inside,
+                           span.t_enter, t_exit,     voxels,    index, span.exit_face};
       if (out.size() > first && continues(out.back(), next)) {
         out.back().t_exit = t_exit;
+        out.back().exit_face = span.exit_face;
         out.back().voxels += voxels;
       } else {
         out.push_back(next);
@@ -85,6 +92,31 @@ GlassLook look_of(const Surface& surface, const GlassBody& body) {
   for (int channel = 0; channel < 3; ++channel) look.passed[channel] = through(surface.log_transmittance[channel]);
   look.own = 1.0F - through(surface.log_clarity);
   return look;
+}
+
+bool reaches(const GlassBody& body, double t) {
+  return t <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
+}
+
+bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t) {
+  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.exit_placed)];
+  return t <= body.t_exit + kRayLift * placed.voxel_size / glm::length(ray_in_view.direction);
+}
+
+Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, Direction face, float ior,
+                 float other_ior) {
+  const glm::dmat3& axes = view.tracer().placed()[static_cast<std::size_t>(placed)].world_axes;
+  const Vec3 normal(axes * DVec3(normal_of(face)));
+  const Vec3 direction(glm::normalize(ray_in_view.direction));
+  const float along = glm::dot(direction, normal);
+  const float cosine = std::min(std::abs(along), 1.0F);
+  const float denser = std::max(ior, other_ior) / std::min(ior, other_ior);
+  const float inside = std::sqrt(1.0F - (1.0F - cosine * cosine) / (denser * denser));
+  const float across = (cosine - denser * inside) / (cosine + denser * inside);
+  const float in_plane = (denser * cosine - inside) / (denser * cosine + inside);
+  // Along a surface between equals both are 0 / 0.
+  const float share = denser > 1.0F ? 0.5F * (across * across + in_plane * in_plane) : 0.0F;
+  return {share, direction.y - 2.0F * along * normal.y};
 }
 
 Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t) {

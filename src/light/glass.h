@@ -18,7 +18,9 @@ struct GlassBody {
   bool starts_inside = false;
   double t_enter = 0.0;
   double t_exit = 0.0;
-  double voxels = 0.0;  ///< length inside, in voxels of the grids
+  double voxels = 0.0;                    ///< length inside, in voxels of the grids
+  std::int32_t exit_placed = 0;           ///< the grid in which the ray leaves it
+  Direction exit_face = Direction::PosX;  ///< and the face through which
 };
 
 /// The bodies that a ray passes before `max_t`, nearest first. `out` is cleared first. Deep inside a body that lets
@@ -35,6 +37,26 @@ struct GlassLook {
 /// A length of a material lets through what Beer and Lambert say, and shows its own colour in place of what it does not
 /// let see past. A body that a ray enters counts as one voxel long at least, so that its edges are crisp.
 [[nodiscard]] GlassLook look_of(const Surface& surface, const GlassBody& body);
+
+/// Whether the ray is in the body still, or just out of it, at `t`: so another body that begins there, or a surface,
+/// touches it.
+[[nodiscard]] bool reaches(const GlassBody& body, double t);
+
+/// Whether something opaque at `t` leaves no air behind the body: a hundredth of a voxel is none, so that it does not
+/// matter how grids that stand on each other are rounded.
+[[nodiscard]] bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t);
+
+/// What a surface between two media does to a ray.
+struct Mirror {
+  float share = 0.0F;  ///< of what is seen: it comes from the mirrored direction
+  float up = 0.0F;     ///< the y of that direction, a unit vector
+};
+
+/// Of a face of a placed grid, between media of these indices of refraction: Fresnel's equations without polarisation.
+/// Since rays go straight on, their angle is taken for that in the thinner medium, on whichever side they come from:
+/// through both faces of a pane the same share is mirrored, as with refraction, and none all of it.
+[[nodiscard]] Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, Direction face,
+                               float ior, float other_ior);
 
 /// What of each channel passes through everything transparent on a ray.
 [[nodiscard]] Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view,

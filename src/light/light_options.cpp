@@ -11,6 +11,7 @@ LightOptions natural_light() {
   options.sun = {-0.48, 0.72, 0.50};
   options.sky_follows_sun = true;
   options.lamps = 64;
+  options.glass_surfaces = true;
   return options;
 }
 

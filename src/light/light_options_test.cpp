@@ -27,7 +27,9 @@ TEST(LightOptions, NaturalLightStandsBesideTheIsoCamera) {
   EXPECT_LT(options.sun.x, 0.0) << "of the three sides that the view shows one lies in the shade";
   EXPECT_GT(options.sun.z, 0.0);
   EXPECT_TRUE(options.sky_follows_sun);
+  EXPECT_TRUE(options.glass_surfaces);
   EXPECT_FALSE(LightOptions{}.sky_follows_sun) << "the reference stays";
+  EXPECT_FALSE(LightOptions{}.glass_surfaces);
 }
 
 TEST(LightOptions, ImpossibleOnesAreRefusedByName) {

@@ -8,6 +8,11 @@
 
 namespace quoin {
 
+std::optional<float> glass_ior(const VoxelProperties& properties) {
+  if (!(properties.ior >= 1.0F) || !std::isfinite(properties.ior)) return std::nullopt;
+  return properties.ior;
+}
+
 Vec3 linear_colour(Rgba8 colour) {
   return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
 }
@@ -22,6 +27,9 @@ void set_absorption(float alpha, Surface& surface) {
 
 namespace {
 
+// Mirrors all but four thousandths, and its square is a number.
+constexpr float kLargestIor = 1e3F;
+
 Surface surface_of(const VoxelProperties& properties) {
   Surface surface;
   const Rgba8 c = properties.colour;
@@ -32,6 +40,7 @@ Surface surface_of(const VoxelProperties& properties) {
   surface.emitted = surface.colour * emission;
   if (properties.visibility != Visibility::Transparent) return surface;
   set_absorption(static_cast<float>(c.a) / 255.0F, surface);
+  surface.ior = std::min(glass_ior(properties).value_or(1.0F), kLargestIor);
   return surface;
 }
 

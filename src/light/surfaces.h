@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -15,7 +16,12 @@ struct Surface {
   /// past altogether. 0 for what is clear; minus infinity for what lets nothing through.
   Vec3 log_transmittance{0.0F};
   float log_clarity = 0.0F;
+  float ior = 1.0F;  ///< of what is transparent, see glass_ior; else that of air
 };
+
+/// The index of refraction with which a transparent type is drawn and written to files; none where its own is not one:
+/// less than that of air, infinite or not a number.
+[[nodiscard]] std::optional<float> glass_ior(const VoxelProperties& properties);
 
 /// Without its alpha.
 [[nodiscard]] Vec3 linear_colour(Rgba8 colour);

@@ -2,8 +2,12 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include <glm/gtc/quaternion.hpp>
 
 #include "light/glass.h"
+#include "light/sky.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -163,6 +167,99 @@ TEST(RenderGlass, ThatGlowsShinesInTheDarkFromOutsideAndInside) {
       seen.at(emission > 0.0F) = pixel_at(taken(scene, from_above(0, height, 0, 2), options), 0, 0);
     }
     EXPECT_GT(seen[1][2], seen[0][2] + 50) << height;
+  }
+}
+
+// Of a glass of index 1.5, what Fresnel's equations say.
+TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
+  GlassScene s;
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {1, 1, 1}}, s.glass);
+  s.scene.edit(place(s.scene, std::move(grid))).rotation = glm::angleAxis(0.5, glm::normalize(DVec3(1, 2, 3)));
+  const SceneTracer tracer(s.scene);
+  const SceneView view(tracer, DVec3(0.0));
+  const glm::dmat3& axes = tracer.placed()[0].world_axes;
+  // At an angle to the upper face, from outside or, with a cosine below 0, from inside.
+  const auto at = [&](double cosine, float ior, float other) {
+    const DVec3 direction = axes * DVec3(std::sqrt(1.0 - cosine * cosine), -cosine, 0.0);
+    return mirror_at(view, {DVec3(0.0), 7.0 * direction}, 0, Direction::PosY, ior, other);
+  };
+  EXPECT_NEAR(at(1.0, 1.0F, 1.5F).share, 0.04F, 1e-6F);
+  EXPECT_NEAR(at(1.0, 1.0F, 1.5F).up, axes[1].y, 1e-6);
+  // Brewster's angle, at which one polarisation is not mirrored: ((n^2 - 1) / (n^2 + 1))^2 / 2 is left.
+  const double brewster = 1.0 / std::sqrt(1.0 + 1.5 * 1.5);
+  EXPECT_NEAR(at(brewster, 1.0F, 1.5F).share, 0.5 * (1.25 / 3.25) * (1.25 / 3.25), 1e-6);
+  EXPECT_NEAR(at(0.0, 1.0F, 1.5F).share, 1.0F, 1e-6F);
+  for (const double cosine : {0.0, 0.01, 0.3, 0.8, 1.0}) {
+    EXPECT_NEAR(at(cosine, 1.5F, 1.0F).share, at(-cosine, 1.0F, 1.5F).share, 1e-5F) << "the same from inside";
+    EXPECT_EQ(at(cosine, 1.5F, 1.5F).share, 0.0F) << "between equals there is no surface";
+    EXPECT_NEAR(at(cosine, 1.3F * 1.2F, 1.3F).share, at(cosine, 1.2F, 1.0F).share, 1e-5F);
+  }
+}
+
+// What a picture with surfaces shows of one without: through a pane on stone, and through one over it.
+TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
+  for (const int gap : {0, 3}) {
+    GlassScene s;
+    Grid grid;
+    grid.fill_box({{-5, -1, -5}, {6, 0, 6}}, s.stone);
+    Grid pane;
+    pane.fill_box({{-5, 0, -5}, {6, 2, 6}}, s.glass);
+    place(s.scene, std::move(grid));
+    // Of another grid, so that where they touch is rounded twice.
+    place(s.scene, std::move(pane), {0.1, 0.1 + gap, 0.1});
+    RenderOptions options = sized(4, 4);
+    options.light.sun = {0, 1, 0};
+    options.light.shadows = false;
+    options.light.occlusion = OcclusionMode::Off;
+    options.light.glass_surfaces = true;
+    const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
+    const Vec3 light(1.0F + 0.1F);
+    const Vec3 zenith = sky_colour(1.0F);
+    const Vec3 passed = power(through_one(), 2.0F);
+    Vec3 behind = linear(kWhite) * light;
+    // What the lower surface mirrors goes through the pane a second time.
+    if (gap != 0) behind = 0.96F * behind + 0.04F * passed * zenith;
+    const float own = 1.0F - (1.0F - kAlpha) * (1.0F - kAlpha);
+    expect_near(pixel_at(picture, 1, 2),
+                encoded(0.04F * zenith + 0.96F * (own * linear(kGlass) * light + passed * behind)), 1);
+  }
+}
+
+TEST(RenderGlass, SurfacesBelongToLightAndToBodies) {
+  const auto scene_with = [](float ior, float other_ior, bool is_split) {
+    GlassScene s;
+    for (const auto& [type, index] : {std::pair{s.glass, ior}, std::pair{s.green, other_ior}}) {
+      VoxelProperties properties = s.scene.types[type];
+      properties.ior = index;
+      s.scene.types.replace(type, properties);
+    }
+    Grid grid;
+    grid.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.stone);
+    grid.fill_box({{-4, 1, -4}, {0, 5, 5}}, s.glass);
+    Grid other;
+    (is_split ? other : grid).fill_box({{0, 1, -4}, {5, 5, 5}}, s.green);
+    place(s.scene, std::move(grid));
+    if (is_split) place(s.scene, std::move(other));
+    return std::move(s.scene);
+  };
+  const Camera camera = towards({9, 8, 11}, {0, 1, 0});
+  RenderOptions plain = sized(90, 70);
+  RenderOptions with_surfaces = plain;
+  with_surfaces.light.glass_surfaces = true;
+  const auto differ = [&](const Scene& a, const Scene& b) {
+    return count_different(taken(a, camera, with_surfaces), taken(b, camera, with_surfaces), 1);
+  };
+  const Scene glass = scene_with(1.5F, 1.5F, false);
+  EXPECT_GT(count_different(taken(glass, camera, plain), taken(glass, camera, with_surfaces), 2), 500);
+  EXPECT_GT(differ(glass, scene_with(1.5F, 1.33F, false)), 100);
+  EXPECT_EQ(differ(scene_with(1.5F, 1.33F, false), scene_with(1.5F, 1.33F, true)), 0) << "in two grids";
+  // What is as thin as air, and what is no index, mirrors nothing.
+  const Scene airy = scene_with(1.0F, std::numeric_limits<float>::quiet_NaN(), false);
+  EXPECT_EQ(taken(airy, camera, with_surfaces).colour.rgb, taken(airy, camera, plain).colour.rgb);
+  for (const Shading shading : {Shading::Unlit, Shading::Occlusion, Shading::Normals}) {
+    plain.light.shading = with_surfaces.light.shading = shading;
+    EXPECT_EQ(taken(glass, camera, with_surfaces).colour.rgb, taken(glass, camera, plain).colour.rgb);
   }
 }
 

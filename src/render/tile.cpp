@@ -68,14 +68,18 @@ void Tile::take_block(int x, int y, const RayPacket& rays, int sample) {
     const bool is_hit = (hits.grids.hit >> lane & 1U) != 0;
     const double t = is_hit ? hits.grids.t[i] : std::numeric_limits<double>::infinity();
     glass_.clear();
-    Vec3 weight(1.0F);
-    if ((through_glass >> lane & 1U) != 0) weight = add_glass(rays.ray(lane), t, pixel);
+    Sight sight;
+    if ((through_glass >> lane & 1U) != 0) sight = add_glass(rays.ray(lane), t, pixel);
     if (sample == 0) {
       depth_[pixel] = static_cast<float>(glass_.empty() ? t : glass_.front().t_enter);
       pixels_hit_ += is_hit || !glass_.empty();
     }
-    sample_[pixel] = is_hit ? Vec3(0.0F) : weight * context_->lighting->sky(context_->camera->sky_up(rays, i));
-    if (is_hit) add_opaque(lane, rays, hits, pixel, weight);
+    sample_[pixel] = sight.mirrored;
+    if (is_hit) {
+      add_opaque(lane, rays, hits, pixel, sight.passed);
+    } else {
+      sample_[pixel] += sight.passed * context_->lighting->sky(context_->camera->sky_up(rays, i));
+    }
   }
 }
 
@@ -110,15 +114,25 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion, point.position);
 }
 
-Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
+Tile::Sight Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   const Surfaces& surfaces = context_->lighting->surfaces();
   find_glass(*context_->view, surfaces, ray, max_t, glass_);
-  Vec3 passed(1.0F);
-  const bool as_solid = shows_values(context_->options->light.shading);
+  Sight sight;
+  const LightOptions& light = context_->options->light;
+  const bool as_solid = shows_values(light.shading);
+  const bool has_surfaces = light.glass_surfaces && light.shading == Shading::Lit;
+  const GlassBody* last = nullptr;
   for (const GlassBody& body : glass_) {
+    if (has_surfaces && last != nullptr && reaches(*last, body.t_enter)) {
+      meet_surface(ray, last, &body, sight);
+    } else if (has_surfaces) {
+      if (last != nullptr) meet_surface(ray, last, nullptr, sight);
+      if (!body.starts_inside) meet_surface(ray, nullptr, &body, sight);
+    }
+    last = &body;
     if (as_solid && body.starts_inside) continue;
     const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surfaces[body.type], body);
-    SurfacePoint& point = add_point(pixel, passed * look.own);
+    SurfacePoint& point = add_point(pixel, sight.passed * look.own);
     point.voxel = body.voxel;
     point.face = body.face;
     point.placed = body.placed;
@@ -126,9 +140,26 @@ Vec3 Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
                              body.voxel, body.face);
     // Seen from inside, it tints and glows but has no surface.
     if (body.starts_inside) point.kind = PointKind::Glow;
-    passed *= look.passed;
+    sight.passed *= look.passed;
   }
-  return passed;
+  if (has_surfaces && last != nullptr && !lies_on_opaque(*context_->view, ray, *last, max_t)) {
+    meet_surface(ray, last, nullptr, sight);
+  }
+  return sight;
+}
+
+void Tile::meet_surface(const Ray& ray, const GlassBody* from, const GlassBody* to, Sight& sight) const {
+  const Surfaces& surfaces = context_->lighting->surfaces();
+  const float before = from != nullptr ? surfaces[from->type].ior : 1.0F;
+  const float behind = to != nullptr ? surfaces[to->type].ior : 1.0F;
+  const Mirror mirror = to != nullptr
+                            ? mirror_at(*context_->view, ray, to->placed, to->face, before, behind)
+                            : mirror_at(*context_->view, ray, from->exit_placed, from->exit_face, before, behind);
+  Vec3 mirrored = sight.passed * mirror.share * context_->lighting->sky(mirror.up);
+  // From within it goes through the body once more.
+  if (from != nullptr) mirrored *= look_of(surfaces[from->type], *from).passed;
+  sight.mirrored += mirrored;
+  sight.passed *= 1.0F - mirror.share;
 }
 
 SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {

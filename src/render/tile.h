@@ -52,8 +52,15 @@ class Tile {
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
-  // Adds what is seen of the glass before `max_t`; returns what passes through it.
-  Vec3 add_glass(const Ray& ray, double max_t, std::size_t pixel);
+  // What glass does to a ray.
+  struct Sight {
+    Vec3 passed{1.0F};    // of what lies behind
+    Vec3 mirrored{0.0F};  // by surfaces
+  };
+  // Adds what is seen of the glass before `max_t`, but for what its surfaces mirror.
+  Sight add_glass(const Ray& ray, double max_t, std::size_t pixel);
+  // The surface between two bodies that touch, or between one and air, which is null.
+  void meet_surface(const Ray& ray, const GlassBody* from, const GlassBody* to, Sight& sight) const;
   // A point that is to be filled in: what it sends counts so much in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
   void light_points();

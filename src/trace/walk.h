@@ -289,7 +289,12 @@ inline Direction face_of(const Walk& walk, const Ray& ray) {
   return static_cast<Direction>(2 * walk.axis() + (ray.direction[walk.axis()] > 0.0 ? 1 : 0));
 }
 
-/// Calls `visit` with a VoxelSpan for each of what `leave` takes a walk out of, from one occupied voxel on, until it
+/// A span, and the face through which the ray leaves it.
+struct WalkSpan : VoxelSpan {
+  Direction exit_face = Direction::PosX;
+};
+
+/// Calls `visit` with a WalkSpan for each of what `leave` takes a walk out of, from one occupied voxel on, until it
 /// returns false.
 template <class Leave, class Visit>
 void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
@@ -297,9 +302,10 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
   Walk walk(tree, ray);
   if (!walk.enter(tree.bounds(), max_t)) return;
   while (walk.find(max_t)) {
-    VoxelSpan span{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0};
+    WalkSpan span{{walk.voxel(), face_of(walk, ray), walk.t(), 0.0, walk.axis() < 0}};
     leave(walk);
     span.t_exit = walk.t();
+    span.exit_face = static_cast<Direction>(static_cast<int>(face_of(walk, ray)) ^ 1);
     if (!visit(span) || !walk.is_within(max_t)) return;
   }
 }

@@ -57,13 +57,17 @@ struct LightOptions {
   /// only shows it. 64 is plenty. A lamp fades out where it adds less than 1/4096.
   int lamps = 0;
   double lamp_brightness = 1.0;  ///< times what lamps add to others; what they show of themselves stays as it is
+  /// Whether glass and water have surfaces: where a ray goes from air into a body, out of it again or from one body
+  /// into another, it shows the sky of the mirrored direction by Fresnel's share, of the types' `ior`. Rays go straight
+  /// on. Shading::Lit; what is rasterised from meshes has none yet.
+  bool glass_surfaces = false;
 
   bool operator==(const LightOptions&) const = default;
 };
 
 /// What the command-line tool and the viewer draw in until they are told otherwise: a sun beside the camera of
-/// View::Iso, so that one sees shadows, a sky that follows it, and lamps. LightOptions{} is the reference model, whose
-/// pictures stay what they are.
+/// View::Iso, so that one sees shadows, a sky that follows it, lamps, and surfaces of glass. LightOptions{} is the
+/// reference model, whose pictures stay what they are.
 [[nodiscard]] LightOptions natural_light();
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of

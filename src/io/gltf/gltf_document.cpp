@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -109,11 +108,6 @@ void add_emission(const SurfaceMaterial& material, Json& entry) {
   entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
 }
 
-/// Whether it is one that glTF can say.
-bool has_glass_ior(const VoxelProperties& properties) {
-  return properties.ior >= 1.0F && std::isfinite(properties.ior);
-}
-
 /// Beside the alpha of the texel, as GlassMaterial has it. Thickness counts in the mesh's units, distance in the
 /// world's.
 void add_glass(const SurfaceMaterial& material, const VoxelProperties& properties, Json& entry) {
@@ -124,7 +118,7 @@ void add_glass(const SurfaceMaterial& material, const VoxelProperties& propertie
   extensions[kVolume] = {{"thicknessFactor", glass.thickness},
                          {"attenuationDistance", glass.thickness * material.unit},
                          {"attenuationColor", json_from(glass.attenuation)}};
-  if (has_glass_ior(properties)) extensions[kIor] = {{"ior", properties.ior}};
+  if (const auto ior = glass_ior(properties)) extensions[kIor] = {{"ior", *ior}};
 }
 
 Json materials_json(const GltfLayout& layout) {
@@ -210,7 +204,7 @@ void add_extensions(const MaterialPalette& palette, Json& document) {
   bool has_glass = false;
   for (const SurfaceMaterial& material : palette.materials()) {
     has_glass |= material.is_transparent();
-    has_ior |= material.is_transparent() && has_glass_ior(palette.types()[material.type]);
+    has_ior |= material.is_transparent() && glass_ior(palette.types()[material.type]).has_value();
   }
   if (has_glass) used.insert(used.end(), {kTransmission, kVolume});
   if (has_ior) used.push_back(kIor);

@@ -219,7 +219,7 @@ std::vector<Vec4> surface_table(const VoxelRegistry& types) {
   for (std::size_t type = 0; type <= types.size(); ++type) {
     const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
     table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
-    table.emplace_back(surface.emitted, 0.0F);
+    table.emplace_back(surface.emitted, surface.ior);
     table.emplace_back(glm::max(surface.log_transmittance, Vec3(kLeast)), 0.0F);
   }
   return table;

@@ -214,6 +214,7 @@ std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
   if (is_of_vertices) flags |= kOcclusionVertex;
   if (light.occlusion_affects == OcclusionAffects::All) flags |= kAffectsAll;
   if (options.detail_colours) flags |= kDetailColours;
+  if (light.glass_surfaces && light.shading == Shading::Lit) flags |= kGlassSurfaces;
   return flags;
 }
 

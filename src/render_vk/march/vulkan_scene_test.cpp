@@ -111,6 +111,44 @@ TEST_F(VulkanScene, GlassOfTurnedInstances) {
   compare(scene, towards({-40, 30, 60}, {0, 0, 0}), sized(128, 96), "glass_village");
 }
 
+TEST_F(VulkanScene, SurfacesOfGlass) {
+  RenderOptions options = sized(128, 96);
+  options.light.glass_surfaces = true;
+  options.light.sky_follows_sun = true;
+  Scene scene = village(DVec3(0.0), true);
+  compare(scene, towards({-40, 30, 60}, {0, 0, 0}), options, "surfaces_village");
+  const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
+  compare(village(far, true), towards(far + DVec3(50, 40, 70), far), options, "surfaces_far");
+  Camera slanted = towards({300, 260, 400}, {0, 0, 0});
+  slanted.projection = Camera::Projection::Orthographic;
+  slanted.view_height = 110;
+  compare(scene, slanted, options, "surfaces_slanted");
+}
+
+// Bodies on bodies of another index, in air, on stone of their own grid and of another one.
+TEST_F(VulkanScene, SurfacesOfGlassThatTouches) {
+  Scene scene;
+  const Types types = add_types(scene);
+  VoxelProperties water = scene.types[types.water];
+  water.ior = 1.33F;
+  scene.types.replace(types.water, water);
+  Grid ground;
+  ground.fill_box({{-30, -1, -30}, {31, 0, 31}}, types.wall);
+  ground.fill_box({{-12, 0, -12}, {13, 3, 13}}, types.water);
+  ground.fill_box({{-3, 0, -3}, {4, 7, 4}}, types.glass);
+  place(scene, std::move(ground));
+  SceneGrid cube;
+  cube.grid.fill_box({{0, 0, 0}, {6, 6, 6}}, types.glass);
+  const GridHandle grid = scene.add_grid(std::move(cube));
+  add_instance(scene, grid, {16.0, 0.0, 4.0}, DQuat(1.0, 0.0, 0.0, 0.0), 1.0, false);
+  add_instance(scene, grid, {-20.0, 3.0, 8.0}, DQuat(0.9, 0.1, 0.3, 0.2), 0.8, false);
+  add_instance(scene, grid, {3.0, 2.5, 7.0}, DQuat(0.9, 0.0, 0.3, 0.0), 0.7, true);
+  RenderOptions options = sized(128, 96);
+  options.light.glass_surfaces = true;
+  compare(scene, towards({30, 20, 45}, {0, 2, 3}), options, "surfaces_touching");
+  compare(scene, towards({1, 1.5, 11}, {-2, 3, -4}, 1.4), options, "surfaces_from_inside");
+}
+
 TEST_F(VulkanScene, AThousandMillionAway) {
   const DVec3 far{1e9 + 0.25, -1e9 - 0.5, 1e9};
   const Scene scene = village(far, true);
@@ -228,6 +266,8 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   RenderOptions options = sized(96, 72);
   options.light.sun = {1.0, 0.25, 0.1};
   compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "panes");
+  options.light.glass_surfaces = true;
+  compare(scene, towards({95, 9, 12}, {0, 7, 10}), options, "mirroring_panes");
 }
 
 TEST_F(VulkanScene, TwentyThousandVoxelsThroughOneGrid) {

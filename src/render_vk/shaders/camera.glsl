@@ -26,6 +26,13 @@ float length_a_depth(vec2 point) {
   return sqrt(dot(d, d));
 }
 
+// How far behind where view space has its origin the point lies on its ray; what shows nothing lies nowhere.
+float t_of(Point point, vec2 at) {
+  if (point.voxel.w < 0) return kInfinity;
+  float ahead = placed_at(point.voxel.w).start.w - frame().view_depth;
+  return ahead * length_a_depth(at) + uintBitsToFloat(point.what.w);
+}
+
 // A coordinate of the picture, in all three.
 Pair pixel_pair(int axis) {
   Pair sum = exact_sum(vec3(float(push.corner[axis] + tile_pixel()[axis])), vec3(push.point[axis]));

@@ -17,6 +17,7 @@ const uint kUnlitOcclusion = 256;
 const uint kShowOcclusion = 512;
 const uint kShowNormals = 1024;
 const uint kLamps = 2048;
+const uint kGlassSurfaces = 4096;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
@@ -77,7 +78,8 @@ struct Point {
 // Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
 // A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
-// enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside.
+// enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside, and where it leaves:
+// 8 times the instance, and the face.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
@@ -176,7 +178,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
   uvec2 leaves;  // their boxes: low and high, w: the instance, and whether it is drawn from its impostor
-  uvec2 surfaces;    // three vectors each: colour and log clarity, emitted, log transmittance
+  uvec2 surfaces;    // three vectors each: colour and log clarity, emitted and index of refraction, log transmittance
   uvec2 directions;  // of occlusion: nine a face; or the rings' angles
   uvec2 turns;
   uvec2 thresholds;  // the least light of each byte

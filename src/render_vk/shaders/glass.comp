@@ -19,10 +19,7 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   has_hit = hit.voxel.w >= 0;
   float scale = length_a_depth(point);
   float depth = frame().view_depth;
-  float max_t = kInfinity;
-  if (has_hit) {
-    max_t = (placed_at(hit.voxel.w).start.w - depth) * scale + uintBitsToFloat(hit.what.w);
-  }
+  float max_t = t_of(hit, point);
   BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
   vec3 unused = vec3(1.0);
   start_visit(ray);

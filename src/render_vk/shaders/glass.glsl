@@ -6,8 +6,11 @@ const float kClosed = -11.0;
 // Lengths of t within which two bodies touch: the rounding of single precision.
 const float kTouching = 4e-6;
 
+bool reaches(Body body, float t) {
+  return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+}
 bool continues(Body body, Body next) {
-  return next.what.x == body.what.x && next.lengths.x <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+  return next.what.x == body.what.x && reaches(body, next.lengths.x);
 }
 
 struct BodyList {
@@ -70,12 +73,14 @@ void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float fro
     float enter_t = walk_t;
     bool goes_on = leave_block(0, room);
     float exit_t = min(walk_t, room);
+    next.what.w = 8 * uint(i) + uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
     next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
     if (next.lengths.z > 0.0) {
       clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
       if (has_body && continues(body, next)) {
         body.lengths.y = next.lengths.y;
         body.lengths.z += next.lengths.z;
+        body.what.w = next.what.w;
       } else {
         if (has_body) keep_body(list, body, from_t, passed);
         body = next;
@@ -95,9 +100,26 @@ bool next_body(BodyList list, inout uint i, out Body body) {
   while (i < list.count) {
     Body next = bodies.at[list.first + i];
     if (!continues(body, next)) break;
-    body.lengths.y = max(body.lengths.y, next.lengths.y);
+    if (next.lengths.y > body.lengths.y) {
+      body.lengths.y = next.lengths.y;
+      body.what.w = next.what.w;
+    }
     body.lengths.z += next.lengths.z;
     ++i;
   }
   return true;
+}
+
+// What a surface between media of two indices of refraction mirrors of a ray, and the y of the mirrored direction.
+// `direction`, `normal`: in the world, unit.
+vec2 mirror_at(vec3 direction, vec3 normal, float ior, float other_ior) {
+  float along = dot(direction, normal);
+  float cosine = min(abs(along), 1.0);
+  float denser = max(ior, other_ior) / min(ior, other_ior);
+  float up = direction.y - 2.0 * along * normal.y;
+  if (!(denser > 1.0)) return vec2(0.0, up);
+  float inside = sqrt(1.0 - (1.0 - cosine * cosine) / (denser * denser));
+  float across = (cosine - denser * inside) / (cosine + denser * inside);
+  float in_plane = (denser * cosine - inside) / (denser * cosine + inside);
+  return vec2(0.5 * (across * across + in_plane * in_plane), up);
 }

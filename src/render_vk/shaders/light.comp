@@ -19,11 +19,6 @@ layout(constant_id = 0) const bool kHasGlass = true;
 
 const uint kTurns = 1024;
 
-vec3 sky_colour(float up) {
-  Frame f = frame();
-  return sky_colour(Sky(f.sky_zenith.xyz, f.sky_horizon.xyz, f.sky_ground.xyz, f.ground_begins, f.ground_is_full), up);
-}
-
 float sky_up(vec2 point) {
   if (has(kPerspective)) return camera_ray(point).direction.y;
   vec3 d = frame().forward.xyz + picture_vector(point) * frame().sky_scale;
@@ -214,7 +209,9 @@ vec3 light_of(Point point, uint slot) {
     surface.emitted = vec3(0.0);
   }
   // As in smooth meshes, a field without materials is white.
-  if (is_of_field(point) && point.what.x == 0) surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0));
+  if (is_of_field(point) && point.what.x == 0) {
+    surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0), 1.0);
+  }
   if (!has(kLit)) return unlit_colour(point, slot, surface.colour);
   if (kind_of(point) == kUnlit) return surface.colour;
   vec3 colour = surface.emitted;
@@ -241,6 +238,40 @@ Point point_of(Body body) {
   return point;
 }
 
+// The surface of a face, which mirrors the sky. `tint`: of what is mirrored.
+void meet_surface(int instance, uint face, float before, float behind, vec3 tint, inout State state) {
+  Placed placed = placed_at(instance);
+  vec3 normal = sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
+  vec2 mirror = mirror_at(camera_ray(picture_point()).direction, normal, before, behind);
+  state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
+  state.weight.xyz *= 1.0 - mirror.x;
+}
+// Where a ray leaves a body into air, or into another that touches it: what is mirrored passes it once more.
+void leave_body(Body from, int instance, uint face, float behind, inout State state) {
+  Surface surface = surface_of(from.what.x);
+  vec3 tint = passed_by(surface, from.lengths.z, from.what.z != 0);
+  meet_surface(instance, face, surface.ior, behind, tint, state);
+}
+void leave_into_air(Body from, inout State state) {
+  leave_body(from, int(from.what.w >> 3), from.what.w & 7, 1.0, state);
+}
+void enter_body(Body from, bool has_from, Body to, inout State state) {
+  float ior = surface_of(to.what.x).ior;
+  if (has_from && reaches(from, to.lengths.x)) {
+    leave_body(from, to.voxel.w, to.what.y, ior, state);
+    return;
+  }
+  if (has_from) leave_into_air(from, state);
+  if (to.what.z == 0) meet_surface(to.voxel.w, to.what.y, 1.0, ior, vec3(1.0), state);
+}
+
+// Whether something opaque leaves no air behind a body.
+bool lies_on_opaque(Body body, Point opaque, vec2 at) {
+  if (opaque.voxel.w < 0) return false;
+  float voxel_size = placed_at(int(body.what.w >> 3)).ref_inside.w;
+  return t_of(opaque, at) <= body.lengths.y + frame().lift * voxel_size;
+}
+
 // Lights what this round has of a pixel, and returns whether that was all.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = picture_point();
@@ -250,7 +281,9 @@ bool light_pixel(uint slot, inout State state) {
   bool is_last = !kHasGlass || state.weight.w == kInfinity;
   uint i = 0;
   Body body;
+  Body last;
   bool is_first = true;
+  bool has_surfaces = kHasGlass && has(kGlassSurfaces);
   bool is_done = false;
   while (!is_done) {
     Point point = opaque;
@@ -258,9 +291,13 @@ bool light_pixel(uint slot, inout State state) {
     if (kHasGlass && next_body(list, i, body)) {
       // What there was no room for may go on where the last ends: both are for the next round.
       if (!is_last && !is_first && i == list.count) {
+        if (has_surfaces) enter_body(last, true, body, state);
         state.weight.w = body.lengths.x;
         break;
       }
+      // That of a later round was entered in the one before.
+      if (has_surfaces && !(is_first && push.round > 0)) enter_body(last, !is_first, body, state);
+      last = body;
       is_first = false;
       bool starts_inside = body.what.z != 0;
       // Where values are shown, glass is as good as stone, but for what one looks from.
@@ -268,11 +305,13 @@ bool light_pixel(uint slot, inout State state) {
       if (shows_values && starts_inside) continue;
       Surface surface = surface_of(body.what.x);
       point = point_of(body);
-      weight *= shows_values ? 1.0 : own_share(surface, body.lengths.z, starts_inside);
+      weight = state.weight.xyz * (shows_values ? 1.0 : own_share(surface, body.lengths.z, starts_inside));
       state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, starts_inside);
     } else {
       is_done = true;
       if (!is_last) break;
+      if (has_surfaces && !is_first && !lies_on_opaque(last, opaque, at)) leave_into_air(last, state);
+      weight = state.weight.xyz;
       if (point.voxel.w < 0) {
         state.colour.xyz += weight * sky_colour(sky_up(at));
         break;

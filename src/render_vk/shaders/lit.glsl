@@ -6,13 +6,15 @@ struct Surface {
   float log_clarity;
   vec3 emitted;
   vec3 log_transmittance;
+  float ior;
 };
 
 Surface surface_of(uint type) {
   uint i = 3 * min(type, frame().last_surface);
   Vectors surfaces = Vectors(frame().surfaces);
   vec4 colour = surfaces.at[i];
-  return Surface(colour.xyz, colour.w, surfaces.at[i + 1].xyz, surfaces.at[i + 2].xyz);
+  vec4 emitted = surfaces.at[i + 1];
+  return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
 vec3 passed_by(Surface surface, float voxels, bool starts_inside) {

@@ -128,6 +128,7 @@ constexpr std::uint32_t kUnlitOcclusion = 256;
 constexpr std::uint32_t kShowOcclusion = 512;
 constexpr std::uint32_t kShowNormals = 1024;
 constexpr std::uint32_t kLamps = 2048;
+constexpr std::uint32_t kGlassSurfaces = 4096;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;

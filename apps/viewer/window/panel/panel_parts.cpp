@@ -127,6 +127,7 @@ void draw_sun(LightOptions& light) {
     light.sun = sun_direction({azimuth, std::clamp(static_cast<double>(elevation), lowest, 89.5)});
   }
   ImGui::Checkbox("sky follows the sun", &light.sky_follows_sun);
+  ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
 }
 
 }  // namespace
