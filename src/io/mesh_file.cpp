@@ -21,21 +21,26 @@ Result<FileFormat> format_of(const std::filesystem::path& path, const MeshFileOp
 
 /// The files, of sound meshes. Errors: Unsupported, and those of the formats.
 Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path,
-                                   OcclusionIn occlusion) {
+                                   const MeshFileOptions& options) {
+  const bool is_gltf = format == FileFormat::Glb || format == FileFormat::Gltf;
+  if ((options.compress || options.quantize) && !is_gltf) {
+    return make_error(ErrorCode::Unsupported,
+                      std::string("only .glb and .gltf are ") + (options.compress ? "compressed" : "quantized"));
+  }
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
   switch (format) {
     case FileFormat::Glb:
-      return plan_glb(meshes, path, occlusion);
+      return plan_glb(meshes, path, options);
     case FileFormat::Gltf:
-      return plan_gltf(meshes, path, occlusion);
+      return plan_gltf(meshes, path, options);
     case FileFormat::Obj:
-      if (occlusion == OcclusionIn::Attribute) {
+      if (options.occlusion_in == OcclusionIn::Attribute) {
         return make_error(ErrorCode::Unsupported,
                           "OBJ has no place for occlusion beside colours; .glb, .gltf and .ply have");
       }
       return plan_obj(meshes, path);
     case FileFormat::Ply:
-      return plan_ply(meshes, path, occlusion);
+      return plan_ply(meshes, path, options);
     case FileFormat::Vox:
     case FileFormat::Scene:
     case FileFormat::Nifti:
@@ -128,7 +133,7 @@ Result<std::uint64_t> write_checked(const SceneMeshes& meshes, const std::filesy
                                     const MeshFileOptions& options, const Progress& progress) {
   const auto format = format_of(path, options);
   if (!format) return format.error();
-  const auto files = plan(meshes, *format, path, options.occlusion_in);
+  const auto files = plan(meshes, *format, path, options);
   if (!files) return files.error();
   return write_files(*files, progress);
 }
@@ -146,7 +151,7 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
                                           const Progress& progress) {
   const auto wanted = as_written(meshes, options);
   if (!wanted) return wanted.error();
-  const auto files = plan(*wanted, format, "", options.occlusion_in);
+  const auto files = plan(*wanted, format, "", options);
   if (!files) return files.error();
   if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
   std::vector<std::byte> bytes;

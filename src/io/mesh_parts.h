@@ -28,7 +28,7 @@ struct MeshFile {
 
 /// The files of a mesh, or why it cannot be written. Requires: the meshes are sound, and outlive the files.
 using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path,
-                                                    OcclusionIn occlusion);
+                                                    const MeshFileOptions& options);
 
 [[nodiscard]] PlanMeshFiles plan_glb;
 [[nodiscard]] PlanMeshFiles plan_gltf;

@@ -1,7 +1,7 @@
 // Converts every .vox file below a folder with the tool and checks the results:
-// node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded] [--smooth]
+// node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded] [--smooth] [--packed]
 //
-// With --smooth they become smooth meshes, and volumes below the folder too.
+// With --packed they are quantized and compressed. With --smooth they become smooth meshes, and volumes below the folder too.
 // Every GLB must pass the validator without a message, and N of them (default 4, spread over the list) the pixel check
 // against their voxels. Files that the tool refuses are listed, and count only when it did not refuse them properly (status 1, one
 // line, no file). Exit status: 0 all right, 1 not, 77 when something is not installed.
@@ -15,6 +15,7 @@ import { parseArgs } from 'node:util';
 const here = fileURLToPath(new URL('.', import.meta.url));
 const { values, positionals } = parseArgs({ allowPositionals: true, options: {
   pixels: { type: 'string', default: '4' }, occluded: { type: 'boolean', default: false }, smooth: { type: 'boolean', default: false },
+  packed: { type: 'boolean', default: false },
 } });
 const [tool, folder] = positionals;
 if (!existsSync(tool ?? '') || !existsSync(folder ?? '')) {
@@ -30,7 +31,7 @@ function convertAll(sources) {
   const [written, faults] = [[], []];
   for (const source of sources) {
     const glb = join(work, `${basename(source).replace(endings, '')}.glb`);
-    const flags = values.smooth ? ['--mesher', 'smooth'] : [];
+    const flags = [...(values.smooth ? ['--mesher', 'smooth'] : []), ...(values.packed ? ['--quantize', '--compress'] : [])];
     const run = spawnSync(tool, ['convert', source, glb, '--json', ...flags], { encoding: 'utf8' });
     if (run.status === 0 && JSON.parse(run.stdout).bytes > 0) {
       written.push([source, glb]);

@@ -1,6 +1,7 @@
 // Runs in the browser: shows models and answers questions about pixels.
 import * as THREE from 'three';
 import { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 import { parseGlb } from './glb.mjs';
@@ -41,7 +42,7 @@ async function load(urls) {
   let x = 0;
   for (const url of urls) {
     const bytes = await (await fetch(url)).arrayBuffer();
-    const gltf = await new GLTFLoader().parseAsync(bytes.slice(0), '/');
+    const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes.slice(0), '/');
     const own = parsed.push(await parseGlb(bytes)) - 1;
     gltf.scene.traverse((object) => {
       if (object.isMesh) object.userData.source = { model: own, ...gltf.parser.associations.get(object) };

@@ -245,6 +245,10 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
       .add_option("--up", options.up,
                   "Which axis of the mesh points up: y or z (default y; z in .ply, as Blender has it)")
       ->check(CLI::IsMember({"y", "z"}));
+  command.add_flag("--compress", options.compress,
+                   "glTF that is a fraction of the size, for clients with EXT_meshopt_compression (loses nothing)");
+  command.add_flag("--quantize", options.quantize,
+                   "glTF with integers as vertices, for clients with KHR_mesh_quantization (blocks lose nothing)");
 }
 
 /// Texts to CLI11, which are read once all are there.
@@ -362,12 +366,18 @@ Json outcome_json(const Outcome& outcome) {
 
 std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
-    return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso and --simplify are "
-           "for mesh formats; " +
+    return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso, --simplify, "
+           "--scale, --up, "
+           "--compress and --quantize are for mesh formats; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
   }
   if (options.occlusion_apart && format.format == FileFormat::Obj) {
     return "--ao-attribute: .obj has no place for it; .glb, .gltf and .ply have";
+  }
+  const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
+  if ((options.compress || options.quantize) && !is_gltf) {
+    return std::string(options.compress ? "--compress" : "--quantize") + " is for .glb and .gltf, not " +
+           std::string(format.extension);
   }
   return "";
 }
@@ -399,6 +409,8 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   }
   MeshFileOptions file;
   if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
+  file.compress = options.compress;
+  file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
   const auto format = format_for_writing(options.output);
   const bool is_ply = format && format->format == FileFormat::Ply;
@@ -450,7 +462,7 @@ void add_convert_command(CLI::App& app, int& status) {
   command->callback([command, options, texts, many, rest, &status] {
     std::size_t given = 0;
     for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
-                             "--no-unite", "--iso", "--simplify", "--scale", "--up"}) {
+                             "--no-unite", "--iso", "--simplify", "--scale", "--up", "--compress", "--quantize"}) {
       given += command->count(name);
     }
     options->has_field_occlusion = given_field_occlusion(*command) != nullptr;

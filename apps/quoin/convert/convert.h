@@ -39,6 +39,8 @@ struct ConvertOptions {
   std::optional<RawVolume> raw;  ///< the input is a file of values alone
   std::optional<double> scale;
   std::string up;          ///< "y", "z"; empty: z for .ply, else y
+  bool compress = false;   ///< of glTF, as MeshFileOptions has it
+  bool quantize = false;   ///< of glTF, as MeshFileOptions has it
   bool mesh_only = false;  ///< any option that only meshes heed was given
 };
 

@@ -29,6 +29,8 @@ struct MeshFileOptions {
   OcclusionIn occlusion_in = OcclusionIn::Colour;
   double scale = 1.0;     ///< units of the file a world unit; positive
   UpAxis up = UpAxis::Y;  ///< Z: what is at (x, y, z) is written at (x, -z, y)
+  bool quantize = false;  ///< of glTF: vertices as integers, which only newer clients read
+  bool compress = false;  ///< of glTF: arrays as meshoptimizer packs them; clients need its decoder
 };
 
 /// Writes meshes as a file; returns the size of all that was written.
@@ -54,6 +56,14 @@ struct MeshFileOptions {
 ///            and one rough, opaque material.
 ///            OcclusionIn::Attribute: a scalar _AO (blocks have 1 - occlusion / 4: 1, 0.75, 0.5 or 0.25) of every
 ///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
+///            `quantize` needs clients that know KHR_mesh_quantization. Blocks lose nothing by it: positions are
+///            whole voxels in 8 or 16 bits (floats where a shear or more than 65,535 voxels do not allow that), and a
+///            node stands up to a voxel from its part's pivot where that lies between voxels, or near the middle of a
+///            mesh that is far from its pivot. Positions of smooth meshes are off by at most a 65,534th of what the
+///            mesh spans from its pivot (where that lies outside: from its middle) and have their step in the node's
+///            scale; normals have 16 bits.
+///            `compress` needs clients that know EXT_meshopt_compression, and loses nothing but the order of vertices
+///            and which corner of a triangle is its first.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
 ///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Transparent
@@ -65,8 +75,10 @@ struct MeshFileOptions {
 /// Left out:  parts without a triangle (their placements are glTF nodes without a mesh) or a placement.
 /// Order:     the same bytes on every run.
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
-///            copy of surfaces whose emission takes several materials.
-/// Errors:    Unsupported for a format that is none of meshes, and for OcclusionIn::Attribute in OBJ; CannotWrite;
+///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
+///            the largest array as it is stored.
+/// Errors:    Unsupported for a format that is none of meshes, for OcclusionIn::Attribute in OBJ, for `quantize` and
+///            `compress` in others than glTF, and for `compress` where the build has no meshoptimizer; CannotWrite;
 ///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
 ///            when a transform is not finite, not affine or singular, the scale is not positive, a vertex comes to lie
 ///            beyond the range of floats, or when a mesh contradicts itself (arrays of different lengths, indices of no
@@ -74,7 +86,7 @@ struct MeshFileOptions {
 ///            all; of several,
 ///            those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
-///            _volume and _ior; Alias/Wavefront's OBJ and MTL.
+///            _volume and _ior; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 

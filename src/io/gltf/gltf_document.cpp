@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -11,16 +12,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // glTF 2.0's numbers for what it borrows from OpenGL.
-constexpr int kUnsignedByte = 5121;
-constexpr int kUnsignedShort = 5123;
-constexpr int kUnsignedInt = 5125;
-constexpr int kFloat = 5126;
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 constexpr int kNearest = 9728;
 constexpr int kClampToEdge = 33071;
 
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+constexpr const char* kCompression = "EXT_meshopt_compression";
+constexpr const char* kQuantization = "KHR_mesh_quantization";
 constexpr const char* kIor = "KHR_materials_ior";
 constexpr const char* kTransmission = "KHR_materials_transmission";
 constexpr const char* kVolume = "KHR_materials_volume";
@@ -37,53 +36,88 @@ Json json_from(const DQuat& q) {
   return {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0};
 }
 
+const char* type_name(int components) {
+  constexpr std::array<const char*, 4> names = {"SCALAR", "VEC2", "VEC3", "VEC4"};
+  return names[static_cast<std::size_t>(components - 1)];
+}
+
+std::uint32_t tight_stride(const GltfArray& array) {
+  const bool is_byte = array.component == GltfComponent::Byte || array.component == GltfComponent::UnsignedByte;
+  const bool is_short = array.component == GltfComponent::Short || array.component == GltfComponent::UnsignedShort;
+  return static_cast<std::uint32_t>(array.components) * (is_byte ? 1 : is_short ? 2 : 4);
+}
+
 /// Collects buffer views and accessors, which refer to each other by number.
 struct Arrays {
   Json views = Json::array();
   Json accessors = Json::array();
+  bool is_compressed = false;
 
-  /// `target` 0: none. Returns the view's number.
-  std::size_t add_view(const GltfView& view, int target) {
-    Json entry = {{"buffer", 0}, {"byteOffset", view.offset}, {"byteLength", view.bytes}};
-    if (target != 0) entry["target"] = target;
-    views.push_back(std::move(entry));
+  std::size_t add_view(const GltfView& view) {
+    views.push_back({{"buffer", 0}, {"byteOffset", view.offset}, {"byteLength", view.bytes}});
     return views.size() - 1;
   }
 
   /// A view and the accessor of all of it; returns the accessor's number.
-  std::size_t add(const GltfView& view, int target, int component, const char* type, std::uint64_t count) {
-    accessors.push_back(
-        {{"bufferView", add_view(view, target)}, {"componentType", component}, {"count", count}, {"type", type}});
+  std::size_t add(const GltfArray& array) {
+    const bool is_index = array.kind == GltfArrayKind::Index;
+    add_view(array.view);
+    Json& view = views.back();
+    if (!is_index && array.stride != tight_stride(array)) view["byteStride"] = array.stride;
+    view["target"] = is_index ? kElementArrayBuffer : kArrayBuffer;
+    if (is_compressed) {
+      view["buffer"] = 1;
+      view["extensions"][kCompression] = {{"buffer", 0},
+                                          {"byteOffset", array.packed_view.offset},
+                                          {"byteLength", array.packed_view.bytes},
+                                          {"byteStride", array.stride},
+                                          {"count", array.count()},
+                                          {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
+    }
+    accessors.push_back({{"bufferView", views.size() - 1},
+                         {"componentType", static_cast<int>(array.component)},
+                         {"count", array.count()},
+                         {"type", type_name(array.components)}});
     return accessors.size() - 1;
   }
 };
 
-Json attributes_json(const GltfPrimitive& primitive, Arrays& arrays) {
-  const std::uint64_t vertices = primitive.view.positions.size();
-  Json attributes;
-  attributes["POSITION"] = arrays.add(primitive.positions, kArrayBuffer, kFloat, "VEC3", vertices);
-  arrays.accessors.back()["min"] = json_from(primitive.min);
-  arrays.accessors.back()["max"] = json_from(primitive.max);
-  attributes["NORMAL"] = arrays.add(primitive.normals, kArrayBuffer, kFloat, "VEC3", vertices);
-  if (primitive.texture_coordinates.bytes > 0) {
-    attributes["TEXCOORD_0"] = arrays.add(primitive.texture_coordinates, kArrayBuffer, kFloat, "VEC2", vertices);
+/// Empty of indices.
+const char* attribute_name(GltfArrayKind kind) {
+  switch (kind) {
+    case GltfArrayKind::Position:
+      return "POSITION";
+    case GltfArrayKind::Normal:
+      return "NORMAL";
+    case GltfArrayKind::TextureCoordinate:
+      return "TEXCOORD_0";
+    case GltfArrayKind::Colour:
+      return "COLOR_0";
+    case GltfArrayKind::Occlusion:
+      return "_AO";
+    case GltfArrayKind::Index:
+      break;
   }
-  if (primitive.colours.bytes > 0) {
-    const int component = primitive.view.has_albedo() ? kUnsignedShort : kUnsignedByte;
-    attributes["COLOR_0"] = arrays.add(primitive.colours, kArrayBuffer, component, "VEC4", vertices);
-    arrays.accessors.back()["normalized"] = true;
-  }
-  if (primitive.occlusion.bytes > 0) {
-    attributes["_AO"] = arrays.add(primitive.occlusion, kArrayBuffer, kFloat, "SCALAR", vertices);
-  }
-  return attributes;
+  return "";
 }
 
 Json primitive_json(const GltfPrimitive& primitive, Arrays& arrays) {
-  Json attributes = attributes_json(primitive, arrays);
-  const std::size_t indices =
-      arrays.add(primitive.indices, kElementArrayBuffer, primitive.wide_indices ? kUnsignedInt : kUnsignedShort,
-                 "SCALAR", primitive.view.indices.size());
+  Json attributes;
+  std::size_t indices = 0;
+  for (const GltfArray& array : primitive.arrays) {
+    const std::size_t number = arrays.add(array);
+    Json& accessor = arrays.accessors.back();
+    if (array.normalized) accessor["normalized"] = true;
+    if (array.kind == GltfArrayKind::Index) {
+      indices = number;
+      continue;
+    }
+    if (array.kind == GltfArrayKind::Position) {
+      accessor["min"] = json_from(primitive.min);
+      accessor["max"] = json_from(primitive.max);
+    }
+    attributes[attribute_name(array.kind)] = number;
+  }
   return {{"attributes", std::move(attributes)}, {"indices", indices}, {"material", primitive.material}};
 }
 
@@ -150,7 +184,7 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
   Json textures = Json::array();
   for (const GltfImage& image : layout.images) {
     textures.push_back({{"sampler", 0}, {"source", images.size()}});
-    images.push_back({{"name", image.name}, {"mimeType", "image/png"}, {"bufferView", arrays.add_view(image.view, 0)}});
+    images.push_back({{"name", image.name}, {"mimeType", "image/png"}, {"bufferView", arrays.add_view(image.view)}});
   }
   document["textures"] = std::move(textures);
   document["images"] = std::move(images);
@@ -186,6 +220,7 @@ void add_nodes(const GltfLayout& layout, Json& document) {
 
 void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& document) {
   Arrays arrays;
+  arrays.is_compressed = layout.is_compressed();
   document["meshes"] = meshes_json(layout, arrays);
   document["materials"] = materials_json(layout);
   if (!layout.images.empty()) add_textures(layout, arrays, document);
@@ -195,9 +230,13 @@ void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& doc
   if (!buffer_uri.empty()) buffer["uri"] = buffer_uri;
   buffer["byteLength"] = layout.buffer_bytes;
   document["buffers"] = Json::array({std::move(buffer)});
+  if (!layout.is_compressed()) return;
+  document["buffers"].push_back(
+      {{"byteLength", layout.decoded_bytes}, {"extensions", {{kCompression, {{"fallback", true}}}}}});
 }
 
-void add_extensions(const MaterialPalette& palette, Json& document) {
+void add_extensions(const GltfLayout& layout, Json& document) {
+  const MaterialPalette& palette = layout.palette;
   Json used = Json::array();
   if (palette.has_emission()) used.push_back(kEmissiveStrength);
   bool has_ior = false;
@@ -208,7 +247,18 @@ void add_extensions(const MaterialPalette& palette, Json& document) {
   }
   if (has_glass) used.insert(used.end(), {kTransmission, kVolume});
   if (has_ior) used.push_back(kIor);
+  Json required = Json::array();
+  const auto is_quantized = [](const GltfMesh& mesh) {
+    const auto& arrays = mesh.primitives.front().arrays;
+    return std::ranges::any_of(arrays, [](const GltfArray& array) {
+      return array.kind == GltfArrayKind::Normal && array.component != GltfComponent::Float;
+    });
+  };
+  if (std::ranges::any_of(layout.meshes, is_quantized)) required.push_back(kQuantization);
+  if (layout.is_compressed()) required.push_back(kCompression);
+  used.insert(used.end(), required.begin(), required.end());
   if (!used.empty()) document["extensionsUsed"] = std::move(used);
+  if (!required.empty()) document["extensionsRequired"] = std::move(required);
 }
 
 }  // namespace
@@ -216,7 +266,7 @@ void add_extensions(const MaterialPalette& palette, Json& document) {
 std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri) {
   Json document;
   document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
-  add_extensions(layout.palette, document);
+  add_extensions(layout, document);
   add_nodes(layout, document);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -28,6 +30,19 @@ GltfView reserve_view(std::uint64_t bytes, std::uint64_t& end) {
 bool needs_wide_indices(std::uint64_t vertices) {
   constexpr std::uint64_t kShortIndexVertices = 65'535;
   return vertices >= kShortIndexVertices;
+}
+
+std::uint32_t size_of(GltfComponent component) {
+  switch (component) {
+    case GltfComponent::Byte:
+    case GltfComponent::UnsignedByte:
+      return 1;
+    case GltfComponent::Short:
+    case GltfComponent::UnsignedShort:
+      return 2;
+    default:
+      return 4;
+  }
 }
 
 GltfTransform transform_of(const Similarity& place) {
@@ -65,43 +80,139 @@ GltfTransform transform_of(const glm::dmat4& world_from_part) {
   return node;
 }
 
-void measure(const VertexTransform& transform, GltfPrimitive& primitive) {
-  if (transform.keeps_axes()) {
+/// The bounds of the positions as they are stored.
+void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
+  const bool is_rounded = mesh.stored.component != GltfComponent::Float;
+  const auto stored = [&](const Vec3& position) {
+    const DVec3 p = mesh.transform.position(position);
+    return Vec3(is_rounded ? glm::round(p) : p);
+  };
+  if (mesh.transform.keeps_axes()) {
     const DBox box = bounds_of(primitive.view);
-    const Vec3 a(transform.position(Vec3(box.min)));
-    const Vec3 b(transform.position(Vec3(box.max)));
+    const Vec3 a = stored(Vec3(box.min));
+    const Vec3 b = stored(Vec3(box.max));
     primitive.min = glm::min(a, b);
     primitive.max = glm::max(a, b);
     return;
   }
   const auto& positions = primitive.view.positions;
-  primitive.min = primitive.max = Vec3(transform.position(positions.front()));
+  primitive.min = primitive.max = stored(positions.front());
   for (const Vec3& position : positions) {
-    const Vec3 p(transform.position(position));
+    const Vec3 p = stored(position);
     primitive.min = glm::min(primitive.min, p);
     primitive.max = glm::max(primitive.max, p);
   }
 }
 
-GltfPrimitive lay_out_primitive(const VertexTransform& transform, const MaterialSurfaces::Surface& surface,
-                                OcclusionIn occlusion, std::uint64_t& end) {
-  GltfPrimitive primitive;
-  primitive.view = surface.view;
-  primitive.material = surface.material;
-  measure(transform, primitive);
-  const MeshView& view = surface.view;
-  const std::uint64_t vertices = view.positions.size();
-  primitive.wide_indices = needs_wide_indices(vertices);
-  primitive.positions = reserve_view(vertices * 12, end);
-  primitive.normals = reserve_view(vertices * 12, end);
-  if (!view.has_albedo()) primitive.texture_coordinates = reserve_view(vertices * 8, end);
-  const bool is_apart = occlusion == OcclusionIn::Attribute;
-  const std::uint64_t greys = is_apart ? 0 : view.block_occlusion.size() * 4;
-  primitive.colours = reserve_view(view.has_albedo() ? vertices * 8 : greys, end);
-  const bool has_occlusion = !view.block_occlusion.empty() || !view.occlusion.empty();
-  if (is_apart && has_occlusion) primitive.occlusion = reserve_view(vertices * 4, end);
-  primitive.indices = reserve_view(view.indices.size() * (primitive.wide_indices ? 4 : 2), end);
-  return primitive;
+/// The arrays of a primitive, in their order, of `count` elements each; their views have sizes, but no places yet.
+class ArrayPlan {
+ public:
+  ArrayPlan(const GltfMesh& mesh, const MeshView& view, const MeshFileOptions& options)
+      : mesh_(mesh), view_(view), options_(options) {}
+
+  [[nodiscard]] std::vector<GltfArray> arrays() {
+    const bool is_smooth = view_.has_albedo();
+    const bool is_apart = options_.occlusion_in == OcclusionIn::Attribute;
+    const std::uint64_t vertices = view_.positions.size();
+    add(GltfArrayKind::Position, mesh_.stored.component, 3, vertices);
+    add(GltfArrayKind::Normal, normal_component(), 3, vertices);
+    const bool is_short = options_.quantize;
+    if (!is_smooth)
+      add(GltfArrayKind::TextureCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
+          vertices);
+    if (is_smooth || (!is_apart && !view_.block_occlusion.empty()))
+      add(GltfArrayKind::Colour, is_smooth ? GltfComponent::UnsignedShort : GltfComponent::UnsignedByte, 4, vertices);
+    const bool has_occlusion = !view_.block_occlusion.empty() || !view_.occlusion.empty();
+    if (is_apart && has_occlusion) add(GltfArrayKind::Occlusion, GltfComponent::Float, 1, vertices);
+    const bool is_wide = needs_wide_indices(vertices);
+    add(GltfArrayKind::Index, is_wide ? GltfComponent::UnsignedInt : GltfComponent::UnsignedShort, 1,
+        view_.indices.size());
+    return std::move(arrays_);
+  }
+
+ private:
+  /// Along the axes bytes are exact.
+  [[nodiscard]] GltfComponent normal_component() const {
+    if (!options_.quantize) return GltfComponent::Float;
+    return !view_.has_albedo() && mesh_.transform.keeps_axes() ? GltfComponent::Byte : GltfComponent::Short;
+  }
+
+  void add(GltfArrayKind kind, GltfComponent component, int components, std::uint64_t count) {
+    GltfArray& array = arrays_.emplace_back();
+    array.kind = kind;
+    array.component = component;
+    array.components = components;
+    const bool is_number = kind == GltfArrayKind::Position || kind == GltfArrayKind::Index;
+    array.normalized = component != GltfComponent::Float && !is_number;
+    array.stride = size_of(component) * static_cast<std::uint32_t>(components);
+    if (kind != GltfArrayKind::Index) array.stride = (array.stride + 3) / 4 * 4;
+    array.view.bytes = array.stride * count;
+  }
+
+  const GltfMesh& mesh_;
+  const MeshView& view_;
+  const MeshFileOptions& options_;
+  std::vector<GltfArray> arrays_;
+};
+
+/// The places of vertices in the order in which triangles first need them: indices, a third of a compressed file, take
+/// a third of the bytes then.
+std::vector<std::uint32_t> places_by_use(const MeshView& view) {
+  constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place_of(view.positions.size(), kNowhere);
+  std::uint32_t next = 0;
+  const auto place = [&](std::uint32_t& at) {
+    if (at == kNowhere) at = next++;
+  };
+  for (const std::uint32_t index : view.indices) place(place_of[index]);
+  for (std::uint32_t& at : place_of) place(at);
+  return place_of;
+}
+
+/// The same elements at other places, or the same indices of vertices that have other places.
+template <class Index>
+void renumber(std::vector<std::byte>& bytes, const std::vector<std::uint32_t>& place_of) {
+  for (std::size_t at = 0; at < bytes.size(); at += sizeof(Index)) {
+    Index index{};
+    std::memcpy(&index, bytes.data() + at, sizeof(Index));
+    index = static_cast<Index>(place_of[index]);
+    std::memcpy(bytes.data() + at, &index, sizeof(Index));
+  }
+}
+
+std::vector<std::byte> moved(const std::vector<std::byte>& bytes, std::size_t stride,
+                             const std::vector<std::uint32_t>& place_of) {
+  std::vector<std::byte> result(bytes.size());
+  for (std::size_t i = 0; i < place_of.size(); ++i) {
+    std::memcpy(result.data() + place_of[i] * stride, bytes.data() + i * stride, stride);
+  }
+  return result;
+}
+
+/// An array's elements, compressed, for vertices at these places.
+std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMesh& mesh,
+                                    const GltfPrimitive& primitive, const GltfArray& array,
+                                    const std::vector<std::uint32_t>& place_of) {
+  std::vector<std::byte> bytes;
+  bytes.reserve(array.view.bytes);
+  const Progress nobody;
+  BlockWriter out(
+      [&](std::span<const std::byte> block) {
+        bytes.insert(bytes.end(), block.begin(), block.end());
+        return Status();
+      },
+      nobody, 0);
+  write_gltf_array(palette, mesh, primitive, array, out);
+  [[maybe_unused]] const Status done = out.finish();
+  QUOIN_ASSERT(done.has_value() && bytes.size() == array.view.bytes, "as large as planned");
+  if (array.kind != GltfArrayKind::Index) {
+    bytes = moved(bytes, array.stride, place_of);
+  } else if (array.component == GltfComponent::UnsignedInt) {
+    renumber<std::uint32_t>(bytes, place_of);
+  } else {
+    renumber<std::uint16_t>(bytes, place_of);
+  }
+  return compress_gltf_array(array, bytes);
 }
 
 Status add_images(GltfLayout& layout) {
@@ -121,8 +232,8 @@ Status add_images(GltfLayout& layout) {
 /// Lays out the meshes that nodes ask for: a part's one after the other, those of blocks as they are before reflected.
 class MeshLayout {
  public:
-  MeshLayout(const SceneMeshes& meshes, OcclusionIn occlusion, GltfLayout& layout)
-      : meshes_(meshes), occlusion_(occlusion), layout_(layout) {}
+  MeshLayout(const SceneMeshes& meshes, const MeshFileOptions& options, GltfLayout& layout)
+      : meshes_(meshes), options_(options), layout_(layout) {}
 
   void lay_out() {
     std::vector<std::size_t> order(meshes_.placements.size());
@@ -133,8 +244,13 @@ class MeshLayout {
     });
     for (const std::size_t i : order) {
       const std::size_t part = meshes_.placements[i].part;
-      if (!layout_.surfaces[part].surfaces().empty())
-        layout_.nodes[i].mesh = mesh_of(part, layout_.nodes[i].transform.baked);
+      if (layout_.surfaces[part].surfaces().empty()) continue;
+      GltfNode& node = layout_.nodes[i];
+      node.mesh = mesh_of(part, node.transform.baked);
+      const GltfQuantization& stored = layout_.meshes[*node.mesh].stored;
+      if (stored.component == GltfComponent::Float) continue;
+      node.transform.translation += node.transform.rotation * (node.transform.scale * stored.origin);
+      node.transform.scale *= stored.step;
     }
   }
 
@@ -163,15 +279,37 @@ class MeshLayout {
     } else if (variants_ > 1) {
       name += " (" + std::to_string(variants_) + ")";
     }
-    GltfMesh mesh{std::move(name), {glm::dmat4(baked), meshes_.parts[part].pivot}, {}};
-    for (const auto& surface : layout_.surfaces[part].surfaces()) {
-      mesh.primitives.push_back(lay_out_primitive(mesh.transform, surface, occlusion_, layout_.buffer_bytes));
+    const DVec3& pivot = meshes_.parts[part].pivot;
+    const auto& surfaces = layout_.surfaces[part].surfaces();
+    GltfMesh mesh{std::move(name), {glm::dmat4(baked), pivot}};
+    if (options_.quantize) {
+      mesh.stored = quantize_positions(mesh.transform, surfaces);
+      glm::dmat4 stored_from_part(baked / mesh.stored.step);
+      stored_from_part[3] = glm::dvec4(-mesh.stored.origin / mesh.stored.step, 1.0);
+      mesh.transform = VertexTransform(stored_from_part, pivot);
     }
+    for (const auto& surface : surfaces) add_primitive(surface, mesh);
     layout_.meshes.push_back(std::move(mesh));
   }
 
+  void add_primitive(const MaterialSurfaces::Surface& surface, GltfMesh& mesh) {
+    GltfPrimitive& primitive = mesh.primitives.emplace_back();
+    primitive.view = surface.view;
+    primitive.material = surface.material;
+    measure(mesh, primitive);
+    primitive.arrays = ArrayPlan(mesh, surface.view, options_).arrays();
+    const auto place_of = options_.compress ? places_by_use(surface.view) : std::vector<std::uint32_t>();
+    for (GltfArray& array : primitive.arrays) {
+      std::uint64_t& end = options_.compress ? layout_.decoded_bytes : layout_.buffer_bytes;
+      array.view = reserve_view(array.view.bytes, end);
+      if (!options_.compress) continue;
+      array.packed = packed_array(layout_.palette, mesh, primitive, array, place_of);
+      array.packed_view = reserve_view(array.packed.size(), layout_.buffer_bytes);
+    }
+  }
+
   const SceneMeshes& meshes_;
-  OcclusionIn occlusion_;
+  const MeshFileOptions& options_;
   GltfLayout& layout_;
   std::map<Key, std::size_t> mesh_of_;  ///< by part and what is baked
   std::optional<std::size_t> part_;     ///< of the last mesh
@@ -214,7 +352,12 @@ void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) 
 
 }  // namespace
 
-Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion) {
+Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options) {
+  if (options.compress && !can_compress_gltf()) {
+    return make_error(
+        ErrorCode::Unsupported,
+        "this build cannot compress meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
+  }
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
   GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
@@ -224,7 +367,7 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion
         {name_of(meshes, placement), std::nullopt, std::visit(transform, placement.world_from_part), placement.layer});
   }
   hang_below_groups(meshes, layout.nodes);
-  MeshLayout(meshes, occlusion, layout).lay_out();
+  MeshLayout(meshes, options, layout).lay_out();
   if (!layout.palette.materials().empty() && !layout.meshes.empty()) {
     if (auto added = add_images(layout); !added) return added.error();
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_meshes.h>
 
+#include "io/block_writer.h"
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"
 
@@ -21,26 +23,55 @@ struct GltfView {
   std::uint64_t bytes = 0;
 };
 
-/// One primitive's arrays and where they lie, in the order in which they are written.
+/// What an array of a primitive holds.
+enum class GltfArrayKind : std::uint8_t { Position, Normal, TextureCoordinate, Colour, Occlusion, Index };
+
+/// glTF 2.0's numbers for the types of components, which are OpenGL's.
+enum class GltfComponent : std::uint16_t {
+  Byte = 5120,
+  UnsignedByte = 5121,
+  Short = 5122,
+  UnsignedShort = 5123,
+  UnsignedInt = 5125,
+  Float = 5126,
+};
+
+/// One array of a primitive, how its elements are stored, and where it lies.
+struct GltfArray {
+  GltfArrayKind kind{};
+  GltfComponent component = GltfComponent::Float;
+  int components = 3;
+  bool normalized = false;
+  std::uint32_t stride = 0;         ///< bytes from one element to the next, a multiple of four but for indices
+  GltfView view{};                  ///< of a compressed file: in the buffer that clients decode into
+  GltfView packed_view{};           ///< of a compressed file: in the file's buffer
+  std::vector<std::byte> packed{};  ///< what lies there, in the codec of EXT_meshopt_compression
+
+  [[nodiscard]] std::uint64_t count() const { return view.bytes / stride; }
+};
+
+/// One primitive's arrays, in the order in which they are written.
 struct GltfPrimitive {
   MeshView view;
   std::size_t material = 0;
-  bool wide_indices = false;  ///< 32 bits instead of 16
-  Vec3 min{0.0F};             ///< of the positions as written
+  Vec3 min{0.0F};  ///< of the positions as written
   Vec3 max{0.0F};
-  GltfView positions;
-  GltfView normals;
-  GltfView texture_coordinates;  ///< 0 bytes for smooth ones
-  GltfView colours;              ///< 0 bytes for blocks without occlusion, or with that of its own
-  GltfView occlusion;            ///< of its own: 0 bytes where it is in the colours, or there is none
-  GltfView indices;
+  std::vector<GltfArray> arrays{};
+};
+
+/// How positions of a mesh are stored: `(position - origin) / step`, as floats or as the integers next to that.
+struct GltfQuantization {
+  GltfComponent component = GltfComponent::Float;
+  DVec3 origin{0.0};
+  double step = 1.0;
 };
 
 /// A part's mesh as the file has it: with what nodes cannot say baked in.
 struct GltfMesh {
   std::string name;
-  VertexTransform transform;  ///< from the part, relative to its pivot
-  std::vector<GltfPrimitive> primitives;
+  VertexTransform transform;  ///< from the part to what is stored
+  GltfQuantization stored{};
+  std::vector<GltfPrimitive> primitives{};
 };
 
 /// Translation, rotation and scale of a node, after what is baked into its mesh: a reflection or a shear.
@@ -75,10 +106,30 @@ struct GltfLayout {
   std::vector<GltfImage> images;           ///< of blocks: base colour, metallic-roughness, perhaps emissive
   std::vector<MaterialSurfaces> surfaces;  ///< of every part
   std::uint64_t buffer_bytes = 0;
+  std::uint64_t decoded_bytes = 0;  ///< of a compressed file, of the buffer that its arrays are decoded into; else 0
+
+  [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
 };
 
-/// Requires: sound meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder.
-[[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, OcclusionIn occlusion = OcclusionIn::Colour);
+/// Requires: sound meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder; Unsupported for
+/// compression where the build has no meshoptimizer.
+[[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options = {});
+
+/// Writes the elements of one array as they are stored, without what fills it up to a multiple of four.
+void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, const GltfPrimitive& primitive,
+                      const GltfArray& array, BlockWriter& out);
+
+/// How the positions of surfaces, as `transform` has them, are stored as integers: those of blocks exactly, which is as
+/// floats where a lattice of whole voxels does not hold them all; others within half of a 32,767th of what the mesh
+/// spans, or a 65,534th where its pivot lies outside.
+[[nodiscard]] GltfQuantization quantize_positions(const VertexTransform& transform,
+                                                  std::span<const MaterialSurfaces::Surface> surfaces);
+
+/// Compresses an array, whose bytes are as they are stored. Requires: can_compress_gltf().
+[[nodiscard]] std::vector<std::byte> compress_gltf_array(const GltfArray& array, std::span<const std::byte> bytes);
+
+/// Whether the build has meshoptimizer.
+[[nodiscard]] bool can_compress_gltf();
 
 /// The JSON of a glTF file: compact, in a fixed order, names made valid UTF-8. `buffer_uri` names the file that holds
 /// the buffer, percent-encoded; empty for the GLB's own.

@@ -125,7 +125,8 @@ void write_content(const SceneMeshes& meshes, OcclusionIn occlusion, const std::
 }  // namespace
 
 Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path,
-                                       OcclusionIn occlusion) {
+                                       const MeshFileOptions& options) {
+  const OcclusionIn occlusion = options.occlusion_in;
   Counts counts;
   for_each_surface(meshes, [&](const MeshView& view, const VertexTransform&) {
     counts.vertices += view.positions.size();
