@@ -59,6 +59,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"render/picture_detail.h", {"render_vk"}},
     {"render/picture_request.h", {"render_vk"}},
     {"scene/frustum.h", {"render_vk"}},
+    {"scene/hierarchy.h", {"io"}},
     {"scene/instance_axes.h", {"io", "live", "render_vk"}},
     {"scene/tracer/scene_view.h", {"light", "render"}},
     {"scene/tracer/halved_grid_cache.h", {"render_vk"}},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -63,16 +64,56 @@ GroupHandle parent_of(const Scene& scene, GroupHandle group) {
   return found->parent;
 }
 
-std::vector<GroupHandle> groups_from_top(const Scene& scene) {
-  std::vector<std::pair<std::size_t, GroupHandle>> by_depth;
-  scene.groups().for_each([&](GroupHandle handle, const SceneGroup&) {
-    std::size_t depth = 0;
-    for (GroupHandle above = parent_of(scene, handle); scene.groups().find(above) != nullptr;
-         above = parent_of(scene, above)) {
-      ++depth;
+namespace {
+
+/// How many groups are above each, by slots, as parent_of has it. Each group is walked over twice at most.
+class GroupDepths {
+ public:
+  explicit GroupDepths(const Scene& scene) : scene_(scene) {
+    scene.groups().for_each([&](GroupHandle handle, const SceneGroup&) {
+      if (handle.index >= depths_.size()) depths_.resize(handle.index + std::size_t{1}, kUnknown);
+    });
+    scene.groups().for_each([&](GroupHandle handle, const SceneGroup&) { find(handle); });
+  }
+
+  [[nodiscard]] std::size_t of(GroupHandle handle) const { return depths_[handle.index]; }
+
+ private:
+  static constexpr std::size_t kUnknown = static_cast<std::size_t>(-1);
+  static constexpr std::size_t kOnTheWay = kUnknown - 1;
+
+  void find(GroupHandle handle) {
+    std::vector<std::size_t> way;
+    const SceneGroup* group = scene_.groups().find(handle);
+    while (group != nullptr && depths_[handle.index] == kUnknown) {
+      depths_[handle.index] = kOnTheWay;
+      way.push_back(handle.index);
+      handle = group->parent;
+      group = scene_.groups().find(handle);
     }
-    by_depth.emplace_back(depth, handle);
-  });
+    std::size_t depth = 0;
+    if (group != nullptr && depths_[handle.index] == kOnTheWay) {
+      // Those of a circle are all at the top.
+      for (bool is_first = false; !is_first; way.pop_back()) {
+        is_first = way.back() == handle.index;
+        depths_[way.back()] = 0;
+      }
+    }
+    if (group != nullptr) depth = depths_[handle.index] + 1;
+    for (; !way.empty(); way.pop_back()) depths_[way.back()] = depth++;
+  }
+
+  const Scene& scene_;
+  std::vector<std::size_t> depths_;
+};
+
+}  // namespace
+
+std::vector<GroupHandle> groups_from_top(const Scene& scene) {
+  const GroupDepths depths(scene);
+  std::vector<std::pair<std::size_t, GroupHandle>> by_depth;
+  scene.groups().for_each(
+      [&](GroupHandle handle, const SceneGroup&) { by_depth.emplace_back(depths.of(handle), handle); });
   std::ranges::stable_sort(by_depth, {}, [](const auto& each) { return each.first; });
   std::vector<GroupHandle> sorted;
   sorted.reserve(by_depth.size());
@@ -127,25 +168,28 @@ void add_instances_below(const Scene& scene, SceneChanges& changes) {
   });
 }
 
+void show_all(Scene& scene) {
+  for (const InstanceHandle each : scene.instances().handles()) scene.edit(each).visible = true;
+  for (const GroupHandle each : scene.groups().handles()) scene.edit(each).visible = true;
+  for (const LayerHandle each : scene.layers().handles()) scene.edit(each).visible = true;
+}
+
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation) {
   const SceneGroup before = scene.groups()[group];
   const DQuat turn = unit_rotation(rotation) * glm::conjugate(unit_rotation(before.rotation));
   const auto moved = [&](DVec3 point) { return position + turn * (point - before.position); };
-  const auto is_below = [&](GroupHandle each) {
-    for (std::size_t left = scene.groups().size(); left > 0 && scene.groups().find(each) != nullptr; --left) {
-      if (each == group) return true;
-      each = parent_of(scene, each);
-    }
-    return false;
-  };
+  std::set<GroupHandle> moving = {group};
+  for (const GroupHandle each : groups_from_top(scene)) {
+    if (moving.contains(parent_of(scene, each))) moving.insert(each);
+  }
   for (const InstanceHandle handle : scene.instances().handles()) {
-    if (!is_below(scene.instances()[handle].group)) continue;
+    if (!moving.contains(scene.instances()[handle].group)) continue;
     Instance& instance = scene.edit(handle);
     instance.position = moved(instance.position);
     instance.rotation = turn * unit_rotation(instance.rotation);
   }
-  for (const GroupHandle handle : scene.groups().handles()) {
-    if (handle == group || !is_below(handle)) continue;
+  for (const GroupHandle handle : moving) {
+    if (handle == group) continue;
     SceneGroup& below = scene.edit(handle);
     below.position = moved(below.position);
     below.rotation = turn * unit_rotation(below.rotation);

@@ -9,4 +9,7 @@ namespace quoin {
 /// Cost: nothing without such; else O(instances + groups * depth).
 void add_instances_below(const Scene& scene, SceneChanges& changes);
 
+/// Shows every instance, group and layer.
+void show_all(Scene& scene);
+
 }  // namespace quoin

@@ -76,6 +76,25 @@ TEST(Hierarchy, GroupsInACircleStandAtTheTop) {
   EXPECT_EQ(parent_of(scene, below), GroupHandle{});
 }
 
+TEST(Hierarchy, ThousandsOfGroupsInEachOtherAreSortedAtOnce) {
+  Scene scene;
+  std::vector<GroupHandle> chain;
+  for (int i = 0; i < 4'000; ++i) {
+    SceneGroup group;
+    if (!chain.empty()) group.parent = chain.back();
+    chain.push_back(scene.add_group(group));
+  }
+  const auto sorted = groups_from_top(scene);
+  EXPECT_EQ(sorted, chain);
+  // And with a circle at the top: its three are all there, and the rest hangs below the third.
+  scene.edit(chain[0]).parent = chain[2];
+  const auto around = groups_from_top(scene);
+  ASSERT_EQ(around.size(), chain.size());
+  EXPECT_EQ(parent_of(scene, chain[3]), chain[2]);
+  EXPECT_EQ(std::vector(around.begin(), around.begin() + 3), std::vector(chain.begin(), chain.begin() + 3));
+  EXPECT_EQ(std::vector(around.begin() + 3, around.end()), std::vector(chain.begin() + 3, chain.end()));
+}
+
 TEST(Hierarchy, AfterRemovalWhatWasBelowBelongsToTheParent) {
   Scene scene;
   const GridHandle grid = add_voxel(scene);

@@ -104,7 +104,8 @@ struct LoadOptions {
 /// Types:    those of the file stay where they are in its palette. New ones take entries of the same look, else some
 ///           that no voxel uses.
 /// Lost:     also, with a warning each: colours of the palette that no voxel uses, when new ones need their entries;
-///           animation, where nodes of the scene graph have several parents and one of them has to change.
+///           animation, attributes of nodes that Quoin does not know and nodes apart from the graph, where nodes of
+///           the scene graph have several parents and one of them has to change.
 [[nodiscard]] Result<std::vector<std::byte>> write_vox(const LoadedScene& loaded, std::vector<std::string>& warnings);
 [[nodiscard]] Result<std::uint64_t> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
                                               std::vector<std::string>& warnings);

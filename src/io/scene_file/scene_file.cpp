@@ -8,6 +8,7 @@
 
 #include "io/text.h"
 #include "io/whole_file.h"
+#include "scene/hierarchy.h"
 
 namespace quoin {
 
@@ -65,12 +66,14 @@ Result<Body> take_over(Scene& from, Scene& into) {
     renumber(grid, new_type_of);
     new_grid_of[handle] = into.add_grid(std::move(grid));
   }
+  // Layers that nothing is on stay behind: MagicaVoxel's files have 8 or more.
   std::map<LayerHandle, LayerHandle> new_layer_of;
-  from.layers().for_each(
-      [&](LayerHandle handle, const SceneLayer& layer) { new_layer_of[handle] = into.add_layer(layer); });
   const auto layer_of = [&](LayerHandle handle) {
-    const auto found = new_layer_of.find(handle);
-    return found == new_layer_of.end() ? LayerHandle{} : found->second;
+    const SceneLayer* layer = from.layers().find(handle);
+    if (layer == nullptr) return LayerHandle{};
+    const auto [place, is_new] = new_layer_of.try_emplace(handle);
+    if (is_new) place->second = into.add_layer(*layer);
+    return place->second;
   };
   Body body;
   for (const GroupHandle handle : groups_from_top(from)) {
@@ -83,8 +86,9 @@ Result<Body> take_over(Scene& from, Scene& into) {
   for (const InstanceHandle handle : handles) {
     Instance instance = from.instances()[handle];
     instance.grid = new_grid_of.at(instance.grid);
-    // Alone it is placed without its groups.
-    if (handles.size() == 1) instance.visible = is_shown(from, instance);
+    // Alone it is placed without its groups, but on its layer.
+    const SceneGroup* group = handles.size() == 1 ? from.groups().find(instance.group) : nullptr;
+    if (group != nullptr) instance.visible = instance.visible && is_shown(from, *group);
     instance.layer = layer_of(instance.layer);
     body.instances.push_back(std::move(instance));
   }
@@ -250,6 +254,7 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   const auto bodies = with_path(read_sources(file->sources, path.parent_path(), options, loaded, progress), path);
   if (!bodies) return bodies.error();
   Placer(*file, grids, *bodies, loaded.scene).place();
+  if (options.show_hidden) show_all(loaded.scene);
   return loaded;
 }
 

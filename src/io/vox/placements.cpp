@@ -323,6 +323,7 @@ Result<Placements> GraphWalk::run() {
   is_seen_.assign(document_.nodes.size(), false);
   if (Status status = walk(find_root()); !status) return status.error();
   const auto apart = std::ranges::count(is_seen_, false);
+  out_.nodes_apart = static_cast<std::size_t>(apart);
   if (apart > 0) out_.warnings.push_back("nodes apart from the scene graph skipped: " + std::to_string(apart));
   return std::move(out_);
 }

@@ -11,6 +11,7 @@
 #include "io/vox/read.h"
 #include "io/vox/source.h"
 #include "io/whole_file.h"
+#include "scene/hierarchy.h"
 
 namespace quoin {
 
@@ -118,12 +119,6 @@ void add_instances(const vox::Placements& placements, const std::vector<GridHand
     std::string& name = scene.edit(grids[placement.model]).name;
     if (name.empty()) name = printable(placement.name);
   }
-}
-
-void show_all(Scene& scene) {
-  for (const InstanceHandle each : scene.instances().handles()) scene.edit(each).visible = true;
-  for (const GroupHandle each : scene.groups().handles()) scene.edit(each).visible = true;
-  for (const LayerHandle each : scene.layers().handles()) scene.edit(each).visible = true;
 }
 
 void warn(const std::string& of_what, std::int64_t count, std::vector<std::string>& warnings) {

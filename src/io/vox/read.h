@@ -45,6 +45,7 @@ struct Placements {
   std::size_t top_group = kNone;    ///< the topmost group's node; kNone where it is in `groups` or is not there
   Motion top_motion;                ///< of it
   bool is_tree = true;              ///< no node has two parents
+  std::size_t nodes_apart = 0;      ///< that no way from the root leads to
   std::vector<bool> is_model_used;  ///< at any frame
   std::vector<std::string> warnings;
 };

@@ -16,6 +16,9 @@ namespace quoin::vox {
 namespace {
 
 constexpr std::int32_t kRootTransform = 0;
+// In RevisedGraph::added, of the nodes that begin_graph puts there.
+constexpr std::size_t kNewRoot = 0;
+constexpr std::size_t kNewTop = 1;
 constexpr std::int32_t kOnlyLayer = 0;
 constexpr std::int32_t kNoLayer = -1;
 
@@ -191,7 +194,12 @@ class GraphRevision {
  private:
   void number_layers();
   void find_top();
-  void begin_new_graph();
+  void begin_graph(std::vector<std::int32_t> below);
+  [[nodiscard]] std::optional<std::int32_t> root_below_no_group() const;
+  [[nodiscard]] bool would_be_the_scene(const SceneGroup& group) const;
+  [[nodiscard]] bool needs_new_top() const;
+  void settle_root();
+  void free_root_id();
   void remove_what_is_gone();
   void remove(const Hanging& hanging);
   Status revise_groups();
@@ -230,7 +238,6 @@ class GraphRevision {
   FreshIds ids_;
   RevisedGraph out_;
   Parent top_;
-  bool has_top_ = false;
   std::map<GroupHandle, Parent> groups_;  // of the scene
   std::map<Parent, ChildChanges> children_;
   std::map<std::size_t, std::size_t> inserted_;  // transforms that were put above nodes, in RevisedGraph::added
@@ -255,7 +262,7 @@ std::size_t GraphRevision::last_transform(const Hanging& hanging) const {
 }
 
 Parent GraphRevision::parent_in_source(std::size_t group) const {
-  if (group == kNone) return {source_.placements.top_group, kNone, source_.placements.top_motion};
+  if (group == kNone) return top_;
   const Hanging& hanging = source_.placements.groups[group];
   return {hanging.node, kNone, hanging.world};
 }
@@ -290,28 +297,48 @@ void GraphRevision::number_layers() {
   out_.adds_only_layer = layers.empty() && scene_.layers().empty() && !keeps_graph_;
 }
 
-void GraphRevision::begin_new_graph() {
+/// A root and a group as the scene itself, with children of the source.
+void GraphRevision::begin_graph(std::vector<std::int32_t> below) {
   NodeContent transform;
   transform.kind = NodeKind::Transform;
   transform.id = ids_.take();
   NodeContent group;
   group.kind = NodeKind::Group;
   group.id = ids_.take();
+  group.children = std::move(below);
   transform.children = {group.id};
   transform.frames.emplace_back();
   out_.added.push_back(std::move(transform));
   out_.added.push_back(std::move(group));
-  top_ = {kNone, 1, {}};
-  has_top_ = true;
+  top_ = {kNone, kNewTop, {}};
+}
+
+/// The source's root, where no group of it is the scene itself. Requires: the source has a graph.
+std::optional<std::int32_t> GraphRevision::root_below_no_group() const {
+  const Placements& placements = source_.placements;
+  const auto first_of = [&](const auto& all) -> std::optional<std::int32_t> {
+    for (const Hanging& hanging : all) {
+      if (hanging.parent != kNone) continue;
+      const std::size_t highest =
+          hanging.transform_count > 0 ? placements.chains[hanging.first_transform] : hanging.node;
+      return source_.document.nodes[highest].id;
+    }
+    return std::nullopt;
+  };
+  const auto group = first_of(placements.groups);
+  return group ? group : first_of(placements.all);
 }
 
 void GraphRevision::find_top() {
   if (!keeps_graph_) {
-    begin_new_graph();
-    return;
+    begin_graph({});
+  } else if (source_.placements.top_group == kNone) {
+    const auto root = root_below_no_group();
+    begin_graph(root ? std::vector{*root}
+                     : std::vector<std::int32_t>{});  // settle_root takes it away if nobody needs it
+  } else {
+    top_ = {source_.placements.top_group, kNone, source_.placements.top_motion};
   }
-  top_ = parent_in_source(kNone);
-  has_top_ = top_.source_node != kNone;
 }
 
 /// Takes it and the chain above it from the graph; what is below stays, or goes by itself.
@@ -324,12 +351,7 @@ void GraphRevision::remove(const Hanging& hanging) {
     out_.is_removed[highest] = true;
   }
   out_.is_removed[hanging.node] = true;
-  const Parent parent = parent_in_source(hanging.parent);
-  if (parent.source_node == kNone) {
-    out_.must_be_new = true;  // it is the root
-  } else {
-    children_[parent].removed.insert(document.nodes[highest].id);
-  }
+  children_[parent_in_source(hanging.parent)].removed.insert(document.nodes[highest].id);
 }
 
 void GraphRevision::remove_what_is_gone() {
@@ -386,7 +408,7 @@ NodeContent& GraphRevision::transform_of(const Known& known) {
   inserted.id = ids_.take();
   inserted.children = {source_.document.nodes[known.hanging.node].id};
   inserted.frames.emplace_back();
-  if (known.parent.source_node == kNone || !source_.placements.is_tree) out_.must_be_new = true;
+  if (!source_.placements.is_tree) out_.must_be_new = true;
   children_[known.parent].replaced.emplace(inserted.children.front(), inserted.id);
   return out_.added.emplace_back(std::move(inserted));
 }
@@ -484,7 +506,7 @@ Status GraphRevision::revise_transform(const Wanted& wanted, const Known& known)
   NodeContent* transform = is_changed ? &change(last) : nullptr;
   if (Status moved = move(wanted, known, transform, read_transform); !moved) return moved;
   if (!is_elsewhere) return {};
-  if (!source_.placements.is_tree || known.parent.source_node == kNone) out_.must_be_new = true;
+  if (!source_.placements.is_tree) out_.must_be_new = true;
   const bool has_chain = hanging.transform_count > 0;
   std::int32_t top =
       source_.document.nodes[has_chain ? source_.placements.chains[hanging.first_transform] : hanging.node].id;
@@ -511,7 +533,6 @@ Status GraphRevision::revise_group(GroupHandle handle) {
     if (!transform) return transform.error();
     transform->id = id;
     children_[wanted.parent].added.push_back(id);
-    if (wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
     out_.added.push_back(std::move(*transform));
     groups_[handle] = {kNone, out_.added.size(), wanted.world};
     out_.added.push_back(std::move(content));
@@ -521,7 +542,6 @@ Status GraphRevision::revise_group(GroupHandle handle) {
   const Known known{hanging, before->name, before->visible, before->layer, parent_in_source(hanging.parent)};
   wanted.world = has_same_place(group, *before) ? hanging.world : place(group, wanted.parent.world);
   groups_[handle] = {hanging.node, kNone, wanted.world};
-  if (!wanted.parent.is_same(known.parent) && wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
   return revise_transform(wanted, known);
 }
 
@@ -590,7 +610,6 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
                          plan.source_model == static_cast<std::size_t>(source_.frame);
   if (was_frame) add_models(*transform, shape, inverse(wanted.parent.world) * *world);
   children_[wanted.parent].added.push_back(id);
-  if (wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
   out_.added.push_back(std::move(*transform));
   const std::size_t at = out_.added.size();
   out_.added.push_back(std::move(shape));
@@ -686,7 +705,6 @@ Status GraphRevision::revise_instance(const Instance& instance, const Placement&
     if (!world) return world.error();
     wanted.world = *world;
   }
-  if (!wanted.parent.is_same(known.parent) && wanted.parent.is_same(top_) && !has_top_) out_.must_be_new = true;
   show_model(placement, plan);
   return revise_transform(wanted, known);
 }
@@ -741,6 +759,50 @@ void GraphRevision::apply_child_changes() {
   }
 }
 
+/// Whether its reader would take the group, if it were the topmost one, for the scene itself.
+bool GraphRevision::would_be_the_scene(const SceneGroup& group) const {
+  return group.visible && printable(group.name).empty() && scene_.layers().find(group.layer) == nullptr;
+}
+
+bool GraphRevision::needs_new_top() const {
+  const auto changes = children_.find(top_);
+  if (changes != children_.end()) return true;
+  const std::vector<Hanging>& groups = source_.placements.groups;
+  const auto root = std::ranges::find(groups, kNone, &Hanging::parent);
+  if (root == groups.end()) return false;
+  const auto slot = static_cast<std::uint32_t>(root - groups.begin());
+  const SceneGroup* group = scene_.groups().find({slot, 0});
+  return group != nullptr && would_be_the_scene(*group);
+}
+
+/// Gives the node that has the root's id another one.
+void GraphRevision::free_root_id() {
+  const std::vector<Node>& nodes = source_.document.nodes;
+  const auto taken = std::ranges::find(nodes, kRootTransform, &Node::id);
+  if (taken == nodes.end()) return;
+  const std::int32_t id = ids_.take();
+  const auto refers = [](const auto& children) { return std::ranges::count(children, kRootTransform) > 0; };
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const auto children = std::span(source_.document.children).subspan(nodes[i].first_child, nodes[i].child_count);
+    if (!out_.is_removed[i] && nodes[i].kind != NodeKind::Shape && refers(children)) change(i);
+  }
+  for (auto& [place, node] : out_.changed) std::ranges::replace(node.children, kRootTransform, id);
+  for (NodeContent& node : out_.added) std::ranges::replace(node.children, kRootTransform, id);
+  change(static_cast<std::size_t>(taken - nodes.begin())).id = id;
+}
+
+/// Where the source had no group as the scene itself, the new root stays only if something hangs there that did not.
+void GraphRevision::settle_root() {
+  if (!keeps_graph_ || source_.placements.top_group != kNone) return;
+  if (!needs_new_top()) {
+    out_.added.erase(out_.added.begin(), out_.added.begin() + kNewTop + 1);
+    return;
+  }
+  if (!source_.placements.is_tree) out_.must_be_new = true;
+  free_root_id();
+  out_.added[kNewRoot].id = kRootTransform;
+}
+
 Result<RevisedGraph> GraphRevision::run() {
   number_layers();
   find_top();
@@ -749,6 +811,7 @@ Result<RevisedGraph> GraphRevision::run() {
   if (Status done = revise_instances(); !done) return done.error();
   name_shapes();
   apply_child_changes();
+  settle_root();
   return std::move(out_);
 }
 

@@ -1,6 +1,7 @@
 #include "io/vox/write/node_content.h"
 
 #include <algorithm>
+#include <initializer_list>
 
 #include "io/vox/chunk_reader.h"
 
@@ -30,6 +31,19 @@ void Entries::set_or_erase(std::string_view key, const std::string& value) {
   } else {
     set(key, value);
   }
+}
+
+bool says_more(const NodeContent& node) {
+  const auto has_others = [](const Entries& entries, std::initializer_list<std::string_view> known) {
+    return std::ranges::any_of(entries.all(),
+                               [&](const auto& entry) { return std::ranges::find(known, entry.first) == known.end(); });
+  };
+  return !node.tail.empty() || has_others(node.attributes, {"_name", "_hidden", "_loop"}) ||
+         std::ranges::any_of(node.frames,
+                             [&](const Entries& key) {
+                               return has_others(key, {"_r", "_t", "_f"});
+                             }) ||
+         std::ranges::any_of(node.models, [&](const auto& key) { return has_others(key.second, {"_f"}); });
 }
 
 NodeContent read_node(NodeKind kind, std::span<const std::byte> content) {

@@ -56,6 +56,9 @@ struct NodeContent {
 void write_node(const NodeContent& node, ChunkWriter& out);
 [[nodiscard]] std::string_view chunk_id(NodeKind kind);
 
+/// Whether it says what no scene holds, animation aside: attributes that are not Quoin's, and what follows them.
+[[nodiscard]] bool says_more(const NodeContent& node);
+
 /// What a key of a transform says of its place: `_r` and `_t`, each left out where it says nothing and was not there.
 /// Requires of a motion: 32 bits.
 void set_motion(Entries& key, const Motion& motion);

@@ -384,6 +384,91 @@ TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
   EXPECT_EQ(losses_of_vox(loaded).value(), warnings) << "said before it is written";
 }
 
+/// A walk of three frames, whose topmost node is what the arguments say, with what nobody knows on every node.
+std::vector<std::byte> lone_walk(bool has_hidden_group) {
+  FileBuilder file;
+  file.model(2, 2, 2, {{0, 0, 0, 5}});
+  file.model(1, 1, 1, {{0, 0, 0, 6}});
+  if (has_hidden_group) {
+    file.with("nGRP", [](auto& out) {
+      out.i32(0);
+      out.dict({{"_hidden", "1"}, {"_odd", "group"}});
+      out.u32(1);
+      out.i32(4);
+    });
+  }
+  const std::int32_t walk = has_hidden_group ? 4 : 0;
+  file.transform(walk, 7, {{{"_t", "0 0 1"}}, {{"_t", "5 0 1"}, {"_f", "2"}}}, {{"_odd", "walk"}}, -1);
+  file.shape(7, {{0, {}}, {1, {{"_f", "1"}}}}, {{"_odd", "shape"}});
+  file.transform(30, 31, {{}}, {{"_name", "apart"}}, -1).shape(31, 1);
+  return file.file();
+}
+
+std::string text_in(const std::vector<std::byte>& file) {
+  return {reinterpret_cast<const char*>(file.data()), file.size()};
+}
+
+TEST(VoxRevision, AboveALoneRootThereIsRoomForMore) {
+  for (const bool has_hidden_group : {false, true}) {
+    const auto file = lone_walk(has_hidden_group);
+    for (const char* edit : {"add", "name", "show", "leave the group", "remove"}) {
+      LoadedScene loaded = load(file, 2);
+      Scene& scene = loaded.scene;
+      const InstanceHandle walk = scene.instances().handles().front();
+      const GroupHandle group = scene.groups().empty() ? GroupHandle{} : scene.groups().handles().front();
+      const bool is_of_group = std::string_view(edit) == "show" || std::string_view(edit) == "leave the group";
+      if (is_of_group && !has_hidden_group) continue;
+      if (std::string_view(edit) == "add") {
+        Instance second = scene.instances()[walk];
+        second.group = {};
+        second.position += DVec3(20, 0, 0);
+        scene.add_instance(second);
+      } else if (std::string_view(edit) == "name") {
+        scene.edit(walk).name = "walker";
+      } else if (std::string_view(edit) == "show") {
+        scene.edit(group).visible = true;
+      } else if (std::string_view(edit) == "leave the group") {
+        scene.edit(walk).group = {};
+      } else {
+        scene.remove_instance(walk);
+        scene.add_group({.name = "new"});
+      }
+      std::vector<std::string> warnings;
+      const auto written = save(loaded, &warnings);
+      EXPECT_TRUE(warnings.empty()) << edit << ": " << warnings.front();
+      LoadedScene again = load(written, std::string_view(edit) == "remove" ? 0 : 2);
+      drop_grid_names(again.scene);
+      drop_grid_names(scene);
+      EXPECT_EQ(text_of(said_by(again.scene)), text_of(said_by(scene))) << edit;
+      const std::string text = text_in(written);
+      EXPECT_EQ(text.find("walk") != std::string::npos, std::string_view(edit) != "remove") << edit;
+      EXPECT_EQ(text.find("shape") != std::string::npos, std::string_view(edit) != "remove") << edit;
+      EXPECT_NE(text.find("apart"), std::string::npos) << edit;
+      EXPECT_EQ(text.find("group") != std::string::npos, has_hidden_group) << edit;
+      if (std::string_view(edit) == "remove") continue;
+      // The other frames too are what they were.
+      const Scene first = load(file, 0).scene;
+      const Scene first_again = load(written, 0).scene;
+      const auto place_of = [](const Scene& at) { return at.instances()[at.instances().handles().front()].position; };
+      EXPECT_EQ(place_of(first_again), place_of(first)) << edit;
+      EXPECT_EQ(first_again.voxel_count(), first.voxel_count()) << edit;
+    }
+  }
+}
+
+TEST(VoxRevision, BytesAfterTheVoxelsStay) {
+  FileBuilder file;
+  file.size(2, 2, 2).with("XYZI", [](auto& out) {
+    out.u32(1);
+    out.raw(std::array{std::byte{1}, std::byte{1}, std::byte{1}, std::byte{9}});
+    out.raw(kSecret);
+  });
+  LoadedScene loaded = load(file.file());
+  loaded.scene.edit(loaded.scene.grids().handles().front()).grid.set({0, 0, 0}, VoxelType{3});
+  const auto written = save(loaded);
+  EXPECT_NE(std::ranges::search(written, kSecret).begin(), written.end());
+}
+
 TEST(VoxRevision, WhatIsHiddenAndWasShownIsSavedAsShown) {
   const auto bytes = house();
   const auto shown = read_vox(bytes, {.show_hidden = true});

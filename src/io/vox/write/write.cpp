@@ -106,6 +106,7 @@ class Writer {
   void renumber_shapes();
   [[nodiscard]] std::vector<bool> shown_models() const;
   void warn(std::vector<std::string>& warnings) const;
+  [[nodiscard]] std::vector<std::string> lost_with_graph() const;
 
   [[nodiscard]] std::size_t bytes_of_new_models() const;
   void write_chunks();
@@ -137,7 +138,7 @@ class Writer {
   vox::RevisedTypes types_;
   vox::ModelPlan models_;
   vox::RevisedGraph graph_;
-  bool loses_animation_ = false;
+  std::vector<std::string> lost_;              ///< with the file's scene graph, where it is written anew
   std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null where the model is no grid any more
   std::vector<std::uint32_t> number_of_;  // of models, by their numbers in the plan; kGone for those that are left out
   std::uint32_t model_count_ = 0;
@@ -171,7 +172,7 @@ Status Writer::plan_graph() {
   Result<vox::RevisedGraph> graph = vox::revise_graph(scene_, source_, models_, has_nodes);
   if (!graph) return graph.error();
   if (graph->must_be_new) {
-    loses_animation_ = vox::is_animated(source_.document);
+    lost_ = lost_with_graph();
     models_ = vox::plan_models(scene_, source_, false);
     graph = vox::revise_graph(scene_, source_, models_, false);
     if (!graph) return graph.error();
@@ -261,10 +262,24 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   count("colours of the palette that no voxel has gave way to new ones", types_.replaced);
   count("lamps left out, which .vox does not hold (a .json keeps them)",
         static_cast<std::int64_t>(scene_.lamps.size()));
-  if (loses_animation_) {
-    warnings.emplace_back(
-        "animation is left out: nodes of the file's scene graph have several parents, and one changed");
+  warnings.insert(warnings.end(), lost_.begin(), lost_.end());
+}
+
+/// What only nodes of the file say, and no scene.
+std::vector<std::string> Writer::lost_with_graph() const {
+  constexpr const char* kWhy = " left out: nodes of the file's scene graph have several parents, and one changed";
+  std::vector<std::string> lost;
+  if (vox::is_animated(source_.document)) lost.push_back(std::string("animation is") + kWhy);
+  std::int64_t nodes = 0;
+  for (std::size_t i = 0; i < source_.document.nodes.size(); ++i) {
+    nodes += vox::says_more(vox::node_of(source_, i)) ? 1 : 0;
   }
+  if (nodes > 0)
+    lost.push_back("attributes of " + std::to_string(nodes) + " nodes that Quoin does not know are" + kWhy);
+  if (source_.placements.nodes_apart > 0) {
+    lost.push_back(std::to_string(source_.placements.nodes_apart) + " nodes apart from the scene graph are" + kWhy);
+  }
+  return lost;
 }
 
 std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) const {
@@ -317,6 +332,12 @@ std::optional<Chunk> Writer::revised_model(const vox::ChunkPlace& place) {
   if (!content) {
     failure_ = content.error();
     return std::nullopt;
+  }
+  if (place.kind == vox::ChunkKind::Voxels) {
+    // What follows the voxels in their chunk stays.
+    const std::size_t voxel_bytes = source_.document.models[place.number].voxels.size();
+    const std::span<const std::byte> tail = content_of(place).subspan(4 + voxel_bytes);
+    content->insert(content->end(), tail.begin(), tail.end());
   }
   return Chunk{place.kind == vox::ChunkKind::Voxels ? "XYZI" : "TDCZ", std::move(*content)};
 }
