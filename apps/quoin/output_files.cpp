@@ -10,7 +10,7 @@
 
 namespace quoin::tool {
 
-Status check_outputs(std::initializer_list<std::filesystem::path> files) {
+Status check_outputs(const std::vector<std::filesystem::path>& files) {
   for (const auto& path : files) {
     if (path.empty()) continue;
     if (auto file = AtomicFile::create(path); !file) return file.error();

@@ -2,17 +2,17 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <initializer_list>
 #include <set>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include <quoin/core/result.h>
 
 namespace quoin::tool {
 
 /// Fails now rather than after all the work where one of the files cannot be written. Empty names are left out.
-[[nodiscard]] Status check_outputs(std::initializer_list<std::filesystem::path> files);
+[[nodiscard]] Status check_outputs(const std::vector<std::filesystem::path>& files);
 
 /// Files, by what they are rather than by their names.
 class FileSet {

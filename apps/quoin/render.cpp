@@ -51,6 +51,22 @@ std::filesystem::path numbered(const std::filesystem::path& output, int number, 
   return output.parent_path() / (output.stem().string() + "-" + digits + output.extension().string());
 }
 
+/// The pictures that will be written.
+std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments) {
+  std::vector<std::filesystem::path> pictures;
+  if (arguments.frames) {
+    const FrameRange& frames = *arguments.frames;
+    for (int frame = frames.first; frame <= frames.last; ++frame)
+      pictures.push_back(numbered(arguments.output, frame, frames.last));
+  } else if (arguments.turns > 1) {
+    for (int turn = 0; turn < arguments.turns; ++turn)
+      pictures.push_back(numbered(arguments.output, turn, arguments.turns - 1));
+  } else {
+    pictures.push_back(arguments.output);
+  }
+  return pictures;
+}
+
 double aspect_of(const RenderArguments& arguments) {
   return static_cast<double>(arguments.render.width) / arguments.render.height;
 }
@@ -163,8 +179,9 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
   if (arguments.turns > 1) {
     SceneFraming framing(arguments.forward(), aspect_of(arguments), arguments.turns);
     framing.add(loaded.scene, arguments.common.instances());
+    const std::vector<std::filesystem::path> pictures = pictures_of(arguments);
     for (int turn = 0; turn < arguments.turns; ++turn) {
-      shots.push_back({framing.camera(turn), numbered(arguments.output, turn, arguments.turns - 1)});
+      shots.push_back({framing.camera(turn), pictures[static_cast<std::size_t>(turn)]});
     }
   } else {
     const auto camera = camera_for(loaded, arguments);
@@ -181,19 +198,22 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
   const bool has_camera = arguments.position || (first.camera && !arguments.has_view);
   SceneFraming framing(arguments.forward(), aspect_of(arguments));
   framing.add(first.scene, filter);
-  for (int frame = frames.first + 1; frame <= frames.last && !has_camera; ++frame) {
+  // The last one first: it says whether all are there.
+  for (int frame = frames.last; frame > frames.first && (!has_camera || frame == frames.last); --frame) {
     const auto loaded = load(arguments, false, frame);
     if (!loaded) return loaded.error();
     framing.add(loaded->scene, filter);
   }
   Result<Camera> camera = has_camera ? camera_for(first, arguments) : framing.camera();
   if (!camera) return camera.error();
+  const std::vector<std::filesystem::path> pictures = pictures_of(arguments);
   for (int frame = frames.first; frame <= frames.last; ++frame) {
-    const auto loaded = load(arguments, false, frame);
-    if (!loaded) return loaded.error();
+    const bool is_first = frame == frames.first;
+    const auto later = is_first ? Result<LoadedScene>(LoadedScene{}) : load(arguments, false, frame);
+    if (!later) return later.error();
     outcome.read += watch.lap();
-    const std::vector<Shot> shots = {{*camera, numbered(arguments.output, frame, frames.last)}};
-    if (auto drawn = draw_shots(*loaded, arguments, shots, watch, outcome); !drawn) return drawn;
+    const std::vector<Shot> shots = {{*camera, pictures[static_cast<std::size_t>(frame - frames.first)]}};
+    if (auto drawn = draw_shots(is_first ? first : *later, arguments, shots, watch, outcome); !drawn) return drawn;
   }
   return {};
 }
@@ -213,7 +233,9 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
 Result<Outcome> render(const RenderArguments& arguments) {
   const InstanceFilter filter = arguments.common.instances();
   Stopwatch watch;
-  if (auto writable = check_outputs({arguments.output, arguments.depth}); !writable) return writable.error();
+  std::vector<std::filesystem::path> outputs = pictures_of(arguments);
+  outputs.push_back(arguments.depth);
+  if (auto writable = check_outputs(outputs); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common.input);
   if (is_volume && arguments.frames) {
     return make_error(ErrorCode::InvalidArgument, "--frames is for voxels, and the input is a volume");

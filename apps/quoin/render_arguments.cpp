@@ -70,7 +70,7 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--elevation", "DEGREES", "From so far above the horizon (default 35.26)");
   command
       .add_option("--turntable", arguments.turns,
-                  "That many pictures once round the scene, framed alike: OUT-01.png, ...")
+                  "That many pictures once round the scene, framed alike: OUT-00.png, ...")
       ->check(CLI::Range(2, 100'000));
   add_text_option(command, "--frames", "A:B", "A picture of each of these frames of an animation, framed alike");
   add_text_option(command, "--camera", "X,Y,Z", "Where the camera stands; with --look-at, instead of --view");

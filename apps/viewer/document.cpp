@@ -221,8 +221,8 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   std::error_code ignored;
   const bool is_own = path == path_ || std::filesystem::equivalent(path, path_, ignored);
   if (is_own && FileStamp::of(path) != stamp_ && std::filesystem::exists(path, ignored)) {
-    all.emplace_back("what another program put into the file since it was opened (kept as " + path.filename().string() +
-                     "~)");
+    all.emplace_back("what another program put into the file since it was opened (kept as " +
+                     kept_as(path).filename().string() + ")");
   }
   std::erase_if(all, [&](const std::string& line) { return accepted_losses_.contains(line); });
   return all;
@@ -233,11 +233,22 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
   const auto format = format_to_write(path);
   if (!format) return format.error();
   if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
-  auto before = FileBackup::of(path);
-  if (!before) return before.error();
+  const bool has_original = originals_.contains(path);
+  std::optional<FileBackup> backup;
+  if (!has_original || has_newly_accepted_) {
+    auto before = FileBackup::of(path, has_original ? FileBackup::Older::Kept : FileBackup::Older::Replaced);
+    if (!before) return before.error();
+    backup = std::move(*before);
+  }
   const auto written = save_scene(loaded_, path, warnings, {}, progress);
   if (!written) return written.error();
-  return before->keep();
+  // The file is what it should be; that the one before has another name than it should is not a failure.
+  if (Status kept = backup ? backup->keep() : Status(); !kept) warnings.push_back(to_string(kept.error()));
+  return {};
+}
+
+std::filesystem::path Document::kept_as(const std::filesystem::path& path) const {
+  return FileBackup::name_for(path, originals_.contains(path) ? FileBackup::Older::Kept : FileBackup::Older::Replaced);
 }
 
 void Document::note_written(const std::filesystem::path& path, std::uint64_t state) {
@@ -245,6 +256,7 @@ void Document::note_written(const std::filesystem::path& path, std::uint64_t sta
   if (!format || *format == FileFormat::Glb) return;
   path_ = path;
   stamp_ = FileStamp::of(path);
+  if (std::exchange(has_newly_accepted_, false)) originals_.insert(path);
   loaded_.names_files = false;
   saved_state_ = state;
 }

@@ -87,10 +87,16 @@ class Document {
   /// losses_of_saving.
   [[nodiscard]] Result<std::vector<std::string>> losses(const std::filesystem::path& path) const;
   /// The user knows what is lost, and does not want to be asked again.
-  void accept_losses(const std::vector<std::string>& losses) { accepted_losses_.insert(losses.begin(), losses.end()); }
+  void accept_losses(const std::vector<std::string>& losses) {
+    accepted_losses_.insert(losses.begin(), losses.end());
+    has_newly_accepted_ = true;
+  }
+  /// What `write` keeps the file as that is there now; empty where it keeps none.
+  [[nodiscard]] std::filesystem::path kept_as(const std::filesystem::path& path) const;
 
   /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. A file that is there already is kept
-  /// as NAME~, unless it is a mesh.
+  /// as NAME~ (see FileBackup), unless it is a mesh. What was kept because saving lost something stays: later saves of
+  /// the document under that name neither replace it nor keep more, until something else is lost.
   /// Errors: Unsupported for other endings; those of save_scene, FileBackup, mesh_scene and write_mesh; Cancelled.
   [[nodiscard]] Status write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                              const Progress& progress = {}) const;
@@ -121,6 +127,8 @@ class Document {
   std::uint64_t saved_state_ = 0;
   std::optional<FileStamp> stamp_;  ///< of `path_`, as it was read or written
   std::set<std::string> accepted_losses_;
+  bool has_newly_accepted_ = false;            ///< since it was written
+  std::set<std::filesystem::path> originals_;  ///< files of which a backup holds what was lost
   std::optional<Stroke> stroke_;
 };
 

@@ -416,6 +416,39 @@ TEST(Document, WhatSavingWouldLoseIsToldOnce) {
   EXPECT_NE(of_others->front().find("another program"), std::string::npos);
 }
 
+TEST(Document, WhatWasLostOnceIsKeptWhateverIsSavedLater) {
+  const ScratchFolder folder("lost_once");
+  const auto path = folder.file("scene.json");
+  const auto document = Document::open(write_layered(folder));
+  ASSERT_TRUE(document);
+  const auto save = [&] {
+    std::vector<std::string> warnings;
+    EXPECT_TRUE((*document)->write(path, warnings));
+    (*document)->note_written(path, (*document)->history().state());
+  };
+  const auto accept = [&](const char* loss) { (*document)->accept_losses({loss}); };
+  const auto content = [&](const char* name) {
+    return read_file(folder.file(name)).value_or(std::vector<std::byte>{});
+  };
+  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("the original")))));
+  const auto original = content("scene.json");
+  accept("animation");
+  EXPECT_EQ((*document)->kept_as(path).filename(), "scene.json~");
+  save();
+  save();
+  save();
+  EXPECT_EQ(content("scene.json~"), original);
+  EXPECT_FALSE(std::filesystem::exists(folder.file("scene.json.~1~"))) << "nothing more was lost";
+  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("another's work")))));
+  const auto of_another = content("scene.json");
+  accept("another's");
+  EXPECT_EQ((*document)->kept_as(path).filename(), "scene.json.~1~");
+  save();
+  save();
+  EXPECT_EQ(content("scene.json~"), original);
+  EXPECT_EQ(content("scene.json.~1~"), of_another);
+}
+
 TEST(Document, WhatIsShownAndHiddenCanBeUndoneAndSaved) {
   const ScratchFolder folder("switches");
   const auto path = write_layered(folder);

@@ -53,6 +53,7 @@ void EditHistory::show(Scene& scene, const SceneNode& node, bool is_visible) {
   step.name = is_visible ? "show" : "hide";
   step.switched = node;
   step.is_visible_after = is_visible;
+  step.bytes = sizeof(Step);
   set_visibility(scene, node, is_visible);
   keep(std::move(step));
 }

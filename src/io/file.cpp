@@ -220,23 +220,56 @@ Status AtomicFile::commit() {
   return {};
 }
 
-Result<FileBackup> FileBackup::of(const std::filesystem::path& path) {
-  FileBackup backup;
-  const std::filesystem::path file = behind_links(path);
+namespace {
+
+bool is_there(const std::filesystem::path& path) {
   struct stat info {};
-  if (::stat(file.c_str(), &info) != 0 && errno == ENOENT) return backup;
+  return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
+}
+
+/// A copy that lasts, with permissions.
+Status copy_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code failed;
+  std::filesystem::copy_file(from, to, failed);
+  if (failed) return cannot_write(failed.message(), to);
+  const int descriptor = ::open(to.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return {};  // readable by nobody, as the file is
+  ::fsync(descriptor);
+  ::close(descriptor);
+  return {};
+}
+
+}  // namespace
+
+std::filesystem::path FileBackup::name_for(const std::filesystem::path& path, Older older) {
+  const std::filesystem::path file = behind_links(path);
+  if (!is_there(file)) return {};
   std::filesystem::path beside = file;
   beside += "~";
   std::optional<mode_t> mode;
-  if (Status free = check_replaceable(beside, mode); !free) return free.error();
+  if (!is_there(beside)) return beside;
+  if (older == Older::Replaced && check_replaceable(beside, mode).has_value()) return beside;
+  constexpr int kMost = 99;
+  for (int number = 1; number <= kMost; ++number) {
+    std::filesystem::path numbered = file;
+    numbered += ".~" + std::to_string(number) + "~";
+    if (!is_there(numbered)) return numbered;
+  }
+  return {};
+}
+
+Result<FileBackup> FileBackup::of(const std::filesystem::path& path, Older older) {
+  FileBackup backup;
+  const std::filesystem::path file = behind_links(path);
+  if (!is_there(file)) return backup;
+  const std::filesystem::path name = name_for(path, older);
+  if (name.empty()) return cannot_write("no name is left for a backup: NAME~ to NAME.~99~ are there", file);
   const std::filesystem::path second_name = temporary_name(file, 0);
   if (::link(file.c_str(), second_name.c_str()) != 0) {
-    const auto bytes = read_file(file);
-    if (!bytes) return bytes.error();
-    if (Status copied = write_file(second_name, *bytes); !copied) return copied.error();
+    if (Status copied = copy_whole(file, second_name); !copied) return copied.error();
   }
   backup.second_name_ = second_name;
-  backup.backup_ = beside;
+  backup.backup_ = name;
   return backup;
 }
 
@@ -255,7 +288,11 @@ FileBackup::~FileBackup() {
 
 Status FileBackup::keep() {
   if (second_name_.empty()) return {};
-  if (::rename(second_name_.c_str(), backup_.c_str()) != 0) return cannot_write(reason(errno), backup_);
+  if (::rename(second_name_.c_str(), backup_.c_str()) != 0) {
+    const int error = errno;
+    const std::string left = std::exchange(second_name_, {}).string();
+    return cannot_write(reason(error) + "; what the file held before is in " + left, backup_);
+  }
   // Where both were the same file already, renaming does nothing.
   ::unlink(std::exchange(second_name_, {}).c_str());
   sync_folder(backup_.parent_path());

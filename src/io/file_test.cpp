@@ -128,13 +128,30 @@ TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
   const fs::path path = folder_ / "a";
   ASSERT_TRUE(write_file(path, bytes_of("kept")));
   fs::create_directory(folder_ / "a~");
-  EXPECT_EQ(FileBackup::of(path).error().code, ErrorCode::CannotWrite);
+  EXPECT_EQ(FileBackup::name_for(path), folder_ / "a.~1~");
+  auto beside = FileBackup::of(path);
+  ASSERT_TRUE(beside && beside->keep());
+  EXPECT_EQ(content(folder_ / "a.~1~"), "kept");
+  EXPECT_TRUE(fs::is_directory(folder_ / "a~"));
   fs::remove(folder_ / "a~");
   fs::create_symlink("a", folder_ / "link");
   auto backup = FileBackup::of(folder_ / "link");
   ASSERT_TRUE(backup);
   EXPECT_TRUE(backup->keep());
   EXPECT_EQ(content(folder_ / "a~"), "kept");
+}
+
+TEST_F(FileTest, ABackupThatIsToStayHasItsName) {
+  const fs::path path = folder_ / "a";
+  for (const char* version : {"first", "second", "third"}) {
+    ASSERT_TRUE(write_file(path, bytes_of(version)));
+    auto backup = FileBackup::of(path, FileBackup::Older::Kept);
+    ASSERT_TRUE(backup && backup->keep());
+  }
+  EXPECT_EQ(content(folder_ / "a~"), "first");
+  EXPECT_EQ(content(folder_ / "a.~1~"), "second");
+  EXPECT_EQ(content(folder_ / "a.~2~"), "third");
+  EXPECT_EQ(FileBackup::name_for(folder_ / "nothing"), fs::path());
 }
 
 TEST_F(FileTest, AMoveCarriesTheFileAlong) {

@@ -129,7 +129,8 @@ void App::draw_losses() {
   ImGui::Text("%s would not keep:", lossy.path.filename().string().c_str());
   for (const std::string& line : lossy.losses) ImGui::BulletText("%s", line.c_str());
   ImGui::Spacing();
-  ImGui::TextDisabled("The file that is there now is kept as %s~.", lossy.path.filename().string().c_str());
+  const std::string kept = state_.open.document->kept_as(lossy.path).filename().string();
+  if (!kept.empty()) ImGui::TextDisabled("The file that is there now is kept as %s.", kept.c_str());
   ImGui::Spacing();
   enum class Answer { None, SaveAs, Save, Stay } answer = Answer::None;
   if (ImGui::Button("Save as...")) answer = Answer::SaveAs;

@@ -11,6 +11,7 @@
 #include "viewer/camera/walker.h"
 #include "viewer/loader.h"
 #include "viewer/settings.h"
+#include "viewer/window/panel/scene_tree.h"
 
 namespace quoin::viewer {
 
@@ -56,6 +57,7 @@ struct ViewState {
   Brush brush;
   VoxelType palette_shows = kAir;                            ///< the type that the palette has scrolled to
   OpenDocument open{std::make_unique<Document>(), nullptr};  ///< there is always a document
+  SceneTree scene_tree;                                      ///< as the panel shows it
 
   SDL_Rect picture_place{0, 0, 0, 0};  ///< in pixels of the output
   double pixels_per_unit = 1.0;

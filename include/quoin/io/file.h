@@ -44,16 +44,22 @@ class AtomicFile {
 ///   auto before = FileBackup::of(path);            // nothing to keep where there is no file
 ///   if (write(path)) before->keep();               // as NAME~, in place of an older one
 ///
-/// Destroyed without `keep`, it leaves nothing behind and an older NAME~ as it was.
+/// Destroyed without `keep`, it leaves nothing behind and an older NAME~ as it was. Where NAME~ cannot be replaced (it
+/// is a folder, or somebody else's), or must not be, it is NAME.~1~ to NAME.~99~, the first that is not there.
 class FileBackup {
  public:
-  /// Cost: none, where the file system has links; else a copy. Errors: CannotWrite, CannotRead: nothing was changed.
-  [[nodiscard]] static Result<FileBackup> of(const std::filesystem::path& path);
+  enum class Older : std::uint8_t { Replaced, Kept };
+
+  /// Cost: none, where the file system has links; else a copy, with the file's permissions. Errors: CannotWrite,
+  /// CannotRead: nothing was changed.
+  [[nodiscard]] static Result<FileBackup> of(const std::filesystem::path& path, Older older = Older::Replaced);
+  /// What `of` would keep the file as; empty where there is nothing to keep, or no name for it.
+  [[nodiscard]] static std::filesystem::path name_for(const std::filesystem::path& path, Older older = Older::Replaced);
   FileBackup(FileBackup&& other) noexcept;
   FileBackup& operator=(FileBackup&& other) noexcept;
   ~FileBackup();
 
-  /// Errors: CannotWrite.
+  /// Errors: CannotWrite; what was to be kept is then left behind under the name that the error has.
   [[nodiscard]] Status keep();
 
  private:

@@ -1,7 +1,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,26 +17,9 @@ struct Switched {
   bool is_visible = false;
 };
 
-/// The scene's groups and instances by what they belong to.
-struct Below {
-  std::vector<GroupHandle> groups;
-  std::vector<InstanceHandle> instances;
-};
-using Tree = std::map<GroupHandle, Below>;
-
-Tree tree_of(const Scene& scene) {
-  Tree tree;
-  for (const GroupHandle group : groups_from_top(scene)) tree[parent_of(scene, group)].groups.push_back(group);
-  scene.instances().for_each([&](InstanceHandle handle, const Instance& instance) {
-    const bool is_below = scene.groups().find(instance.group) != nullptr;
-    tree[is_below ? instance.group : GroupHandle{}].instances.push_back(handle);
-  });
-  return tree;
-}
-
 class SceneList {
  public:
-  explicit SceneList(const Scene& scene) : scene_(scene), tree_(tree_of(scene)) {}
+  SceneList(const Scene& scene, const SceneTree& tree) : scene_(scene), tree_(tree) {}
 
   void draw_layers() {
     if (scene_.layers().empty()) return;
@@ -60,11 +42,11 @@ class SceneList {
   }
 
   void draw_below(GroupHandle group) {
-    const auto below = tree_.find(group);
-    if (below == tree_.end()) return;
-    for (const GroupHandle each : below->second.groups) draw_group(each);
+    const SceneTree::Below* below = tree_.find(group);
+    if (below == nullptr) return;
+    for (const GroupHandle each : below->groups) draw_group(each);
     ImGuiListClipper clipper;  // there may be thousands
-    const std::vector<InstanceHandle>& instances = below->second.instances;
+    const std::vector<InstanceHandle>& instances = below->instances;
     clipper.Begin(static_cast<int>(instances.size()));
     while (clipper.Step()) {
       for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i) {
@@ -116,7 +98,7 @@ class SceneList {
   }
 
   const Scene& scene_;
-  Tree tree_;
+  const SceneTree& tree_;
   std::optional<Switched> switched_;
 };
 
@@ -126,7 +108,8 @@ void draw_scene_part(ViewState& state) {
   const Scene& scene = state.scene();
   const bool says_something = scene.instances().size() > 1 || !scene.groups().empty() || !scene.layers().empty();
   if (!says_something || !heading("Scene", !scene.groups().empty())) return;
-  SceneList list(scene);
+  state.scene_tree.update(scene);
+  SceneList list(scene, state.scene_tree);
   const std::size_t entries = scene.instances().size() + scene.groups().size() + (scene.layers().empty() ? 1 : 2);
   const auto rows = static_cast<float>(std::clamp<std::size_t>(entries, 4, 10));
   ImGui::BeginChild("scene", {0.0F, rows * ImGui::GetFrameHeightWithSpacing()}, true);
