@@ -12,12 +12,13 @@ struct CpuBackendOptions {
   InstanceFilter instances = InstanceFilter::Visible;
   Threads threads;
   /// How long the first picture after a change of the camera may take, by the time that pixels have taken so far: it
-  /// is as fine as that allows. 0: always the coarsest, an eighth of the size.
-  double first_frame_seconds = 0.03;
+  /// is as large as that allows, of a quarter of the width and height at least. 0: always that.
+  double first_frame_seconds = 0.05;
 };
 
-/// Pictures by CpuRenderer on a thread of its own: an eighth of the size, a quarter, half, whole; then of 4, 16 ...
-/// samples a pixel up to what was asked for. A settled frame is CpuRenderer's picture to the byte.
+/// Pictures by CpuRenderer on a thread of its own: a quarter of the size, or a third, half, whole; then of 4, 16 ...
+/// samples a pixel up to what was asked for. A settled frame is CpuRenderer's picture to the byte. Where full light
+/// would make the first picture smaller than a half it is a draft: with few lamps, and the occlusion of vertices.
 ///
 /// A new request ends what is under way, but for the coarsest picture: however fast requests come, some are seen.
 class CpuBackend final : public ViewBackend {

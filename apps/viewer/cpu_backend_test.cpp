@@ -122,6 +122,73 @@ TEST(CpuBackend, PicturesBecomeFiner) {
   EXPECT_FALSE(watched.backend.take()) << "a frame is taken once";
 }
 
+TEST(CpuBackend, MovingPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+  const LoadedScene loaded = small_scene();
+  // No picture is that fast.
+  Watched watched(loaded.scene, 1e-9);
+  ViewRequest request = request_for(loaded.scene, View::Iso, 403, 299);
+  for (int i = 0; i < 40; ++i) {
+    request.camera.position.x += 0.1;
+    watched.backend.show(request);
+    ASSERT_TRUE(watched.bell.wait());
+    const auto frame = watched.backend.take();
+    if (!frame) continue;
+    EXPECT_GE(frame->colour.width, 101);
+    EXPECT_GE(frame->colour.height, 75);
+    EXPECT_FALSE(frame->is_settled);
+  }
+  request.camera.position.x += 0.1;
+  watched.backend.show(request);
+  const auto frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().colour.rgb, expected(loaded.scene, request).rgb);
+}
+
+TEST(CpuBackend, MovingPicturesAreWholeWhereThereIsTime) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene, 1e9);
+  ViewRequest request = request_for(loaded.scene, View::Iso);
+  request.light = natural_light();
+  watched.backend.show(request);
+  ASSERT_FALSE(watched.settle().empty());
+  request.camera.position.x += 1.0;
+  watched.backend.show(request);
+  const auto frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  for (const ViewFrame& frame : frames) EXPECT_TRUE(frame.is_whole) << "the time of pixels is known";
+  request.samples = 1;
+  if (frames.front().samples == 1) {
+    EXPECT_EQ(frames.front().colour.rgb, expected(loaded.scene, request).rgb) << "in full light";
+  }
+}
+
+TEST(CpuBackend, WhereThereIsNoTimeMovingPicturesAreDraftsInLessLight) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  ViewRequest request = request_for(loaded.scene, View::Iso);
+  request.light = natural_light();
+  ASSERT_EQ(request.light.occlusion, OcclusionMode::Rays);
+  for (const Shading shading : {Shading::Lit, Shading::Normals}) {
+    request.light.shading = shading;
+    watched.backend.show(request);
+    const auto frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    ViewRequest first = request;
+    first.width = (request.width + 3) / 4;
+    first.height = (request.height + 3) / 4;
+    first.samples = 1;
+    if (shading == Shading::Lit) {
+      first.light.occlusion = OcclusionMode::Vertex;
+      first.light.lamps = std::min(first.light.lamps, 2);
+    }
+    // A frame that nobody took in time is replaced by the next.
+    if (frames.front().colour.width == first.width) {
+      EXPECT_EQ(frames.front().colour.rgb, expected(loaded.scene, first).rgb);
+    }
+    EXPECT_EQ(frames.back().colour.rgb, expected(loaded.scene, request).rgb);
+  }
+}
+
 TEST(CpuBackend, TheSameRequestAgainChangesNothing) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);

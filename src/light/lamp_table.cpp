@@ -17,6 +17,7 @@ namespace {
 
 // What a white surface gets at a lamp's reach, at most: less than a step of a picture's bytes.
 constexpr double kLeastLight = 1.0 / 4096.0;
+constexpr std::size_t kMaxKept = 2;  // tables
 constexpr int kBricksAChunk = kChunkEdge / LampTable::kBrick;
 
 double largest(Vec3 light) {
@@ -286,23 +287,27 @@ LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const Occupan
 
 void LampCache::update() {
   const std::lock_guard lock(mutex_);
-  max_lamps_ = 0;
+  kept_.clear();
 }
 
 std::shared_ptr<const LampTable> LampCache::table(const Scene& scene, const LightOptions& light, Threads threads,
                                                   FunctionRef<std::vector<LampPlace>()> places_of) {
   if (light.lamps == 0 || light.lamp_brightness == 0.0 || light.shading != Shading::Lit) return nullptr;
   const std::lock_guard lock(mutex_);
-  if (light.lamps == max_lamps_ && light.lamp_brightness == brightness_) return table_;
-  max_lamps_ = 0;
+  const auto known = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) {
+    return kept.max_lamps == light.lamps && kept.brightness == light.lamp_brightness;
+  });
+  if (known != kept_.end()) {
+    std::rotate(known, known + 1, kept_.end());
+    return kept_.back().table;
+  }
   const std::vector<LampPlace> places = places_of();
   auto made = std::make_shared<LampTable>();
   made->lamps = lamps_of(scene, places, light.lamp_brightness);
   if (!made->lamps.empty()) make_lists(places, light.lamps, threads, *made);
-  table_ = made->lists.empty() ? nullptr : std::move(made);
-  max_lamps_ = light.lamps;
-  brightness_ = light.lamp_brightness;
-  return table_;
+  if (kept_.size() == kMaxKept) kept_.erase(kept_.begin());
+  kept_.push_back({light.lamps, light.lamp_brightness, made->lists.empty() ? nullptr : std::move(made)});
+  return kept_.back().table;
 }
 
 std::vector<PlacedLamp> LampCache::lamps_of(const Scene& scene, std::span<const LampPlace> places, double brightness) {

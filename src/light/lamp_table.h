@@ -96,7 +96,8 @@ struct LampPlace {
 [[nodiscard]] LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
                                    const OccupancyTree* transparent, const DensityTree* field);
 
-/// Makes the table of a scene when it is first asked for after an `update`. Threads: any number may call `table`.
+/// Makes the table of a scene when it is first asked for after an `update`, and keeps the last two that options asked
+/// for: pictures of a moving view may take fewer lamps than others. Threads: any number may call `table`.
 class LampCache {
  public:
   /// The scene was edited, or its instances are others.
@@ -116,9 +117,12 @@ class LampCache {
   std::mutex mutex_;
   std::map<GridHandle, EmissiveCells> cells_;
   std::map<GridHandle, EmissiveCells> field_cells_;
-  std::shared_ptr<const LampTable> table_;
-  int max_lamps_ = 0;  // of the table; 0: it is out of date
-  double brightness_ = 0.0;
+  struct Kept {
+    int max_lamps = 0;
+    double brightness = 0.0;
+    std::shared_ptr<const LampTable> table;
+  };
+  std::vector<Kept> kept_;  // none is out of date; the one that was used last is the last
 };
 
 }  // namespace quoin

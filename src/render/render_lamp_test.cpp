@@ -376,5 +376,29 @@ TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
   }
 }
 
+TEST(RenderLamps, PicturesOfFewLampsAndOfManyMayTakeTurns) {
+  Scene scene = floor_by_night();
+  for (int i = 0; i < 6; ++i) {
+    Lamp lamp;
+    lamp.position = {5.0 * i - 12.0, 4.0, 2.0 * i - 5.0};
+    lamp.intensity = 10.0 + i;
+    lamp.range = 25.0;
+    scene.lamps.push_back(lamp);
+  }
+  CpuRenderer renderer(scene);
+  RenderOptions options = by_night(40, 40);
+  const auto check = [&](int lamps) {
+    SCOPED_TRACE(lamps);
+    options.light.lamps = lamps;
+    const Picture picture = renderer.render(from_above(0, 20, 0, 40), options).value();
+    EXPECT_EQ(picture.colour.rgb, taken(scene, from_above(0, 20, 0, 40), options).colour.rgb);
+  };
+  // Three kinds are one more than are kept.
+  for (const int lamps : {64, 2, 64, 2, 1, 2, 64}) check(lamps);
+  scene.lamps[2].intensity = 40.0;
+  renderer.update();
+  for (const int lamps : {2, 64, 2}) check(lamps);
+}
+
 }  // namespace
 }  // namespace quoin
