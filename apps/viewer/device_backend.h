@@ -14,15 +14,19 @@ using OpenDevice = std::function<Result<std::shared_ptr<VulkanRenderer>>()>;
 
 struct DeviceBackendOptions {
   CpuBackendOptions cpu;
-  /// Whether rays are marched on the device; else the processor marches them, which is faster than a device that is a
-  /// processor in truth.
+  /// Whether rays are marched on the device, which is then the one that shows the window: `take` draws, and pictures
+  /// stay there. Else the processor marches them, which is faster than a device that is a processor in truth; meshes
+  /// are drawn on a thread of their own, and come back as bytes.
   bool rays_on_device = false;
-  /// How long a picture may take when the camera has moved: it is as fine as that allows.
+  /// How long a picture may take when the camera has moved: it is as fine as that allows, and of meshes a quarter of
+  /// the size at least.
   double frame_seconds = 0.025;
+  double slow_seconds = 0.1;  ///< pictures that take longer though they are that small make their mode a slow one
 };
 
 /// Pictures by a graphics device: ray-marched ones get better sample by sample, meshes follow edits as workers finish
-/// them. What is pointed at is found by the processor, which also draws where the device cannot.
+/// them. What is pointed at is found by the processor, which also draws where the device cannot, and rays until the
+/// device has its first picture of meshes.
 ///
 /// After a fault of the device it is not used again.
 class DeviceBackend final : public ViewBackend {
@@ -40,6 +44,8 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::optional<ViewFrame> take() override;
   [[nodiscard]] bool wants_frames() const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const override;
+  [[nodiscard]] std::string activity() const override;
+  [[nodiscard]] bool is_slow(DrawMode mode) const override;
   [[nodiscard]] std::optional<Error> fault() override;
   double pause() override;
   void resume(bool changed) override;

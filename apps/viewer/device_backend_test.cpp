@@ -1,6 +1,9 @@
 #include "device_backend.h"
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
+#include <future>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -32,7 +35,12 @@ class DeviceBackendTest : public ::testing::Test {
     DeviceBackendOptions options;
     options.cpu.threads = {2};
     options.rays_on_device = rays_on_device;
-    const auto open = [this]() -> Result<std::shared_ptr<VulkanRenderer>> { return renderer_; };
+    return backend_of(document, options);
+  }
+
+  [[nodiscard]] std::unique_ptr<DeviceBackend> backend_of(const Document& document,
+                                                          const DeviceBackendOptions& options) {
+    const auto open = [opened = renderer_]() -> Result<std::shared_ptr<VulkanRenderer>> { return opened; };
     return std::make_unique<DeviceBackend>(document.scene(), options, open, std::function<void()>());
   }
 
@@ -104,6 +112,16 @@ void edit(Document& document, DeviceBackend& backend, IVec3 voxel) {
   brush.radius = 4;
   ASSERT_TRUE(document.begin_stroke(brush, hit));
   document.end_stroke();
+}
+
+/// Whether that becomes true within a minute.
+bool comes(const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
 }
 
 TEST_F(DeviceBackendTest, RaysSettleOnTheProcessorsPictureAndFollowEdits) {
@@ -280,14 +298,145 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
                         },
                         {});
   backend.show(request_for(document, DrawMode::Blocks));
-  EXPECT_FALSE(backend.take());
-  ASSERT_TRUE(backend.fault());
+  ASSERT_TRUE(comes([&] { return backend.fault().has_value(); }));
   EXPECT_EQ(backend.fault()->message, "vulkan: nothing here");
+  EXPECT_EQ(backend.activity(), "");
   EXPECT_FALSE(backend.can_draw(DrawMode::Blocks));
   EXPECT_FALSE(backend.wants_frames()) << "what cannot be drawn keeps nobody busy";
   EXPECT_TRUE(backend.can_draw(DrawMode::Rays));
   backend.show(request_for(document, DrawMode::Rays));
   EXPECT_FALSE(settle(backend).empty());
+}
+
+TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
+  Document document = small_document();
+  const auto at_once = backend_of(document, true);
+  // Its thread has a device of its own.
+  auto made = VulkanRenderer::create();
+  ASSERT_TRUE(made);
+  renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
+  const auto apart = backend_of(document, false);
+  for (const DrawMode mode : {DrawMode::Blocks, DrawMode::Smooth, DrawMode::Blocks}) {
+    const ViewRequest request = request_for(document, mode);
+    for (const bool is_edited : {false, true}) {
+      SCOPED_TRACE(is_edited);
+      if (is_edited) {
+        const ScenePause pause(*at_once);
+        edit(document, *apart, {30, 12, 20});
+      }
+      apart->show(request);
+      at_once->show(request);
+      const auto pictures = settle(*apart);
+      const auto same = settle(*at_once);
+      ASSERT_FALSE(pictures.empty());
+      ASSERT_FALSE(same.empty());
+      EXPECT_EQ(pictures.back().rgb, same.back().rgb);
+      EXPECT_FALSE(apart->wants_frames()) << "they come by themselves";
+      EXPECT_EQ(apart->activity(), "");
+      EXPECT_EQ(apart->name(), renderer_->device().name);
+      EXPECT_FALSE(apart->stats().empty());
+    }
+    const ScenePause pause_apart(*apart);
+    const ScenePause pause_at_once(*at_once);
+    ASSERT_TRUE(document.undo());
+  }
+}
+
+TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
+  Document document = small_document();
+  std::promise<void> go_on;
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  DeviceBackend backend(document.scene(), options,
+                        [this, opened = go_on.get_future().share()]() -> Result<std::shared_ptr<VulkanRenderer>> {
+                          opened.wait();
+                          return renderer_;
+                        },
+                        {});
+  ViewRequest request = request_for(document, DrawMode::Blocks);
+  backend.show(request);
+  EXPECT_TRUE(comes([&] { return backend.activity() == "opening a device"; }));
+  for (int i = 0; i < 5; ++i) {
+    request.camera.position.x += 0.5;
+    backend.show(request);
+    EXPECT_TRUE(comes([&] {
+      const auto frame = backend.take();
+      return frame && !frame->is_settled && !frame->on_device;
+    })) << "rays stand in";
+    EXPECT_EQ(backend.name(), "processor");
+    // Without waiting for the device, or this would never end.
+    edit(document, backend, {20 + 4 * i, 12, 20});
+  }
+  go_on.set_value();
+  const auto pictures = settle(backend);
+  ASSERT_FALSE(pictures.empty());
+  const auto fresh = backend_of(document);
+  fresh->show(request);
+  const auto same = settle(*fresh);
+  ASSERT_FALSE(same.empty());
+  EXPECT_EQ(pictures.back().rgb, same.back().rgb);
+}
+
+TEST_F(DeviceBackendTest, MeshPicturesAreNeverUnderAQuarterOfTheSizeHoweverSlow) {
+  const Document document = small_document();
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  options.frame_seconds = 1e-9;
+  const auto backend = backend_of(document, options);
+  ViewRequest request = request_for(document, DrawMode::Blocks);
+  for (int i = 0; i < 10; ++i) {
+    request.camera.position.x += 0.5;
+    backend->show(request);
+    std::optional<ViewFrame> frame;
+    ASSERT_TRUE(comes([&] { return (frame = backend->take()).has_value(); }));
+    EXPECT_GE(frame->colour.width, 40);
+    EXPECT_GE(frame->colour.height, 25);
+  }
+  const auto pictures = settle(*backend);
+  ASSERT_FALSE(pictures.empty());
+  EXPECT_EQ(pictures.back().width, request.width);
+}
+
+TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
+  const Document document = small_document();
+  for (const double seconds : {1e-9, 1e9}) {
+    DeviceBackendOptions options;
+    options.cpu.threads = {2};
+    options.slow_seconds = seconds;
+    // Coarse pictures alone tell.
+    options.frame_seconds = 1e-9;
+    const auto backend = backend_of(document, options);
+    ViewRequest request = request_for(document, DrawMode::Blocks);
+    for (int i = 0; i < 4; ++i) {
+      request.camera.position.x += 0.5;
+      backend->show(request);
+      ASSERT_FALSE(settle(*backend).empty());
+    }
+    EXPECT_EQ(backend->is_slow(DrawMode::Blocks), seconds < 1.0);
+    EXPECT_FALSE(backend->is_slow(DrawMode::Rays));
+    EXPECT_FALSE(backend->is_slow(DrawMode::Smooth));
+  }
+}
+
+TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
+  SceneGrid wide;
+  wide.grid.fill_box({{0, 0, 0}, {1'300, 3, 1'300}}, 1);
+  LoadedScene loaded = small_scene();
+  loaded.scene.add_instance({"", loaded.scene.add_grid(std::move(wide))});
+  const Document document(std::move(loaded), "wide.vox");
+  const auto backend = backend_of(document, false);
+  backend->show(request_for(document, DrawMode::Blocks));
+  std::vector<std::string> told;
+  ASSERT_TRUE(comes([&] {
+    const std::string now = backend->activity();
+    if (told.empty() || told.back() != now) told.push_back(now);
+    const auto frame = backend->take();
+    return frame && frame->is_settled;
+  }));
+  EXPECT_NE(
+      std::find_if(told.begin(), told.end(), [](const std::string& text) { return text.starts_with("meshing "); }),
+      told.end());
+  EXPECT_EQ(backend->activity(), "");
 }
 
 TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {

@@ -74,7 +74,7 @@ struct ViewFrame {
 /// What makes the picture of a scene: the processor here, a graphics card elsewhere.
 ///
 /// Threads: all calls come from one thread, the window's. None but `pause` ever waits for the processor's pictures;
-/// those of a graphics device are drawn in `take`.
+/// those of the device that shows the window are drawn in `take`.
 class ViewBackend {
  public:
   ViewBackend() = default;
@@ -102,6 +102,12 @@ class ViewBackend {
 
   /// What people may want to know of it: names and values.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> stats() const { return {}; }
+
+  /// For people, what a picture still waits for: "meshing 120/480"; empty: nothing but its drawing.
+  [[nodiscard]] virtual std::string activity() const { return {}; }
+
+  /// Whether pictures of the mode turned out to take too long for anybody to want to start with them.
+  [[nodiscard]] virtual bool is_slow(DrawMode /*mode*/) const { return false; }
 
   /// What went wrong with the last request, if anything.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;

@@ -100,7 +100,13 @@ Status App::run(const std::function<bool()>& is_interrupted) {
   }
   note_size();
   show_detail(false);
+  forget_slow_mode();
   return status_;
+}
+
+// Nobody should have to wait for the first picture of the next file since this one was looked at in a slow mode.
+void App::forget_slow_mode() {
+  if (state_.open.backend && state_.open.backend->is_slow(state_.settings.mode)) state_.settings.mode = DrawMode::Rays;
 }
 
 void App::note_size() {

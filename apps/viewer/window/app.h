@@ -60,6 +60,7 @@ class App {
   void update_hover();
   void update_title();
   void note_size();
+  void forget_slow_mode();
 
   // What commands do.
   void run_command(Command command);

@@ -74,6 +74,8 @@ void App::load(const std::filesystem::path& path) {
   DeviceBackendOptions backend;
   backend.cpu = {options_.instances(), options_.threads, CpuBackendOptions{}.first_frame_seconds};
   backend.rays_on_device = screen_->renderer() != nullptr;
+  // Where pictures come from another thread the window need not wait for them.
+  if (!backend.rays_on_device) backend.frame_seconds = backend.cpu.first_frame_seconds;
   const auto make = [this, backend](const Document& document) -> std::unique_ptr<ViewBackend> {
     return std::make_unique<DeviceBackend>(
         document.scene(), backend, [this] { return open_device(); }, wake_window);

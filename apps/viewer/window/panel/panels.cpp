@@ -110,6 +110,7 @@ std::string hover_text(const ViewState& state) {
 
 std::string picture_text(const ViewState& state) {
   if (!state.open.backend) return "";
+  if (std::string activity = state.open.backend->activity(); !activity.empty()) return activity;
   const FrameStats& stats = state.stats;
   if (stats.is_settled) return "done";
   if (stats.width < state.picture_place.w) return "drawing";

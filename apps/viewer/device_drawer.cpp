@@ -1,0 +1,337 @@
+#include "device_drawer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <new>
+#include <system_error>
+
+#include <quoin/render_vk/vulkan_mesh_renderer.h>
+
+namespace quoin::viewer {
+
+namespace {
+
+constexpr std::array kRayDivisors = {8, 4, 2, 1};
+constexpr std::array kMeshDivisors = {4, 3, 2, 1};
+constexpr int kMeshSamples = 4;
+constexpr double kDetailDistance = 256.0;  // samples of fields
+constexpr std::chrono::milliseconds kRest{150};
+constexpr double kSlowStart = 10.0;  // times as long as a slow picture is a slow first one
+constexpr double kConstancy = 1.3;   // times as long is what lets the size of moving pictures be as it was
+constexpr double kNews = 0.3;        // the share of a new measurement in what is known of how long pictures take
+
+std::string text(const char* format, double value) {
+  std::array<char, 64> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), format, value);
+  return buffer.data();
+}
+
+}  // namespace
+
+DeviceDrawer::DeviceDrawer(const Scene& scene, const DeviceBackendOptions& options, OpenDevice open_device,
+                           std::function<void()> on_surfaces)
+    : scene_(&scene), options_(options), open_device_(std::move(open_device)), on_surfaces_(std::move(on_surfaces)) {}
+
+void DeviceDrawer::want(const ViewRequest& request) {
+  const bool is_other_kind = !request_ || request_->mode != request.mode || request_->wireframe != request.wireframe ||
+                             request_->light.shading != request.light.shading;
+  if (is_other_kind) {
+    mesh_seconds_.clear();
+    has_shaders_ = false;
+  }
+  if (!request_ || request_->mode != request.mode) {
+    mode_since_ = Clock::now();
+    is_mode_drawn_ = false;
+  }
+  request_ = request;
+  is_request_new_ = true;
+  wanted_at_ = Clock::now();
+}
+
+void DeviceDrawer::note_edit() {
+  is_scene_new_ = true;
+  if (meshes_) meshes_->is_scene_new = true;
+}
+
+bool DeviceDrawer::wants_frames() const {
+  if (!request_) return false;
+  const bool is_rays = request_->mode == DrawMode::Rays;
+  const bool is_stale = is_rays ? is_scene_new_ || !is_settled_
+                                : !meshes_ || meshes_->is_scene_new || (!is_settled_ && meshes_->live->pending() == 0);
+  return is_request_new_ || is_stale;
+}
+
+std::optional<DeviceDrawer::Clock::time_point> DeviceDrawer::rests_until() const {
+  const bool is_moving = !request_ || !has_meshes(request_->mode) || is_request_new_ || !meshes_ ||
+                         meshes_->is_scene_new || meshes_->live->pending() > 0;
+  if (is_moving || is_settled_ || foreseen_seconds(1) <= options_.frame_seconds) return std::nullopt;
+  const Clock::time_point rest = wanted_at_ + kRest;
+  return Clock::now() < rest ? std::optional(rest) : std::nullopt;
+}
+
+Status DeviceDrawer::open() {
+  if (renderer_) return {};
+  auto opened = open_device_();
+  if (!opened) return opened.error();
+  renderer_ = std::move(*opened);
+  picture_ = std::make_shared<VulkanPicture>(*renderer_);
+  is_scene_new_ = true;
+  return {};
+}
+
+Status DeviceDrawer::read_scene() {
+  if (request_->mode == DrawMode::Rays) return update_renderer();
+  const bool is_smooth = request_->mode == DrawMode::Smooth;
+  if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) return ready;
+  return take_surfaces();
+}
+
+// Without levels of detail and light by rays a picture of meshes is one of what was put into the device's memory.
+bool DeviceDrawer::draws_from_scene() const {
+  return !has_meshes(request_->mode) || request_->detail_by_pixels || !is_processor();
+}
+
+Result<std::optional<ViewFrame>> DeviceDrawer::read_and_draw() {
+  try {
+    if (Status opened = open(); !opened) return opened.error();
+    if (Status read = read_scene(); !read) return read.error();
+    return draw();
+  } catch (const std::bad_alloc&) {
+    return make_error(ErrorCode::LimitExceeded, "out of memory");
+  } catch (const std::system_error& why) {
+    return make_error(ErrorCode::LimitExceeded, std::string("cannot start another thread: ") + why.what());
+  }
+}
+
+Result<std::optional<ViewFrame>> DeviceDrawer::draw() {
+  const Clock::time_point start = Clock::now();
+  const Result<bool> drawn = request_->mode == DrawMode::Rays ? draw_rays() : draw_meshes();
+  if (!drawn) return drawn.error();
+  if (!*drawn) return std::optional<ViewFrame>();
+  if (!std::exchange(is_mode_drawn_, true) && is_processor()) {
+    is_slow_.at(static_cast<std::size_t>(request_->mode)) |=
+        seconds_since(mode_since_) > kSlowStart * options_.slow_seconds;
+  }
+  return std::optional(frame(seconds_since(start)));
+}
+
+Status DeviceDrawer::prepare_meshes(SurfaceStyle style) {
+  if (meshes_ && meshes_->style == style) {
+    renew_occlusion();
+    return {};
+  }
+  meshes_.reset();
+  auto drawer = VulkanMeshRenderer::create(*renderer_);
+  if (!drawer) return drawer.error();
+  const SmoothOcclusionOptions occlusion = request_->light.smooth;
+  meshes_.reset(new Meshes{style, occlusion, live_meshes(style, occlusion), std::move(*drawer)});
+  is_request_new_ = true;
+  return {};
+}
+
+std::unique_ptr<LiveMeshes> DeviceDrawer::live_meshes(SurfaceStyle style,
+                                                      const SmoothOcclusionOptions& occlusion) const {
+  LiveMeshOptions live;
+  live.style = style;
+  live.instances = options_.cpu.instances;
+  live.threads = options_.cpu.threads;
+  live.on_ready = on_surfaces_;
+  live.detail_distance = kDetailDistance;
+  live.occlusion = occlusion;
+  return std::make_unique<LiveMeshes>(live);
+}
+
+// Has all chunks meshed with another occlusion, once those that are under way are done: surfaces stay until the new
+// ones come, and none is left of a chunk that an edit emptied.
+void DeviceDrawer::renew_occlusion() {
+  if (meshes_->occlusion == request_->light.smooth || meshes_->is_scene_new) return;
+  meshes_->live->update(*scene_, request_->camera.position);
+  if (meshes_->live->pending() > 0) return;
+  meshes_->occlusion = request_->light.smooth;
+  meshes_->live = live_meshes(meshes_->style, meshes_->occlusion);
+  is_request_new_ = true;
+}
+
+// Has the renderer know the scene.
+Status DeviceDrawer::update_renderer() {
+  if (!std::exchange(is_scene_new_, false)) return {};
+  is_request_new_ = true;
+  return renderer_->update(*scene_, options_.cpu.instances, options_.cpu.threads);
+}
+
+// Takes over what was edited and what workers made of it.
+Status DeviceDrawer::take_surfaces() {
+  // Only light by rays and levels of detail need the voxels on the device.
+  if (request_->detail_by_pixels || !is_processor()) {
+    if (Status updated = update_renderer(); !updated) return updated;
+  }
+  const bool is_scene_changed = std::exchange(meshes_->is_scene_new, false);
+  if (is_scene_changed) {
+    is_request_new_ = true;
+    if (Status taken = meshes_->renderer.update(*scene_, options_.cpu.instances); !taken) return taken;
+  }
+  // The levels of detail of fields follow the camera.
+  if (is_request_new_ || meshes_->live->pending() > 0) meshes_->live->update(*scene_, request_->camera.position);
+  count_pending();
+  const std::vector<SurfaceUpdate> surfaces = meshes_->live->take();
+  if (surfaces.empty()) return {};
+  is_request_new_ = true;
+  return meshes_->renderer.put(surfaces);
+}
+
+void DeviceDrawer::count_pending() {
+  const std::size_t left = meshes_->live->pending();
+  meshes_->to_mesh = left == 0 ? 0 : std::max(meshes_->to_mesh, left);
+}
+
+std::pair<std::size_t, std::size_t> DeviceDrawer::meshing() const {
+  if (!request_ || !has_meshes(request_->mode) || !meshes_) return {0, 0};
+  const std::size_t left = meshes_->live->pending();
+  const std::size_t all = std::max(meshes_->to_mesh, left);
+  return left == 0 ? std::pair{left, left} : std::pair{all - left, all};
+}
+
+MeshPictureOptions DeviceDrawer::mesh_picture() const {
+  MeshPictureOptions wanted;
+  wanted.width = (request_->width + divisor_ - 1) / divisor_;
+  wanted.height = (request_->height + divisor_ - 1) / divisor_;
+  wanted.samples = samples_;
+  wanted.light = request_->light;
+  wanted.wireframe = request_->wireframe;
+  wanted.detail_colours = request_->detail_colours;
+  wanted.threads = options_.cpu.threads;
+  if (request_->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  if (!waits_) wanted.impostor_seconds = 0.0;
+  // Without a graphics card meshes have no light that takes rays: a picture with shadows would take seconds.
+  if (is_processor()) {
+    wanted.light.shadows = false;
+    wanted.light.lamps = 0;
+  }
+  return wanted;
+}
+
+// Of a moving picture: as it took before, and not more than its pixels say by what coarser ones took. 0: not known.
+double DeviceDrawer::foreseen_seconds(int divisor) const {
+  double least = 0.0;
+  for (const auto& [known, seconds] : mesh_seconds_) {
+    if (known < divisor) continue;
+    const double most = seconds * known * known / (divisor * divisor);
+    least = least > 0.0 ? std::min(least, most) : most;
+  }
+  return least;
+}
+
+int DeviceDrawer::moving_divisor() const {
+  int chosen = kMeshDivisors.front();
+  for (const int finer : kMeshDivisors) {
+    const double seconds = foreseen_seconds(finer);
+    if (seconds <= 0.0) continue;
+    if (seconds <= options_.frame_seconds * (finer == divisor_ ? kConstancy : 1.0)) chosen = finer;
+  }
+  return chosen;
+}
+
+void DeviceDrawer::note_mesh_seconds(double seconds, bool is_moving) {
+  if (!is_moving) return;
+  // The first of a kind compiles shaders: it says nothing.
+  if (!std::exchange(has_shaders_, true)) return;
+  const auto [known, is_new] = mesh_seconds_.try_emplace(divisor_, seconds);
+  if (!is_new) known->second += kNews * (seconds - known->second);
+  if (divisor_ == kMeshDivisors.front() && known->second > options_.slow_seconds)
+    is_slow_.at(static_cast<std::size_t>(request_->mode)) = true;
+}
+
+Result<bool> DeviceDrawer::draw_meshes() {
+  const bool is_moving = std::exchange(is_request_new_, false);
+  if (is_moving) is_settled_ = false;
+  if (is_settled_ || (!is_moving && (meshes_->live->pending() > 0 || rests_until()))) return false;
+  divisor_ = is_moving ? moving_divisor() : 1;
+  samples_ = is_moving && is_processor() ? 1 : std::min(request_->samples, kMeshSamples);
+  // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
+  waits_ = !is_moving;
+  MeshPictureOptions wanted = mesh_picture();
+  wanted.selector = &selectors_[divisor_];
+  const Clock::time_point start = Clock::now();
+  if (Status drawn = meshes_->renderer.draw(*picture_, request_->camera, wanted); !drawn) return drawn.error();
+  note_mesh_seconds(seconds_since(start), is_moving);
+  const bool is_best =
+      divisor_ == 1 && samples_ == std::min(request_->samples, kMeshSamples) && (waits_ || !request_->detail_by_pixels);
+  // Otherwise the next picture is a better one.
+  is_settled_ = is_best && meshes_->live->pending() == 0 && meshes_->occlusion == request_->light.smooth;
+  return true;
+}
+
+int DeviceDrawer::first_divisor() const {
+  const double pixels = static_cast<double>(request_->width) * request_->height;
+  int chosen = kRayDivisors.front();
+  if (seconds_per_sample_ <= 0.0) return chosen;
+  for (const int finer : kRayDivisors) {
+    if (pixels / (finer * finer) * seconds_per_sample_ <= options_.frame_seconds) chosen = finer;
+  }
+  return chosen;
+}
+
+// As many as the time of a frame allows, so that fast devices settle soon.
+int DeviceDrawer::samples_now() const {
+  if (divisor_ > 1 || picture_->samples() == 0) return 1;
+  const double whole = static_cast<double>(request_->width) * request_->height * seconds_per_sample_;
+  const int affordable = whole > 0.0 ? static_cast<int>(std::min(options_.frame_seconds / whole, 64.0)) : 1;
+  return std::clamp(affordable, 1, request_->samples - picture_->samples());
+}
+
+Status DeviceDrawer::draw_stage() {
+  const bool is_first = std::exchange(is_request_new_, false);
+  const bool is_new = is_first || divisor_ > 1;
+  divisor_ = is_first ? first_divisor() : std::max(divisor_ / 2, 1);
+  RenderOptions wanted;
+  wanted.width = (request_->width + divisor_ - 1) / divisor_;
+  wanted.height = (request_->height + divisor_ - 1) / divisor_;
+  wanted.samples = is_new ? 1 : samples_now();
+  wanted.light = request_->light;
+  wanted.detail_colours = request_->detail_colours;
+  if (request_->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  wanted.selector = &selectors_[divisor_];
+  // What is shown for a moment does not wait for impostors.
+  if (divisor_ > 1) wanted.impostor_seconds = 0.0;
+  const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
+  const Clock::time_point start = Clock::now();
+  if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, accumulation); !drawn) return drawn;
+  seconds_per_sample_ = seconds_since(start) / (static_cast<double>(wanted.width) * wanted.height * wanted.samples);
+  is_settled_ = divisor_ == 1 && picture_->samples() >= request_->samples;
+  return {};
+}
+
+Result<bool> DeviceDrawer::draw_rays() {
+  if (is_request_new_) is_settled_ = false;
+  if (is_settled_) return false;
+  if (Status drawn = draw_stage(); !drawn) return drawn.error();
+  return true;
+}
+
+ViewFrame DeviceDrawer::frame(double seconds) const {
+  ViewFrame made;
+  made.on_device = picture_;
+  made.samples = picture_->samples();
+  made.is_whole = divisor_ == 1;
+  made.is_settled = is_settled_;
+  made.seconds = seconds;
+  made.rays = picture_->rays();
+  return made;
+}
+
+std::vector<std::pair<std::string, std::string>> DeviceDrawer::stats() const {
+  if (!meshes_ || !request_ || !has_meshes(request_->mode)) return {};
+  const VulkanMeshRenderer::Stats drawn = meshes_->renderer.stats();
+  const LiveMeshes::Stats live = meshes_->live->stats();
+  return {{"triangles, each once", text("%.0f", static_cast<double>(drawn.triangles))},
+          {"triangles drawn", text("%.0f", static_cast<double>(drawn.drawn_triangles))},
+          {"chunks", text("%.0f", static_cast<double>(drawn.chunks))},
+          {"still to mesh", text("%.0f", static_cast<double>(meshes_->live->pending()))},
+          {"meshes", text("%.1f MB", static_cast<double>(drawn.bytes) / 1e6)},
+          {"last chunk took", text("%.2f ms", live.last_mesh_seconds * 1e3)},
+          {"edit to mesh", text("%.2f ms", live.last_latency_seconds * 1e3)}};
+}
+
+}  // namespace quoin::viewer
