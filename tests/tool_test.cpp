@@ -426,6 +426,24 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   EXPECT_EQ(run("convert empty --to glb --recursive").err, "quoin: empty: no file in it can be read\n");
 }
 
+TEST_F(Tool, InfoAndRenderReadStandardInput) {
+  const ToolRun info = shell("'" QUOIN_TOOL "' info - < tiny.vox");
+  EXPECT_EQ(info.status, 0);
+  EXPECT_TRUE(info.out.starts_with("standard input: vox, ")) << info.out;
+  const std::string named = run("info tiny.vox").out;
+  EXPECT_EQ(info.out.substr(info.out.find(':')), named.substr(named.find(':')));
+  EXPECT_EQ(shell("'" QUOIN_TOOL "' info - --json < tiny.vox").out, run("info tiny.vox --json").out);
+  ASSERT_EQ(run("render tiny.vox -o named.png --size 32x24").status, 0);
+  EXPECT_EQ(shell("'" QUOIN_TOOL "' render - -o streamed.png --size 32x24 < tiny.vox").status, 0);
+  EXPECT_EQ(text_of(folder_.file("streamed.png")), text_of(folder_.file("named.png")));
+  for (const char* command : {"info -", "render - -o none.png"}) {
+    const ToolRun result = shell("'" QUOIN_TOOL "' " + std::string(command) + " < named.png");
+    EXPECT_EQ(result.status, 1);
+    EXPECT_TRUE(result.err.starts_with("quoin: standard input: not a file of any format")) << result.err;
+    EXPECT_FALSE(exists("none.png"));
+  }
+}
+
 TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
   const ToolRun through = shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb");

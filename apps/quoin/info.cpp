@@ -8,6 +8,7 @@
 #include <quoin/scene/scene_faces.h>
 
 #include "commands.h"
+#include "interrupt.h"
 #include "output.h"
 #include "volume_info.h"
 
@@ -212,9 +213,10 @@ std::string hierarchy_text(const LoadedScene& loaded) {
   return kept.empty() ? text : text + "Kept when saved as .vox: " + kept + "\n";
 }
 
-std::string info_text(const CommonOptions& options, const LoadedScene& loaded, const FaceCounts& faces) {
+std::string info_text(const CommonOptions& options, const std::string& name, const LoadedScene& loaded,
+                      const FaceCounts& faces) {
   const Scene& scene = loaded.scene;
-  std::string text = options.input.filename().string() + ": " + loaded.format + ", " +
+  std::string text = name + ": " + loaded.format + ", " +
                      count_of(static_cast<std::int64_t>(scene.grids().size()), "grid") + ", " +
                      count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
   text += "Voxels: " + with_thousands(scene.voxel_count()) + " of " +
@@ -230,17 +232,26 @@ std::string info_text(const CommonOptions& options, const LoadedScene& loaded, c
   return text;
 }
 
-int run_info(const CommonOptions& options) {
-  if (holds_volume(options.input)) return run_volume_info(options);
+Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
+  if (holds_volume(options.input)) return run_volume_info(options, streams);
   const auto loaded = load_scene(options.input, options.load);
-  if (!loaded) {
-    print_error(loaded.error());
-    return kFailed;
-  }
+  if (!loaded) return loaded.error();
   const FaceCounts faces = count_faces(loaded->scene, options.instances(), options.threads);
   if (options.json) return print_json(info_json(*loaded, options.instances(), faces));
   print_warnings(loaded->warnings);
-  return print(info_text(options, *loaded, faces));
+  return print(info_text(options, streams.name_of(options.input), *loaded, faces));
+}
+
+int run_info(CommonOptions& options) {
+  StandardStreams streams;
+  const Status read = streams.take_input(options.input);
+  const auto status = read ? info(options, streams) : Result<int>(read.error());
+  if (status) return *status;
+  const Error error = streams.named(status.error());
+  streams.remove();
+  die_if_interrupted();
+  print_error(error);
+  return kFailed;
 }
 
 }  // namespace
@@ -251,8 +262,9 @@ void add_info_command(CLI::App& app, int& status) {
   const auto options = std::make_shared<CommonOptions>();
   add_common_options(*command, *options);
   command->footer("Reads " + readable_extensions() +
-                  ".\nFaces are those of the models that are placed and not hidden, each model's once.\nExample: quoin "
-                  "info castle.vox");
+                  "; - is standard input.\n"
+                  "Faces are those of the models that are placed and not hidden, each model's once.\n"
+                  "Example: quoin info castle.vox");
   command->callback([options, &status] { status = run_info(*options); });
 }
 

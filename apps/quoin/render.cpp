@@ -16,6 +16,7 @@
 #include "progress_bar.h"
 #include "render_arguments.h"
 #include "scene_warnings.h"
+#include "standard_streams.h"
 #include "stopwatch.h"
 #include "volume_info.h"
 
@@ -317,11 +318,20 @@ std::string outcome_text(const Outcome& outcome) {
   return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
-int run_render(const RenderArguments& arguments) {
-  const auto outcome = render(arguments);
+/// Draws, with standard input as a file where IN is "-".
+Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams) {
+  if (Status read = streams.take_input(arguments.common.input); !read) return read.error();
+  return render(arguments);
+}
+
+int run_render(RenderArguments& arguments) {
+  StandardStreams streams;
+  const auto outcome = render_from(arguments, streams);
   if (!outcome) {
+    const Error error = streams.named(outcome.error());
+    streams.remove();
     die_if_interrupted();
-    print_error(outcome.error());
+    print_error(error);
     return kFailed;
   }
   if (arguments.common.json) return print_json(outcome_json(arguments, *outcome));
@@ -336,7 +346,7 @@ void add_render_command(CLI::App& app, int& status) {
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
   command->footer("Reads " + readable_extensions() +
-                  ". Positions are in world units, +Y up, as `quoin info` gives them.\n"
+                  "; - is standard input. Positions are in world units, +Y up, as `quoin info` gives them.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"

@@ -59,14 +59,13 @@ std::string three(const DVec3& v, const char* between) {
   return digits_for_people(v.x) + between + digits_for_people(v.y) + between + digits_for_people(v.z);
 }
 
-std::string volume_text(const CommonOptions& options, const Volume& volume) {
+std::string volume_text(const std::string& name, const Volume& volume) {
   const std::int64_t count = static_cast<std::int64_t>(volume.size.x) * volume.size.y * volume.size.z;
   const DBox bounds = bounds_of(volume);
   const std::string units = volume.units.empty() ? "" : " " + volume.units;
-  return options.input.filename().string() + ": " + volume.format + " volume\n" +
-         "Values: " + std::to_string(volume.size.x) + " x " + std::to_string(volume.size.y) + " x " +
-         std::to_string(volume.size.z) + " = " + with_thousands(count) + " of type " +
-         std::string(name_of(volume.type)) + "\n" + "Range: " + digits_for_people(volume.min) + " to " +
+  return name + ": " + volume.format + " volume\n" + "Values: " + std::to_string(volume.size.x) + " x " +
+         std::to_string(volume.size.y) + " x " + std::to_string(volume.size.z) + " = " + with_thousands(count) +
+         " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + digits_for_people(volume.min) + " to " +
          digits_for_people(volume.max) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
          "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + units + "\n";
 }
@@ -78,15 +77,12 @@ bool holds_volume(const std::filesystem::path& path) {
   return format && *format && format_info(**format).is_volume;
 }
 
-int run_volume_info(const CommonOptions& options) {
+Result<int> run_volume_info(const CommonOptions& options, const StandardStreams& streams) {
   const auto volume = read_volume(options.input);
-  if (!volume) {
-    print_error(volume.error());
-    return kFailed;
-  }
+  if (!volume) return volume.error();
   if (options.json) return print_json(volume_json(*volume));
   print_warnings(volume->warnings);
-  return print(volume_text(options, *volume));
+  return print(volume_text(streams.name_of(options.input), *volume));
 }
 
 }  // namespace quoin::tool

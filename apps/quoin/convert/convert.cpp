@@ -7,7 +7,6 @@
 
 #include <quoin/io/mesh_file.h>
 
-#include "convert/standard_streams.h"
 #include "field_occlusion.h"
 #include "interrupt.h"
 #include "output.h"
@@ -15,6 +14,7 @@
 #include "parse.h"
 #include "progress_bar.h"
 #include "scene_warnings.h"
+#include "standard_streams.h"
 #include "stopwatch.h"
 
 namespace quoin::tool {
@@ -160,11 +160,7 @@ Result<std::string> open_streams(ConvertOptions& options, const ManyOptions& man
     if (!file) return file.error();
     options.output = *file;
   }
-  if (options.common.input == kStandardStream) {
-    auto file = streams.input();
-    if (!file) return file.error();
-    options.common.input = *file;
-  }
+  if (Status read = streams.take_input(options.common.input); !read) return read.error();
   return std::string();
 }
 

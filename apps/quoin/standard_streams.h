@@ -20,10 +20,14 @@ class StandardStreams {
 
   /// Reads standard input to its end; the name of the file that has it. Errors: CannotRead, CannotWrite.
   [[nodiscard]] Result<std::filesystem::path> input();
+  /// Where the name is "-", does so and gives it the file's; from then on interrupts are heard of. Errors: those.
+  [[nodiscard]] Status take_input(std::filesystem::path& name);
   /// The name of a file with this ending, for `write_output`. Errors: CannotWrite.
   [[nodiscard]] Result<std::filesystem::path> output(const std::string& extension);
   /// Copies that file to standard output. Errors: CannotRead, CannotWrite.
   [[nodiscard]] Status write_output() const;
+  /// A file's name for people, without its folder.
+  [[nodiscard]] std::string name_of(const std::filesystem::path& path) const;
   /// The error in words of the streams, instead of the files' names.
   [[nodiscard]] Error named(Error error) const;
   /// Removes the folder.

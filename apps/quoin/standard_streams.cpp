@@ -1,4 +1,4 @@
-#include "convert/standard_streams.h"
+#include "standard_streams.h"
 
 #include <cerrno>
 #include <cstdio>
@@ -68,6 +68,15 @@ Result<std::filesystem::path> StandardStreams::input() {
   return input_;
 }
 
+Status StandardStreams::take_input(std::filesystem::path& name) {
+  if (name != kStandardStream) return {};
+  catch_interrupts();
+  auto file = input();
+  if (!file) return file.error();
+  name = std::move(*file);
+  return {};
+}
+
 Result<std::filesystem::path> StandardStreams::output(const std::string& extension) {
   if (Status made = make_folder(); !made) return made.error();
   output_ = folder_ / ("output" + extension);
@@ -78,6 +87,10 @@ Status StandardStreams::write_output() const {
   const File file = open(output_, "rb");
   if (file == nullptr) return make_error(ErrorCode::CannotRead, std::strerror(errno), output_.string());
   return copy(file.get(), stdout, output_.c_str(), "standard output");
+}
+
+std::string StandardStreams::name_of(const std::filesystem::path& path) const {
+  return !path.empty() && path == input_ ? "standard input" : path.filename().string();
 }
 
 Error StandardStreams::named(Error error) const {
