@@ -32,6 +32,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
     {"grid/coordinate_hash.h", {"live", "mesh", "scene", "trace"}},
+    {"grid/density/cell_corners.h", {"mesh", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/density/trilinear.h", {"scene", "trace"}},

@@ -27,7 +27,11 @@ struct DeviceBackend::Impl {
     if (has_thread()) on_surfaces = [this] { note_surfaces(); };
     drawer = std::make_unique<DeviceDrawer>(of_scene, given, std::move(opener), std::move(on_surfaces));
   }
-  ~Impl() { stop(); }
+  ~Impl() {
+    stop();
+    // Its workers tell by what is declared below, and so are to end before that.
+    drawer.reset();
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -165,7 +169,10 @@ Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_loc
   lock.unlock();
   if (Status opened = drawer->open(); !opened) return opened.error();
   lock.lock();
-  if (is_paused || is_stopped) return std::optional<ViewFrame>();
+  if (is_paused || is_stopped) {
+    has_surfaces = true;  // perhaps: nobody has looked
+    return std::optional<ViewFrame>();
+  }
   is_reading = true;
   lock.unlock();
   if (Status read = drawer->read_scene(); !read) return read.error();

@@ -24,7 +24,7 @@ Counted blocky(const std::string& name, workloads::Blocky which, bool occlusion,
   QuadOptions options;
   options.occlusion = occlusion;
   options.region = workloads::kInterior;
-  return {name, [=] { state->mesher.mesh(lone(state->chunk), state->types, options, state->quads); }};
+  return {name, [=] { state->mesher.mesh(isolated(state->chunk), state->types, options, state->quads); }};
 }
 
 Counted smooth(const std::string& name, workloads::Smooth which, SmoothOcclusion form, InstructionSet instructions) {

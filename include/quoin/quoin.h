@@ -2,20 +2,26 @@
 
 /// All of Quoin. Including one folder's headers instead builds faster.
 
+#include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>
 #include <quoin/core/buffer.h>
+#include <quoin/core/changes.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/direction_set.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/half.h>
+#include <quoin/core/hash.h>
 #include <quoin/core/image.h>
 #include <quoin/core/oriented_box.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
+#include <quoin/core/ref.h>
 #include <quoin/core/result.h>
 #include <quoin/core/slot_map.h>
 #include <quoin/core/thousands.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/array_view.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/connected.h>
 #include <quoin/grid/copy_box.h>
@@ -29,6 +35,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_file.h>
@@ -61,6 +68,7 @@
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/lamp.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_edit.h>

@@ -23,7 +23,7 @@ unsigned thread_count(Threads threads) {
 
 #ifdef QUOIN_PARALLEL_WITH_JTHREAD
 
-void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
+void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size_t i)> body) {
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_lock;
@@ -47,7 +47,7 @@ void parallel_for(std::size_t count, Threads threads, const std::function<void(s
 
 #else
 
-void parallel_for(std::size_t count, Threads threads, const std::function<void(std::size_t)>& body) {
+void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size_t i)> body) {
   // Asked for more workers than there are processors, oneTBB starts no more but complains on standard error.
   const auto processors = static_cast<unsigned>(std::max(1, oneapi::tbb::info::default_concurrency()));
   const unsigned workers = std::min(thread_count(threads), processors);

@@ -26,8 +26,8 @@ void make_room(std::vector<T>& all) {
 
 struct TypeRecord : TypeChange {
   void merge(const TypeRecord& other) {
-    visibility |= other.visibility;
-    colour |= other.colour;
+    visibility_changed |= other.visibility_changed;
+    colour_changed |= other.colour_changed;
   }
   [[nodiscard]] TypeChange change() const { return *this; }
 };
@@ -36,7 +36,7 @@ struct VoxelRegistry::Journal : ChangeJournal<TypeRecord> {};
 
 bool has_other_visibility(const TypeChanges& changes) {
   return changes.all || std::any_of(changes.items.begin(), changes.items.end(),
-                                    [](const TypeChange& change) { return change.visibility; });
+                                    [](const TypeChange& change) { return change.visibility_changed; });
 }
 
 VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::make_unique<Journal>()) {

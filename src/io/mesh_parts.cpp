@@ -83,8 +83,7 @@ const char* fault_of(const glm::dmat4& matrix) {
 bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
   constexpr double kMost = std::numeric_limits<float>::max();
   for (int i = 0; i < 8; ++i) {
-    const DVec3 corner{(i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y, (i & 4 ? box.max : box.min).z};
-    const DVec3 moved(moved_from_box * glm::dvec4(corner, 1.0));
+    const DVec3 moved(moved_from_box * glm::dvec4(box_corner(box, i), 1.0));
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::abs(moved[axis]) <= kMost)) return false;
     }

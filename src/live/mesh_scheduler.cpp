@@ -146,8 +146,8 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
       to[change.type] = true;
     }
   };
-  add(changed.visibility, &TypeChange::visibility);
-  add(changed.colour, &TypeChange::colour);
+  add(changed.visibility, &TypeChange::visibility_changed);
+  add(changed.colour, &TypeChange::colour_changed);
   if (options_.style == SurfaceStyle::Blocky && !changed.visibility.empty()) {
     types_.registry = std::make_shared<const VoxelRegistry>(types);
   }

@@ -37,9 +37,7 @@ DBox bounds_of(const std::vector<PlacedField>& fields) {
   for (const PlacedField& field : fields) {
     const IBox bounds = field.grid->field.bounds();
     for (int i = 0; i < 8; ++i) {
-      const DVec3 corner((i & 1 ? bounds.max : bounds.min).x, (i & 2 ? bounds.max : bounds.min).y,
-                         (i & 4 ? bounds.max : bounds.min).z);
-      const DVec3 point = world_from_grid(*field.instance, *field.grid, corner);
+      const DVec3 point = world_from_grid(*field.instance, *field.grid, box_corner(bounds, i));
       if (is_finite(point)) box.extend(point);
     }
   }

@@ -111,9 +111,9 @@ DVec3 direction_of(View view) {
   return kViews[static_cast<std::size_t>(view)].forward;
 }
 
-DVec3 direction_of_view(double azimuth, double elevation) {
-  const double a = azimuth * std::numbers::pi / 180.0;
-  const double e = elevation * std::numbers::pi / 180.0;
+DVec3 direction_of_view(double azimuth_degrees, double elevation_degrees) {
+  const double a = azimuth_degrees * std::numbers::pi / 180.0;
+  const double e = elevation_degrees * std::numbers::pi / 180.0;
   return glm::normalize(-DVec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e)));
 }
 

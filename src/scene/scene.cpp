@@ -289,11 +289,7 @@ DBox Scene::bounds(InstanceFilter filter) const {
     if (grid == nullptr || !passes(filter, *this, instance) || !has_place(instance)) continue;
     const IBox tight = grid->bounds();
     if (tight.empty()) continue;
-    for (int corner = 0; corner < 8; ++corner) {
-      const DVec3 point{(corner & 1) != 0 ? tight.max.x : tight.min.x, (corner & 2) != 0 ? tight.max.y : tight.min.y,
-                        (corner & 4) != 0 ? tight.max.z : tight.min.z};
-      box.extend(world_from_grid(instance, *grid, point));
-    }
+    for (int i = 0; i < 8; ++i) box.extend(world_from_grid(instance, *grid, box_corner(tight, i)));
   }
   return box;
 }

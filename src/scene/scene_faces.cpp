@@ -43,7 +43,7 @@ struct ChunkCount {
 bool has_any_of(const Grid& grid, const TypeChanges& changes) {
   const std::vector<VoxelType> types = grid.types();
   return changes.all || std::ranges::any_of(changes.items, [&](const TypeChange& change) {
-           return change.visibility && std::ranges::binary_search(types, change.type);
+           return change.visibility_changed && std::ranges::binary_search(types, change.type);
          });
 }
 

@@ -101,6 +101,33 @@ Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, d
   return even;
 }
 
+/// The field of a volume at equal distances.
+Result<DensityGrid> field_of(const Volume& volume, const Lattice& lattice, double step,
+                             const VolumeFieldOptions& options, Threads threads, const Progress& progress) {
+  const auto samples = static_cast<std::size_t>(std::max(volume.size.x, 0)) *
+                       static_cast<std::size_t>(std::max(volume.size.y, 0)) *
+                       static_cast<std::size_t>(std::max(volume.size.z, 0));
+  const DVec3 spacing = lattice.spacing;
+  const bool is_even = std::max(std::max(spacing.x, spacing.y), spacing.z) <= step * (1.0 + kUneven);
+  // What field_from_volume refuses it says itself.
+  const bool is_sound = samples > 0 && volume.values.size() == samples;
+  if (is_even || !is_sound) return field_from_volume(volume, options, threads, progress);
+  const auto even = with_even_spacing(volume, lattice, step, threads);
+  if (!even) return even.error();
+  return field_from_volume(*even, options, threads, progress);
+}
+
+Instance placed_by(const Lattice& lattice, double step) {
+  Instance placed;
+  placed.position = lattice.corner;
+  placed.voxel_size = step;
+  glm::dmat3 axes = lattice.axes;
+  placed.mirrored = glm::determinant(axes) < 0.0;
+  if (placed.mirrored) axes[0] = -axes[0];
+  placed.rotation = glm::normalize(glm::quat_cast(axes));
+  return placed;
+}
+
 }  // namespace
 
 Result<Scene> scene_from_volume(const Volume& volume, const VolumeSceneOptions& options, Threads threads,
@@ -116,34 +143,14 @@ Result<Scene> scene_from_volume(const Volume& volume, const VolumeSceneOptions& 
 
   const DVec3 spacing = lattice->spacing;
   const double step = std::min(std::min(spacing.x, spacing.y), spacing.z);
-  const VolumeFieldOptions wanted{options.iso, *material};
-  const auto samples = static_cast<std::size_t>(std::max(volume.size.x, 0)) *
-                       static_cast<std::size_t>(std::max(volume.size.y, 0)) *
-                       static_cast<std::size_t>(std::max(volume.size.z, 0));
-  const bool is_even = std::max(std::max(spacing.x, spacing.y), spacing.z) <= step * (1.0 + kUneven);
-  // What field_from_volume refuses it says itself.
-  const bool is_sound = samples > 0 && volume.values.size() == samples;
-  Result<DensityGrid> field = make_error(ErrorCode::InvalidArgument, "no field");
-  if (is_even || !is_sound) {
-    field = field_from_volume(volume, wanted, threads, progress);
-  } else {
-    const auto even = with_even_spacing(volume, *lattice, step, threads);
-    if (!even) return even.error();
-    field = field_from_volume(*even, wanted, threads, progress);
-  }
+  auto field = field_of(volume, *lattice, step, {options.iso, *material}, threads, progress);
   if (!field) return field.error();
 
   SceneGrid grid;
   grid.name = volume.name;
   grid.field = std::move(*field);
-  Instance placed;
+  Instance placed = placed_by(*lattice, step);
   placed.name = volume.name;
-  placed.position = lattice->corner;
-  placed.voxel_size = step;
-  glm::dmat3 axes = lattice->axes;
-  placed.mirrored = glm::determinant(axes) < 0.0;
-  if (placed.mirrored) axes[0] = -axes[0];
-  placed.rotation = glm::normalize(glm::quat_cast(axes));
   placed.grid = scene.add_grid(std::move(grid));
   scene.add_instance(std::move(placed));
   return scene;

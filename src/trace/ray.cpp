@@ -77,8 +77,7 @@ std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays) {
   return blocked;
 }
 
-void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
-                const std::function<bool(const VoxelSpan&)>& visit) {
+void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t, FunctionRef<bool(const VoxelSpan&)> visit) {
   trace::visit_spans(
       tree, ray, max_t, [](Walk& walk) { walk.leave_voxel(); }, visit);
 }

@@ -58,16 +58,17 @@ class AxisOrientation {
     return 8 * order + int{is_negated_[0]} + 2 * int{is_negated_[1]} + 4 * int{is_negated_[2]};
   }
 
-  /// The axis that becomes `axis`, 0 to 2, and whether it is negated on the way. Requires: 0 <= axis < 3.
+  /// The axis (0 x, 1 y, 2 z) that becomes `axis`. Requires: 0 <= axis < 3.
   [[nodiscard]] constexpr int source_axis(int axis) const {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     return source_[static_cast<std::size_t>(axis)];
   }
+  /// Whether `axis` points the other way than the one that becomes it. Requires: 0 <= axis < 3.
   [[nodiscard]] constexpr bool is_negated(int axis) const {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     return is_negated_[static_cast<std::size_t>(axis)];
   }
-  /// Whether it makes left hands of right ones.
+  /// Whether it mirrors: makes left hands of right ones.
   [[nodiscard]] constexpr bool is_mirrored() const {
     return (is_negated_[0] != is_negated_[1]) != (is_negated_[2] == is_cyclic());
   }
@@ -84,6 +85,7 @@ class AxisOrientation {
   /// A box of that size, turned.
   [[nodiscard]] IVec3 size_of(IVec3 size) const { return {size[source_[0]], size[source_[1]], size[source_[2]]}; }
 
+  /// The one that turns back what this turned.
   [[nodiscard]] constexpr AxisOrientation inverse() const {
     AxisOrientation back;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -102,6 +104,7 @@ class AxisOrientation {
     }
     return both;
   }
+  /// The same as a matrix for column vectors.
   [[nodiscard]] glm::dmat3 matrix() const {
     glm::dmat3 columns(0.0);
     for (int i = 0; i < 3; ++i) columns[source_axis(i)][i] = is_negated(i) ? -1.0 : 1.0;

@@ -9,8 +9,9 @@
 
 namespace quoin {
 
-/// A growing array of plain values that never writes what nobody asked for: new elements are uninitialised. For output
-/// that is written by the hundred thousand and reused.
+/// A growing array of plain values whose new elements are uninitialised: for output that is written by the hundred
+/// thousand and reused. Moved, never copied. `data` and iterators are good until it grows beyond its capacity.
+/// Requires: indices are less than `size()`; this is not checked.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -42,8 +43,9 @@ class Buffer {
   [[nodiscard]] const T* end() const { return values_.get() + size_; }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
 
+  /// Keeps the memory.
   void clear() { size_ = 0; }
-  /// Elements beyond the old size are uninitialised. Invalidates pointers when it grows beyond the capacity.
+  /// Elements beyond the old size are uninitialised.
   void resize(std::size_t size) {
     reserve(size);
     size_ = size;

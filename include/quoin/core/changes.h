@@ -41,8 +41,8 @@ struct Changes {
 
 class EditNotices;
 
-/// By which a container tells the one that holds it (a grid its scene) that it was edited. It stays where it is when
-/// the container's content is moved.
+/// Part of Grid and DensityGrid, of no use to callers: by it a container tells the one that holds it (a grid its scene)
+/// that it was edited. It stays where it is when the container's content is moved.
 class EditNotice {
  public:
   EditNotice() = default;

@@ -29,6 +29,7 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
                                                          FaceFrame{1, +1, 2, 0}, FaceFrame{1, -1, 0, 2},
                                                          FaceFrame{2, +1, 0, 1}, FaceFrame{2, -1, 1, 0}};
 
+/// The frame of a direction's faces.
 [[nodiscard]] constexpr const FaceFrame& frame_of(Direction d) {
   return kFaceFrames[static_cast<std::size_t>(d)];
 }
@@ -40,7 +41,7 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
   return n;
 }
 
-/// The direction along which a vector points most; x before y before z. PosX of none.
+/// The direction along which a vector points most; of equal ones x before y before z. PosX for a vector of 0.
 [[nodiscard]] inline Direction nearest_direction(const DVec3& vector) {
   int axis = 0;
   for (int other = 1; other < 3; ++other) {

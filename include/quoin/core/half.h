@@ -8,6 +8,7 @@ namespace quoin {
 /// The bits of an IEEE 754 half: 11 bits of precision, up to 65,504, down to 2^-24.
 using Half = std::uint16_t;
 
+/// The largest finite half, and the smallest above 0.
 inline constexpr float kMaxHalf = 65504.0F;
 inline constexpr float kMinHalf = 1.0F / 16777216.0F;
 

@@ -13,7 +13,7 @@ struct Image {
   std::vector<std::uint8_t> rgb;  ///< 3 * width * height
 };
 
-/// One float a pixel, rows from the top: depth.
+/// One float a pixel, rows from the top, pixels from the left; pictures have their depth so.
 struct FloatImage {
   int width = 0;
   int height = 0;

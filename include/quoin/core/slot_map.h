@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed.
+/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
 template <class T>
 struct Handle {
   std::uint32_t index = 0xFFFFFFFFu;
@@ -47,6 +47,7 @@ class SlotMap {
   }
   ~SlotMap() = default;
 
+  /// Puts a value in a free slot. Returns its handle.
   /// Errors: bad_alloc, and what moving a T throws; the map is then as it was.
   Handle<T> insert(T value) {
     const std::uint32_t index = next_index();
@@ -64,7 +65,7 @@ class SlotMap {
   /// The slot that the next element is put into: Handle::index of what `insert` returns.
   [[nodiscard]] std::uint32_t next_index() const { return free_.empty() ? count_ : free_.back(); }
 
-  /// Returns false when the handle names nothing.
+  /// Ends the element and its handle. Returns false when the handle names nothing.
   bool remove(Handle<T> handle) {
     if (find(handle) == nullptr) return false;
     free_.push_back(handle.index);  // first, since it may throw
@@ -75,7 +76,7 @@ class SlotMap {
     return true;
   }
 
-  /// Null when the handle names nothing (never inserted, or removed since).
+  /// Null when the handle names nothing (never inserted, or removed since). Lifetime: the map owns the element.
   [[nodiscard]] const T* find(Handle<T> handle) const {
     if (handle.index >= count_) return nullptr;
     const Slot& slot = slot_at(handle.index);

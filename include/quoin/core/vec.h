@@ -46,7 +46,7 @@ struct IBox {
   return {glm::min(a.min, b.min), glm::max(a.max, b.max)};
 }
 
-/// What both boxes cover; empty when they do not meet.
+/// The box that both cover; empty when they do not meet.
 [[nodiscard]] inline IBox intersect(const IBox& a, const IBox& b) {
   return {glm::max(a.min, b.min), glm::min(a.max, b.max)};
 }
@@ -57,10 +57,20 @@ struct DBox {
   DVec3 max{-std::numeric_limits<double>::infinity()};
 
   [[nodiscard]] bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
+  /// Grows to hold a point.
   void extend(DVec3 p) {
     min = glm::min(min, p);
     max = glm::max(max, p);
   }
 };
+
+/// Corner 0 to 7 of a box: at its greater x, y and z where bit 0, 1 and 2 of `index` are set.
+[[nodiscard]] inline DVec3 box_corner(const DBox& box, int index) {
+  return {((index & 1) != 0 ? box.max : box.min).x, ((index & 2) != 0 ? box.max : box.min).y,
+          ((index & 4) != 0 ? box.max : box.min).z};
+}
+[[nodiscard]] inline DVec3 box_corner(const IBox& box, int index) {
+  return box_corner(DBox{DVec3(box.min), DVec3(box.max)}, index);
+}
 
 }  // namespace quoin

@@ -9,7 +9,9 @@
 
 namespace quoin {
 
-/// Somebody else's dense array of numbers on a regular lattice, as NumPy, ITK and simulations hold them; owns nothing.
+/// A caller's dense array of numbers on a regular lattice, as NumPy, ITK and simulations hold them.
+///
+/// Lifetime: owns nothing; the array must outlive it, unchanged while it is read.
 ///
 /// Sample (i, j, k) is at `data` + i * strides[0] + j * strides[1] + k * strides[2], in the machine's byte order, and
 /// lies at `origin` + `spacing` * (i, j, k). The axes 0, 1 and 2 are x, y and z of what is made of it, whichever of
@@ -20,7 +22,7 @@ struct ArrayView {
   std::array<std::int64_t, 3> size{};     ///< samples along each axis
   std::array<std::int64_t, 3> strides{};  ///< bytes from a sample to the next, of any sign; 0 repeats the same ones;
                                           ///< samples need not be aligned
-  DVec3 spacing{1.0};                     ///< of either sign, not 0
+  DVec3 spacing{1.0};                     ///< of neighbours, in the caller's unit; of either sign, not 0
   DVec3 origin{0.0};                      ///< where sample (0, 0, 0) lies
 };
 
@@ -38,7 +40,8 @@ struct ArrayView {
   return {bytes, bytes * size[0], bytes * size[0] * size[1]};
 }
 
-/// A volume's values, with its spacing; its `world_from_voxel` is left to the caller.
+/// A volume's values, with its spacing; its `world_from_voxel` is left to the caller. Lifetime: the volume must outlive
+/// the view, unchanged.
 [[nodiscard]] inline ArrayView view_of(const Volume& volume) {
   ArrayView view;
   view.data = volume.values.data();

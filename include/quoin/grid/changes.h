@@ -16,7 +16,7 @@ class DensityGrid;
 struct ChunkChange {
   IVec3 chunk{0};
   IBox box;  ///< the smallest around them, in the chunk's coordinates
-  /// Bit (dz + 1) * 9 + (dy + 1) * 3 + (dx + 1): the chunk at that offset holds one of their 26 neighbours.
+  /// Bit Neighbourhood::index(dx, dy, dz): the chunk at that offset holds one of their 26 neighbours.
   std::uint32_t neighbours = 0;
 
   /// Whether the mesh of the chunk at an offset of -1 to 1 on each axis may have changed.
@@ -35,8 +35,8 @@ using GridChanges = Changes<ChunkChange>;
 struct DensityChange {
   IVec3 chunk{0};
   IBox box;  ///< the smallest around them, in the chunk's coordinates
-  /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]: how many samples past its own the chunk at that offset has to read to
-  /// come upon one of them; 0 for the chunk itself.
+  /// [Neighbourhood::index(dx, dy, dz)]: how many samples past its own the chunk at that offset has to read to come
+  /// upon one of them; 0 for the chunk itself.
   std::array<std::uint8_t, 27> distance{};
 
   /// Whether the chunk at an offset of -1 to 1 on each axis, grown by `reach` samples (0 to 64), holds one of them.

@@ -45,6 +45,7 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 /// itself.
 class Chunk {
  public:
+  /// All voxels of one type.
   explicit Chunk(VoxelType uniform = kAir);
   Chunk(const Chunk& other);
   Chunk(Chunk&& other) noexcept;
@@ -53,7 +54,7 @@ class Chunk {
   ~Chunk();
 
   /// From 64^3 types, x fastest, then y, then z. The smallest storage that holds them.
-  static Chunk from_dense(std::span<const VoxelType, kChunkVoxels> types);
+  [[nodiscard]] static Chunk from_dense(std::span<const VoxelType, kChunkVoxels> types);
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
@@ -62,12 +63,14 @@ class Chunk {
   /// Sets the voxels of one row along x whose bits are set in `mask`; returns which of them had another type before.
   /// Requires: 0 <= y, z < 64.
   std::uint64_t fill_row(int y, int z, std::uint64_t mask, VoxelType type);
-  /// Sets the 64 voxels of one row; returns which of them had another type before.
+  /// Sets the 64 voxels of one row; returns which of them had another type before. Requires: 0 <= y, z < 64.
   std::uint64_t write_row(int y, int z, std::span<const VoxelType, kChunkEdge> types) {
     return write_row(y, z, ~std::uint64_t{0}, types);
   }
   /// Sets those of the 64 voxels of one row whose bits are set in `mask`; returns which had another type before.
+  /// Requires: 0 <= y, z < 64.
   std::uint64_t write_row(int y, int z, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
+  /// Copies the types of one row to `out`. Requires: 0 <= y, z < 64.
   void read_row(int y, int z, std::span<VoxelType, kChunkEdge> out) const;
   /// Returns true when the voxel had another type before. Requires: 0 <= x, y, z < 64.
   bool set(int x, int y, int z, VoxelType type);
@@ -77,17 +80,19 @@ class Chunk {
   /// Sets the voxels of a box (clipped to the chunk); calls `on_change` for every row in which some had another type.
   void fill_box(const IBox& box, VoxelType type, FunctionRef<void(int y, int z, std::uint64_t changed)> on_change);
 
-  /// Which of a row's voxels have this type. Requires: as for every row, 0 <= y, z < 64.
+  /// Which of a row's voxels have this type. Requires: 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t row_mask(int y, int z, VoxelType type) const;
 
   /// The one type of the whole chunk, if it is stored as such.
   [[nodiscard]] std::optional<VoxelType> uniform() const {
     return storage_ == nullptr ? std::optional(uniform_) : std::nullopt;
   }
+  /// Cost: O(1), as every count of voxels but `count`.
   [[nodiscard]] int non_air_count() const;
   /// Whether no voxel is air.
   [[nodiscard]] bool is_full() const { return non_air_count() == static_cast<int>(kChunkVoxels); }
-  /// Whether a copy of the other has not been written since, nor this: equal without a look. False says nothing.
+  /// Whether both still share one storage, as a copy and its original do until one of them is written. True means that
+  /// they are equal; false means nothing.
   [[nodiscard]] bool shares_storage_with(const Chunk& other) const {
     return storage_ == other.storage_ && (storage_ != nullptr || uniform_ == other.uniform_);
   }

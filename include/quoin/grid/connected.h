@@ -62,7 +62,7 @@ class ConnectedPieces {
   /// When it throws (bad_alloc), call it again before anything else.
   void update(const Grid& grid, Threads threads = {});
 
-  /// As of the last update. Good until the next one.
+  /// As of the last update; the index of a piece is its number in all calls. Lifetime: until the next update.
   [[nodiscard]] std::span<const ConnectedPiece> pieces() const;
   [[nodiscard]] std::size_t size() const { return pieces().size(); }
 

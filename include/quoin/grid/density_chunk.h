@@ -42,10 +42,12 @@ class DensityChunk {
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] Half get(int x, int y, int z) const;
-  /// Which samples of a row are solid (below 0).
+  /// Which samples of a row are solid (below 0). Requires: 0 <= y, z < 64, as for every row.
   [[nodiscard]] std::uint64_t solid_row(int y, int z) const;
   /// The 64 samples of a row, or null where its slab, or the chunk, is of one value: `get` of any of them.
+  /// Lifetime: until the chunk is written, assigned or destroyed.
   [[nodiscard]] const Half* row(int y, int z) const;
+  /// Copies the densities of one row to `out`.
   void read_row(int y, int z, std::span<Half, kChunkEdge> out) const;
 
   /// Returns which samples of the row had another density before. Slabs stay expanded until `unite_slabs`.
@@ -64,7 +66,7 @@ class DensityChunk {
 
   /// Whether every sample is solid. Cost: O(4096).
   [[nodiscard]] bool is_full() const;
-  /// Whether a copy of the other has not been written since, nor this: equal without a look. False says nothing.
+  /// As Chunk::shares_storage_with, of densities and materials.
   [[nodiscard]] bool shares_storage_with(const DensityChunk& other) const {
     return storage_ == other.storage_ && (storage_ != nullptr || uniform_ == other.uniform_) &&
            materials_.shares_storage_with(other.materials_);
@@ -72,11 +74,13 @@ class DensityChunk {
   /// As Chunk::content_hash, of densities and materials. Cost: up to 0.2 ms.
   [[nodiscard]] std::uint64_t content_hash() const;
 
+  /// The samples' materials; what is written into them counts as a write to this chunk.
   [[nodiscard]] const Chunk& materials() const { return materials_; }
   [[nodiscard]] Chunk& materials() { return materials_; }
   /// Bytes held, this object and its materials included.
   [[nodiscard]] std::size_t bytes() const;
 
+  /// Whether a stored density is below 0.
   [[nodiscard]] static constexpr bool is_solid(Half density) { return (density & 0x8000U) != 0; }
 
   /// The storage, laid out as is best for the library's own kernels; null when the chunk is uniform.

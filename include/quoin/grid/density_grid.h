@@ -41,7 +41,9 @@ class DensityGrid {
   /// As Grid::snapshot.
   [[nodiscard]] DensityGrid snapshot() const;
 
+  /// The distance beyond which densities are clamped, in samples.
   [[nodiscard]] float band() const;
+  /// What is stored at a sample: `band` and kAir where nothing was set.
   [[nodiscard]] float density(IVec3 sample) const;
   [[nodiscard]] VoxelType material(IVec3 sample) const;
   /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, and at NaN, far
@@ -51,7 +53,7 @@ class DensityGrid {
   /// 0 outside the int32 range, and at NaN.
   [[nodiscard]] DVec3 gradient_at(DVec3 point) const;
 
-  /// True when density or material was another before.
+  /// Returns true when density or material was another before.
   bool set(IVec3 sample, DensitySample value);
 
   /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges, at most until its shortest side is
@@ -102,13 +104,15 @@ class DensityGrid {
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Requires: its densities are `stored_density`
   /// of this band. The outermost chunks are ignored.
   void put_chunk(IVec3 chunk, DensityChunk samples);
+  /// Makes everything far air, as an edit.
   void clear();
 
-  /// Null where all is far air.
+  /// Null where all is far air. Lifetime: as Grid::find_chunk.
   [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;
   /// Coordinates of all chunks that are not far air, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
+  /// The chunk and the 26 around it, for meshers. Lifetime: the grid must outlive it, and an edit ends it.
   [[nodiscard]] DensityNeighbourhood neighbourhood(IVec3 chunk) const;
   /// The smallest box around all solid samples; empty when there are none.
   /// Cost: O(chunks * 4096) the first time, then that of the chunks that changed.
@@ -116,6 +120,7 @@ class DensityGrid {
   /// The smallest box of whole coordinates within which the trilinear field is negative anywhere: the solid lies
   /// between its sides. Empty where there is none. Cost: as `solid_bounds`.
   [[nodiscard]] IBox bounds() const;
+  /// How many samples are solid. Cost: as `solid_bounds`.
   [[nodiscard]] std::int64_t solid_count() const;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.

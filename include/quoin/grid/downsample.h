@@ -24,7 +24,7 @@ namespace quoin {
 /// Cost:    1.3 to 3 milliseconds a chunk of the result, of caves and several types.
 [[nodiscard]] Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-/// One chunk of `halved(grid, types)`: `chunk` is among its chunks.
+/// One chunk of `halved(grid, types)`, by its place among that grid's chunks.
 ///
 /// Reads the voxels that its cells stand for and two past them on each side, and no others: an edit elsewhere leaves it
 /// as it was.
@@ -113,7 +113,7 @@ class DensityPyramid {
   /// The field halved `level` times. Lifetime: as GridPyramid::level.
   /// Requires: 1 <= level <= levels().
   [[nodiscard]] const DensityGrid& level(int level) const;
-  /// Requires: 1 <= level <= levels().
+  /// What halving to `level` has kept. Lifetime: as `level`. Requires: 1 <= level <= levels().
   [[nodiscard]] const HalvedDensityCounts& counts(int level) const;
 
  private:

@@ -40,11 +40,12 @@ class Grid {
   /// snapshot shares it.
   [[nodiscard]] Grid snapshot() const;
 
+  /// The voxel's type; kAir where nothing was set.
   // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
   [[nodiscard]] VoxelType get(IVec3 voxel) const { return get(voxel.x, voxel.y, voxel.z); }
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
 
-  /// Returns true when the voxel had another type before.
+  /// Sets one voxel. Returns true when it had another type before. Of many, `edit` or a GridWriter is faster.
   bool set(IVec3 voxel, VoxelType type) { return set(voxel.x, voxel.y, voxel.z, type); }
   bool set(int x, int y, int z, VoxelType type);
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
@@ -77,6 +78,7 @@ class Grid {
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many voxels changed. The outermost
   /// chunks are ignored.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
+  /// Makes everything air, as an edit.
   void clear();
 
   /// Null where all is air. Lifetime: the grid owns the chunk, and its next edit may end it; a copy of the chunk costs
@@ -86,6 +88,7 @@ class Grid {
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
+  /// The chunk and the 26 around it, for meshers. Lifetime: the grid must outlive it, and an edit ends it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
@@ -178,7 +181,7 @@ class GridReader {
 /// comes to another row, when it is flushed, and at its end. Until then the grid is as it was.
 ///
 /// Lifetime: the grid must outlive the writer.
-/// Requires: nobody reads the grid before a flush and expects what was set.
+/// Requires: nothing reads the grid before a flush and expects what was set.
 /// Cost:     where voxels come in rows, a tenth of `Grid::set`; where every voxel lies in another row, more than that.
 class GridWriter {
  public:
@@ -196,6 +199,7 @@ class GridWriter {
     types_[static_cast<std::size_t>(local)] = type;
     is_set_[static_cast<std::size_t>(local)] = 1;
   }
+  /// Sets what was collected. Errors: bad_alloc; that row is then not set.
   void flush();
 
  private:

@@ -16,8 +16,9 @@ struct Neighbourhood {
   /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]; the centre is 13.
   std::array<const Chunk*, 27> chunks{};
 
-  /// The offset of the chunk at an index: -1 to 1 on each axis.
+  /// The offset of the chunk at an index, the inverse of `index`: -1 to 1 on each axis.
   [[nodiscard]] static IVec3 offset(int index) { return {index % 3 - 1, index / 3 % 3 - 1, index / 9 - 1}; }
+  /// The index of the chunk at an offset of -1 to 1 on each axis.
   [[nodiscard]] static std::size_t index(int dx, int dy, int dz) {
     return static_cast<std::size_t>((dz + 1) * 9 + (dy + 1) * 3 + (dx + 1));
   }
@@ -32,8 +33,8 @@ struct Neighbourhood {
   }
 };
 
-/// A neighbourhood in which only the centre is there.
-[[nodiscard]] inline Neighbourhood lone(const Chunk& chunk) {
+/// A neighbourhood of a chunk with nothing around it. Lifetime: as Neighbourhood.
+[[nodiscard]] inline Neighbourhood isolated(const Chunk& chunk) {
   Neighbourhood n;
   n.chunks[13] = &chunk;
   return n;

@@ -62,8 +62,9 @@ struct Volume {
 /// How many metres a unit of length has: "m", "cm", "mm", "um" and "nm", also spelt out; nothing for others.
 [[nodiscard]] std::optional<double> metres_of_unit(std::string_view unit);
 
-/// A value between the two groups into which the finite values part best: the one that leaves the least variance within
-/// the groups, by a histogram of 1,024 bins; amid the gap where there is one. The value itself where all are the same.
+/// A threshold between the two groups into which the finite values part best: the one that leaves the least variance
+/// within the groups, by a histogram of 1,024 bins; amid the gap where there is one. The value itself where all are the
+/// same.
 ///
 /// Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms" (1979).
 [[nodiscard]] float volume_threshold(const Volume& volume);

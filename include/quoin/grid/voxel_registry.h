@@ -47,15 +47,15 @@ struct VoxelProperties {
   bool operator==(const VoxelProperties&) const = default;
 };
 
-/// A type that was added or replaced.
+/// A type that was added, or replaced by one that may differ in other properties alone.
 struct TypeChange {
   VoxelType type = kAir;
-  bool visibility = false;  ///< is another; what is not registered counts as opaque
-  bool colour = false;      ///< is another; added ones always
+  bool visibility_changed = false;  ///< what is not registered counts as opaque
+  bool colour_changed = false;      ///< always where the type was added
 };
 using TypeChanges = Changes<TypeChange>;
 
-/// Whether any type blocks or lets through light otherwise than before, or may do so.
+/// Whether the visibility of any type changed, or may have: then more than chunks has to be meshed and traced anew.
 [[nodiscard]] bool has_other_visibility(const TypeChanges& changes);
 
 /// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.

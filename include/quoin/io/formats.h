@@ -12,7 +12,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/io/vox.h>
+#include <quoin/io/loaded_scene.h>
 
 namespace quoin {
 

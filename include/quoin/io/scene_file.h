@@ -12,7 +12,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
-#include <quoin/io/vox.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
@@ -70,8 +70,9 @@ struct SceneFile {
 ///         ("grids[0].voxels[2]: byte 37 of the voxel data: ...").
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
 
-/// A scene as a file that holds it all: every type, every grid with its voxels (snapshots, which cost pointers), and an
-/// instance each. Handles become places in the lists, in their order. Add a sun and a camera, if there are any.
+/// A scene as a file that holds it all: every type, every grid with its voxels and its field (snapshots, which cost
+/// pointers), its groups, layers and lamps, and an instance each. Handles become places in the lists, in their order.
+/// Add a sun and a camera, if there are any.
 ///
 /// Errors: InvalidArgument for an instance whose grid is not there.
 [[nodiscard]] Result<SceneFile> scene_file_of(const Scene& scene);

@@ -3,44 +3,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
-#include <quoin/scene/camera.h>
+#include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
-
-/// A .vox file as it was read, with all that a scene has no place for: see write_vox.
-struct VoxSource;
-
-/// What reading a file gave.
-struct LoadedScene {
-  Scene scene;
-  std::string format;                 ///< "vox", ...
-  std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
-  std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
-  std::optional<Camera> camera;       ///< where the file has one
-  bool names_files = false;           ///< models came from other files, which saving would put into this one
-  std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
-};
-
-struct LoadOptions {
-  bool show_hidden = false;  ///< what is hidden (instances, groups, layers) becomes visible
-  int frame = 0;             ///< which animation frame to show
-  /// Whether LoadedScene::source is set, so that writing a .vox file again keeps what scenes cannot hold. It takes the
-  /// file's size, and of chunks that are edited later what they were.
-  bool keep_source = true;
-  /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
-  std::optional<float> iso = std::nullopt;
-  Threads threads = {};  ///< for the field of a volume
-};
 
 /// MagicaVoxel's format, versions 150 and 200.
 ///

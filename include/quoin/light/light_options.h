@@ -16,7 +16,8 @@ enum class OcclusionMode : std::uint8_t {
   Vertex,  ///< the occlusion of the face's four corners, interpolated over its triangles, as blocky meshes carry it:
            ///< it knows of the face's own grid only. Fields, which have no such corners, have Rays
   Smooth,  ///< of fields as their smooth meshes carry it (smooth_occlusion), at every point: it knows of the own field
-           ///< only, and costs half of what rays do. Blocks have Vertex. Drawn by the processor; meshes as with Vertex
+           ///< only, and costs half of what rays do. Blocks have Vertex. CpuRenderer alone marches it; VulkanRenderer
+           ///< refuses it, VulkanMeshRenderer takes it as Vertex
 };
 
 /// What ambient occlusion darkens.
@@ -45,8 +46,8 @@ struct LightOptions {
   int occlusion_rays = 9;           ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
   double occlusion_distance = 6.0;  ///< voxels
   SmoothOcclusionOptions smooth;    ///< of OcclusionMode::Smooth
-  double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels
-  double exposure = 1.0;
+  double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels; beyond it nothing casts a shadow
+  double exposure = 1.0;        ///< times all light of a surface, before it is clamped to 0..1
   double sun_brightness = 1.0;  ///< times the sun's light; 0: night
   double sky_brightness = 1.0;  ///< times the ambient light, and the sky behind everything
   /// Whether the colours of the sky, of the ambient light and of the sun follow how high the sun stands in the world

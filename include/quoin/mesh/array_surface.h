@@ -45,7 +45,8 @@ struct ArraySurface {
 ///           cell.
 /// Quads:    one around each crossed edge, split along the diagonal that is shorter in space.
 /// Normals:  the gradient of the trilinear field at the vertex, in space; (0, 1, 0) where that is 0.
-/// Faces:    turned right whatever the strides and the signs of the spacing: nothing is mirrored.
+/// Winding:  counter-clockwise seen from the air whatever the strides and the signs of the spacing: nothing is
+///           mirrored.
 /// Closed:   every edge has an even number of triangles (but for the ends of an open border), as many in one direction
 ///           as in the other; two with `split_sheets`. Without, two sheets that pass through one cell share its vertex,
 ///           and an edge of two such cells may have four triangles: the mesh is then not manifold there.

@@ -30,9 +30,10 @@ struct BlockyTriangles {
   std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise from outside
 };
 
+/// The mesh of a whole grid.
 struct BlockyMesh {
-  std::array<BlockyTriangles, kSurfaceClasses> surfaces;
-  std::int64_t faces_total = 0;  ///< 6 x non-air voxels
+  std::array<BlockyTriangles, kSurfaceClasses> surfaces;  ///< [SurfaceClass]
+  std::int64_t faces_total = 0;                           ///< 6 x non-air voxels
   std::int64_t faces_visible = 0;
   std::int64_t quads = 0;
 
@@ -41,8 +42,8 @@ struct BlockyMesh {
 };
 
 struct BlockyMeshOptions {
-  bool merge = true;
-  bool occlusion = true;
+  bool merge = true;        ///< as QuadOptions::merge
+  bool occlusion = true;    ///< as QuadOptions::occlusion
   bool watertight = false;  ///< subdivide outlines so that no vertex lies inside another triangle's edge
 };
 

@@ -24,7 +24,7 @@ struct LabelSurfaceOptions {
 /// The faces between two labels: a range of the triangles.
 struct LabelInterface {
   std::int64_t back = 0;   ///< the label behind the faces; never the background
-  std::int64_t front = 0;  ///< the label before them: the background, or else the lesser of both
+  std::int64_t front = 0;  ///< the label in front of them: the background, or else the lesser of both
   std::size_t first_index = 0;
   std::size_t index_count = 0;
 };
@@ -49,7 +49,7 @@ struct LabelSurfaces {
 /// Labels:   each triangle has exactly two. The triangles of the interfaces of one label are its surface, which is
 ///           closed: every edge has an even number of them, and four only where the label touches itself along an edge.
 ///           Two neighbours' surfaces share the triangles of their interface, to the bit.
-/// Faces:    turned right whatever the strides and the signs of the spacing.
+/// Winding:  as LabelSurfaces says, whatever the strides and the signs of the spacing.
 /// Order:    within an interface along the axis with the largest stride, then the next; the same bytes at any thread
 ///           count and on every instruction set.
 /// Memory:   beside input and output a fifth of a byte a sample, and a byte a vertex with relaxation, where the axis of

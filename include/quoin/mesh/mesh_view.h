@@ -8,8 +8,8 @@
 
 namespace quoin {
 
-/// Triangles of one surface of any mesh, whichever mesher made them. Arrays of vertices have
-/// one entry a vertex. A view is one of two kinds:
+/// Triangles of one surface of any mesh, whichever mesher made them. Arrays of vertices have one entry a vertex. A view
+/// is one of two kinds:
 ///
 /// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or none.
 /// Smooth: `normals` and `albedo`; `occlusion`, or none.

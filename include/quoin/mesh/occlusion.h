@@ -13,7 +13,7 @@ namespace quoin {
 /// direction's (u, v): counter-clockwise from outside.
 using FaceOcclusion = std::array<std::uint8_t, 4>;
 
-/// The three voxels before a face that give the occlusion of one of its corners, as offsets from the face's voxel:
+/// The three voxels in front of a face that give the occlusion of one of its corners, as offsets from the face's voxel:
 /// those that touch the corner, in the layer in front.
 struct CornerNeighbours {
   IVec3 side1;   ///< along the direction's u

@@ -40,9 +40,8 @@ struct SmoothMeshOptions {
   bool split_sheets = true;  ///< as in SmoothOptions, where it is off
   SurfaceColours colours = SurfaceColours::Blended;
   /// 1: the surface of the field. Less draws each vertex to the middle of its cell, and each normal to that of its
-  /// face, until at 0 the surface is that of blocks around the solid samples (which are 1/256 apart, or as
-  /// much connected, where they touch by edges or corners). 0 to 1; others count as the nearest of
-  /// these, NaN as 1.
+  /// face, until at 0 the surface is that of blocks around the solid samples (which are 1/256 apart, or as much
+  /// connected, where they touch by edges or corners). 0 to 1; others count as the nearest of these, NaN as 1.
   float smoothness = 1.0F;
   /// Whether what is one sample thick, solid or gap, keeps about that thickness, and what is slanted holds together
   /// (`join_diagonals`): surfaces of fields shrink it to a third. For fields of voxels. At level 0.

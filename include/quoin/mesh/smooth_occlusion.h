@@ -21,8 +21,8 @@ struct SmoothPlaces {
   int level = 0;                    ///< of detail, 0 to kMaxSmoothLevel; others count as the nearest of these
 };
 
-/// How dark a field is at a place, for meshes that others made: 0 (open) to 1 (dark), as SmoothChunkMesh::occlusion;
-/// openness is 1 less it. 0 without a form.
+/// How dark a field is at a place, for meshes of other makers: 0 (open) to 1 (dark), as SmoothChunkMesh::occlusion;
+/// what of the light arrives is 1 minus that. 0 with SmoothOcclusion::None.
 ///
 ///            const float light = 1.0F - smooth_occlusion(field, vertex.position, vertex.normal);
 ///

@@ -21,7 +21,7 @@ struct RenderOptions {
   int width = 1280;
   int height = 720;
   int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
-  bool depth = false;  ///< also the distances
+  bool depth = false;  ///< whether Picture::depth is filled
   LightOptions light;
   /// How instances are drawn; without, all are Near. Whether hidden instances are drawn is for the renderer to say, not
   /// the policy.
@@ -45,16 +45,18 @@ struct RenderOptions {
 struct Picture {
   Image colour;
   /// Euclidean distance along the ray through each pixel's centre in world units, to the first voxel of any kind,
-  /// transparent ones too; 0 inside a voxel; +infinity where nothing was hit. Empty unless asked for.
+  /// transparent ones too, or surface of a field; 0 inside of either; +infinity where nothing was hit. Empty unless
+  /// asked for.
   FloatImage depth;
   std::int64_t rays = 0;        ///< of every kind
-  std::int64_t pixels_hit = 0;  ///< whose centre shows a voxel
+  std::int64_t pixels_hit = 0;  ///< whose centre shows a voxel or a field
 };
 
 /// Takes pictures of a scene by ray marching on the processor.
 ///
 /// Light:       see LightOptions; computed linearly, each sample clamped to 0..1, averaged, and rounded to sRGB bytes
-///              exactly. Behind the scene is a sky, which neither the sun nor the exposure changes.
+///              exactly. Behind the scene is a sky, which the exposure does not change, and the sun only with
+///              LightOptions::sky_follows_sun.
 /// Transparent: a run of voxels of one type is one body, whatever chunks and grids it crosses. It tints what is behind
 ///              it by its length (one voxel of alpha a and colour c lets (1 - a) (1 - a (1 - c)) through; no body
 ///              counts as less than one voxel), shows its own lit colour in place of what it covers, tints the sun's

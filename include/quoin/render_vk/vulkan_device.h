@@ -47,7 +47,7 @@ struct VulkanRequirements {
 /// The same for every device; also in builds without Vulkan.
 [[nodiscard]] VulkanRequirements vulkan_requirements();
 
-/// Returns how a physical device of a program's own instance is called, and what it lacks. `instance` must have been
+/// Returns the name of a physical device of a program's own instance, and what it lacks. `instance` must have been
 /// made with at least `vulkan_requirements().api_version`. `get_instance_proc_addr` is vkGetInstanceProcAddr; null:
 /// that of the loader that the library finds (libvulkan.so.1).
 ///

@@ -37,7 +37,8 @@ enum class Accumulation : std::uint8_t {
 
 /// Takes the pictures that CpuRenderer takes, on a graphics device: one of its own, or a program's.
 ///
-/// Equal:   every option means the same, and so does every error; a channel of a pixel differs by 2 at most but at
+/// Equal:   every option means the same but OcclusionMode::Smooth, which is Unsupported, and so does every error; a
+///          channel of a pixel differs by 2 at most but at
 ///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
 ///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little.
 /// Detail:  grids are halved and impostors built on the processor, when a picture first asks for them, from the scene

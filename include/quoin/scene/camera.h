@@ -56,9 +56,9 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 
 /// Where a camera of that view looks: unit.
 [[nodiscard]] DVec3 direction_of(View view);
-/// The same of a camera that stands `azimuth` degrees to the right of the front (90: towards +X) and `elevation` above
-/// the horizon. `iso` is 45 and 35.26.
-[[nodiscard]] DVec3 direction_of_view(double azimuth, double elevation);
+/// The same of a camera that stands so many degrees to the right of the front (90: towards +X) and above the horizon.
+/// View::Iso is 45 and 35.26.
+[[nodiscard]] DVec3 direction_of_view(double azimuth_degrees, double elevation_degrees);
 
 /// A perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
 ///

@@ -51,8 +51,8 @@ struct DetailPolicy {
   InstanceFilter instances = InstanceFilter::Visible;  ///< of which it is chosen
 };
 
-/// By the distance between camera and content centre, in the units of `radius`. R = 0: Near at distance 0, else Far;
-/// NaN is Far.
+/// What `ByRadius` decides, from the distance between camera and content centre, in the units of `radius`. R = 0: Near
+/// at distance 0, else Far; NaN is Far.
 [[nodiscard]] Detail detail_by_radius(double distance, double radius, const DetailPolicy& policy = {});
 
 /// What `ByPixels` decides on.
@@ -60,7 +60,7 @@ struct ScreenSize {
   double voxel_pixels = 0.0;     ///< that one voxel spans at the content's nearest point
   double diameter_pixels = 0.0;  ///< that the whole content spans at its centre's distance
 };
-/// Not finite counts as nothing to see: Far.
+/// What `ByPixels` decides. Numbers that are not finite count as nothing to see: Far.
 [[nodiscard]] Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy = {});
 
 /// One instance that may be in the picture.

@@ -82,7 +82,10 @@ struct SceneLayer {
 };
 
 /// Which instances a function looks at.
-enum class InstanceFilter : std::uint8_t { Visible, All };
+enum class InstanceFilter : std::uint8_t {
+  Visible,  ///< those that `is_shown`
+  All,      ///< hidden ones too
+};
 
 /// What changed in a scene; in the order of the handles, each once. Those that were removed are among them: they name
 /// nothing.
@@ -124,9 +127,12 @@ class Scene {
   /// Cost: a pointer a grid and a copy of each instance, well below a microsecond each, whatever the grids hold.
   [[nodiscard]] Scene snapshot() const;
 
+  /// Takes a grid, which the scene owns from then on. It shows once an instance places it.
   GridHandle add_grid(SceneGrid grid);
+  /// Places a grid. One whose `grid` names nothing is kept, and left out of all that looks at the scene.
   InstanceHandle add_instance(Instance instance);
-  /// Removes the grid and every instance of it.
+  /// Removes the grid and every instance of it. Returns false when the handle names nothing, as all that remove.
+  /// Cost: O(instances).
   bool remove_grid(GridHandle handle);
   bool remove_instance(InstanceHandle handle);
 
@@ -163,11 +169,11 @@ class Scene {
   /// A cursor at the present: it will be told what changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
 
-  /// Non-air voxels of all grids; a grid that is placed several times counts once.
+  /// Non-air voxels of all grids, without their fields; a grid that is placed several times counts once.
   [[nodiscard]] std::int64_t voxel_count() const;
 
-  /// The box around the tight bounds of every placed grid, in world units; empty when nothing is placed.
-  /// Of the instances that `filter` lets pass.
+  /// The box around the tight bounds (SceneGrid::bounds) of every grid that an instance of `filter` places, in world
+  /// units; empty when nothing is placed.
   [[nodiscard]] DBox bounds(InstanceFilter filter = InstanceFilter::Visible) const;
 
  private:

@@ -8,8 +8,9 @@
 
 namespace quoin {
 
-// Edits of a scene's grids by shapes in the world. They go through Scene::edit, so that the journals of scene and grid
-// tell of them. A grid that is placed several times changes in all its places.
+// Edits of the voxels of a scene's grids by shapes in the world; fields are edited by DensityGrid's own functions, at
+// places from `grid_from_world`. They go through Scene::edit, so that the journals of scene and grid tell of them. A
+// grid that is placed several times changes in all its places.
 //
 // Requires: the handle names an instance of the scene, and the instance's grid is in the scene.
 // Nothing:  is changed, and `false` or 0 returned, where the instance has no place (see Instance::rotation) or a number

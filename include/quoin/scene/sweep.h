@@ -41,10 +41,10 @@ struct SweepHit {
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry& types,
                                                 const OrientedBox& box, DVec3 displacement);
 
-/// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope`.
+/// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {
-  DVec3 up{0.0, 1.0, 0.0};  ///< in the world, of any length; where it is 0 or not finite nothing is a floor
-  double max_slope = 45.0;  ///< degrees from level
+  DVec3 up{0.0, 1.0, 0.0};          ///< in the world, of any length; where it is 0 or not finite nothing is a floor
+  double max_slope_degrees = 45.0;  ///< from level
   /// How high an obstacle may be that is stepped onto, world units; 0: none. There must be a floor on it, or within
   /// half of the box's width beyond its edge, and room for the box above.
   double step_height = 0.0;

@@ -18,8 +18,8 @@ struct VolumeSceneOptions {
 ///
 /// Spacing: where it differs along the axes, values are interpolated at the least of the spacings first (trilinear), as
 ///          grids have cubes for cells.
-/// Errors:  Unsupported for a volume whose axes are not upright to each other; InvalidArgument where a spacing is 0 or
-///          not finite; LimitExceeded where the interpolated volume would have more than 2^31 samples; those of
+/// Errors:  Unsupported for a volume whose axes are not perpendicular to each other; InvalidArgument where a spacing is
+///          0 or not finite; LimitExceeded where the interpolated volume would have more than 2^31 samples; those of
 ///          field_from_volume.
 [[nodiscard]] Result<Scene> scene_from_volume(const Volume& volume, const VolumeSceneOptions& options = {},
                                               Threads threads = {}, const Progress& progress = {});

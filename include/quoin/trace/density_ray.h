@@ -40,7 +40,7 @@ class DensityTree {
 
 /// Where a ray comes into the solid of a field.
 struct DensityHit {
-  double t = 0.0;              ///< 0 with `starts_inside`
+  double t = 0.0;              ///< in lengths of the ray's direction; 0 with `starts_inside`
   bool starts_inside = false;  ///< the field is negative at the origin
   IVec3 cell{0};               ///< the least of the eight samples between which it lies
   VoxelType material = kAir;   ///< of the nearest of their solid samples; of several, the least of (z, y, x)

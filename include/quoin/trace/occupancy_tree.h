@@ -37,14 +37,15 @@ class OccupancyTree {
   OccupancyTree& operator=(OccupancyTree&&) noexcept;
   ~OccupancyTree();
 
-  /// From the grid's own storage. Cost: 5 to 20 microseconds a chunk that is not uniform; of a tree of transparent
-  /// voxels as much again for each of their types there, to know which blocks are of one.
-  static OccupancyTree build(const Grid& grid, const VoxelRegistry& types, Occupancy which = Occupancy::NonAir);
+  /// Of a grid, which need not outlive it. Cost: 5 to 20 microseconds a chunk that is not uniform; of a tree of
+  /// transparent voxels as much again for each of their types there, to know which blocks are of one.
+  [[nodiscard]] static OccupancyTree build(const Grid& grid, const VoxelRegistry& types,
+                                           Occupancy which = Occupancy::NonAir);
 
   /// Of a field: of the cells between its samples, those with a solid corner, since the trilinear field is below 0
   /// nowhere else. Cell (i, j, k), here a voxel, spans the points from sample (i, j, k) to (i + 1, j + 1, k + 1).
   /// Cost: as that of a grid.
-  static OccupancyTree build(const DensityGrid& field);
+  [[nodiscard]] static OccupancyTree build(const DensityGrid& field);
 
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///

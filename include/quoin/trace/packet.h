@@ -21,7 +21,8 @@ struct alignas(64) RayPacket {
   Lanes<double> max_t{};     ///< up to and including; infinity is none, a negative number or NaN hits nothing
   std::uint32_t active = 0;  ///< bit i: ray i counts
 
-  /// Puts a ray into a lane, which becomes active; lanes that are no longer wanted leave `active` by hand.
+  /// Puts a ray into a lane, which becomes active; to drop a lane, clear its bit in `active`.
+  /// Requires: 0 <= lane < kSize, here and below.
   void set(int lane, const Ray& ray, double ray_max_t) {
     const auto i = static_cast<std::size_t>(lane);
     origin_x[i] = ray.origin.x, origin_y[i] = ray.origin.y, origin_z[i] = ray.origin.z;
@@ -52,6 +53,7 @@ struct alignas(64) PacketHits {
     t[i] = found.t;
     face[i] = found.face;
   }
+  /// What a lane hit. Requires: its bit in `hit` is set.
   [[nodiscard]] RayHit operator[](int lane) const {
     const auto i = static_cast<std::size_t>(lane);
     return {{x[i], y[i], z[i]}, face[i], t[i], (starts_inside >> lane & 1U) != 0};

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <limits>
 #include <optional>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/occupancy_tree.h>
 
@@ -21,7 +21,7 @@ struct RayHit {
   IVec3 voxel{0};
   /// The face through which the ray enters; with `starts_inside`, the one that looks most against the ray.
   Direction face = Direction::PosX;
-  double t = 0.0;              ///< 0 with `starts_inside`
+  double t = 0.0;              ///< in lengths of the ray's direction; 0 with `starts_inside`
   bool starts_inside = false;  ///< the origin lies in an occupied voxel
 };
 
@@ -46,7 +46,7 @@ struct RayHit {
 [[nodiscard]] bool any_hit(const OccupancyTree& tree, const Ray& ray,
                            double max_t = std::numeric_limits<double>::infinity());
 
-/// A voxel that a ray passes through, from `t_enter` to `t_exit`.
+/// A voxel that a ray passes through, from `t_enter` to `t_exit`, in lengths of its direction.
 struct VoxelSpan {
   IVec3 voxel{0};
   Direction face = Direction::PosX;  ///< as in RayHit
@@ -58,7 +58,6 @@ struct VoxelSpan {
 /// Calls `visit` for every occupied voxel along a ray that is entered up to and including `max_t`, in the order in
 /// which the ray passes them, until it returns false. `t_exit` is not cut at `max_t`; where that is negative or not a
 /// number there is none.
-void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t,
-                const std::function<bool(const VoxelSpan&)>& visit);
+void visit_hits(const OccupancyTree& tree, const Ray& ray, double max_t, FunctionRef<bool(const VoxelSpan&)> visit);
 
 }  // namespace quoin

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "grid/density/cell_corners.h"
 #include "grid/density/density_grid_impl.h"
 #include "grid/density/trilinear.h"
 
@@ -27,17 +28,12 @@ struct Cell {
 
 CellCorners corners_of(const DensityStore& store, IVec3 low) {
   CellCorners corners{};
-  const IVec3 local = local_of(low);
-  const bool is_in_one_chunk = local.x < kChunkEdge - 1 && local.y < kChunkEdge - 1 && local.z < kChunkEdge - 1;
-  const DensityStore::Entry* entry = is_in_one_chunk ? store.find(chunk_of(low)) : nullptr;
-  for (int i = 0; i < 8; ++i) {
-    const IVec3 offset{i & 1, i >> 1 & 1, i >> 2};
-    const IVec3 p = local + offset;
-    const Half half = !is_in_one_chunk   ? store.get(low + offset)
-                      : entry == nullptr ? store.far()
-                                         : entry->samples.get(p.x, p.y, p.z);
-    corners[static_cast<std::size_t>(i)] = float_from_half(half);
-  }
+  const auto find_chunk = [&](IVec3 chunk) {
+    const DensityStore::Entry* const entry = store.find(chunk);
+    return entry == nullptr ? nullptr : &entry->samples;
+  };
+  read_cell_corners(
+      low, 1, find_chunk, [&] { return store.band(); }, corners.data());
   return corners;
 }
 

@@ -55,13 +55,14 @@ std::int64_t BlockyMesh::vertex_count() const {
   return static_cast<std::int64_t>(total);
 }
 
-Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
-                                     Threads threads, const Progress& progress) {
-  const std::vector<IVec3> chunks = grid.chunks();
+namespace {
+
+// The quads of all chunks; fewer where `reporter` was cancelled.
+std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
+                                 const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
   std::vector<QuadBuffer> parts(chunks.size());
   // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
-  ProgressSteps reporter(progress, 2 * chunks.size());
   parallel_for(tasks, threads, [&](std::size_t task) {
     BlockyMesher mesher;
     QuadOptions quad_options;
@@ -72,6 +73,16 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
       reporter.step();
     }
   });
+  return parts;
+}
+
+}  // namespace
+
+Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types, const BlockyMeshOptions& options,
+                                     Threads threads, const Progress& progress) {
+  const std::vector<IVec3> chunks = grid.chunks();
+  ProgressSteps reporter(progress, 2 * chunks.size());
+  std::vector<QuadBuffer> parts = quads_of(grid, chunks, types, options, threads, reporter);
   if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
 
   std::vector<SurfaceClass> classes(types.size());

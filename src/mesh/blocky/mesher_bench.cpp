@@ -72,7 +72,7 @@ void mesh_world(benchmark::State& state, bool occlusion, InstructionSet instruct
 
 // Empty and full chunks lie among their like.
 Neighbourhood surrounded(const Chunk& chunk, Blocky which) {
-  Neighbourhood n = lone(chunk);
+  Neighbourhood n = isolated(chunk);
   if (which == Blocky::Full) n.chunks.fill(&chunk);
   return n;
 }
@@ -137,11 +137,11 @@ void visible_faces(benchmark::State& state) {
   const VoxelRegistry types = workloads::three_types();
   BlockyMesher mesher;
   FaceRows faces;
-  mesher.find_faces(lone(chunks[0]), types, workloads::kInterior, faces);
+  mesher.find_faces(isolated(chunks[0]), types, workloads::kInterior, faces);
   check(Blocky::W1, faces.count());
   std::size_t next = 0;
   for (auto _ : state) {
-    mesher.find_faces(lone(chunks[next]), types, workloads::kInterior, faces);
+    mesher.find_faces(isolated(chunks[next]), types, workloads::kInterior, faces);
     benchmark::DoNotOptimize(faces.rows[0].data());
     next = next + 1 == chunks.size() ? 0 : next + 1;
   }

@@ -35,7 +35,7 @@ int quad_count(const Chunk& chunk, Direction direction, bool occlusion = true) {
   QuadOptions options;
   options.occlusion = occlusion;
   QuadBuffer quads;
-  BlockyMesher().mesh(lone(chunk), oracle::mixed_types(), options, quads);
+  BlockyMesher().mesh(isolated(chunk), oracle::mixed_types(), options, quads);
   int count = 0;
   for (const Quad& quad : quads) count += quad.direction() == direction;
   return count;
@@ -55,7 +55,7 @@ Chunk box_chunk(const IBox& box, VoxelType type = 1) {
 
 TEST(BlockyMesher, EmptyChunkHasNone) {
   QuadBuffer quads(5);
-  BlockyMesher().mesh(lone(Chunk()), oracle::mixed_types(), {}, quads);
+  BlockyMesher().mesh(isolated(Chunk()), oracle::mixed_types(), {}, quads);
   EXPECT_TRUE(quads.empty());
   BlockyMesher().mesh(Neighbourhood{}, oracle::mixed_types(), {}, quads);
   EXPECT_TRUE(quads.empty());
@@ -63,16 +63,16 @@ TEST(BlockyMesher, EmptyChunkHasNone) {
 
 TEST(BlockyMesher, OneVoxelHasSix) {
   QuadBuffer quads;
-  BlockyMesher().mesh(lone(box_chunk({{5, 6, 7}, {6, 7, 8}})), oracle::mixed_types(), {}, quads);
+  BlockyMesher().mesh(isolated(box_chunk({{5, 6, 7}, {6, 7, 8}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
   for (const Quad& quad : quads) EXPECT_EQ(quad.voxel(), IVec3(5, 6, 7));
 }
 
 TEST(BlockyMesher, SolidCubeHasSix) {
   QuadBuffer quads;
-  BlockyMesher().mesh(lone(box_chunk({{0, 0, 0}, {32, 32, 32}})), oracle::mixed_types(), {}, quads);
+  BlockyMesher().mesh(isolated(box_chunk({{0, 0, 0}, {32, 32, 32}})), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
-  BlockyMesher().mesh(lone(Chunk(1)), oracle::mixed_types(), {}, quads);
+  BlockyMesher().mesh(isolated(Chunk(1)), oracle::mixed_types(), {}, quads);
   EXPECT_EQ(quads.size(), 6U);
   EXPECT_EQ(quads[0].size_u(), 64);
 }
@@ -116,12 +116,12 @@ TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
   for (const Blocky which : {Blocky::W1, Blocky::W2, Blocky::W3a, Blocky::W3b, Blocky::W3c, Blocky::W4, Blocky::Glass,
                              Blocky::GlassColumns}) {
     const Chunk chunk = workloads::blocky_chunk(which);
-    mesher.mesh(lone(chunk), types, options, quads);
+    mesher.mesh(isolated(chunk), types, options, quads);
     EXPECT_EQ(face_count(quads), workloads::expected_faces(which));
     if (which != Blocky::W1) continue;
     EXPECT_NEAR(static_cast<double>(quads.size()), 8'450.0, 50.0);
     options.occlusion = false;
-    mesher.mesh(lone(chunk), types, options, quads);
+    mesher.mesh(isolated(chunk), types, options, quads);
     EXPECT_NEAR(static_cast<double>(quads.size()), 5'750.0, 50.0);
     options.occlusion = true;
   }

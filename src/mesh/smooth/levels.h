@@ -13,8 +13,8 @@
 #include <quoin/grid/density_chunk.h>
 #include <quoin/mesh/smooth.h>
 
+#include "grid/density/cell_corners.h"
 #include "grid/density/density_storage.h"
-
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/quad.h"
 
@@ -107,10 +107,9 @@ class ChunkLevels {
 /// Density of a cell's corners.
 inline Corners corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
   Corners corners;
-  for (int i = 0; i < 8; ++i) {
-    const IVec3 sample = cell.first + corner_place(i) * cell.size();
-    corners[static_cast<std::size_t>(i)] = float_from_half(chunks.get(sample));
-  }
+  const auto find_chunk = [&](IVec3 chunk) { return chunks.at(chunk.x, chunk.y, chunk.z); };
+  const auto outside = [&] { return float_from_half(chunks.outside); };
+  read_cell_corners(cell.first, cell.size(), find_chunk, outside, corners.data());
   return corners;
 }
 

@@ -299,6 +299,20 @@ Vec3 normal_between(Direction direction, Vec3 normal, float smoothness) {
 
 }  // namespace
 
+std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i) {
+  const auto index = static_cast<std::uint32_t>(to.positions.size());
+  const auto append = [i](auto& values, const auto& source) {
+    const auto value = source[i];
+    values.push_back(value);
+  };
+  append(to.positions, from.positions);
+  append(to.normals, from.normals);
+  if (!from.occlusion.empty()) append(to.occlusion, from.occlusion);
+  append(to.albedo, from.albedo);
+  append(to.types, from.types);
+  return index;
+}
+
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
                                           const SmoothMeshOptions& options, std::span<const std::uint32_t> groups) {
   const bool is_sharp = options.colours == SurfaceColours::Sharp;
@@ -316,12 +330,13 @@ std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry&
   split.types.reserve(copies.size());
   std::vector<std::uint32_t> group_of;
   for (const VertexCopy& copy : copies) {
-    const Vec3 normal = whole.normals[copy.vertex];
-    split.positions.push_back(whole.positions[copy.vertex]);
-    split.normals.push_back(smoothness < 1.0F ? normal_between(copy.look.direction, normal, smoothness) : normal);
-    if (!whole.occlusion.empty()) split.occlusion.push_back(whole.occlusion[copy.vertex]);
-    split.albedo.push_back(is_sharp ? materials.albedo(copy.look.type) : whole.albedo[copy.vertex]);
-    split.types.push_back(is_sharp ? copy.look.type : whole.types[copy.vertex]);
+    append_vertex(split, whole, copy.vertex);
+    Vec3& normal = split.normals.back();
+    if (smoothness < 1.0F) normal = normal_between(copy.look.direction, normal, smoothness);
+    if (is_sharp) {
+      split.albedo.back() = materials.albedo(copy.look.type);
+      split.types.back() = copy.look.type;
+    }
     if (!groups.empty()) group_of.push_back(copy.look.group);
   }
   whole = std::move(split);

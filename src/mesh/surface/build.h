@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include <quoin/mesh/smooth_mesh.h>
@@ -30,6 +33,10 @@ struct SurfaceRequest {
 /// Requires: with sharp colours, or a smoothness below 1, the surface has its faces.
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
                                           const SmoothMeshOptions& options, std::span<const std::uint32_t> groups = {});
+
+/// Appends vertex `i` of a mesh, which may be the same one, with all that it has there. Returns its index.
+/// Requires: both have occlusion, or `to` has no vertex yet, or neither has it.
+std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i);
 
 /// The smoothness that options mean.
 [[nodiscard]] float smoothness_of(const SmoothMeshOptions& options);

@@ -154,11 +154,6 @@ void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::u
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;
   std::vector<std::uint32_t> indices;
   indices.reserve(simple.indices.size());
-  const auto append = [](auto& values, std::uint32_t from) {
-    if (values.empty()) return;
-    const auto value = values[from];
-    values.push_back(value);
-  };
   for (std::size_t i = 0; i < simple.indices.size(); ++i) {
     const std::uint32_t vertex = simple.indices[i];
     const std::uint32_t corner = simple.corners[i];
@@ -168,12 +163,9 @@ void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::u
     }
     const auto [copy, is_new] = copies.try_emplace({vertex, corner}, static_cast<std::uint32_t>(mesh.positions.size()));
     if (is_new) {
-      mesh.positions.push_back(simple.positions[vertex]);
-      append(mesh.normals, corner);
-      append(mesh.occlusion, corner);
-      append(mesh.albedo, corner);
-      append(mesh.types, corner);
-      append(tags, corner);
+      smooth::append_vertex(mesh, mesh, corner);
+      mesh.positions.back() = simple.positions[vertex];
+      if (const std::uint32_t tag = tags.empty() ? 0 : tags[corner]; !tags.empty()) tags.push_back(tag);
     }
     indices.push_back(copy->second);
   }

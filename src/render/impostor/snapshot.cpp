@@ -20,9 +20,7 @@ TexelArea texels_of(const SnapshotCamera& camera, const IBox& box, int edge) {
   };
   TexelArea area{edge, edge, 0, 0};
   for (int corner = 0; corner < 8; ++corner) {
-    const DVec3 point{(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
-                      (corner & 4) != 0 ? box.max.z : box.min.z};
-    const DVec3 seen = point - camera.position;
+    const DVec3 seen = box_corner(box, corner) - camera.position;
     const double scale = camera.focal / glm::dot(seen, camera.forward);
     const double x = half + glm::dot(seen, camera.right) * scale;
     const double y = half - glm::dot(seen, camera.up) * scale;

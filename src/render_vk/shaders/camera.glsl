@@ -76,8 +76,8 @@ bool is_before(Pair a, Pair b, int axis) {
   return a.high[axis] != b.high[axis] ? a.high[axis] < b.high[axis] : a.low[axis] < b.low[axis];
 }
 
-// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does before
-// it rounds. `axis`: of the plane through which it enters; -1 where it is left as it is. False when it misses.
+// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does
+// before it rounds. `axis`: of the plane through which it enters; -1 where it is left as it is. False when it misses.
 bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float moved_t, out int axis) {
   vec3 low = vec3(tree.low.xyz - placed.start_base.xyz);
   vec3 high = vec3(tree.high.xyz - placed.start_base.xyz);

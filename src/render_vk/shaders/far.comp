@@ -1,6 +1,6 @@
 #version 460
-// Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which face
-// that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
+// Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which
+// face that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
 #include "compute.glsl"
 #include "far.glsl"
 #include "faces.glsl"

@@ -1,5 +1,5 @@
-// What the shaders of meshes read; src/render_vk/raster/mesh_shader_data.h says the same to the compiler of the processor's
-// side. Vectors are read as a whole: see docs/decisions/040.
+// What the shaders of meshes read; src/render_vk/raster/mesh_shader_data.h says the same to the compiler of the
+// processor's side. Vectors are read as a whole: see docs/decisions/040.
 #include "data.glsl"
 #include "srgb.glsl"
 
@@ -15,8 +15,8 @@ struct MeshInstance {
   vec4 axes[3];     // columns: the grid's axes in the world
   vec4 eye;         // the camera, in voxels from there, and 1; orthographic: the direction towards it, and 0
   vec4 diffuse[2];  // the sun's light on its faces
-  ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin), and which instance of the
-                    // frame it is: -1 where none
+  ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin), and which instance of
+                    // the frame it is: -1 where none
   float room;       // voxels per clip w by which faces are widened
   float far_half;   // of an impostor: from the middle of a face to its edges, and of one that no view saw
   float unseen_half;

@@ -14,15 +14,10 @@ constexpr double kTolerance = 1e-3;
 /// Coordinates beyond this are left alone: sums of them would not fit.
 constexpr double kFarthest = 1 << 29;
 
-DVec3 corner_of(const IBox& box, int corner) {
-  return {(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
-          (corner & 4) != 0 ? box.max.z : box.min.z};
-}
-
 DBox world_box(const SceneGrid& grid, const Instance& instance) {
   DBox box;
   const IBox bounds = grid.grid.bounds();
-  for (int corner = 0; corner < 8; ++corner) box.extend(world_from_grid(instance, grid, corner_of(bounds, corner)));
+  for (int i = 0; i < 8; ++i) box.extend(world_from_grid(instance, grid, box_corner(bounds, i)));
   return box;
 }
 
@@ -174,7 +169,7 @@ std::optional<LatticePlace> place_in_lattice(const Scene& scene, const Instance&
   }
   place.offset = IVec3(whole);
   for (int corner = 0; corner < 8; ++corner) {
-    const DVec3 at = corner_of(box, corner);
+    const DVec3 at = box_corner(box, corner);
     const DVec3 off = moved(at) - (place.orientation.apply(at) + DVec3(place.offset));
     if (!(std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}) < kTolerance)) return std::nullopt;
   }

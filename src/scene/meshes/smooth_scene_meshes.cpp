@@ -217,14 +217,11 @@ std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     SmoothMesh& part = parts[body.owners[i]];
     const LatticePlace& back = united.way_back(body.owners[i]);
-    const DVec3 point(body.mesh.positions[i]);
-    places[i] = static_cast<std::uint32_t>(part.positions.size());
+    places[i] = smooth::append_vertex(part, body.mesh, i);
     // Samples are half a voxel from the corners that the places speak of.
-    part.positions.emplace_back(back.orientation.apply(point + 0.5) + DVec3(back.offset) - 0.5);
-    part.normals.emplace_back(back.orientation.apply(DVec3(body.mesh.normals[i])));
-    if (!body.mesh.occlusion.empty()) part.occlusion.push_back(body.mesh.occlusion[i]);
-    part.albedo.push_back(body.mesh.albedo[i]);
-    part.types.push_back(body.mesh.types[i]);
+    const DVec3 point(body.mesh.positions[i]);
+    part.positions.back() = Vec3(back.orientation.apply(point + 0.5) + DVec3(back.offset) - 0.5);
+    part.normals.back() = Vec3(back.orientation.apply(DVec3(body.mesh.normals[i])));
   }
   for (std::size_t i = 0; i < body.mesh.indices.size(); i += 3) {
     const std::uint32_t* triangle = body.mesh.indices.data() + i;

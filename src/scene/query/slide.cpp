@@ -104,7 +104,10 @@ SlideResult slide(Body body, DVec3 displacement) {
 class Walk {
  public:
   Walk(const Body& body, const FloorOptions& floor, DVec3 up)
-      : body_(body), floor_(floor), up_(up), steepest_(std::cos(floor.max_slope * std::numbers::pi / 180.0) - 1e-6) {}
+      : body_(body),
+        floor_(floor),
+        up_(up),
+        steepest_(std::cos(floor.max_slope_degrees * std::numbers::pi / 180.0) - 1e-6) {}
 
   SlideResult run(DVec3 displacement) {
     displacement_ = displacement;

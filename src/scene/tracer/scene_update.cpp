@@ -61,7 +61,7 @@ bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   if (!has_other_visibility(changes)) return false;
   std::vector<VoxelType> changed;
   for (const TypeChange& change : changes.items) {
-    if (change.visibility) changed.push_back(change.type);
+    if (change.visibility_changed) changed.push_back(change.type);
   }
   std::vector<GridHandle> kept;
   bool has_forgotten = false;

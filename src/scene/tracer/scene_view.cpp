@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
-#include <functional>
 #include <new>
 #include <type_traits>
 
@@ -129,6 +128,47 @@ struct SceneView::Impl {
     }
   }
 
+  // What rays meet first in the only instance that there is.
+  void meet_alone(const RayPacket& rays_in_view, SceneHits& hits) const {
+    const PlacedGrid& placed = tracer->placed().front();
+    RoomFor<RayPacket> room_for_rays;
+    RayPacket& rays = *room_for_rays;
+    move(grid_from_view.front(), rays_in_view, rays);
+    if (has_opaque(placed)) quoin::first_hits(*placed.opaque, rays, hits.grids);
+    hits.placed.fill(0);
+    if (placed.field == nullptr) return;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
+    }
+    (void)add_field(placed, 0, rays, hits);
+  }
+
+  // What the lanes `near` of rays in view meet in an instance nearer than what `hits` knows, whose max_t shrink to
+  // that. Returns which lanes met it.
+  std::uint32_t meet(std::size_t index, std::uint32_t near, RayPacket& left, SceneHits& hits) const {
+    const PlacedGrid& placed = tracer->placed()[index];
+    RoomFor<RayPacket> room_for_rays;
+    RayPacket& rays = *room_for_rays;
+    move(grid_from_view[index], left, rays);
+    rays.active = near;
+    std::uint32_t met = 0;
+    if (has_opaque(placed)) {
+      RoomFor<PacketHits> room_for_hits;
+      PacketHits& found = *room_for_hits;
+      quoin::first_hits(*placed.opaque, rays, found);
+      met = found.hit;
+      take_nearer(index, found, left, hits);
+    }
+    if (placed.field == nullptr) return met;
+    rays.max_t = left.max_t;
+    const std::uint32_t taken = add_field(placed, index, rays, hits);
+    for (std::uint32_t each = taken; each != 0; each &= each - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(each));
+      left.max_t[lane] = hits.grids.t[lane];
+    }
+    return met | taken;
+  }
+
   // What of a placed grid's field lies nearer than what `hits` knows; the rays are in its grid and go no further.
   // Returns which lanes met it.
   static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
@@ -191,47 +231,19 @@ void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
 }
 
 void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const {
-  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
-  RoomFor<RayPacket> room_for_rays;
-  RayPacket& rays = *room_for_rays;
   hits.grids.hit = hits.grids.starts_inside = hits.in_field = 0;
   if (impl_->is_alone && impl_->sees_all()) {
-    move(impl_->grid_from_view[0], rays_in_view, rays);
-    if (has_opaque(placed[0])) quoin::first_hits(*placed[0].opaque, rays, hits.grids);
-    hits.placed.fill(0);
-    if (placed[0].field == nullptr) return;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
-    }
-    (void)Impl::add_field(placed[0], 0, rays, hits);
+    impl_->meet_alone(rays_in_view, hits);
     return;
   }
   RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
   PacketBounds bounds(left);
   LanesWhenNeeded lanes(left, bounds);
-  RoomFor<PacketHits> room_for_hits;
-  PacketHits& found = *room_for_hits;
   const PacketTree& seen = impl_->sees_all() ? impl_->instances : impl_->seen;
   seen.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
     if (near == 0) return true;
-    move(impl_->grid_from_view[i], left, rays);
-    rays.active = near;
-    std::uint32_t met = 0;
-    if (has_opaque(placed[i])) {
-      quoin::first_hits(*placed[i].opaque, rays, found);
-      met = found.hit;
-      impl_->take_nearer(i, found, left, hits);
-    }
-    if (placed[i].field != nullptr) {
-      rays.max_t = left.max_t;
-      const std::uint32_t taken = Impl::add_field(placed[i], i, rays, hits);
-      for (std::uint32_t each = taken; each != 0; each &= each - 1) {
-        const auto lane = static_cast<std::size_t>(std::countr_zero(each));
-        left.max_t[lane] = hits.grids.t[lane];
-      }
-      met |= taken;
-    }
+    const std::uint32_t met = impl_->meet(i, near, left, hits);
     if (met == 0) return true;
     for (std::uint32_t each = met; each != 0; each &= each - 1) {
       const int lane = std::countr_zero(each);
@@ -290,7 +302,7 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 }
 
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
-                                  const std::function<void(std::int32_t, const Ray&)>& visit) const {
+                                  FunctionRef<void(std::int32_t, const Ray&)> visit) const {
   const auto visit_one = [&](std::size_t i) {
     if (impl_->tracer->placed()[i].transparent == nullptr) return;
     const Affine& to_grid = impl_->grid_from_view[i];

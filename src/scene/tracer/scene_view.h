@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
@@ -59,7 +59,7 @@ class SceneView {
   /// Calls `visit` for each instance with transparent voxels that one ray may meet before `max_t`: an index into
   /// SceneTracer::placed, and the ray in its grid.
   void visit_transparent(const Ray& ray_in_view, double max_t,
-                         const std::function<void(std::int32_t, const Ray&)>& visit) const;
+                         FunctionRef<void(std::int32_t placed, const Ray& ray_in_grid)> visit) const;
 
   [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
   [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 
+#include "grid/density/cell_corners.h"
 #include "grid/density/trilinear.h"
 #include "trace/kernel/kernel.h"
 
@@ -17,24 +18,9 @@ const DensityStorage* find_storage(const DensityGrid& field, int x, int y, int z
 }
 
 void read_corners(const DensityGrid& field, int x, int y, int z, float* corners) {
-  const auto offset = [](unsigned i) { return IVec3(i & 1U, i >> 1 & 1U, i >> 2); };
-  const IVec3 chunk = IVec3{x, y, z} >> kChunkShift;
-  const IVec3 local = IVec3{x, y, z} & (kChunkEdge - 1);
-  constexpr int kLast = kChunkEdge - 1;
-  const unsigned beyond =
-      unsigned{local.x == kLast} | unsigned{local.y == kLast} << 1 | unsigned{local.z == kLast} << 2;
-  const DensityChunk* chunks[8];
-  unsigned known = 0;
-  for (unsigned i = 0; i < 8; ++i) {
-    const unsigned side = i & beyond;
-    if ((known >> side & 1U) == 0) {
-      known |= 1U << side;
-      chunks[side] = field.find_chunk(chunk + offset(side));
-    }
-    const IVec3 at = (local + offset(i)) & kLast;
-    corners[i] = chunks[side] == nullptr ? field.density(IVec3{x, y, z} + offset(i))
-                                         : float_from_half(chunks[side]->get(at.x, at.y, at.z));
-  }
+  const auto find_chunk = [&](IVec3 chunk) { return field.find_chunk(chunk); };
+  read_cell_corners(
+      {x, y, z}, 1, find_chunk, [&] { return field.band(); }, corners);
 }
 
 trace::FieldView view_of(const DensityTree& tree) {

@@ -7,8 +7,6 @@
 #include <set>
 #include <string_view>
 
-#include <quoin/core/assert.h>
-
 #include "io/text.h"
 
 namespace quoin::vox {
@@ -53,60 +51,6 @@ std::optional<Offset> rounded(DVec3 point, bool& is_exact) {
 template <class Placed>
 bool has_same_place(const Placed& a, const Placed& b) {
   return a.position == b.position && a.rotation == b.rotation && a.mirrored == b.mirrored;
-}
-
-/// Which of a node's keys, in the file's order, is in force at a frame, and whether it stands right there.
-struct KeyInForce {
-  std::size_t place = 0;
-  std::int64_t frame = 0;  ///< as the keys count: folded where the node loops
-  bool is_exact = false;
-};
-
-template <class Key, class AttributesOf>
-KeyInForce key_in_force(const std::vector<Key>& keys, bool loops, int frame, AttributesOf attributes_of) {
-  std::vector<std::pair<std::int64_t, std::size_t>> sorted;
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    sorted.emplace_back(frame_of_key(attributes_of(keys[i]).get("_f"), i).value_or(0), i);
-  }
-  std::ranges::sort(sorted);
-  KeyInForce found;
-  found.frame = frame;
-  if (loops) {
-    const std::int64_t length = sorted.back().first - sorted.front().first + 1;
-    found.frame = sorted.front().first + ((frame - sorted.front().first) % length + length) % length;
-  }
-  const auto after = std::ranges::upper_bound(sorted, found.frame, {}, [](const auto& key) { return key.first; });
-  const auto& key = after == sorted.begin() ? *after : *std::prev(after);
-  found.place = key.second;
-  found.is_exact = key.first == found.frame;
-  return found;
-}
-
-bool loops(const NodeContent& node) {
-  return node.attributes.get("_loop") == "1";
-}
-
-KeyInForce frame_in_force(const NodeContent& transform, int frame) {
-  return key_in_force(transform.frames, loops(transform), frame,
-                      [](const Entries& key) -> const Entries& { return key; });
-}
-
-KeyInForce model_in_force(const NodeContent& shape, int frame) {
-  return key_in_force(shape.models, loops(shape), frame, [](const auto& key) -> const Entries& { return key.second; });
-}
-
-/// Gives a transform a place at a frame: its only key, the one that stands there, or a new one.
-void set_motion_at(NodeContent& transform, int frame, const Motion& motion) {
-  if (transform.frames.empty()) transform.frames.emplace_back();
-  const KeyInForce key = frame_in_force(transform, frame);
-  if (transform.frames.size() == 1 || key.is_exact) {
-    set_motion(transform.frames[key.place], motion);
-    return;
-  }
-  // At the end: keys that do not say their frame count by their place.
-  Entries& added = transform.frames.emplace_back();
-  set_motion(added, motion);
-  added.set("_f", std::to_string(key.frame));
 }
 
 /// Where a piece of a grid stands beside its first one.
@@ -215,6 +159,7 @@ class GraphRevision {
   Status move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read);
   void show_model(const Placement& placement, const GridPlan& plan);
   void show_pieces(std::size_t shape, const GridPlan& plan);
+  std::int32_t add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown, const Motion& motion);
   void name_shapes();
   void apply_child_changes();
 
@@ -636,6 +581,23 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
   return {};
 }
 
+/// Adds a shape, like one of the source but that it shows other models, below a transform. Returns the transform's id.
+std::int32_t GraphRevision::add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown,
+                                      const Motion& motion) {
+  const std::int32_t id = ids_.take();
+  NodeContent shape = before;
+  shape.id = ids_.take();
+  shape.attributes.erase("_hidden");
+  for (std::size_t i = 0; i < shown.size(); ++i) shape.models[i].first = shown[i];
+  NodeContent& transform = out_.added.emplace_back();
+  transform.kind = NodeKind::Transform;
+  transform.id = id;
+  transform.children = {shape.id};
+  set_motion(transform.frames.emplace_back(), motion);
+  out_.added.push_back(std::move(shape));
+  return id;
+}
+
 /// A shape that shows one model at the frame becomes a group of shapes that show its pieces then, and nothing at other
 /// frames; what it shows at those is a shape beside them.
 void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
@@ -650,33 +612,18 @@ void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
   shape.attributes = Entries{};
   if (before.attributes.get("_hidden") == "1") shape.attributes.set("_hidden", "1");
   std::vector<std::int32_t> children;
-  const auto hang = [&](const Motion& motion, const std::vector<std::uint32_t>& shown) {
-    NodeContent transform;
-    transform.kind = NodeKind::Transform;
-    transform.id = ids_.take();
-    transform.children = {ids_.take()};
-    set_motion(transform.frames.emplace_back(), motion);
-    NodeContent part = before;
-    part.id = transform.children.front();
-    part.attributes.erase("_hidden");
-    for (std::size_t i = 0; i < shown.size(); ++i) part.models[i].first = shown[i];
-    children.push_back(transform.id);
-    out_.added.push_back(std::move(transform));
-    added_shapes_[plan.grid].push_back(out_.added.size());
-    out_.added.push_back(std::move(part));
-  };
   for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
     std::vector<std::uint32_t> shown(before.models.size(), nothing);
     shown[now.place] = plan.first_model + static_cast<std::uint32_t>(i);
-    hang(from_first_piece(plan, i), shown);
+    added_shapes_[plan.grid].push_back(out_.added.size() + 1);
+    children.push_back(add_shape(before, shown, from_first_piece(plan, i)));
   }
   if (has_others) {
     std::vector<std::uint32_t> shown;
     shown.reserve(before.models.size());
     for (const auto& [model, key] : before.models) shown.push_back(model);
     shown[now.place] = nothing;
-    hang({}, shown);
-    added_shapes_[plan.grid].pop_back();
+    children.push_back(add_shape(before, shown, {}));
   }
   shape.children = std::move(children);
 }
@@ -816,15 +763,6 @@ Result<RevisedGraph> GraphRevision::run() {
 }
 
 }  // namespace
-
-NodeContent node_of(const VoxSource& source, std::size_t node) {
-  const vox::Node& known = source.document.nodes[node];
-  const auto& chunks = source.document.chunks;
-  const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkPlace::begin);
-  QUOIN_ASSERT(at != chunks.end() && at->kind == ChunkKind::Node, "every node has its chunk");
-  const std::span<const std::byte> file = source.bytes;
-  return read_node(known.kind, file.subspan(at->begin + kChunkHeaderBytes, at->content_bytes));
-}
 
 RevisedGraph revise_layers(const Scene& scene, const VoxSource& source) {
   ModelPlan nothing;

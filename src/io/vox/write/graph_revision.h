@@ -38,9 +38,6 @@ struct RevisedGraph {
 /// The same of a file without a scene graph that needs none: its layers.
 [[nodiscard]] RevisedGraph revise_layers(const Scene& scene, const VoxSource& source);
 
-/// What a node of the source says.
-[[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
-
 /// Whether a file without a scene graph needs one to show the scene: without, its reader shows one model at its place.
 [[nodiscard]] bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models);
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <iterator>
+
+#include <quoin/core/assert.h>
 
 #include "io/vox/chunk_reader.h"
 
@@ -111,6 +114,15 @@ std::string_view chunk_id(NodeKind kind) {
   return {};
 }
 
+NodeContent node_of(const VoxSource& source, std::size_t node) {
+  const vox::Node& known = source.document.nodes[node];
+  const auto& chunks = source.document.chunks;
+  const auto at = std::ranges::lower_bound(chunks, known.offset, {}, &ChunkPlace::begin);
+  QUOIN_ASSERT(at != chunks.end() && at->kind == ChunkKind::Node, "every node has its chunk");
+  const std::span<const std::byte> file = source.bytes;
+  return read_node(known.kind, file.subspan(at->begin + kChunkHeaderBytes, at->content_bytes));
+}
+
 void set_motion(Entries& key, const Motion& motion) {
   const Offset& t = motion.translation;
   const bool turns = motion.orientation != Orientation{} || !key.get("_r").empty();
@@ -122,6 +134,56 @@ void set_motion(Entries& key, const Motion& motion) {
 Motion motion_of(const Entries& key) {
   const IVec3 moved = parse_translation(key.get("_t")).value_or(IVec3{0});
   return {parse_orientation(key.get("_r")).value_or(Orientation{}), {moved.x, moved.y, moved.z}};
+}
+
+namespace {
+
+template <class Key, class AttributesOf>
+KeyInForce key_in_force(const std::vector<Key>& keys, bool loops, int frame, AttributesOf attributes_of) {
+  std::vector<std::pair<std::int64_t, std::size_t>> sorted;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    sorted.emplace_back(frame_of_key(attributes_of(keys[i]).get("_f"), i).value_or(0), i);
+  }
+  std::ranges::sort(sorted);
+  KeyInForce found;
+  found.frame = frame;
+  if (loops) {
+    const std::int64_t length = sorted.back().first - sorted.front().first + 1;
+    found.frame = sorted.front().first + ((frame - sorted.front().first) % length + length) % length;
+  }
+  const auto after = std::ranges::upper_bound(sorted, found.frame, {}, [](const auto& key) { return key.first; });
+  const auto& key = after == sorted.begin() ? *after : *std::prev(after);
+  found.place = key.second;
+  found.is_exact = key.first == found.frame;
+  return found;
+}
+
+bool loops(const NodeContent& node) {
+  return node.attributes.get("_loop") == "1";
+}
+
+}  // namespace
+
+KeyInForce frame_in_force(const NodeContent& transform, int frame) {
+  return key_in_force(transform.frames, loops(transform), frame,
+                      [](const Entries& key) -> const Entries& { return key; });
+}
+
+KeyInForce model_in_force(const NodeContent& shape, int frame) {
+  return key_in_force(shape.models, loops(shape), frame, [](const auto& key) -> const Entries& { return key.second; });
+}
+
+void set_motion_at(NodeContent& transform, int frame, const Motion& motion) {
+  if (transform.frames.empty()) transform.frames.emplace_back();
+  const KeyInForce key = frame_in_force(transform, frame);
+  if (transform.frames.size() == 1 || key.is_exact) {
+    set_motion(transform.frames[key.place], motion);
+    return;
+  }
+  // At the end: keys that do not say their frame count by their place.
+  Entries& added = transform.frames.emplace_back();
+  set_motion(added, motion);
+  added.set("_f", std::to_string(key.frame));
 }
 
 }  // namespace quoin::vox

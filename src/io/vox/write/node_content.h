@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/vox/chunks.h"
+#include "io/vox/source.h"
 #include "io/vox/write/chunk_writer.h"
 
 namespace quoin::vox {
@@ -52,6 +53,9 @@ struct NodeContent {
 /// Requires: `content` is that of a chunk of this kind, which `parse_document` has read without an error.
 [[nodiscard]] NodeContent read_node(NodeKind kind, std::span<const std::byte> content);
 
+/// What a node of the source says.
+[[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
+
 /// Writes the content without a chunk's header: what read_node read, the same bytes.
 void write_node(const NodeContent& node, ChunkWriter& out);
 [[nodiscard]] std::string_view chunk_id(NodeKind kind);
@@ -63,5 +67,19 @@ void write_node(const NodeContent& node, ChunkWriter& out);
 /// Requires of a motion: 32 bits.
 void set_motion(Entries& key, const Motion& motion);
 [[nodiscard]] Motion motion_of(const Entries& key);
+
+/// Which of a node's keys, in the file's order, is in force at a frame, and whether it stands right there.
+struct KeyInForce {
+  std::size_t place = 0;
+  std::int64_t frame = 0;  ///< as the keys count: folded where the node loops
+  bool is_exact = false;
+};
+
+/// Requires: the transform, or the shape, has a key.
+[[nodiscard]] KeyInForce frame_in_force(const NodeContent& transform, int frame);
+[[nodiscard]] KeyInForce model_in_force(const NodeContent& shape, int frame);
+
+/// Gives a transform a place at a frame: its only key, the one that stands there, or a new one.
+void set_motion_at(NodeContent& transform, int frame, const Motion& motion);
 
 }  // namespace quoin::vox

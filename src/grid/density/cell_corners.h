@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <quoin/core/half.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/density_chunk.h>
+
+namespace quoin {
+
+/// Densities of the eight corners of a cell between samples: corner i lies `size` samples further along x, y and z
+/// where bit 0, 1 and 2 of i are set.
+///
+/// `find_chunk(IVec3 chunk)` returns the chunk at a place, null where all is `outside()`; it is asked once for each
+/// chunk that the corners lie in. Requires: 0 < size < 64, corners within int32.
+template <class Number, class FindChunk, class Outside>
+inline void read_cell_corners(IVec3 first, int size, const FindChunk& find_chunk, const Outside& outside,
+                              Number* corners) {
+  const IVec3 chunk = chunk_of(first);
+  const IVec3 local = local_of(first);
+  const int last = kChunkEdge - 1 - size;  // from beyond which the next chunk is reached
+  const unsigned beyond = unsigned{local.x > last} | unsigned{local.y > last} << 1 | unsigned{local.z > last} << 2;
+  std::array<const DensityChunk*, 8> chunks;
+  unsigned known = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const IVec3 offset(i & 1U, i >> 1 & 1U, i >> 2);
+    const unsigned side = i & beyond;
+    if ((known >> side & 1U) == 0) {
+      known |= 1U << side;
+      chunks[side] = find_chunk(chunk + IVec3(side & 1U, side >> 1 & 1U, side >> 2));
+    }
+    const IVec3 at = local_of(local + offset * size);
+    corners[i] = chunks[side] == nullptr ? outside() : float_from_half(chunks[side]->get(at.x, at.y, at.z));
+  }
+}
+
+}  // namespace quoin
