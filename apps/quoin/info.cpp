@@ -4,6 +4,7 @@
 #include <set>
 
 #include <quoin/io/formats.h>
+#include <quoin/io/vox.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_faces.h>
 

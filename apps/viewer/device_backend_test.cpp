@@ -418,12 +418,17 @@ TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
   }
 }
 
-TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
+// Of 441 chunks and a small one.
+Document wide_document() {
   SceneGrid wide;
   wide.grid.fill_box({{0, 0, 0}, {1'300, 3, 1'300}}, 1);
   LoadedScene loaded = small_scene();
   loaded.scene.add_instance({"", loaded.scene.add_grid(std::move(wide))});
-  const Document document(std::move(loaded), "wide.vox");
+  return {std::move(loaded), "wide.vox"};
+}
+
+TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
+  const Document document = wide_document();
   const auto backend = backend_of(document, false);
   backend->show(request_for(document, DrawMode::Blocks));
   std::vector<std::string> told;
@@ -437,6 +442,31 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
       std::find_if(told.begin(), told.end(), [](const std::string& text) { return text.starts_with("meshing "); }),
       told.end());
   EXPECT_EQ(backend->activity(), "");
+}
+
+TEST_F(DeviceBackendTest, PausesWithoutAnEditLoseNothing) {
+  const Document document = wide_document();
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const auto backend = backend_of(document, false);
+    backend->show(request_for(document, DrawMode::Blocks));
+    EXPECT_TRUE(comes([&] {
+      for (int i = 0; i < 20; ++i) {
+        backend->pause();
+        backend->resume(false);
+      }
+      const auto frame = backend->take();
+      return frame && frame->is_settled;
+    }));
+  }
+}
+
+TEST_F(DeviceBackendTest, EndsWhileChunksAreMeshed) {
+  const Document document = wide_document();
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const auto backend = backend_of(document, false);
+    backend->show(request_for(document, DrawMode::Blocks));
+    ASSERT_TRUE(comes([&] { return backend->activity().starts_with("meshing "); }));
+  }
 }
 
 TEST_F(DeviceBackendTest, MemoryThatRunsOutIsAFaultLikeOthers) {

@@ -5,6 +5,7 @@
 
 #include <quoin/io/scene_file.h>
 #include <quoin/io/volume.h>
+#include <quoin/io/vox.h>
 #include <quoin/scene/volume_scene.h>
 
 #include "io/byte_stream.h"

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include <quoin/io/mesh_file.h>
+#include <quoin/io/vox.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/vox.h>
 
 namespace quoin {
 namespace {

@@ -15,6 +15,7 @@
 #ifdef QUOIN_HAVE_MESHOPTIMIZER
 #include <meshoptimizer.h>
 
+#include "mesh/surface/build.h"
 #include "mesh/surface/manifold.h"
 #include "mesh/surface/triangle_tree.h"
 #endif
