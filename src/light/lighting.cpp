@@ -124,6 +124,13 @@ bool Lighting::needs_openness() const {
 
 std::int64_t Lighting::light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample) const {
   QUOIN_ASSERT(colours.size() >= points.size(), "a colour for every point");
+  if (options_.shading == Shading::Unlit) {
+    // No call a point: half of all that is left to do.
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      colours[i] = points[i].kind == PointKind::Glow ? Vec3(0.0F) : surface_at(points[i]).colour;
+    }
+    return 0;
+  }
   if (options_.shading != Shading::Lit && !needs_openness()) {
     for (std::size_t i = 0; i < points.size(); ++i) colours[i] = shade(points[i], {}, 1.0F);
     return 0;

@@ -30,7 +30,7 @@ trace::FieldView view_of(const DensityTree& tree) {
 template <bool kAsksWhere>
 std::optional<FieldHit> find(const DensityTree& tree, const Ray& ray, double max_t) {
   const trace::FieldView field = view_of(tree);
-  const auto kernel = kAsksWhere ? trace::kernel().first_in_field : trace::kernel().any_in_field;
+  const auto kernel = kAsksWhere ? trace::field_kernel().first_in_field : trace::field_kernel().any_in_field;
   FieldHit hit;
   bool is_unfinished = true;
   if (field.cells != nullptr && kernel != nullptr && kernel(field, ray, max_t, hit, is_unfinished)) return hit;
@@ -78,7 +78,7 @@ bool any_hit(const DensityTree& tree, const Ray& ray, double max_t) {
 
 void first_hits(const DensityTree& tree, const RayPacket& rays, DensityPacketHits& hits) {
   const trace::FieldView field = view_of(tree);
-  const auto kernel = trace::kernel().first_hits_in_field;
+  const auto kernel = trace::field_kernel().first_hits_in_field;
   RayPacket::Lanes<FieldHit> found;
   std::uint32_t one_by_one = rays.active;
   hits.hit = 0;
@@ -100,7 +100,7 @@ void first_hits(const DensityTree& tree, const RayPacket& rays, DensityPacketHit
 
 std::uint32_t any_hits(const DensityTree& tree, const RayPacket& rays) {
   const trace::FieldView field = view_of(tree);
-  const auto kernel = trace::kernel().any_hits_in_field;
+  const auto kernel = trace::field_kernel().any_hits_in_field;
   std::uint32_t one_by_one = rays.active;
   std::uint32_t blocked = 0;
   if (field.cells != nullptr && kernel != nullptr) blocked = kernel(field, rays, one_by_one);

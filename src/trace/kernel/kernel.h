@@ -44,6 +44,11 @@ struct Kernel {
   void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
   /// Returns the lanes that are blocked.
   std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
+};
+
+/// Of fields. Files of their own hold these: in one with the others, compilers divide what both use into calls, and rays
+/// among voxels take a tenth more instructions (docs/decisions/052).
+struct FieldKernel {
   /// One ray in a field; null where it is to be walked otherwise, as are those that are unfinished. Whether alone: `t`
   /// means nothing.
   bool (*first_in_field)(const FieldView& field, const Ray& ray, double max_t, FieldHit& hit, bool& unfinished);
@@ -59,14 +64,19 @@ bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray
                    FieldHit& hit);
 
 extern const Kernel kPlainKernel;
+extern const FieldKernel kPlainFieldKernel;
 #ifdef QUOIN_X86_KERNELS
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
+extern const FieldKernel kAvx2FieldKernel;
+extern const FieldKernel kAvx512FieldKernel;
 #endif
 
 #ifdef QUOIN_X86_KERNELS
 inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel,
                                                              &kAvx512Kernel};
+inline constexpr const FieldKernel* kFieldKernels[kInstructionSets] = {&kPlainFieldKernel, &kAvx2FieldKernel,
+                                                                       &kAvx512FieldKernel, &kAvx512FieldKernel};
 #endif
 
 /// That of the widest instructions that this machine has.
@@ -75,6 +85,13 @@ inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAv
   return *kKernels[static_cast<std::size_t>(instruction_set())];
 #else
   return kPlainKernel;
+#endif
+}
+[[nodiscard]] inline const FieldKernel& field_kernel() {
+#ifdef QUOIN_X86_KERNELS
+  return *kFieldKernels[static_cast<std::size_t>(instruction_set())];
+#else
+  return kPlainFieldKernel;
 #endif
 }
 

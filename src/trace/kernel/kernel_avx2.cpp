@@ -4,15 +4,12 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "trace/kernel/field.inl"
-#include "trace/kernel/field_packet.inl"
 #include "trace/kernel/packet.inl"
 #include "trace/kernel/single.inl"
 
 namespace quoin::trace {
 
-const Kernel kAvx2Kernel = {first_single<PathTracer>, any_single<PathTracer>, trace_first,         trace_any,
-                            first_in_field<true>,     first_in_field<false>,  first_hits_in_field, any_hits_in_field};
+const Kernel kAvx2Kernel = {first_single<PathTracer>, any_single<PathTracer>, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

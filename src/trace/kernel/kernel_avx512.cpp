@@ -4,16 +4,13 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "trace/kernel/field.inl"
-#include "trace/kernel/field_packet.inl"
 #include "trace/kernel/packet.inl"
 #include "trace/kernel/single.inl"
 #include "trace/kernel/single_short.inl"
 
 namespace quoin::trace {
 
-const Kernel kAvx512Kernel = {first_single<PathTracer>, any_short_single,      trace_first,         trace_any,
-                              first_in_field<true>,     first_in_field<false>, first_hits_in_field, any_hits_in_field};
+const Kernel kAvx512Kernel = {first_single<PathTracer>, any_short_single, trace_first, trace_any};
 
 }  // namespace quoin::trace
 

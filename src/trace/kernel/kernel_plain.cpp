@@ -4,7 +4,6 @@
 //   Steps   the next plane of each axis, and when it is crossed       | plane0 t0 | plane1 t1 | plane2 t2 |
 //   index   of cells: a bit of the flat table; of voxels: as in trace/kernel/numbers.inl
 
-#include "trace/kernel/field_walk.inl"
 #include "trace/kernel/numbers.inl"
 
 namespace quoin::trace {
@@ -314,21 +313,6 @@ std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::u
 
 }  // namespace
 
-bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray& ray, double max_t, bool asks_where,
-                   FieldHit& hit) {
-  const std::optional<FieldHit> found = asks_where ? SurfaceWalk<true>(cells, field, ray, max_t).find()
-                                                   : SurfaceWalk<false>(cells, field, ray, max_t).find();
-  if (found) hit = *found;
-  return found.has_value();
-}
-
-const Kernel kPlainKernel = {first_single<PlainTracer>,
-                             any_single<PlainTracer>,
-                             first_one_by_one,
-                             any_one_by_one,
-                             nullptr,
-                             nullptr,
-                             nullptr,
-                             nullptr};
+const Kernel kPlainKernel = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one, any_one_by_one};
 
 }  // namespace quoin::trace

@@ -1,0 +1,17 @@
+// Rays in fields for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#include "trace/kernel/kernel.h"
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "trace/kernel/field.inl"
+#include "trace/kernel/field_packet.inl"
+
+namespace quoin::trace {
+
+const FieldKernel kAvx2FieldKernel = {first_in_field<true>, first_in_field<false>, first_hits_in_field,
+                                      any_hits_in_field};
+
+}  // namespace quoin::trace
+
+#endif
