@@ -73,8 +73,8 @@ TEST_F(ViewerTest, ManyStartsLeaveNothingBehind) {
   }
   EXPECT_EQ(open_files(), files);
   EXPECT_LE(threads_after_joining(threads_before), threads_before) << "a thread of a window that is closed still runs";
-  // A window's fonts and pictures alone take more than 1 MB: sixteen of them would show. What the thread sanitizer notes
-  // of memory takes some of it too.
+  // A window's fonts and pictures alone take more than 1 MB: sixteen of them would show. The thread sanitizer notes
+  // take some too.
 #if defined(__SANITIZE_THREAD__)
   constexpr double kMegabytes = 15.0;
 #else

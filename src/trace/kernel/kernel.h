@@ -46,7 +46,7 @@ struct Kernel {
   std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
 };
 
-/// Of fields. Files of their own hold these: in one with the others, compilers divide what both use into calls, and rays
+/// Of fields. Files of their own hold these: in one with the others, compilers turn what both use into calls, and rays
 /// among voxels take a tenth more instructions (docs/decisions/052).
 struct FieldKernel {
   /// One ray in a field; null where it is to be walked otherwise, as are those that are unfinished. Whether alone: `t`
