@@ -118,7 +118,10 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   file.transform(2, 3, {{}}, {{"_name", "crew"}}, 1).group(3, {4});
   file.transform(4, 5, {{}}, {{"_name", "walker"}}, 0).shape(5, {{0, {{"_f", "0"}}}, {1, {{"_f", "3"}}}});
   file.layer(0, {}).layer(1, {{"_name", "people"}});
-  file.with("rCAM", [](auto& out) { out.dict({}); });
+  file.with("rCAM", [](auto& out) {
+    out.i32(0);
+    out.dict({});
+  });
   const auto bytes = file.file();
   ASSERT_TRUE(write_file(folder_.file("crew.vox"), bytes));
   const ToolRun same = run("convert crew.vox same.vox");
