@@ -161,8 +161,9 @@ TEST_F(Obj, AnAtlasIsThePictureOfOpaqueBlocks) {
     seen.insert({texel[0], texel[1], texel[2]});
   }
   EXPECT_TRUE(seen.contains({90, 80, 70}));
-  for (const auto& file : mesh_files(meshes_, path).value()) EXPECT_TRUE(std::filesystem::exists(file)) << file;
-  EXPECT_EQ(mesh_files(meshes_, path).value().size(), folder_.count());
+  const auto files = mesh_files(meshes_, path).value();
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(files.size(), folder_.count());
 }
 
 TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {

@@ -38,19 +38,18 @@ std::vector<MeshKey> keys_of(const std::vector<std::optional<Similarity>>& at, s
 }  // namespace
 
 Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
-  const auto& handles = frame.instances().handles();
+  const std::size_t count = frame.instances().size();
   if (frames_ == 0) {
     scene_ = frame.snapshot();
-    const std::vector<InstanceHandle> all(scene_.instances().handles().begin(), scene_.instances().handles().end());
-    for (const InstanceHandle handle : all) scene_.remove_instance(handle);
-    instances_.resize(handles.size());
+    for (const InstanceHandle handle : scene_.instances().handles()) scene_.remove_instance(handle);
+    instances_.resize(count);
   }
-  if (handles.size() != instances_.size() || frame.grids().size() != scene_.grids().size()) {
+  if (count != instances_.size() || frame.grids().size() != scene_.grids().size()) {
     return make_error(ErrorCode::InvalidArgument,
                       "frame " + std::to_string(frames_) + " has other instances or grids than those before it");
   }
   std::size_t place = 0;
-  for (const InstanceHandle handle : handles) {
+  for (const InstanceHandle handle : frame.instances().handles()) {
     const Instance& instance = frame.instances()[handle];
     if (is_drawn(frame, instance, filter)) {
       Shown& shown = shown_as(place, instance);
