@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,14 +17,22 @@ namespace quoin {
 /// A .vox file as it was read, with all that a scene has no place for: see write_vox.
 struct VoxSource;
 
+/// A camera that a file has beside others, under a number.
+struct FileCamera {
+  std::int32_t number = 0;
+  Camera camera;
+};
+
 /// What reading a file gave.
 struct LoadedScene {
   Scene scene;
-  std::string format;                 ///< "vox", ...
-  std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
-  std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
-  std::optional<Camera> camera;       ///< where the file has one
-  bool names_files = false;           ///< models came from other files, which saving would put into this one
+  std::string format;                                 ///< "vox", ...
+  std::vector<std::string> warnings;                  ///< one line each: what was skipped, and why
+  std::optional<DVec3> sun;                           ///< from the surface towards the sun, where the file says it
+  std::optional<Camera> camera;                       ///< to look through at first, where the file has such a one
+  std::vector<FileCamera> cameras;                    ///< all of the file, in its order
+  std::int64_t last_frame = 0;                        ///< of its animation; LoadOptions::frame says which one this is
+  std::vector<std::filesystem::path> named_files;     ///< whose models are in it, which saving would put into this one
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
 };
 
