@@ -37,6 +37,10 @@ struct MeshPictureOptions {
   double impostor_seconds = std::numeric_limits<double>::infinity();
   int impostor_edge = 128;
   bool detail_colours = false;
+  /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays through
+  /// the VulkanRenderer's voxels. Else each face counts as a body one voxel thick without a surface, drawn from back to
+  /// front: cheap, and without need of voxels.
+  bool glass_by_rays = true;
   Threads threads;
   Wireframe wireframe = Wireframe::Off;
 };

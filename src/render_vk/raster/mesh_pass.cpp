@@ -174,22 +174,33 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
     steps.front().is_backwards = true;
     steps.insert(steps.begin(), {solid, kDrawDepth});
   }
+  const bool has_edges = wireframe == Wireframe::Over;
+  if (data.glass_by_rays) {
+    // Before it hides them.
+    if (has_edges) steps.push_back({Step::Over::Opaque, kDrawEdgesOver});
+    for (const std::uint32_t mode : {kDrawGlassDepth, kDrawGlassPassed, kDrawGlassAdded}) {
+      steps.push_back({Step::Over::GlassByChunk, mode});
+    }
+    if (has_edges) steps.push_back({Step::Over::GlassByChunk, kDrawEdgesOver});
+    return steps;
+  }
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMaxOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
     for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
   }
-  if (wireframe == Wireframe::Over) steps.push_back({Step::Over::All, kDrawEdgesOver});
+  if (has_edges) steps.push_back({Step::Over::All, kDrawEdgesOver});
   return steps;
 }
 
 Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light, bool has_fields) {
   for (Step& step : steps) {
     // Edges are as bright as what they lie on, but for shadows.
-    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || step.is_glass());
+    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
+    MeshLight lit = is_lit ? light : MeshLight::Plain;
+    if (is_glass_by_rays(step.mode)) lit = MeshLight::TracedThroughGlass;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder,
-                                               is_lit ? light : MeshLight::Plain,
-                                               is_lit && light != MeshLight::Plain && has_fields, samples});
+      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
+                                               lit != MeshLight::Plain && has_fields, samples});
       if (!found) return found.error();
       out = *found;
       return {};

@@ -24,7 +24,7 @@ enum class MeshLight : std::uint8_t {
 struct MeshWay {
   enum class What : std::uint8_t { Sky, Blocky, Smooth, Far };
   What what = What::Sky;
-  /// As ShaderMeshPush: surfaces, edges over them, edges alone, or a channel of glass.
+  /// As ShaderMeshPush: surfaces, edges over them, edges alone, a channel of glass, or a step of glass by rays.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says

@@ -67,7 +67,7 @@ void MeshStore::clear() {
     for (auto& [at, mesh] : grid.chunks) memory_->release(mesh.place);
   }
   grids_.clear();
-  chunks_ = bytes_ = 0;
+  chunks_ = chunks_with_glass_ = bytes_ = 0;
   triangles_ = 0;
 }
 
@@ -166,12 +166,14 @@ void MeshStore::replace(Change& change) {
   if (!is_new) give_back(at->second);
   at->second = std::move(change.mesh);
   ++chunks_;
+  chunks_with_glass_ += at->second.has_glass() ? 1 : 0;
   triangles_ += at->second.triangles();
   bytes_ += at->second.place.size;
 }
 
 void MeshStore::give_back(StoredMesh& mesh) {
   --chunks_;
+  chunks_with_glass_ -= mesh.has_glass() ? 1 : 0;
   triangles_ -= mesh.triangles();
   bytes_ -= mesh.place.size;
   memory_->release(mesh.place);

@@ -27,6 +27,7 @@ struct StoredMesh {
   [[nodiscard]] std::int64_t triangles() const {
     return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
   }
+  [[nodiscard]] bool has_glass() const { return !glass.empty(); }
 };
 
 /// Whose chunks: those of a grid's voxels, or of these halved that often, or of its field.
@@ -73,6 +74,7 @@ class MeshStore {
   [[nodiscard]] std::size_t chunks() const { return chunks_; }
   [[nodiscard]] std::int64_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] bool has_glass() const { return chunks_with_glass_ > 0; }
 
  private:
   struct Change {
@@ -90,6 +92,7 @@ class MeshStore {
   DeviceMemory* memory_;
   std::map<MeshKey, StoredGrid> grids_;
   std::size_t chunks_ = 0;
+  std::size_t chunks_with_glass_ = 0;
   std::int64_t triangles_ = 0;
   std::size_t bytes_ = 0;
 };

@@ -5,8 +5,13 @@
 layout(constant_id = 1) const bool kIsGlass = false;
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
+layout(constant_id = 5) const bool kSeesThrough = false;
+#define HOLDS_BODIES
 #include "face_colour.glsl"
 #include "mesh_light.glsl"
+#include "corners.glsl"
+#include "sky.glsl"
+#include "seen_glass.glsl"
 
 layout(location = 0) centroid in vec4 place;
 layout(location = 1) flat in ivec4 base;
@@ -38,7 +43,29 @@ vec3 light_of(uint face) {
   return traced_light(voxel, base.xyz & ~63, vec3(base.xyz & 63) + from, normal.xyz, diffuse);
 }
 
+// Whether the fragment lies on what the face was widened by. There another face has one too, and of glass each place
+// must be passed once.
+bool is_beyond(uint face) {
+  vec2 at = vec2(place[kFaceU[face]], place[kFaceV[face]]);
+  return any(lessThan(at, edges.xy)) || any(greaterThanEqual(at, edges.zw));
+}
+
+// Glass with all that is transparent behind it.
+vec4 seen_through(uint face) {
+  int home = mesh_frame().instances[what.y].home.w;
+  // The voxels that rays meet have no such instance any more.
+  if (home < 0) discard;
+  const float kWithin = 1e-4;
+  State state = seen_from(home, base.xyz, before_face(face, -kWithin), face);
+  return drawn() == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
+}
+
 void main() {
+  if (kSeesThrough) {
+    if (is_beyond(what.x)) discard;
+    pixel = drawn() == kGlassDepth ? vec4(0.0) : seen_through(what.x);
+    return;
+  }
   vec4 seen = colour;
   if (kTraces) seen = colour_of_face(what.x, uint(base.w), what.y, light_of(what.x), place.w);
   // Between opaque corners is not always opaque: what is interpolated beyond a triangle's edge can be less.

@@ -28,16 +28,10 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   return false;
 }
 
-// What of each channel of the sun's light passes what is transparent on the way.
-vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
-  ViewRay in_view = view_from_grid(own, ray);
-  float length = own.ref_inside.w;
-#ifdef KEEPS_BODIES
-  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, 0, kInfinity);
-#else
-  BodyList list = BodyList(uvec2(0), 0, 0, kInfinity);
-#endif
-  vec3 passed = vec3(1.0);
+// The bodies of all instances along a ray in the space of grid `home`, and in view. `length`: of the ray's direction in
+// the world.
+void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max_t, float from_t, inout BodyList list,
+                 inout vec3 passed) {
   start_visit(in_view);
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
@@ -45,8 +39,19 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
     GridRay in_grid = ray;
     if (i != home) in_grid = grid_from_view(placed, in_view);
     if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
-    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, 0.0, list, passed);
+    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, from_t, list, passed);
   }
+}
+
+// What of each channel of the sun's light passes what is transparent on the way.
+vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
+#ifdef KEEPS_BODIES
+  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, kBodies, 0, kInfinity);
+#else
+  BodyList list = BodyList(uvec2(0), 0, 0, 0, kInfinity);
+#endif
+  vec3 passed = vec3(1.0);
+  find_bodies(home, ray, view_from_grid(own, ray), own.ref_inside.w, max_t, 0.0, list, passed);
   uint i = 0;
   Body body;
   while (next_body(list, i, body)) {
