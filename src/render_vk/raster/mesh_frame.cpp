@@ -99,7 +99,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
   const double radius = kChunkRadius * space.instance->voxel_size;
   const std::size_t before = data.draws.size();
   for (const auto& [chunk, mesh] : grid.chunks) {
-    if (space.instance->is_far && mesh.glass.empty()) continue;
+    if (space.instance->is_far && !mesh.has_glass()) continue;
     const DVec3 offset = DVec3(chunk) * kEdge - space.base;
     const DVec3 middle = space.view_axes * (offset + kEdge / 2) + space.base_in_view;
     if (!view.frustum.meets(middle, radius)) continue;
@@ -215,7 +215,10 @@ bool faces_camera(const Quad& quad, const MeshDraw& draw, const Space& space, co
 }
 
 void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData& data) {
-  for (const MeshDraw& draw : data.draws) data.glass_quads += draw.mesh->glass.size();
+  for (const MeshDraw& draw : data.draws) {
+    data.glass_quads += draw.mesh->glass.size();
+    data.has_smooth_glass |= draw.mesh->glass_indices > 0;
+  }
   if (data.glass_by_rays || data.glass_quads > kMaxOrdered) return;
   struct Entry {
     float distance;

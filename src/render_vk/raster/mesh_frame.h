@@ -92,6 +92,7 @@ struct MeshFrameData {
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
+  bool has_smooth_glass = false;
   bool has_fields = false;    ///< among what rays meet
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, with all that is seen through it
 

@@ -140,8 +140,8 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 6> values;
-  std::array<VkSpecializationMapEntry, 6> entries;
+  std::array<VkBool32, 7> values;
+  std::array<VkSpecializationMapEntry, 7> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
@@ -151,8 +151,9 @@ struct Stages {
                way.light != MeshLight::Plain,
                way.light == MeshLight::TracedThroughGlass,
                way.fields,
-               is_glass_by_rays(way.mode)},
-        constants{6, entries.data(), sizeof values, values.data()} {
+               is_nearest_glass(way.mode),
+               way.glass_by_rays},
+        constants{7, entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }

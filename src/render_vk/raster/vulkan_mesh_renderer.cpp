@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/picture_request.h"
 #include "render_vk/march/device_picture.h"
 #include "render_vk/march/renderer_impl.h"

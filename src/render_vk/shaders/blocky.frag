@@ -5,7 +5,7 @@
 layout(constant_id = 1) const bool kIsGlass = false;
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
-layout(constant_id = 5) const bool kSeesThrough = false;
+layout(constant_id = 6) const bool kSeesThrough = false;
 #define HOLDS_BODIES
 #include "face_colour.glsl"
 #include "mesh_light.glsl"
@@ -50,20 +50,34 @@ bool is_beyond(uint face) {
   return any(lessThan(at, edges.xy)) || any(greaterThanEqual(at, edges.zw));
 }
 
-// Glass with all that is transparent behind it.
-vec4 seen_through(uint face) {
-  int home = mesh_frame().instances[what.y].home.w;
-  // The voxels that rays meet have no such instance any more.
-  if (home < 0) discard;
-  const float kWithin = 1e-4;
-  State state = seen_from(home, base.xyz, before_face(face, -kWithin), face);
-  return drawn() == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
+vec3 normal_met(int instance, uint face, float t) {
+  return face_normal(placed_at(instance), face);
+}
+vec3 light_of_body(Body body, uint slot) {
+  Placed placed = placed_at(body.voxel.w);
+  uint face = body.what.y;
+  float diffuse = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
+  return light_of_body(body, placed, face_normal(placed, face), diffuse);
+}
+
+// The body of the fragment begins in its face; those of other instances in which the ray starts began before.
+void enter_first(inout BodyList list) {
+  for (uint i = 0; i < list.count; ++i) {
+    Body body = listed_body(list, i);
+    if (body.what.z == 0 || body.voxel.w != seen_home) continue;
+    body.what.y = what.x;
+    body.what.z = 0;
+    list_body(list, i, body);
+  }
 }
 
 void main() {
   if (kSeesThrough) {
+    const float kWithin = 1e-4;
     if (is_beyond(what.x)) discard;
-    pixel = drawn() == kGlassDepth ? vec4(0.0) : seen_through(what.x);
+    pixel = vec4(0.0);
+    if (drawn() == kGlassDepth) return;
+    pixel = seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
     return;
   }
   vec4 seen = colour;

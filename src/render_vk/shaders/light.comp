@@ -198,6 +198,9 @@ vec3 light_of_body(Body body, uint slot) {
 vec3 seen_direction() {
   return camera_ray(picture_point()).direction;
 }
+vec3 normal_met(int instance, uint face, float t) {
+  return face_normal(placed_at(instance), face);
+}
 
 // Lights what this round has of a pixel, and returns whether that was all.
 bool light_pixel(uint slot, inout State state) {

@@ -1,33 +1,38 @@
 // What one sees through bodies of glass, as light/glass.h says on the processor's side. Those that include this define
-// these two: the light of the face through which a body is entered, and which way one looks, in the world.
+// these: the light of the face through which a body is entered, which way one looks, in the world, and the upright of the
+// surface that is met at `t`, in the face of an instance's voxel; unit, in the world.
 vec3 light_of_body(Body body, uint slot);
 vec3 seen_direction();
+vec3 normal_met(int instance, uint face, float t);
 
-// The surface of a face, which mirrors the sky. `tint`: of what is mirrored.
-void meet_surface(int instance, uint face, float before, float behind, vec3 tint, inout State state) {
-  Placed placed = placed_at(instance);
-  vec3 normal = sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
-  vec2 mirror = mirror_at(seen_direction(), normal, before, behind);
+// Of a face.
+vec3 face_normal(Placed placed, uint face) {
+  return sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
+}
+
+// A surface that mirrors the sky. `tint`: of what is mirrored.
+void meet_surface(int instance, uint face, float t, float before, float behind, vec3 tint, inout State state) {
+  vec2 mirror = mirror_at(seen_direction(), normal_met(instance, face, t), before, behind);
   state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
   state.weight.xyz *= 1.0 - mirror.x;
 }
 // Where a ray leaves a body into air, or into another that touches it: what is mirrored passes it once more.
-void leave_body(Body from, int instance, uint face, float behind, inout State state) {
+void leave_body(Body from, int instance, uint face, float t, float behind, inout State state) {
   Surface surface = surface_of(from.what.x);
   vec3 tint = passed_by(surface, from.lengths.z, from.what.z != 0);
-  meet_surface(instance, face, surface.ior, behind, tint, state);
+  meet_surface(instance, face, t, surface.ior, behind, tint, state);
 }
 void leave_into_air(Body from, inout State state) {
-  leave_body(from, int(from.what.w >> 3), from.what.w & 7, 1.0, state);
+  leave_body(from, int(from.what.w >> 3), from.what.w & 7, from.lengths.y, 1.0, state);
 }
 void enter_body(Body from, bool has_from, Body to, inout State state) {
   float ior = surface_of(to.what.x).ior;
   if (has_from && reaches(from, to.lengths.x)) {
-    leave_body(from, to.voxel.w, to.what.y, ior, state);
+    leave_body(from, to.voxel.w, to.what.y, to.lengths.x, ior, state);
     return;
   }
   if (has_from) leave_into_air(from, state);
-  if (to.what.z == 0) meet_surface(to.voxel.w, to.what.y, 1.0, ior, vec3(1.0), state);
+  if (to.what.z == 0) meet_surface(to.voxel.w, to.what.y, to.lengths.x, 1.0, ior, vec3(1.0), state);
 }
 
 // Whether something opaque leaves no air behind a body. `opaque_t`: how far that is; kInfinity where there is nothing.

@@ -15,14 +15,20 @@ vec3 seen_direction() {
   return direction / length(direction);
 }
 
+// The ray in the space of an instance.
+GridRay seen_ray_in(int instance, Placed placed) {
+  GridRay ray = seen_ray;
+  if (instance != seen_home) ray = grid_from_view(placed, seen_in_view);
+  return ray;
+}
+
 // How far along the ray the first opaque voxel or solid of a field lies; kInfinity where there is none.
 float opaque_behind() {
   float nearest = kInfinity;
   start_visit(seen_in_view);
   for (int i = next_instance(nearest); i >= 0; i = next_instance(nearest)) {
     Placed placed = placed_at(i);
-    GridRay ray = seen_ray;
-    if (i != seen_home) ray = grid_from_view(placed, seen_in_view);
+    GridRay ray = seen_ray_in(i, placed);
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
     if (start_walk(opaque, ray.base, ray.origin, ray.direction, nearest, -1) && find_voxel(nearest)) nearest = walk_t;
     if (kHasFields) {
@@ -36,9 +42,9 @@ float opaque_behind() {
   return nearest;
 }
 
-// By the occlusion that a blocky mesh would carry there.
-vec3 light_of_body(Body body, uint slot) {
-  Placed placed = placed_at(body.voxel.w);
+// Of the face through which a body is entered, by the occlusion that a blocky mesh would carry there. `normal`: unit, in
+// the world; `diffuse`: of the sun.
+vec3 light_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   uint face = body.what.y;
   Surface surface = surface_of(body.what.x);
   if (has(kDetailColours)) {
@@ -47,8 +53,7 @@ vec3 light_of_body(Body body, uint slot) {
   }
   // From inside it shows only what it emits.
   if (body.what.z != 0) surface.colour = vec3(0.0);
-  GridRay ray = seen_ray;
-  if (body.voxel.w != seen_home) ray = grid_from_view(placed, seen_in_view);
+  GridRay ray = seen_ray_in(body.voxel.w, placed);
   vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
   inside = on_face(inside, face);
   float openness = 1.0;
@@ -60,27 +65,19 @@ vec3 light_of_body(Body body, uint slot) {
   if (has(kLit) && body.what.z == 0) {
     vec3 from = vec3(body.voxel.xyz & 63) + inside;
     from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
-    vec3 normal = sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
-    float diffuse = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
     sunlight = traced_light(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse);
   }
   return colour_in_light(surface.colour, surface.emitted, sunlight, openness);
 }
 
-// The bodies of a list that the ray starts in, of the fragment's instance: it has entered them through `face`.
-void mark_entered(BodyList list, uint face) {
-  for (uint i = 0; i < list.count; ++i) {
-    Body body = listed_body(list, i);
-    if (body.what.z == 0 || body.voxel.w != seen_home) continue;
-    body.what.y = face;
-    body.what.z = 0;
-    list_body(list, i, body);
-  }
-}
+// Those that include this define what begins in the fragment: the first body of a list.
+void enter_first(inout BodyList list);
 
-// What is seen from where a face of instance `home` lies, in its tree's coordinates from `base`, a little within the
-// body: `weight` of what is drawn there, and `colour` besides.
-State seen_from(int home, ivec3 base, vec3 from, uint face) {
+// What is seen from a point of instance `home` on, in its tree's coordinates from `base`: of each channel what passes of
+// what is drawn there, or what is added to it, whichever is drawn now.
+vec4 seen_from(int home, ivec3 base, vec3 from) {
+  // The voxels that rays meet have no such instance any more.
+  if (home < 0) discard;
   Placed placed = placed_at(home);
   seen_home = home;
   seen_ray = GridRay(base & ~63, vec3(base & 63) + from, turned(placed.grid_axes, seen_direction()), 0.0);
@@ -92,12 +89,12 @@ State seen_from(int home, ivec3 base, vec3 from, uint face) {
   for (bool is_last = false, is_first = true; !is_last; is_first = false) {
     BodyList list = BodyList(uvec2(0), 0, kHeldBodies, 0, kInfinity);
     find_bodies(home, seen_ray, seen_in_view, 1.0, opaque_t, state.weight.w, list, unused);
-    mark_entered(list, face);
+    if (is_first) enter_first(list);
     is_last = list.dropped_t == kInfinity;
     state.weight.w = list.dropped_t;
     bool has_bodies = pass_bodies(list, is_last, !is_first, 0, state, last);
     bool is_left = is_last && has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, opaque_t);
     if (is_left) leave_into_air(last, state);
   }
-  return state;
+  return drawn() == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
 }
