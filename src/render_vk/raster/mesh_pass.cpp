@@ -223,12 +223,19 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
       out = *found;
       return {};
     };
-    const bool is_sky = step.over == Step::Over::Sky;
-    Status done = find(is_sky ? MeshWay::What::Sky : MeshWay::What::Blocky, false, step.blocky);
-    const bool has_smooth = !is_sky && step.styles != Step::Styles::Blocky;
-    if (done && has_smooth) done = find(MeshWay::What::Smooth, false, step.smooth[0]);
-    if (done && has_smooth) done = find(MeshWay::What::Smooth, true, step.smooth[1]);
-    if (done && !is_sky && !step.is_glass()) done = find(MeshWay::What::Far, false, step.far);
+    if (step.over == Step::Over::Sky) {
+      if (Status done = find(MeshWay::What::Sky, false, step.blocky); !done) return done;
+      continue;
+    }
+    Status done;
+    for (const MeshDraw& draw : data.draws) {
+      if (!done || !step.draws(draw)) continue;
+      const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
+      VkPipeline& pipeline = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
+      const auto what = is_smooth ? MeshWay::What::Smooth : MeshWay::What::Blocky;
+      if (pipeline == VK_NULL_HANDLE) done = find(what, is_smooth && draw.mirrored, pipeline);
+    }
+    if (done && !step.is_glass() && !data.far.empty()) done = find(MeshWay::What::Far, false, step.far);
     if (!done) return done;
   }
   return {};
@@ -281,9 +288,8 @@ void MeshPass::record(VkCommandBuffer commands, const MeshFrameData& data, const
 
 void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
   const Api& api = device_->api();
-  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
-  VkPipeline bound = step.blocky;
   if (step.over == Step::Over::Sky) {
+    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     push(commands, data.sky);
     return api.vkCmdDraw(commands, 3, 1, 0, 0);
   }
@@ -291,14 +297,16 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
   values.numbers |= step.mode;
   bind_corners(commands);
   if (step.over == Step::Over::GlassInOrder) {
+    if (data.order.empty()) return;
+    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     push(commands, values);
     return draw_quads(commands, 0, static_cast<std::uint32_t>(data.order.size()));
   }
   if (step.is_backwards) {
     draw_far(commands, data, step);
-    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     bind_corners(commands);
   }
+  VkPipeline bound = VK_NULL_HANDLE;
   const bool is_backwards = step.is_glass() || step.is_backwards;
   for (std::size_t i = 0; i < data.draws.size(); ++i) {
     const MeshDraw& draw = data.draws[is_backwards ? data.draws.size() - 1 - i : i];

@@ -30,12 +30,24 @@ constexpr std::uint32_t kSmoothFragment[] = {
 #include "smooth.frag.inc"
 };
 
-constexpr std::array<std::span<const std::uint32_t>, 7> kCode = {
-    kSkyVertex, kSkyFragment, kBlockyVertex, kBlockyFragment, kSmoothVertex, kSmoothFragment, kFarVertex};
+constexpr std::uint32_t kBlockyGlassFragment[] = {
+#include "blocky_glass.frag.inc"
+};
+constexpr std::uint32_t kSmoothGlassFragment[] = {
+#include "smooth_glass.frag.inc"
+};
 
-// Of vertices and of fragments, in `kCode`.
-std::array<std::size_t, 2> shaders_of(MeshWay::What what) {
-  switch (what) {
+constexpr std::array<std::span<const std::uint32_t>, 9> kCode = {
+    kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,     kSmoothVertex,
+    kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment};
+
+// Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and are
+// apart from all others.
+std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
+  const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
+  if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
+  if (sees_through && way.what == MeshWay::What::Smooth) return {4, 8};
+  switch (way.what) {
     case MeshWay::What::Sky:
       return {0, 1};
     case MeshWay::What::Blocky:
@@ -140,8 +152,8 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 7> values;
-  std::array<VkSpecializationMapEntry, 7> entries;
+  std::array<VkBool32, 6> values;
+  std::array<VkSpecializationMapEntry, 6> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
@@ -151,9 +163,8 @@ struct Stages {
                way.light != MeshLight::Plain,
                way.light == MeshLight::TracedThroughGlass,
                way.fields,
-               is_nearest_glass(way.mode),
-               way.glass_by_rays},
-        constants{7, entries.data(), sizeof values, values.data()} {
+               is_nearest_glass(way.mode) ? way.mode : 0},
+        constants{6, entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }
@@ -243,7 +254,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 }
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
-  const auto [vertices, fragments] = shaders_of(way.what);
+  const auto [vertices, fragments] = shaders_of(way);
   const Stages stages(way, {shaders_[vertices], shaders_[fragments]});
   GraphicsPipelineInfo info;
   info.pass = pass;

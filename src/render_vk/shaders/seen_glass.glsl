@@ -1,19 +1,12 @@
 // What a fragment of glass shows: all that is transparent from there to what is opaque behind, as marched pictures show
-// it. Those that include this draw the nearest such fragment of each pixel, once what is opaque is drawn.
+// it. Those that include this draw the nearest such fragment of each pixel, once what is opaque is drawn, and say which
+// step of that it is (`kGlassStep`).
 #include "see_through.glsl"
 
 // The ray from the fragment on. It starts within the body that the fragment is of.
 GridRay seen_ray;
 ViewRay seen_in_view;
 int seen_home;  // the instance
-
-// From the camera through the fragment's pixel, in the world; unit.
-vec3 seen_direction() {
-  Frame f = frame();
-  vec3 direction = f.forward.xyz;
-  if (has(kPerspective)) direction += f.corner.xyz + f.right.xyz * gl_FragCoord.x + f.down.xyz * gl_FragCoord.y;
-  return direction / length(direction);
-}
 
 // The ray in the space of an instance.
 GridRay seen_ray_in(int instance, Placed placed) {
@@ -42,9 +35,9 @@ float opaque_behind() {
   return nearest;
 }
 
-// Of the face through which a body is entered, by the occlusion that a blocky mesh would carry there. `normal`: unit, in
+// The face through which a body is entered, with the occlusion that a blocky mesh would carry there. `normal`: unit, in
 // the world; `diffuse`: of the sun.
-vec3 light_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
+LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   uint face = body.what.y;
   Surface surface = surface_of(body.what.x);
   if (has(kDetailColours)) {
@@ -61,20 +54,24 @@ vec3 light_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
     openness = 1.0 - occlusion_at(corner_occlusion(opaque, body.voxel.xyz, face), face, inside) / 3.0;
   }
-  vec3 sunlight = vec3(0.0);
-  if (has(kLit) && body.what.z == 0) {
-    vec3 from = vec3(body.voxel.xyz & 63) + inside;
-    from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
-    sunlight = traced_light(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse);
-  }
-  return colour_in_light(surface.colour, surface.emitted, sunlight, openness);
+  vec3 from = vec3(body.voxel.xyz & 63) + inside;
+  from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
+  return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, openness);
+}
+
+// Those that include this say how bodies are lit.
+LitPoint point_of_body(Body body);
+
+vec3 light_of_body(Body body, uint slot) {
+  if (kGlassStep == kGlassPassed) return vec3(0.0);
+  return colour_of(point_of_body(body));
 }
 
 // Those that include this define what begins in the fragment: the first body of a list.
 void enter_first(inout BodyList list);
 
-// What is seen from a point of instance `home` on, in its tree's coordinates from `base`: of each channel what passes of
-// what is drawn there, or what is added to it, whichever is drawn now.
+// What is seen from a point of instance `home` on, in its tree's coordinates from `base`: what of each channel passes,
+// or what is added to what is drawn behind.
 vec4 seen_from(int home, ivec3 base, vec3 from) {
   // The voxels that rays meet have no such instance any more.
   if (home < 0) discard;
@@ -96,5 +93,5 @@ vec4 seen_from(int home, ivec3 base, vec3 from) {
     bool is_left = is_last && has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, opaque_t);
     if (is_left) leave_into_air(last, state);
   }
-  return drawn() == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
+  return kGlassStep == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
 }
