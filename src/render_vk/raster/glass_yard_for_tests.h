@@ -34,7 +34,7 @@ inline Scene glass_yard(DVec3 at = DVec3(0.0), std::uint8_t alpha = 20) {
   grid.fill_box({{6, 10, 44}, {26, 26, 45}}, green);
   grid.fill_box({{10, 10, 36}, {20, 20, 41}}, red);
   grid.fill_box({{34, 10, 30}, {42, 20, 40}}, clear);
-  grid.fill_box({{42, 10, 30}, {50, 16, 40}}, green);
+  grid.fill_box({{42, 10, 30}, {50, 20, 40}}, green);
   grid.fill_box({{18, 3, 24}, {22, 14, 28}}, clear);
   grid.fill_box({{52, 10, 50}, {55, 16, 53}}, lamp);
   render_test::place(scene, std::move(grid), at);
