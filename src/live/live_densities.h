@@ -63,7 +63,7 @@ class LiveDensity {
   bool has_base_ = false;
   ChangeReach changed_densities_;  // from the base
   ChangeReach changed_types_;
-  bool may_change_bodies_ = false;  // with `changed_types_`
+  bool may_change_bodies_ = false;              // with `changed_types_`
   std::shared_ptr<const VoxelRegistry> types_;  // until made
   std::vector<VoxelType> transparent_;          // those that are, of what `bodies_` was made of
   std::map<std::uint32_t, std::shared_ptr<const DensityChunk>> bodies_;

@@ -48,8 +48,8 @@ void append(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
 }
 
 // Each face in the colour of its sample.
-void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
-                     SmoothChunkMesh& mesh, ChunkSurface& surface) {
+void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+                     const SurfaceMaterials& materials, SmoothChunkMesh& mesh, ChunkSurface& surface) {
   std::vector<smooth::TriangleFace> faces;
   smooth::find_faces(chunks, options, materials, mesh, faces);
   const std::vector<smooth::VertexCopy> copies =

@@ -37,10 +37,10 @@ struct MeshPictureOptions {
   double impostor_seconds = std::numeric_limits<double>::infinity();
   int impostor_edge = 128;
   bool detail_colours = false;
-  /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays through
-  /// the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface, drawn from
-  /// back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface: cheap, and
-  /// without need of voxels.
+  /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays
+  /// through the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface,
+  /// drawn from back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface:
+  /// cheap, and without need of voxels.
   bool glass_by_rays = true;
   Threads threads;
   Wireframe wireframe = Wireframe::Off;
@@ -49,17 +49,17 @@ struct MeshPictureOptions {
 /// Draws chunks' meshes by rasterisation, on the device of a VulkanRenderer: a quad of a blocky mesh takes 8 bytes
 /// there, and its corners are made when it is drawn.
 ///
-/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes and edges
-///         of shadows; glass with `glass_by_rays`. Walls of smooth bodies of glass are the same to 4, away from their
-///         edges. What is brighter than white counts as white behind glass. There is no inside: only faces that look
-///         towards the camera are drawn.
+/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes and
+///         edges of shadows; glass with `glass_by_rays`. Walls of smooth bodies of glass are the same to 4, away from
+///         their edges. What is brighter than white counts as white behind glass. There is no inside: only faces that
+///         look towards the camera are drawn.
 /// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
 /// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
 ///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its
 ///         impostor is there an instance is drawn halved.
-/// Glass:  by rays each pixel is seen through from its nearest fragment on, through the bodies that the VulkanRenderer's
+/// Glass:  by rays each pixel is seen through from its nearest fragment on, through the bodies that the renderer's
 ///         voxels make, so nothing is put in order. The surfaces behind a smooth body's first have the upright of the
 ///         voxels there, blurred. Face by face, quads are put in order by the distances of their middles, so large
 ///         merged ones that lie close may be drawn in the wrong one; of more than 1,048,576 in a picture only the

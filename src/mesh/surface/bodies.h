@@ -23,8 +23,8 @@ namespace quoin::smooth {
 /// A chunk in which what is solid of other bodies is as far out as it was in.
 [[nodiscard]] DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 
-/// The densities of one body of several: those of all, `without_others`. Shares the chunks of `whole` in which there are
-/// no others; chunks that are not near the body are left out where it is transparent.
+/// The densities of one body of several: those of all, `without_others`. Shares the chunks of `whole` in which there
+/// are no others; chunks that are not near the body are left out where it is transparent.
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
 

@@ -189,8 +189,8 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
   return shared;
 }
 
-/// Splits quads with vertices that bodies share along the diagonals that are shorter now: each body chose its own before
-/// these were moved.
+/// Splits quads with vertices that bodies share along the diagonals that are shorter now: each body chose its own
+/// before these were moved.
 void split_quads_again(const ChunkLevels& levels, const std::vector<bool>& is_shared, SmoothChunkMesh& mesh) {
   const std::size_t quads_end = quad_indices_of(mesh);
   for (std::size_t i = 0; i < quads_end; i += 6) {

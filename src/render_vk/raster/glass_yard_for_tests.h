@@ -30,7 +30,7 @@ inline Scene glass_yard(DVec3 at = DVec3(0.0), std::uint8_t alpha = 20) {
   grid.fill_box({{0, 0, 0}, {64, 10, 64}}, stone);
   for (int step = 0; step < 4; ++step) grid.fill_box({{4, 8 - 2 * step, 4 + 6 * step}, {24, 10, 30}}, water);
   grid.fill_box({{4, 9, 4}, {24, 10, 30}}, kAir);
-  grid.fill_box({{32, 10, 6}, {44, 22, 18}}, clear);
+  grid.fill_box({{32, 10, 4}, {48, 26, 20}}, clear);
   grid.fill_box({{6, 10, 44}, {26, 26, 45}}, green);
   grid.fill_box({{10, 10, 36}, {20, 20, 41}}, red);
   grid.fill_box({{34, 10, 30}, {42, 20, 40}}, clear);

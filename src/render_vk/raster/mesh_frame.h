@@ -86,14 +86,14 @@ struct MeshFrameData {
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
   std::vector<FarDraw> far;     ///< likewise
-  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`, or rays find
-  /// what is transparent: then chunks are drawn in their order, and the quads of each as they come.
+  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`, or rays
+  /// find what is transparent: then chunks are drawn in their order, and the quads of each as they come.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
   bool has_smooth_glass = false;
-  bool has_fields = false;    ///< among what rays meet
+  bool has_fields = false;     ///< among what rays meet
   bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, with all that is seen through it
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }

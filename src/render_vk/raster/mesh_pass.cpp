@@ -211,8 +211,7 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
                                 const MeshFrameData& data) {
   for (Step& step : steps) {
     // Edges are as bright as what they lie on, but for shadows.
-    const bool is_lit =
-        step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
+    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {

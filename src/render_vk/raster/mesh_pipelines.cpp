@@ -41,8 +41,8 @@ constexpr std::array<std::span<const std::uint32_t>, 9> kCode = {
     kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,     kSmoothVertex,
     kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment};
 
-// Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and are
-// apart from all others.
+// Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and
+// are apart from all others.
 std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
   const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
   if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
@@ -134,8 +134,8 @@ void blend(VkBlendFactor added, VkBlendFactor kept, VkPipelineColorBlendAttachme
   state.colorBlendOp = state.alphaBlendOp = VK_BLEND_OP_ADD;
 }
 
-// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel; or, where
-// each pixel has one fragment of it, what is there is multiplied by what passes, and then the rest is added.
+// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel; or,
+// where each pixel has one fragment of it, what is there is multiplied by what passes, and then the rest is added.
 VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   VkPipelineColorBlendAttachmentState state{};
   state.colorWriteMask =

@@ -30,7 +30,7 @@ struct MeshWay {
   bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
   MeshLight light = MeshLight::Plain;
   bool glass_by_rays = false;  ///< of the nearest glass: with all that is seen through it
-  bool fields = false;  ///< rays may meet some
+  bool fields = false;         ///< rays may meet some
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;

@@ -280,8 +280,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
   if (surface_table.empty()) instances.clear();
   const auto shown_as = detailed(placement, request.threads);
   if (!shown_as) return shown_as.error();
-  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(),
-                                      glass_by_rays);
+  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays);
   if (!data) return data.error();
   if (Status done = put_picture(placement, camera, request, *data); !done) return done.error();
   if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;

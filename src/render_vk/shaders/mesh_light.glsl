@@ -9,8 +9,8 @@
 // The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
 // `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
 //
-// One loop over them all: compilers copy the walk to each place that asks for it, and that of lavapipe takes seconds for
-// each.
+// One loop over them all: compilers copy the walk to each place that asks for it, and that of lavapipe takes seconds
+// for each.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);

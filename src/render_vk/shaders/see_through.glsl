@@ -1,6 +1,6 @@
 // What one sees through bodies of glass, as light/glass.h says on the processor's side. Those that include this define
-// these: the light of the face through which a body is entered, which way one looks, in the world, and the upright of the
-// surface that is met at `t`, in the face of an instance's voxel; unit, in the world.
+// these: the light of the face through which a body is entered, which way one looks, in the world, and the upright of
+// the surface that is met at `t`, in the face of an instance's voxel; unit, in the world.
 vec3 light_of_body(Body body, uint slot);
 vec3 seen_direction();
 vec3 normal_met(int instance, uint face, float t);
