@@ -46,7 +46,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/sky.h", {"render"}},
     {"light/surfaces.h", {"io", "render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
-    {"mesh/surface/bodies.h", {"scene"}},
+    {"mesh/surface/bodies.h", {"live", "scene"}},
     {"mesh/surface/build.h", {"scene"}},
     {"mesh/surface/faces.h", {"live"}},
     {"mesh/surface/material.h", {"live"}},
