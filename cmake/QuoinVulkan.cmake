@@ -26,18 +26,18 @@ function(quoin_choose_vulkan_sources sources)
   set(${sources} ${all} PARENT_SCOPE)
 endfunction()
 
-# Compiles the shaders in a folder into lists of numbers that sources of the target include: those named after `USERS`.
+# Compiles the shaders in a folder and its rooms into lists of numbers that sources of the target include: those named after `USERS`.
 function(quoin_add_shaders target folder)
   cmake_parse_arguments(PARSE_ARGV 2 shaders "" "" "USERS")
   set(outputs)
   set(binary "${CMAKE_CURRENT_BINARY_DIR}/shaders")
   file(MAKE_DIRECTORY "${binary}")
-  file(GLOB all CONFIGURE_DEPENDS "${folder}/*.comp" "${folder}/*.vert" "${folder}/*.frag")
+  file(GLOB_RECURSE all CONFIGURE_DEPENDS "${folder}/*.comp" "${folder}/*.vert" "${folder}/*.frag")
   foreach(shader ${all})
     cmake_path(GET shader FILENAME name)
     set(output "${binary}/${name}.inc")
     add_custom_command(OUTPUT "${output}"
-      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 -O -mfmt=num -MD -MF "${output}.d" -o "${output}" "${shader}"
+      COMMAND "${QUOIN_GLSLC}" --target-env=vulkan1.2 -O -mfmt=num -I "${folder}" -MD -MF "${output}.d" -o "${output}" "${shader}"
       DEPENDS "${shader}" DEPFILE "${output}.d" VERBATIM COMMENT "Compiling shader ${name}")
     list(APPEND outputs "${output}")
   endforeach()

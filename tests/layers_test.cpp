@@ -48,7 +48,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/surfaces.h", {"io", "render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
     {"mesh/blocky/occlusion_atlas.h", {"scene"}},
-    {"mesh/surface/bodies.h", {"scene"}},
+    {"mesh/surface/bodies.h", {"live", "scene"}},
     {"mesh/surface/build.h", {"scene"}},
     {"mesh/surface/faces.h", {"live"}},
     {"mesh/surface/material.h", {"live"}},

@@ -204,10 +204,11 @@ MeshPictureOptions DeviceDrawer::mesh_picture() const {
   wanted.threads = options_.cpu.threads;
   if (request_->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
   if (!waits_) wanted.impostor_seconds = 0.0;
-  // Without a graphics card meshes have no light that takes rays: a picture with shadows would take seconds.
+  // Without a graphics card meshes have no light that takes rays, nor glass: such a picture would take seconds.
   if (is_processor()) {
     wanted.light.shadows = false;
     wanted.light.lamps = 0;
+    wanted.glass_by_rays = false;
   }
   return wanted;
 }

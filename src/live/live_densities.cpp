@@ -7,6 +7,7 @@
 
 #include "grid/chunk_order.h"
 #include "grid/long_box.h"
+#include "mesh/surface/bodies.h"
 
 namespace quoin {
 namespace {
@@ -51,10 +52,23 @@ const Chunk* materials_of(const DensityChunk* chunk) {
   return chunk == nullptr ? nullptr : &chunk->materials();
 }
 
+std::vector<VoxelType> transparent_of(const DensityChunk* chunk, const VoxelRegistry& types) {
+  if (chunk == nullptr || !types.has_transparent()) return {};
+  std::vector<VoxelType> found = chunk->materials().types();
+  std::erase_if(found, [&](VoxelType type) { return !types.is_transparent(type); });
+  return found;
+}
+
 }  // namespace
 
-LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed)
-    : stamp_(next_stamp()), chunk_(chunk), voxels_(std::move(voxels)), base_(std::move(base)), changed_(changed) {}
+LiveDensity::LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed,
+                         std::shared_ptr<const VoxelRegistry> types)
+    : stamp_(next_stamp()),
+      chunk_(chunk),
+      voxels_(std::move(voxels)),
+      base_(std::move(base)),
+      changed_(changed),
+      types_(std::move(types)) {}
 
 void LiveDensity::try_to_make() {
   if (is_made()) return;
@@ -86,6 +100,8 @@ void LiveDensity::make_locked() {
       reached = intersect({changed.min - kVoxelFieldReach, changed.max + kVoxelFieldReach}, kWholeChunk);
     changed_densities_ = density_difference(base_->densities(), made.get(), reached);
     changed_types_ = difference(materials_of(base_->densities()), materials_of(made.get()), kWholeChunk).types;
+    may_change_bodies_ =
+        !transparent_of(base_->densities(), *types_).empty() || !transparent_of(made.get(), *types_).empty();
     base_stamp_ = base_->stamp();
     has_base_ = true;
   }
@@ -93,14 +109,33 @@ void LiveDensity::make_locked() {
   is_made_.store(true, std::memory_order_release);
   voxels_.reset();
   base_.reset();
+  types_.reset();
+}
+
+std::shared_ptr<const DensityChunk> LiveDensity::of_body(const VoxelRegistry& types, std::uint32_t body) {
+  if (densities_ == nullptr) return nullptr;
+  const std::lock_guard lock(mutex_);
+  std::vector<VoxelType> transparent = transparent_of(densities_.get(), types);
+  if (transparent != transparent_) {
+    bodies_.clear();
+    transparent_ = std::move(transparent);
+  }
+  std::shared_ptr<const DensityChunk>& known = bodies_[body];
+  if (known == nullptr) {
+    known = smooth::holds_others(*densities_, types, body)
+                ? std::make_shared<const DensityChunk>(smooth::without_others(*densities_, types, body))
+                : std::shared_ptr<const DensityChunk>(std::shared_ptr<void>(), densities_.get());
+  }
+  return known;
 }
 
 bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
   if (stamp == stamp_) return true;
   if (!has_base_ || base_stamp_ != stamp) return false;
-  // Vertices take the materials of their cells' corners, which end one sample past the chunk.
+  // Vertices take the materials of their cells' corners, which end one sample past the chunk; what is solid of one body
+  // is air to others.
   return !changed_densities_.is_within(reach, offset.x, offset.y, offset.z) &&
-         !changed_types_.is_within(1, offset.x, offset.y, offset.z);
+         !changed_types_.is_within(may_change_bodies_ ? reach : 1, offset.x, offset.y, offset.z);
 }
 
 // Where the chunks of the edits differ from what they were, as far as that is looked into.
@@ -146,7 +181,8 @@ void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached)
     } else if (i == 13 && change.difference.types.samples != 0) {
       invalidate(at, false, {});
     }
-    if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, 1)) {
+    // Of types, those beside the chunk matter; which body a sample is of may matter further away: LiveDensity knows.
+    if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, reach_)) {
       reached.push_back(at);
     }
   }
@@ -175,19 +211,19 @@ bool DensityCache::has_voxels_near(IVec3 chunk) const {
   return false;
 }
 
-LiveDensities DensityCache::around(IVec3 chunk) {
+LiveDensities DensityCache::around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
   LiveDensities all;
-  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(chunk + Neighbourhood::offset(i));
+  for (int i = 0; i < 27; ++i) all[static_cast<std::size_t>(i)] = density(chunk + Neighbourhood::offset(i), types);
   return all;
 }
 
-std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk) {
+std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
   // As in a DensityGrid, the outermost chunks stay air.
   if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;
   if (std::shared_ptr<LiveDensity> under_way = slot.under_way.lock()) return under_way;
-  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, slot.changed);
+  auto made = std::make_shared<LiveDensity>(seen_, chunk, slot.kept, slot.changed, types);
   slot.under_way = made;
   return made;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -11,6 +12,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
 
 #include "grid/chunk/chunk_difference.h"
 #include "grid/coordinate_hash.h"
@@ -26,8 +28,9 @@ using GridSnapshot = std::shared_ptr<const Grid>;
 class LiveDensity {
  public:
   /// `base` are the densities of an earlier state, or null. `changed` holds the voxels that came or went since, in the
-  /// grid; empty where the two differ in types alone.
-  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed);
+  /// grid; empty where the two differ in types alone. `types` says which of these are transparent.
+  LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed,
+              std::shared_ptr<const VoxelRegistry> types);
 
   /// Tells this state of this chunk from every other; 0 stands for far air, of which there is no object.
   [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
@@ -39,6 +42,9 @@ class LiveDensity {
 
   /// Null where all is far air. Requires: is_made().
   [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
+  /// Those of one body alone (smooth::without_others), made by the first who needs them and kept. Null where all is far
+  /// air. The result must not outlive this. Requires: is_made().
+  [[nodiscard]] std::shared_ptr<const DensityChunk> of_body(const VoxelRegistry& types, std::uint32_t body);
   /// Whether these are, for the chunk at an offset from this one that looks `reach` samples beyond its own, those of
   /// `stamp`; false when that is not known. Requires: is_made().
   [[nodiscard]] bool reads_as(std::uint64_t stamp, int reach, IVec3 offset) const;
@@ -57,6 +63,10 @@ class LiveDensity {
   bool has_base_ = false;
   ChangeReach changed_densities_;  // from the base
   ChangeReach changed_types_;
+  bool may_change_bodies_ = false;              // with `changed_types_`
+  std::shared_ptr<const VoxelRegistry> types_;  // until made
+  std::vector<VoxelType> transparent_;          // those that are, of what `bodies_` was made of
+  std::map<std::uint32_t, std::shared_ptr<const DensityChunk>> bodies_;
   std::atomic<bool> is_made_{false};
 };
 
@@ -77,8 +87,8 @@ class DensityCache {
   /// and those in which the surface may have changed (`reached`), both sorted. When all has changed, what was there
   /// before is to be cleared first.
   void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
-  /// Of the grid as `follow` saw it last.
-  [[nodiscard]] LiveDensities around(IVec3 chunk);
+  /// Of the grid as `follow` saw it last. `types`: whose visibility all densities of one registry's state have.
+  [[nodiscard]] LiveDensities around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
   /// Keeps what workers made, as far as it holds still. Returns a bit for each that is new.
   std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
 
@@ -100,7 +110,7 @@ class DensityCache {
   void drop_what_is_gone(const std::vector<IVec3>& changed);
   void invalidate(IVec3 chunk, bool solid, const IBox& changed);
   [[nodiscard]] bool has_voxels_near(IVec3 chunk) const;
-  [[nodiscard]] std::shared_ptr<LiveDensity> density(IVec3 chunk);
+  [[nodiscard]] std::shared_ptr<LiveDensity> density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
 
   int reach_;
   GridSnapshot seen_;  // the grid as it was followed last

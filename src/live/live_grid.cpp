@@ -111,11 +111,14 @@ void LiveGrid::see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time
 }
 
 void LiveGrid::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
-  const std::vector<bool>& seen = options_.style == SurfaceStyle::Blocky ? changed.visibility : changed.colour;
-  if (seen.empty()) return;
+  const bool is_smooth = options_.style == SurfaceStyle::Smooth;
+  if (changed.visibility.empty() && (!is_smooth || changed.colour.empty())) return;
   for (const IVec3 chunk : content.grid.chunks()) {
     const std::vector<VoxelType> types = content.grid.find_chunk(chunk)->types();
-    const auto has_changed = [&](VoxelType type) { return type < seen.size() && seen[type]; };
+    const auto is_in = [](const std::vector<bool>& set, VoxelType type) { return type < set.size() && set[type]; };
+    const auto has_changed = [&](VoxelType type) {
+      return is_in(changed.visibility, type) || (is_smooth && is_in(changed.colour, type));
+    };
     if (std::none_of(types.begin(), types.end(), has_changed)) continue;
     for (int i = 0; i < 27; ++i) mark_if_there(chunk + Neighbourhood::offset(i), now);
   }
@@ -176,14 +179,14 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chun
   auto job = std::make_unique<LiveJob>();
   job->source = {handle_, SurfaceContent::Voxels};
   job->chunk = chunk;
+  job->types = types.registry;
   job->serial = ++totals_.serial;
   job->seen = state.seen;
   if (options_.style == SurfaceStyle::Blocky) {
     job->voxels = grid;
-    job->types = types.registry;
     return job;
   }
-  job->densities = densities_.around(chunk);
+  job->densities = densities_.around(chunk, types.registry);
   job->materials = types.materials;
   job->type_generation = types.generation;
   job->last_collected = state.collected;

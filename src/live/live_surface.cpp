@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <utility>
 
 #include "live/mesh_job_queue.h"
+#include "mesh/surface/bodies.h"
 #include "mesh/surface/faces.h"
 #include "mesh/surface/shape.h"
 
@@ -8,9 +10,10 @@ namespace quoin {
 namespace {
 
 template <class T>
-void copy_exactly(const Buffer<T>& from, Buffer<T>& to) {
-  to.resize(from.size());
-  std::copy(from.begin(), from.end(), to.begin());
+void append(const Buffer<T>& from, Buffer<T>& to) {
+  const std::size_t first = to.size();
+  to.resize(first + from.size());
+  std::copy(from.begin(), from.end(), to.begin() + first);
 }
 
 void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
@@ -32,39 +35,45 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   job.surface = std::move(surface);
 }
 
-void copy_exactly(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
-  copy_exactly(from.positions, to.positions);
-  copy_exactly(from.normals, to.normals);
-  copy_exactly(from.occlusion, to.occlusion);
-  copy_exactly(from.cells, to.cells);
-  copy_exactly(from.indices, to.indices);
+// Its triangles and vertices follow those that are there.
+void append(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
+  const auto first = static_cast<std::uint32_t>(to.positions.size());
+  const std::size_t begin = to.indices.size();
+  append(from.positions, to.positions);
+  append(from.normals, to.normals);
+  append(from.occlusion, to.occlusion);
+  append(from.cells, to.cells);
+  append(from.indices, to.indices);
+  for (std::size_t i = begin; i < to.indices.size(); ++i) to.indices[i] += first;
 }
 
 // Each face in the colour of its sample.
-void copy_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
-                   const SmoothChunkMesh& mesh, ChunkSurface& surface) {
+void append_by_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options,
+                     const SurfaceMaterials& materials, SmoothChunkMesh& mesh, ChunkSurface& surface) {
   std::vector<smooth::TriangleFace> faces;
   smooth::find_faces(chunks, options, materials, mesh, faces);
-  SmoothChunkMesh& out = surface.smooth;
-  copy_exactly(mesh.indices, out.indices);
   const std::vector<smooth::VertexCopy> copies =
-      smooth::split_by_faces({out.indices.begin(), out.indices.end()}, mesh.positions.size(), faces,
+      smooth::split_by_faces({mesh.indices.begin(), mesh.indices.end()}, mesh.positions.size(), faces,
                              {.types = true, .directions = false, .groups = {}});
-  out.positions.resize(copies.size());
-  out.normals.resize(copies.size());
-  if (!mesh.occlusion.empty()) out.occlusion.resize(copies.size());
-  out.cells.resize(copies.size());
-  surface.albedo.reserve(copies.size());
-  surface.types.reserve(copies.size());
+  SmoothChunkMesh split;
+  split.positions.resize(copies.size());
+  split.normals.resize(copies.size());
+  if (!mesh.occlusion.empty()) split.occlusion.resize(copies.size());
+  split.cells.resize(copies.size());
+  surface.albedo.reserve(surface.albedo.size() + copies.size());
+  surface.types.reserve(surface.types.size() + copies.size());
   for (std::size_t i = 0; i < copies.size(); ++i) {
     const std::uint32_t vertex = copies[i].vertex;
-    out.positions[i] = mesh.positions[vertex];
-    out.normals[i] = mesh.normals[vertex];
-    if (!mesh.occlusion.empty()) out.occlusion[i] = mesh.occlusion[vertex];
-    out.cells[i] = mesh.cells[vertex];
+    split.positions[i] = mesh.positions[vertex];
+    split.normals[i] = mesh.normals[vertex];
+    if (!mesh.occlusion.empty()) split.occlusion[i] = mesh.occlusion[vertex];
+    split.cells[i] = mesh.cells[vertex];
     surface.albedo.push_back(materials.albedo(copies[i].look.type));
     surface.types.push_back(copies[i].look.type);
   }
+  std::swap(split.indices, mesh.indices);
+  append(split, surface.smooth);
+  std::swap(split.indices, mesh.indices);
 }
 
 bool reads_as_before(const LiveJob& job, int reach) {
@@ -93,8 +102,9 @@ DensityNeighbourhood make_densities(const LiveDensities& densities) {
   return chunks;
 }
 
-void mesh_smooth(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, LiveJob& job,
-                 LiveWorkspace& workspace) {
+// Adds the surface of one body. `whole`: as smooth::Shape has it.
+void mesh_body(const LiveMeshOptions& options, const DensityNeighbourhood& chunks, const DensityNeighbourhood* whole,
+               const LiveJob& job, LiveWorkspace& workspace, ChunkSurface& surface) {
   if (!workspace.smooth) workspace.smooth.emplace();
   SmoothOptions wanted;
   wanted.occlusion = options.occlusion;
@@ -104,26 +114,68 @@ void mesh_smooth(const LiveMeshOptions& options, const DensityNeighbourhood& chu
   wanted.join_diagonals = is_of_voxels;
   workspace.smooth->mesh(chunks, wanted, workspace.mesh);
   if (workspace.mesh.indices.empty()) return;
-  auto surface = std::make_shared<ChunkSurface>();
-  surface->style = SurfaceStyle::Smooth;
-  surface->level = job.levels[13];
   if (is_of_voxels) {
-    smooth::Shape shape;
-    shape.keep_thin = true;
+    smooth::Shape shape{1.0F, true, whole, job.types.get()};
     smooth::shape_vertices(chunks, wanted, shape, workspace.mesh);
   }
   if (is_of_voxels && options.colours == SurfaceColours::Sharp) {
-    copy_by_faces(chunks, wanted, *job.materials, workspace.mesh, *surface);
-  } else {
-    copy_exactly(workspace.mesh, surface->smooth);
-    surface->albedo.reserve(surface->smooth.cells.size());
-    surface->types.reserve(surface->smooth.cells.size());
-    for (const CellMaterial& material : smooth::materials_of(chunks, wanted, *job.materials, surface->smooth)) {
-      surface->albedo.push_back(material.albedo);
-      surface->types.push_back(material.type);
-    }
+    append_by_faces(chunks, wanted, *job.materials, workspace.mesh, surface);
+    return;
   }
+  for (const CellMaterial& material : smooth::materials_of(chunks, wanted, *job.materials, workspace.mesh)) {
+    surface.albedo.push_back(material.albedo);
+    surface.types.push_back(material.type);
+  }
+  append(workspace.mesh, surface.smooth);
+}
+
+void finish(std::shared_ptr<ChunkSurface> surface, LiveJob& job) {
+  if (surface->smooth.indices.empty()) return;
+  surface->style = SurfaceStyle::Smooth;
+  surface->level = job.levels[13];
   job.surface = std::move(surface);
+}
+
+// The bodies that a chunk may own faces of, sorted, and whether a cell of its may have several.
+struct BodiesAround {
+  std::vector<std::uint32_t> own;
+  bool are_several = false;
+};
+
+BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegistry& types) {
+  std::vector<VoxelType> own;
+  std::vector<VoxelType> all;
+  for (int i = 0; i < 27; ++i) {
+    const DensityChunk* chunk = chunks.chunks[static_cast<std::size_t>(i)];
+    if (chunk == nullptr) continue;
+    const std::vector<VoxelType> materials = chunk->materials().types();
+    all.insert(all.end(), materials.begin(), materials.end());
+    const IVec3 offset = Neighbourhood::offset(i);
+    if (offset.x >= 0 && offset.y >= 0 && offset.z >= 0) own.insert(own.end(), materials.begin(), materials.end());
+  }
+  return {smooth::bodies_of(types, own), smooth::bodies_of(types, all).size() > 1};
+}
+
+void make_bodies(const LiveMeshOptions& options, const DensityNeighbourhood& whole, LiveJob& job,
+                 LiveWorkspace& workspace) {
+  auto surface = std::make_shared<ChunkSurface>();
+  const BodiesAround bodies = bodies_around(whole, *job.types);
+  for (const std::uint32_t body : bodies.own) {
+    const std::size_t before = surface->smooth.indices.size();
+    if (bodies.are_several) {
+      DensityNeighbourhood chunks = whole;
+      std::array<std::shared_ptr<const DensityChunk>, 27> held;
+      for (std::size_t i = 0; i < 27; ++i) {
+        if (job.densities[i] != nullptr) held[i] = job.densities[i]->of_body(*job.types, body);
+        chunks.chunks[i] = held[i].get();
+      }
+      mesh_body(options, chunks, &whole, job, workspace, *surface);
+    } else {
+      mesh_body(options, whole, nullptr, job, workspace, *surface);
+    }
+    if (body != 0) surface->glass_indices += surface->smooth.indices.size() - before;
+  }
+  finish(std::move(surface), job);
 }
 
 void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
@@ -132,12 +184,14 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
     job.outcome = LiveJob::Outcome::AsBefore;
     return;
   }
-  mesh_smooth(options, chunks, job, workspace);
+  make_bodies(options, chunks, job, workspace);
 }
 
 // Fields have no `last_stamps`: what reads as before is not meshed.
 void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
-  mesh_smooth(options, job.field->neighbourhood(job.chunk), job, workspace);
+  auto surface = std::make_shared<ChunkSurface>();
+  mesh_body(options, job.field->neighbourhood(job.chunk), nullptr, job, workspace, *surface);
+  finish(std::move(surface), job);
 }
 
 }  // namespace

@@ -19,6 +19,8 @@
 #include <quoin/mesh/smooth_mesh.h>
 
 #include "grid/chunk_order.h"
+#include "mesh/surface/bodies.h"
+#include "mesh/surface/build.h"
 
 namespace quoin {
 
@@ -158,6 +160,15 @@ inline SmoothTriangles triangles_of(const SmoothMesh& mesh) {
   return all;
 }
 
+inline void expect_glass_last(const ChunkSurface& surface, const VoxelRegistry& types) {
+  const auto& indices = surface.smooth.indices;
+  ASSERT_LE(surface.glass_indices, indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const bool is_glass = i >= indices.size() - surface.glass_indices;
+    ASSERT_EQ(types.is_transparent(surface.types[indices[i]]), is_glass);
+  }
+}
+
 inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
   const std::set<GridHandle> drawn = drawn_grids(scene, options.instances);
   for (const SurfaceUpdate& each : shown.all()) EXPECT_TRUE(drawn.contains(each.grid));
@@ -166,13 +177,27 @@ inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const 
     wanted.occlusion = options.occlusion;
     wanted.colours = options.colours;
     wanted.keep_thin = true;
-    const auto whole = build_smooth_mesh(field_from_grid(scene.grids()[handle].grid), scene.types, wanted);
-    ASSERT_TRUE(whole.has_value());
-    SmoothTriangles expected = triangles_of(*whole);
+    SmoothTriangles expected;
+    const Grid& grid = scene.grids()[handle].grid;
+    const DensityGrid whole = field_from_grid(grid);
+    const std::vector<std::uint32_t> bodies = smooth::bodies_of(scene.types, grid.types());
+    for (const std::uint32_t body : bodies) {
+      const bool is_alone = bodies.size() == 1;
+      smooth::SurfaceRequest request;
+      request.whole = is_alone ? nullptr : &whole;
+      request.with_faces = true;
+      const DensityGrid field = is_alone ? whole.snapshot() : smooth::field_of_body(whole, scene.types, body, {});
+      auto surface = smooth::build_surface(field, scene.types, wanted, request, {}, {});
+      ASSERT_TRUE(surface.has_value());
+      smooth::finish_surface(*surface, scene.types, wanted);
+      const SmoothTriangles part = triangles_of(surface->mesh);
+      expected.insert(expected.end(), part.begin(), part.end());
+    }
     SmoothTriangles found;
     for (const SurfaceUpdate& each : shown.all()) {
       if (each.grid != handle) continue;
       ASSERT_EQ(each.surface->style, SurfaceStyle::Smooth);
+      expect_glass_last(*each.surface, scene.types);
       const SmoothTriangles part = triangles_of(*each.surface, each.chunk);
       found.insert(found.end(), part.begin(), part.end());
     }

@@ -45,13 +45,13 @@ struct LiveJob {
   LiveClock::time_point seen;  ///< when the edit was
 
   GridSnapshot voxels;                                ///< blocky
-  std::shared_ptr<const VoxelRegistry> types;         ///< blocky
+  std::shared_ptr<const VoxelRegistry> types;         ///< of voxels
   LiveDensities densities;                            ///< smooth
   std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth, and of fields
   /// Smooth: the stamps of the densities of which the last surface is; meshing what they say again is spared.
   std::optional<DensityStamps> last_stamps;
   std::uint64_t last_collected = 0;       ///< the job whose surface that was
-  std::uint64_t type_generation = 0;      ///< of `materials`
+  std::uint64_t type_generation = 0;      ///< of `types` and `materials`
   FieldSnapshot field;                    ///< of fields, which take `materials` too
   std::array<std::uint8_t, 27> levels{};  ///< of fields: of detail, as a neighbourhood has them
 

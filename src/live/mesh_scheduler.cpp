@@ -148,13 +148,9 @@ ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   };
   add(changed.visibility, &TypeChange::visibility_changed);
   add(changed.colour, &TypeChange::colour_changed);
-  if (options_.style == SurfaceStyle::Blocky && !changed.visibility.empty()) {
-    types_.registry = std::make_shared<const VoxelRegistry>(types);
-  }
-  if (!changed.colour.empty()) {
-    types_.materials = std::make_shared<const SurfaceMaterials>(types);
-    ++types_.generation;
-  }
+  if (!changed.visibility.empty()) types_.registry = std::make_shared<const VoxelRegistry>(types);
+  if (!changed.colour.empty()) types_.materials = std::make_shared<const SurfaceMaterials>(types);
+  if (!changed.visibility.empty() || !changed.colour.empty()) ++types_.generation;
   followed_types_ = now;
   return changed;
 }

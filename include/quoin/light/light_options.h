@@ -60,7 +60,7 @@ struct LightOptions {
   double lamp_brightness = 1.0;  ///< times what lamps add to others; what they show of themselves stays as it is
   /// Whether glass and water have surfaces: where a ray goes from air into a body, out of it again or from one body
   /// into another, it shows the sky of the mirrored direction by Fresnel's share, of the types' `ior`. Rays go straight
-  /// on. Shading::Lit; what is rasterised from meshes has none yet.
+  /// on. Shading::Lit; what is rasterised from meshes has them as MeshPictureOptions::glass_by_rays says.
   bool glass_surfaces = false;
 
   bool operator==(const LightOptions&) const = default;

@@ -37,6 +37,11 @@ struct MeshPictureOptions {
   double impostor_seconds = std::numeric_limits<double>::infinity();
   int impostor_edge = 128;
   bool detail_colours = false;
+  /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays
+  /// through the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface,
+  /// drawn from back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface:
+  /// cheap, and without need of voxels.
+  bool glass_by_rays = true;
   Threads threads;
   Wireframe wireframe = Wireframe::Off;
 };
@@ -44,18 +49,21 @@ struct MeshPictureOptions {
 /// Draws chunks' meshes by rasterisation, on the device of a VulkanRenderer: a quad of a blocky mesh takes 8 bytes
 /// there, and its corners are made when it is drawn.
 ///
-/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes, edges
-///         of shadows and where glass is seen: glass counts as one voxel thick, drawn from back to front. There is no
-///         inside: only faces that look towards the camera are drawn.
+/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes and
+///         edges of shadows; glass with `glass_by_rays`. Walls of smooth bodies of glass are the same to 4, away from
+///         their edges. What is brighter than white counts as white behind glass. There is no inside: only faces that
+///         look towards the camera are drawn.
 /// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
 /// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
 ///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its
 ///         impostor is there an instance is drawn halved.
-/// Glass:  quads are put in order by the distances of their middles, so large merged ones that lie close may be drawn
-///         in the wrong one; of more than 1,048,576 in a picture only the chunks are. Smooth surfaces are opaque,
-///         whatever their types; and so is glass where values are shown instead of colours.
+/// Glass:  by rays each pixel is seen through from its nearest fragment on, through the bodies that the renderer's
+///         voxels make, so nothing is put in order. The surfaces behind a smooth body's first have the upright of the
+///         voxels there, blurred. Face by face, quads are put in order by the distances of their middles, so large
+///         merged ones that lie close may be drawn in the wrong one; of more than 1,048,576 in a picture only the
+///         chunks are. Fields are opaque, whatever their types; and so is glass where values are shown.
 /// Far:    what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
 ///         1/1024 of a voxel is cut off.
 /// Lifetime: the renderer it was made for must outlive it.
@@ -82,9 +90,9 @@ class VulkanMeshRenderer {
   /// Requires: with levels of detail or lamps the scene was not edited since the last update of this and of the
   ///           VulkanRenderer.
   /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
-  /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps or levels of detail when
-  /// the VulkanRenderer was not last updated with the same scene and filter; Unsupported for wireframes where the
-  /// device has no lines. After an error in drawing the picture has no samples.
+  /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, levels of detail or glass
+  /// by rays, if there is any, when the VulkanRenderer was not last updated with the same scene and filter; Unsupported
+  /// for wireframes where the device has no lines. After an error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
 
   struct Stats {

@@ -17,7 +17,12 @@ bool holds(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t 
   });
 }
 
-/// Turns what is solid of other bodies inside out.
+}  // namespace
+
+bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body) {
+  return holds(chunk, types, body, true);
+}
+
 DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body) {
   DensityChunk made = whole;
   std::array<Half, kChunkEdge> row;
@@ -40,8 +45,6 @@ DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& type
   made.unite_slabs();
   return made;
 }
-
-}  // namespace
 
 std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials) {
   std::vector<std::uint32_t> bodies;
@@ -69,7 +72,7 @@ DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, 
   std::vector<std::optional<DensityChunk>> made(places.size());
   parallel_for(places.size(), threads, [&](std::size_t i) {
     const DensityChunk& chunk = *whole.find_chunk(places[i]);
-    made[i] = holds(chunk, types, body, true) ? without_others(chunk, types, body) : chunk;
+    made[i] = holds_others(chunk, types, body) ? without_others(chunk, types, body) : chunk;
   });
   for (std::size_t i = 0; i < places.size(); ++i) field.put_chunk(places[i], std::move(*made[i]));
   return field;

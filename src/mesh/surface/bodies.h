@@ -17,9 +17,14 @@ namespace quoin::smooth {
 /// The bodies of some materials, sorted, each once.
 [[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials);
 
-/// The densities of one body of several: those of all, but what is solid of others is as far out as it was in. Shares
-/// the chunks of `whole` in which there are no others; chunks that are not near the body are left out where it is
-/// transparent.
+/// Whether any material of a chunk is of another body.
+[[nodiscard]] bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
+
+/// A chunk in which what is solid of other bodies is as far out as it was in.
+[[nodiscard]] DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
+
+/// The densities of one body of several: those of all, `without_others`. Shares the chunks of `whole` in which there
+/// are no others; chunks that are not near the body are left out where it is transparent.
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
 

@@ -189,11 +189,13 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
   return shared;
 }
 
-/// Splits quads along the diagonals that are shorter now: each body chose its own before its vertices were moved.
-void split_quads_again(const ChunkLevels& levels, SmoothChunkMesh& mesh) {
+/// Splits quads with vertices that bodies share along the diagonals that are shorter now: each body chose its own
+/// before these were moved.
+void split_quads_again(const ChunkLevels& levels, const std::vector<bool>& is_shared, SmoothChunkMesh& mesh) {
   const std::size_t quads_end = quad_indices_of(mesh);
   for (std::size_t i = 0; i < quads_end; i += 6) {
     std::uint32_t* quad = mesh.indices.data() + i;
+    if (std::none_of(quad, quad + 6, [&](std::uint32_t vertex) { return is_shared[vertex]; })) continue;
     const std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, mesh);
     std::array<QuadCorner, 4> corners;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -214,6 +216,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
   std::unique_ptr<const ThinCells> thin;
   if (shape.keep_thin) thin = std::make_unique<const ThinCells>(chunks);
   const bool moves_thin_only = shape.whole == nullptr && shape.smoothness == 1.0F;
+  std::vector<bool> is_shared(shape.whole != nullptr ? mesh.positions.size() : 0);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const LevelCell cell = levels.cell_of(mesh.cells[i]);
     const bool has_thin = thin && cell.level == 0 && thin->has_any(cell.first);
@@ -226,6 +229,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
       shared = vertex_of_bodies(shape, cell);
     }
     if (shared) {
+      is_shared[i] = true;
       fraction = shared->fraction;
       if (shared->normal) mesh.normals[i] = *shared->normal;
     }
@@ -243,7 +247,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
       mesh.positions[i][axis] = first[axis] + moved * size;
     }
   }
-  if (shape.whole != nullptr && levels.all_same()) split_quads_again(levels, mesh);
+  if (shape.whole != nullptr && levels.all_same()) split_quads_again(levels, is_shared, mesh);
 }
 
 }  // namespace quoin::smooth

@@ -27,8 +27,8 @@ struct Shape {
 ///             Vertices of level-0 cells with a corner that is thin along an axis keep a third of that way along it.
 /// Bodies:     in a cell of level 0 that samples of several bodies and one sheet share, the vertex is the mean of the
 ///             crossings of all edges between different bodies or air, in the middle where both ends are solid, and is
-///             kept as if thin; the normal is that of the whole, if that is crossed. Quads are split anew, so that two
-///             bodies do it alike.
+///             kept as if thin; the normal is that of the whole, if that is crossed. Quads with such a vertex are split
+///             anew, so that two bodies do it alike.
 /// Cost:       of thin features up to 0.5 ms a chunk.
 void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
                     SmoothChunkMesh& mesh);

@@ -99,7 +99,7 @@ bool add_draws(const Space& space, const MeshStore::StoredGrid& grid, View& view
   const double radius = kChunkRadius * space.instance->voxel_size;
   const std::size_t before = data.draws.size();
   for (const auto& [chunk, mesh] : grid.chunks) {
-    if (space.instance->is_far && mesh.glass.empty()) continue;
+    if (space.instance->is_far && !mesh.has_glass()) continue;
     const DVec3 offset = DVec3(chunk) * kEdge - space.base;
     const DVec3 middle = space.view_axes * (offset + kEdge / 2) + space.base_in_view;
     if (!view.frustum.meets(middle, radius)) continue;
@@ -215,8 +215,11 @@ bool faces_camera(const Quad& quad, const MeshDraw& draw, const Space& space, co
 }
 
 void order_glass(std::span<const Space> spaces, const View& view, MeshFrameData& data) {
-  for (const MeshDraw& draw : data.draws) data.glass_quads += draw.mesh->glass.size();
-  if (data.glass_quads > kMaxOrdered) return;
+  for (const MeshDraw& draw : data.draws) {
+    data.glass_quads += draw.mesh->glass.size();
+    data.has_smooth_glass |= draw.mesh->glass_indices > 0;
+  }
+  if (data.glass_by_rays || data.glass_quads > kMaxOrdered) return;
   struct Entry {
     float distance;
     ShaderGlassQuad quad;
@@ -268,7 +271,7 @@ QuadRuns visible_quads(const MeshDraw& draw, bool with_glass) {
 }
 
 std::int64_t MeshFrameData::triangles() const {
-  const bool is_ordered = glass_quads > 0 && glass_quads <= kMaxOrdered;
+  const bool is_ordered = !glass_by_rays && glass_quads > 0 && glass_quads <= kMaxOrdered;
   std::int64_t count = is_ordered ? 2 * static_cast<std::int64_t>(order.size()) : 0;
   for (const FarDraw& draw : far) {
     for (const auto& [first, end] : draw.runs) count += 2 * std::int64_t{end - first};
@@ -281,9 +284,10 @@ std::int64_t MeshFrameData::triangles() const {
 }
 
 Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances, const Camera& camera,
-                                      const RenderOptions& options, int subpixels) {
+                                      const RenderOptions& options, int subpixels, bool glass_by_rays) {
   if (is_flat(camera)) return make_error(ErrorCode::InvalidArgument, "camera: directions must not lie in one plane");
   MeshFrameData data;
+  data.glass_by_rays = glass_by_rays;
   View view(camera, options);
   std::vector<Space> spaces;
   const auto keep = [&](const Space& space) {

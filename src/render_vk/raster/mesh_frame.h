@@ -86,13 +86,15 @@ struct MeshFrameData {
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
   std::vector<FarDraw> far;     ///< likewise
-  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`: then
-  /// chunks are drawn in their order, and the quads of each as they come.
+  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`, or rays
+  /// find what is transparent: then chunks are drawn in their order, and the quads of each as they come.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
-  bool has_fields = false;  ///< among what rays meet
+  bool has_smooth_glass = false;
+  bool has_fields = false;     ///< among what rays meet
+  bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, with all that is seen through it
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }
   /// Of the surfaces that are drawn.
@@ -107,10 +109,12 @@ constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 /// Depth: reversed, 1 at the near plane. It lies at the nearest chunk in the picture, but not nearer than 1/1024 of the
 ///        smallest voxel; perspective has no far plane, orthographic pictures' lies behind the last chunk.
 /// `subpixels`: in how many places per pixel and axis a device tells corners apart.
+/// `glass_by_rays`: as the result has it; where values are shown glass is drawn like anything else.
 /// `picture` is left to the caller. Requires: `check` accepts the camera and the options.
 /// Errors:   InvalidArgument for a camera whose axes lie in one plane.
 /// Cost:     O(chunks of the instances), and sorting those in the picture and the transparent quads.
 [[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,
-                                                    const Camera& camera, const RenderOptions& options, int subpixels);
+                                                    const Camera& camera, const RenderOptions& options, int subpixels,
+                                                    bool glass_by_rays);
 
 }  // namespace quoin::vulkan

@@ -35,14 +35,21 @@ struct MeshPass::Step {
     GlassInOrder,
     GlassByChunk,  ///< the furthest first
   };
+  enum class Styles : std::uint8_t { All, Blocky, Smooth };
   Over over;
   std::uint32_t mode = kDrawSurfaces;
   VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
   std::array<VkPipeline, 2> smooth{};  // mirrored: 1
   VkPipeline far = VK_NULL_HANDLE;     // impostors
   bool is_backwards = false;           // so that of equally near surfaces the one stays that is drawn first otherwise
+  Styles styles = Styles::All;
 
   [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
+  [[nodiscard]] bool draws(const MeshDraw& draw) const {
+    const SurfaceStyle style = draw.mesh->style;
+    if (styles != Styles::All && (styles == Styles::Smooth) != (style == SurfaceStyle::Smooth)) return false;
+    return is_glass() ? draw.mesh->has_glass() : !(draw.is_far && over == Over::Opaque);
+  }
 };
 
 Result<std::unique_ptr<MeshPass>> MeshPass::create(Device& device, DeviceMemory& memory) {
@@ -174,35 +181,60 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
     steps.front().is_backwards = true;
     steps.insert(steps.begin(), {solid, kDrawDepth});
   }
+  const bool has_edges = wireframe == Wireframe::Over;
+  const auto add_nearest_glass = [&](Step::Styles styles) {
+    for (const std::uint32_t mode : {kDrawGlassDepth, kDrawGlassPassed, kDrawGlassAdded}) {
+      steps.push_back({Step::Over::GlassByChunk, mode});
+      steps.back().styles = styles;
+    }
+  };
+  if (data.glass_by_rays) {
+    // Before it hides them.
+    if (has_edges) steps.push_back({Step::Over::Opaque, kDrawEdgesOver});
+    add_nearest_glass(Step::Styles::All);
+    if (has_edges) steps.push_back({Step::Over::GlassByChunk, kDrawEdgesOver});
+    return steps;
+  }
   if (data.glass_quads > 0) {
     const auto over = data.glass_quads > kMaxOrdered ? Step::Over::GlassByChunk : Step::Over::GlassInOrder;
-    for (std::uint32_t channel = 0; channel < 3; ++channel) steps.push_back({over, kDrawGlass + channel});
+    for (std::uint32_t channel = 0; channel < 3; ++channel) {
+      steps.push_back({over, kDrawGlass + channel});
+      steps.back().styles = Step::Styles::Blocky;
+    }
   }
-  if (wireframe == Wireframe::Over) steps.push_back({Step::Over::All, kDrawEdgesOver});
+  if (data.has_smooth_glass) add_nearest_glass(Step::Styles::Smooth);
+  if (has_edges) steps.push_back({Step::Over::All, kDrawEdgesOver});
   return steps;
 }
 
-Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light, bool has_fields) {
+Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light,
+                                const MeshFrameData& data) {
   for (Step& step : steps) {
     // Edges are as bright as what they lie on, but for shadows.
-    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || step.is_glass());
+    const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
+    MeshLight lit = is_lit ? light : MeshLight::Plain;
+    if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
     const auto find = [&](MeshWay::What what, bool mirrored, VkPipeline& out) -> Status {
-      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder,
-                                               is_lit ? light : MeshLight::Plain,
-                                               is_lit && light != MeshLight::Plain && has_fields, samples});
+      const auto found = pipelines_->pipeline({what, step.mode, mirrored, step.over == Step::Over::GlassInOrder, lit,
+                                               data.glass_by_rays && is_nearest_glass(step.mode),
+                                               lit != MeshLight::Plain && data.has_fields, samples});
       if (!found) return found.error();
       out = *found;
       return {};
     };
-    const bool is_sky = step.over == Step::Over::Sky;
-    Status done = find(is_sky ? MeshWay::What::Sky : MeshWay::What::Blocky, false, step.blocky);
-    if (is_sky || step.is_glass()) {
-      if (!done) return done;
+    if (step.over == Step::Over::Sky) {
+      if (Status done = find(MeshWay::What::Sky, false, step.blocky); !done) return done;
       continue;
     }
-    if (done) done = find(MeshWay::What::Smooth, false, step.smooth[0]);
-    if (done) done = find(MeshWay::What::Smooth, true, step.smooth[1]);
-    if (done) done = find(MeshWay::What::Far, false, step.far);
+    Status done;
+    for (const MeshDraw& draw : data.draws) {
+      if (!done || !step.draws(draw)) continue;
+      const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
+      VkPipeline& pipeline = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
+      const auto what = is_smooth ? MeshWay::What::Smooth : MeshWay::What::Blocky;
+      if (pipeline == VK_NULL_HANDLE) done = find(what, is_smooth && draw.mirrored, pipeline);
+    }
+    if (done && !step.is_glass() && !data.far.empty()) done = find(MeshWay::What::Far, false, step.far);
     if (!done) return done;
   }
   return {};
@@ -211,7 +243,7 @@ Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples,
 Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe, MeshLight light,
                       const Buffer& colours) {
   std::vector<Step> steps = steps_for(data, wireframe, light);
-  Status done = find_pipelines(steps, samples, light, data.has_fields);
+  Status done = find_pipelines(steps, samples, light, data);
   if (done) done = prepare(data, size, samples);
   if (!done) return done;
   return device_->run(kDoing, [&](VkCommandBuffer commands) { record(commands, data, steps, colours); });
@@ -255,9 +287,8 @@ void MeshPass::record(VkCommandBuffer commands, const MeshFrameData& data, const
 
 void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {
   const Api& api = device_->api();
-  api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
-  VkPipeline bound = step.blocky;
   if (step.over == Step::Over::Sky) {
+    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     push(commands, data.sky);
     return api.vkCmdDraw(commands, 3, 1, 0, 0);
   }
@@ -265,20 +296,21 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
   values.numbers |= step.mode;
   bind_corners(commands);
   if (step.over == Step::Over::GlassInOrder) {
+    if (data.order.empty()) return;
+    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     push(commands, values);
     return draw_quads(commands, 0, static_cast<std::uint32_t>(data.order.size()));
   }
   if (step.is_backwards) {
     draw_far(commands, data, step);
-    api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, step.blocky);
     bind_corners(commands);
   }
+  VkPipeline bound = VK_NULL_HANDLE;
   const bool is_backwards = step.is_glass() || step.is_backwards;
   for (std::size_t i = 0; i < data.draws.size(); ++i) {
     const MeshDraw& draw = data.draws[is_backwards ? data.draws.size() - 1 - i : i];
     const bool is_smooth = draw.mesh->style == SurfaceStyle::Smooth;
-    if (step.is_glass() && draw.mesh->glass.empty()) continue;
-    if (draw.is_far && step.over == Step::Over::Opaque) continue;
+    if (!step.draws(draw)) continue;
     const VkPipeline wanted = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
     if (wanted != bound) {
       api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
@@ -325,7 +357,10 @@ void MeshPass::draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const S
   if (mesh.style == SurfaceStyle::Smooth) {
     device_->api().vkCmdBindIndexBuffer(commands, memory_->buffer_of(mesh.place), mesh.place.offset + mesh.first_index,
                                         VK_INDEX_TYPE_UINT32);
-    device_->api().vkCmdDrawIndexed(commands, mesh.indices, 1, 0, 0, 0);
+    const std::uint32_t opaque = mesh.indices - mesh.glass_indices;
+    const std::uint32_t first = step.is_glass() ? opaque : 0;
+    const std::uint32_t end = step.is_glass() || step.over == Step::Over::All ? mesh.indices : opaque;
+    if (first < end) device_->api().vkCmdDrawIndexed(commands, end - first, 1, first, 0, 0);
     return;
   }
   const std::uint32_t opaque = mesh.opaque.back();

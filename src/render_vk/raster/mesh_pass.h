@@ -38,7 +38,7 @@ class MeshPass {
   Status put_frame(MeshFrameData& data);
   Status grow(VkDeviceSize bytes);
   [[nodiscard]] std::vector<Step> steps_for(const MeshFrameData& data, Wireframe wireframe, MeshLight light) const;
-  Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light, bool has_fields);
+  Status find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light, const MeshFrameData& data);
   void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
               const Buffer& colours) const;
   void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;

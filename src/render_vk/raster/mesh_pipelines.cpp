@@ -30,12 +30,24 @@ constexpr std::uint32_t kSmoothFragment[] = {
 #include "smooth.frag.inc"
 };
 
-constexpr std::array<std::span<const std::uint32_t>, 7> kCode = {
-    kSkyVertex, kSkyFragment, kBlockyVertex, kBlockyFragment, kSmoothVertex, kSmoothFragment, kFarVertex};
+constexpr std::uint32_t kBlockyGlassFragment[] = {
+#include "blocky_glass.frag.inc"
+};
+constexpr std::uint32_t kSmoothGlassFragment[] = {
+#include "smooth_glass.frag.inc"
+};
 
-// Of vertices and of fragments, in `kCode`.
-std::array<std::size_t, 2> shaders_of(MeshWay::What what) {
-  switch (what) {
+constexpr std::array<std::span<const std::uint32_t>, 9> kCode = {
+    kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,     kSmoothVertex,
+    kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment};
+
+// Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and
+// are apart from all others.
+std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
+  const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
+  if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
+  if (sees_through && way.what == MeshWay::What::Smooth) return {4, 8};
+  switch (way.what) {
     case MeshWay::What::Sky:
       return {0, 1};
     case MeshWay::What::Blocky:
@@ -78,9 +90,6 @@ std::array<VkSubpassDependency, 2> around_pass() {
                               VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT, VK_ACCESS_TRANSFER_READ_BIT, 0}};
 }
 
-bool is_glass(const MeshWay& way) {
-  return way.mode >= kDrawGlass && way.mode < kDrawGlass + 3;
-}
 bool is_edges(const MeshWay& way) {
   return way.mode == kDrawEdgesOver || way.mode == kDrawEdgesOnly;
 }
@@ -106,8 +115,10 @@ VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
   const bool is_sky = way.what == MeshWay::What::Sky;
   state.depthTestEnable = way.mode != kDrawEdgesOnly ? VK_TRUE : VK_FALSE;
   // Where light is traced, depths are there before: each pixel is lit once.
-  const bool has_depth = way.mode == kDrawSurfaces && way.light != MeshLight::Plain;
-  const bool writes = (way.mode == kDrawSurfaces && !is_sky && !has_depth) || way.mode == kDrawDepth;
+  const bool is_lit_once = way.mode == kDrawSurfaces && way.light != MeshLight::Plain;
+  const bool has_depth = is_lit_once || way.mode == kDrawGlassPassed || way.mode == kDrawGlassAdded;
+  const bool is_depth = way.mode == kDrawDepth || way.mode == kDrawGlassDepth;
+  const bool writes = (way.mode == kDrawSurfaces && !is_sky && !has_depth) || is_depth;
   state.depthWriteEnable = writes ? VK_TRUE : VK_FALSE;
   // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
   state.depthCompareOp = VK_COMPARE_OP_GREATER;
@@ -116,35 +127,44 @@ VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
   return state;
 }
 
-// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel.
+void blend(VkBlendFactor added, VkBlendFactor kept, VkPipelineColorBlendAttachmentState& state) {
+  state.blendEnable = VK_TRUE;
+  state.srcColorBlendFactor = state.srcAlphaBlendFactor = added;
+  state.dstColorBlendFactor = state.dstAlphaBlendFactor = kept;
+  state.colorBlendOp = state.alphaBlendOp = VK_BLEND_OP_ADD;
+}
+
+// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel; or,
+// where each pixel has one fragment of it, what is there is multiplied by what passes, and then the rest is added.
 VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   VkPipelineColorBlendAttachmentState state{};
   state.colorWriteMask =
       VK_COLOR_COMPONENT_R_BIT | VK_COLOR_COMPONENT_G_BIT | VK_COLOR_COMPONENT_B_BIT | VK_COLOR_COMPONENT_A_BIT;
-  if (way.mode == kDrawDepth) state.colorWriteMask = 0;
-  if (!is_glass(way)) return state;
-  state.colorWriteMask = VkColorComponentFlags{VK_COLOR_COMPONENT_R_BIT} << (way.mode - kDrawGlass);
-  state.blendEnable = VK_TRUE;
-  state.srcColorBlendFactor = VK_BLEND_FACTOR_ONE;
-  state.dstColorBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
-  state.colorBlendOp = VK_BLEND_OP_ADD;
-  state.srcAlphaBlendFactor = VK_BLEND_FACTOR_ONE;
-  state.dstAlphaBlendFactor = VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
-  state.alphaBlendOp = VK_BLEND_OP_ADD;
+  if (way.mode == kDrawDepth || way.mode == kDrawGlassDepth) state.colorWriteMask = 0;
+  if (way.mode == kDrawGlassPassed) blend(VK_BLEND_FACTOR_ZERO, VK_BLEND_FACTOR_SRC_COLOR, state);
+  if (way.mode == kDrawGlassAdded) blend(VK_BLEND_FACTOR_ONE, VK_BLEND_FACTOR_ONE, state);
+  if (is_channel_of_glass(way.mode)) {
+    state.colorWriteMask = VkColorComponentFlags{VK_COLOR_COMPONENT_R_BIT} << (way.mode - kDrawGlass);
+    blend(VK_BLEND_FACTOR_ONE, VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA, state);
+  }
   return state;
 }
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 5> values;
-  std::array<VkSpecializationMapEntry, 5> entries;
+  std::array<VkBool32, 6> values;
+  std::array<VkSpecializationMapEntry, 6> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
   Stages(const MeshWay& way, const std::array<VkShaderModule, 2>& shaders)
-      : values{way.ordered, is_glass(way), way.light != MeshLight::Plain, way.light == MeshLight::TracedThroughGlass,
-               way.fields},
-        constants{5, entries.data(), sizeof values, values.data()} {
+      : values{way.ordered,
+               is_channel_of_glass(way.mode),
+               way.light != MeshLight::Plain,
+               way.light == MeshLight::TracedThroughGlass,
+               way.fields,
+               is_nearest_glass(way.mode) ? way.mode : 0},
+        constants{6, entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }
@@ -234,7 +254,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
 }
 
 VkResult MeshPipelines::make(const MeshWay& way, VkRenderPass pass, VkPipeline& pipeline) const {
-  const auto [vertices, fragments] = shaders_of(way.what);
+  const auto [vertices, fragments] = shaders_of(way);
   const Stages stages(way, {shaders_[vertices], shaders_[fragments]});
   GraphicsPipelineInfo info;
   info.pass = pass;

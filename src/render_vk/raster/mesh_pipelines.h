@@ -24,12 +24,13 @@ enum class MeshLight : std::uint8_t {
 struct MeshWay {
   enum class What : std::uint8_t { Sky, Blocky, Smooth, Far };
   What what = What::Sky;
-  /// As ShaderMeshPush: surfaces, edges over them, edges alone, or a channel of glass.
+  /// As ShaderMeshPush: surfaces, edges over them, edges alone, a channel of glass, or a step of the nearest glass.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
   bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
   MeshLight light = MeshLight::Plain;
-  bool fields = false;  ///< rays may meet some
+  bool glass_by_rays = false;  ///< of the nearest glass: with all that is seen through it
+  bool fields = false;         ///< rays may meet some
   std::uint32_t samples = 1;
 
   auto operator<=>(const MeshWay&) const = default;
@@ -50,7 +51,7 @@ class MeshPipelines {
   [[nodiscard]] Result<VkPipeline> pipeline(const MeshWay& way);
 
  private:
-  static constexpr std::size_t kShaders = 7;
+  static constexpr std::size_t kShaders = 9;
 
   explicit MeshPipelines(Device& device) : device_(&device) {}
   VkResult make_pass(std::uint32_t samples, VkRenderPass& pass) const;

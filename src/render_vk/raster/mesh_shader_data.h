@@ -7,7 +7,7 @@
 
 namespace quoin::vulkan {
 
-// What src/render_vk/shaders/mesh.glsl declares, field by field.
+// What src/render_vk/shaders/raster/mesh.glsl declares, field by field.
 
 struct ShaderMeshInstance {
   std::array<Vec4, 4> clip{};
@@ -48,6 +48,16 @@ constexpr std::uint32_t kDrawEdgesOver = 1;
 constexpr std::uint32_t kDrawEdgesOnly = 2;
 constexpr std::uint32_t kDrawGlass = 3;  ///< and the channel
 constexpr std::uint32_t kDrawDepth = 6;  ///< where surfaces are, before they are lit
+// of the glass that is nearest where it is, what of each channel passes and what is added,
+constexpr std::uint32_t kDrawGlassDepth = 7;
+constexpr std::uint32_t kDrawGlassPassed = 8;
+constexpr std::uint32_t kDrawGlassAdded = 9;
+[[nodiscard]] constexpr bool is_channel_of_glass(std::uint32_t mode) {
+  return mode >= kDrawGlass && mode < kDrawGlass + 3;
+}
+[[nodiscard]] constexpr bool is_nearest_glass(std::uint32_t mode) {
+  return mode >= kDrawGlassDepth && mode <= kDrawGlassAdded;
+}
 // and of an impostor which views count, and whether its faces are those that none saw.
 constexpr int kMeshViewsShift = 4;
 constexpr std::uint32_t kMeshIsUnseen = std::uint32_t{1} << 30;

@@ -37,7 +37,9 @@ Status check(const ChunkSurface& surface) {
   const bool is_whole = mesh.normals.size() == count && surface.albedo.size() == count &&
                         surface.types.size() == count && (mesh.occlusion.empty() || mesh.occlusion.size() == count);
   if (!is_whole) return refuse("surface: its vertices' arrays are not of one size");
-  if (mesh.indices.size() % 3 != 0) return refuse("surface: its indices are no whole triangles");
+  const bool is_of_triangles = mesh.indices.size() % 3 == 0 && surface.glass_indices % 3 == 0;
+  if (!is_of_triangles) return refuse("surface: its indices are no whole triangles");
+  if (surface.glass_indices > mesh.indices.size()) return refuse("surface: more indices of glass than indices");
   const bool is_inside =
       std::all_of(mesh.indices.begin(), mesh.indices.end(), [&](std::uint32_t index) { return index < count; });
   if (!is_inside) return refuse("surface: an index names no vertex");
@@ -67,7 +69,7 @@ void MeshStore::clear() {
     for (auto& [at, mesh] : grid.chunks) memory_->release(mesh.place);
   }
   grids_.clear();
-  chunks_ = bytes_ = 0;
+  chunks_ = chunks_with_glass_ = bytes_ = 0;
   triangles_ = 0;
 }
 
@@ -119,6 +121,7 @@ Status MeshStore::upload(const ChunkSurface& surface, StoredMesh& mesh) {
   } else {
     const SmoothChunkMesh& smooth = surface.smooth;
     mesh.indices = static_cast<std::uint32_t>(smooth.indices.size());
+    mesh.glass_indices = static_cast<std::uint32_t>(surface.glass_indices);
     words.reserve(kVertexWords * smooth.positions.size() + smooth.indices.size());
     if (mesh.indices != 0) {
       for (std::size_t i = 0; i < smooth.positions.size(); ++i) append_vertex(surface, i, words);
@@ -166,12 +169,14 @@ void MeshStore::replace(Change& change) {
   if (!is_new) give_back(at->second);
   at->second = std::move(change.mesh);
   ++chunks_;
+  chunks_with_glass_ += at->second.has_glass() ? 1 : 0;
   triangles_ += at->second.triangles();
   bytes_ += at->second.place.size;
 }
 
 void MeshStore::give_back(StoredMesh& mesh) {
   --chunks_;
+  chunks_with_glass_ -= mesh.has_glass() ? 1 : 0;
   triangles_ -= mesh.triangles();
   bytes_ -= mesh.place.size;
   memory_->release(mesh.place);

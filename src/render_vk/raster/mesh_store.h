@@ -19,14 +19,16 @@ struct StoredMesh {
   /// Blocky: where each direction's opaque quads begin and the last one's end; then come the transparent ones.
   std::array<std::uint32_t, 7> opaque{};
   bool is_by_direction = true;  ///< false: only the first and the last of these mean something
-  /// Smooth: of how many, and where they begin in `place`.
+  /// Smooth: of how many, of which the last so many are of transparent bodies, and where they begin in `place`.
   std::uint32_t indices = 0;
+  std::uint32_t glass_indices = 0;
   VkDeviceSize first_index = 0;
-  std::vector<Quad> glass;  ///< the transparent quads, which are put in order for each picture
+  std::vector<Quad> glass;  ///< the transparent quads, which may be put in order for each picture
 
   [[nodiscard]] std::int64_t triangles() const {
     return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
   }
+  [[nodiscard]] bool has_glass() const { return !glass.empty() || glass_indices > 0; }
 };
 
 /// Whose chunks: those of a grid's voxels, or of these halved that often, or of its field.
@@ -73,6 +75,7 @@ class MeshStore {
   [[nodiscard]] std::size_t chunks() const { return chunks_; }
   [[nodiscard]] std::int64_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] bool has_glass() const { return chunks_with_glass_ > 0; }
 
  private:
   struct Change {
@@ -90,6 +93,7 @@ class MeshStore {
   DeviceMemory* memory_;
   std::map<MeshKey, StoredGrid> grids_;
   std::size_t chunks_ = 0;
+  std::size_t chunks_with_glass_ = 0;
   std::int64_t triangles_ = 0;
   std::size_t bytes_ = 0;
 };

@@ -1,4 +1,4 @@
-// What is transparent, drawn from back to front.
+// What is transparent, drawn face by face from back to front.
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,19 @@ using vulkan_test::blocky_surfaces;
 using vulkan_test::mesh_options;
 using vulkan_test::without_shadows;
 
-class VulkanMeshGlass : public vulkan_test::VulkanMeshTest {};
+class VulkanMeshGlass : public vulkan_test::VulkanMeshTest {
+ protected:
+  /// Compares pictures of glass as single faces, and of glass by rays: of panes of one voxel they are the same.
+  void compare_both(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
+    const Picture cpu = render_test::taken(scene, camera, options);
+    meshes_->clear();
+    put(scene, blocky_surfaces(scene));
+    MeshPictureOptions meshes = mesh_options(options);
+    expect_like(drawn(camera, meshes), cpu, name + "_by_rays");
+    meshes.glass_by_rays = false;
+    expect_like(drawn(camera, meshes), cpu, name);
+  }
+};
 
 struct Types {
   VoxelType wall, blue, red, glowing;
@@ -62,7 +74,7 @@ TEST_F(VulkanMeshGlass, PanesOfOneVoxelAreThoseOfTheProcessor) {
     options.light.shading = is_lit ? Shading::Lit : Shading::Unlit;
     const std::string name = is_lit ? "lit" : "unlit";
     const auto expect_same = [&](const std::vector<VoxelType Types::*>& types, const std::string& which) {
-      compare(panes(types), camera, options, which + name);
+      compare_both(panes(types), camera, options, which + name);
     };
     expect_same({&Types::blue}, "pane_");
     expect_same({&Types::blue, &Types::red}, "blue_red_");
@@ -83,12 +95,12 @@ TEST_F(VulkanMeshGlass, OrderIsThatOfTheCameraAndNotOfChunksOrInstances) {
   pane(types.blue, 0);
   pane(types.glowing, 5);
   const RenderOptions options = without_shadows(sized(80, 80));
-  compare(scene, straight({10.03, 10.02, 50}, 26), options, "panes_before");
+  compare_both(scene, straight({10.03, 10.02, 50}, 26), options, "panes_before");
   Camera behind = straight({10.03, 10.02, -50}, 26);
   behind.forward = {0, 0, 1};
   behind.right = {-1, 0, 0};
-  compare(scene, behind, options, "panes_behind");
-  compare(scene, towards({12, 11, 400}, {10, 10, 5}, 0.06), options, "panes_perspective");
+  compare_both(scene, behind, options, "panes_behind");
+  compare_both(scene, towards({12, 11, 400}, {10, 10, 5}, 0.06), options, "panes_perspective");
 }
 
 TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
@@ -98,17 +110,19 @@ TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
   grid.fill_box({{0, 0, 0}, {20, 20, 1}}, types.red);
   grid.fill_box({{0, 0, 10}, {10, 20, 11}}, types.wall);
   place(scene, std::move(grid));
-  compare(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
+  compare_both(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
 }
 
-// Waters of any depth are not the processor's, which counts their voxels; all else is.
+// Face by face, waters of any depth are not the processor's, which counts their voxels; all else is.
 TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
   Scene scene = golden::terrain_scene();
   const golden::GoldenView& view = golden::kViews[0];
   const Camera camera = golden::camera_for(view);
   const RenderOptions options = without_shadows(golden::options_for(view));
   put(scene, blocky_surfaces(scene));
-  const Image image = drawn(camera, mesh_options(options));
+  MeshPictureOptions by_faces = mesh_options(options);
+  by_faces.glass_by_rays = false;
+  const Image image = drawn(camera, by_faces);
   const Picture cpu = render_test::taken(scene, camera, options);
   // Of another colour, water tells where it is.
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
@@ -139,7 +153,8 @@ TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
 
 TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
   const Scene shown = panes({&Types::red, &Types::blue, &Types::glowing});
-  const MeshPictureOptions options = mesh_options(without_shadows(sized(120, 120)));
+  MeshPictureOptions options = mesh_options(without_shadows(sized(120, 120)));
+  options.glass_by_rays = false;
   const Camera camera = straight({20.03, 20.02, 500}, 44);
   std::vector<SurfaceUpdate> surfaces = blocky_surfaces(shown);
   put(shown, surfaces);

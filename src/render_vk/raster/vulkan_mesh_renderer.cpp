@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "light/daylight.h"
+#include "light/light_model.h"
 #include "render/picture_request.h"
 #include "render_vk/march/device_picture.h"
 #include "render_vk/march/renderer_impl.h"
@@ -92,7 +93,8 @@ struct VulkanMeshRenderer::Impl {
   [[nodiscard]] Result<std::vector<vulkan::MeshInstance>> detailed(const vulkan::Placement& placement, Threads threads);
   Status put_picture(const vulkan::Placement& placement, const Camera& camera, const RenderOptions& request,
                      vulkan::MeshFrameData& data);
-  [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const RenderOptions& request,
+  [[nodiscard]] bool has_glass_by_rays(const MeshPictureOptions& options) const;
+  [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const MeshPictureOptions& options,
                                                          vulkan::MeshLight& light);
 
   vulkan::RendererImpl* renderer;
@@ -188,12 +190,18 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
     return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
   }
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
-  const bool needs_voxels = options.detail.has_value() || traces_light(options.light);
+  const bool needs_voxels = options.detail.has_value() || traces_light(options.light) || has_glass_by_rays(options);
   if (needs_voxels && scene != nullptr && (renderer->voxels != scene || renderer->instances != shown)) {
     return refuse(
-        "vulkan: shadows, lamps and levels of detail need VulkanRenderer::update with the scene of the meshes");
+        "vulkan: shadows, lamps, glass by rays and levels of detail need VulkanRenderer::update with the scene of the "
+        "meshes");
   }
   return {};
+}
+
+bool VulkanMeshRenderer::Impl::has_glass_by_rays(const MeshPictureOptions& options) const {
+  const bool shows_glass = !shows_values(options.light.shading) && options.wireframe != Wireframe::Only;
+  return options.glass_by_rays && shows_glass && store.has_glass() && scene != nullptr;
 }
 
 // The instances as a picture shows them; the meshes of halved grids are in the store then.
@@ -254,12 +262,15 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
   return {};
 }
 
-Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera& camera, const RenderOptions& request,
+Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera& camera,
+                                                                   const MeshPictureOptions& options,
                                                                    vulkan::MeshLight& light) {
+  const RenderOptions request = request_of(options);
   const bool traces = traces_light(request.light) && scene != nullptr;
+  const bool glass_by_rays = has_glass_by_rays(options);
   const vulkan::Placement nothing;
   std::optional<vulkan::Subject> subject;
-  if (scene != nullptr && (traces || request.detail)) {
+  if (scene != nullptr && (traces || glass_by_rays || request.detail)) {
     auto made = vulkan::Subject::of(*renderer, camera, request);
     if (!made) return made.error();
     subject.emplace(std::move(*made));
@@ -269,7 +280,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
   if (surface_table.empty()) instances.clear();
   const auto shown_as = detailed(placement, request.threads);
   if (!shown_as) return shown_as.error();
-  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels());
+  auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays);
   if (!data) return data.error();
   if (Status done = put_picture(placement, camera, request, *data); !done) return done.error();
   if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;
@@ -280,7 +291,7 @@ Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, co
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
   if (Status right = impl_->check_request(target, camera, options); !right) return right;
   auto light = vulkan::MeshLight::Plain;
-  auto data = impl_->make_frame(camera, request_of(options), light);
+  auto data = impl_->make_frame(camera, options, light);
   if (!data) return data.error();
   if (Status sized = target.resize(options.width, options.height); !sized) return sized;
   target.samples = 0;

@@ -20,7 +20,7 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   float scale = length_a_depth(point);
   float depth = frame().view_depth;
   float max_t = t_of(hit, point);
-  BodyList list = BodyList(frame().bodies, slot * kBodies, 0, kInfinity);
+  BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, 0, kInfinity);
   vec3 unused = vec3(1.0);
   start_visit(ray);
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {

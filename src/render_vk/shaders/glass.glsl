@@ -1,5 +1,5 @@
-// Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list of kBodies for each
-// pixel of the tile, nearest first; without KEEPS_BODIES there is no room for any.
+// Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list, nearest first. With
+// KEEPS_BODIES there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
 
 // ln of the share of light below which a body counts as closed.
 const float kClosed = -11.0;
@@ -16,45 +16,59 @@ bool continues(Body body, Body next) {
 struct BodyList {
   uvec2 address;
   uint first;
+  uint room;  // 0: none is kept
   uint count;
   float dropped_t;  // where the first begins for which there was no room
 };
 
-#ifdef KEEPS_BODIES
+#ifdef HOLDS_BODIES
+const uint kHeldBodies = 8;
+Body held_bodies[kHeldBodies];
+
+Body listed_body(BodyList list, uint i) {
+  return held_bodies[i];
+}
+void list_body(BodyList list, uint i, Body body) {
+  held_bodies[i] = body;
+}
+#else
+Body listed_body(BodyList list, uint i) {
+  return Bodies(list.address).at[list.first + i];
+}
+void list_body(BodyList list, uint i, Body body) {
+  Bodies(list.address).at[list.first + i] = body;
+}
+#endif
+
 // Puts a body in its place; when the list is full the furthest gives way, and is returned.
 bool insert_body(inout BodyList list, Body body, out Body dropped) {
-  Bodies bodies = Bodies(list.address);
-  bool is_full = list.count == kBodies;
+  dropped = body;
+  if (list.room == 0) return true;
+  bool is_full = list.count == list.room;
   if (is_full) {
-    Body last = bodies.at[list.first + kBodies - 1];
-    if (body.lengths.x >= last.lengths.x) {
-      dropped = body;
-      return true;
-    }
+    Body last = listed_body(list, list.room - 1);
+    if (body.lengths.x >= last.lengths.x) return true;
     dropped = last;
   } else {
     ++list.count;
   }
   uint i = list.count - 1;
   for (; i > 0; --i) {
-    Body before = bodies.at[list.first + i - 1];
+    Body before = listed_body(list, i - 1);
     bool stays = before.lengths.x < body.lengths.x ||
                  (before.lengths.x == body.lengths.x && before.voxel.w <= body.voxel.w);
     if (stays) break;
-    bodies.at[list.first + i] = before;
+    list_body(list, i, before);
   }
-  bodies.at[list.first + i] = body;
+  list_body(list, i, body);
   return is_full;
 }
-#endif
 
 // What one more body does to the light of those that found no room.
 void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) {
   if (body.lengths.x < from_t) return;
-  Body dropped = body;
-#ifdef KEEPS_BODIES
+  Body dropped;
   if (!insert_body(list, body, dropped)) return;
-#endif
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
   passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, dropped.what.z != 0);
 }
@@ -95,10 +109,9 @@ void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float fro
 // The next body of a list, as one with those that it touches; false at the list's end.
 bool next_body(BodyList list, inout uint i, out Body body) {
   if (i >= list.count) return false;
-  Bodies bodies = Bodies(list.address);
-  body = bodies.at[list.first + i++];
+  body = listed_body(list, i++);
   while (i < list.count) {
-    Body next = bodies.at[list.first + i];
+    Body next = listed_body(list, i);
     if (!continues(body, next)) break;
     if (next.lengths.y > body.lengths.y) {
       body.lengths.y = next.lengths.y;

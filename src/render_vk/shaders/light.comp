@@ -16,6 +16,8 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "lamps.glsl"
 #include "rays.glsl"
 #include "faces.glsl"
+#include "corners.glsl"
+#include "see_through.glsl"
 
 const uint kTurns = 1024;
 
@@ -53,62 +55,12 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
   return direction;
 }
 
-// 3 when both sides are occluders, else how many of the three are.
-float vertex_occlusion(bool side_u, bool side_v, bool corner) {
-  return side_u && side_v ? 3.0 : float(side_u) + float(side_v) + float(corner);
-}
-
-// The occlusion of the corners that a blocky mesh carries, counted around the face: light/corner_light.h.
-vec4 corner_occlusion(Tree opaque, ivec3 voxel, uint face) {
-  int u = kFaceU[face];
-  int v = kFaceV[face];
-  ivec3 front = voxel;
-  front[axis_of(face)] += int(sign_of(face));
-  uint occluders = 0;
-  for (uint i = 0; i < 9; ++i) {
-    ivec3 at = front;
-    at[u] += int(i % 3) - 1;
-    at[v] += int(i / 3) - 1;
-    if (i != 4 && holds(opaque, at)) occluders |= 1u << i;
-  }
-  bool west = (occluders & 8) != 0;
-  bool east = (occluders & 32) != 0;
-  bool south = (occluders & 2) != 0;
-  bool north = (occluders & 128) != 0;
-  return vec4(vertex_occlusion(west, south, (occluders & 1) != 0), vertex_occlusion(east, south, (occluders & 4) != 0),
-              vertex_occlusion(east, north, (occluders & 256) != 0),
-              vertex_occlusion(west, north, (occluders & 64) != 0));
-}
-
-// Interpolated over the mesh's two triangles.
-float occlusion_at(vec4 corners, uint face, vec3 inside) {
-  float a = corners.x;
-  float b = corners.y;
-  float c = corners.z;
-  float d = corners.w;
-  float x = clamp(inside[kFaceU[face]], 0.0, 1.0);
-  float y = clamp(inside[kFaceV[face]], 0.0, 1.0);
-  if (!(a + c > b + d)) {
-    if (x >= y) return a + x * (b - a) + y * (c - b);
-    return a + y * (d - a) + x * (c - d);
-  }
-  if (x + y <= 1.0) return a + x * (b - a) + y * (d - a);
-  return c + (1.0 - x) * (d - c) + (1.0 - y) * (b - c);
-}
-
 // What a face of an impostor says of itself.
 float openness_of_far(Point point) {
   uint light = point.what.z >> 8;
   if (!has(kOcclusionVertex) || is_of_field(point)) return float(light >> 8) / 9.0;
   vec4 corners = vec4(light & 3, light >> 2 & 3, light >> 4 & 3, light >> 6 & 3);
   return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
-}
-
-// Where a ray meets a face: put onto it, and a little inside its edges.
-vec3 on_face(vec3 inside, uint face) {
-  vec3 at = clamp(inside, vec3(1e-6), vec3(1.0 - 1e-6));
-  at[axis_of(face)] = (face & 1) == 0 ? 1.0 : 0.0;
-  return at;
 }
 
 // The upright of a surface point, in its grid.
@@ -238,89 +190,39 @@ Point point_of(Body body) {
   return point;
 }
 
-// The surface of a face, which mirrors the sky. `tint`: of what is mirrored.
-void meet_surface(int instance, uint face, float before, float behind, vec3 tint, inout State state) {
-  Placed placed = placed_at(instance);
-  vec3 normal = sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
-  vec2 mirror = mirror_at(camera_ray(picture_point()).direction, normal, before, behind);
-  state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
-  state.weight.xyz *= 1.0 - mirror.x;
+vec3 light_of_body(Body body, uint slot) {
+  Point point = point_of(body);
+  point.inside.xyz = on_face(point.inside.xyz, point.what.y);
+  return light_of(point, slot);
 }
-// Where a ray leaves a body into air, or into another that touches it: what is mirrored passes it once more.
-void leave_body(Body from, int instance, uint face, float behind, inout State state) {
-  Surface surface = surface_of(from.what.x);
-  vec3 tint = passed_by(surface, from.lengths.z, from.what.z != 0);
-  meet_surface(instance, face, surface.ior, behind, tint, state);
+vec3 seen_direction() {
+  return camera_ray(picture_point()).direction;
 }
-void leave_into_air(Body from, inout State state) {
-  leave_body(from, int(from.what.w >> 3), from.what.w & 7, 1.0, state);
-}
-void enter_body(Body from, bool has_from, Body to, inout State state) {
-  float ior = surface_of(to.what.x).ior;
-  if (has_from && reaches(from, to.lengths.x)) {
-    leave_body(from, to.voxel.w, to.what.y, ior, state);
-    return;
-  }
-  if (has_from) leave_into_air(from, state);
-  if (to.what.z == 0) meet_surface(to.voxel.w, to.what.y, 1.0, ior, vec3(1.0), state);
-}
-
-// Whether something opaque leaves no air behind a body.
-bool lies_on_opaque(Body body, Point opaque, vec2 at) {
-  if (opaque.voxel.w < 0) return false;
-  float voxel_size = placed_at(int(body.what.w >> 3)).ref_inside.w;
-  return t_of(opaque, at) <= body.lengths.y + frame().lift * voxel_size;
+vec3 normal_met(int instance, uint face, float t) {
+  return face_normal(placed_at(instance), face);
 }
 
 // Lights what this round has of a pixel, and returns whether that was all.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = picture_point();
   Point opaque = Points(frame().points).at[slot];
-  uint bodies = kHasGlass ? uint(state.colour.w) - 1 : 0;
-  BodyList list = BodyList(frame().bodies, slot * kBodies, bodies, kInfinity);
   bool is_last = !kHasGlass || state.weight.w == kInfinity;
-  uint i = 0;
-  Body body;
-  Body last;
-  bool is_first = true;
-  bool has_surfaces = kHasGlass && has(kGlassSurfaces);
-  bool is_done = false;
-  while (!is_done) {
-    Point point = opaque;
-    vec3 weight = state.weight.xyz;
-    if (kHasGlass && next_body(list, i, body)) {
-      // What there was no room for may go on where the last ends: both are for the next round.
-      if (!is_last && !is_first && i == list.count) {
-        if (has_surfaces) enter_body(last, true, body, state);
-        state.weight.w = body.lengths.x;
-        break;
-      }
-      // That of a later round was entered in the one before.
-      if (has_surfaces && !(is_first && push.round > 0)) enter_body(last, !is_first, body, state);
-      last = body;
-      is_first = false;
-      bool starts_inside = body.what.z != 0;
-      // Where values are shown, glass is as good as stone, but for what one looks from.
-      bool shows_values = has(kShowOcclusion) || has(kShowNormals);
-      if (shows_values && starts_inside) continue;
-      Surface surface = surface_of(body.what.x);
-      point = point_of(body);
-      weight = state.weight.xyz * (shows_values ? 1.0 : own_share(surface, body.lengths.z, starts_inside));
-      state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, starts_inside);
-    } else {
-      is_done = true;
-      if (!is_last) break;
-      if (has_surfaces && !is_first && !lies_on_opaque(last, opaque, at)) leave_into_air(last, state);
-      weight = state.weight.xyz;
-      if (point.voxel.w < 0) {
-        state.colour.xyz += weight * sky_colour(sky_up(at));
-        break;
-      }
-    }
-    if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
-    state.colour.xyz += weight * light_of(point, slot);
+  if (kHasGlass) {
+    BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, uint(state.colour.w) - 1, kInfinity);
+    Body last;
+    // The first of a later round was entered in the one before.
+    bool has_bodies = pass_bodies(list, is_last, push.round > 0, slot, state, last);
+    if (!is_last) return false;
+    bool is_left = has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, t_of(opaque, at));
+    if (is_left) leave_into_air(last, state);
   }
-  return is_last;
+  if (opaque.voxel.w < 0) {
+    state.colour.xyz += state.weight.xyz * sky_colour(sky_up(at));
+    return true;
+  }
+  if (!is_of_field(opaque)) opaque.inside.xyz = on_face(opaque.inside.xyz, opaque.what.y);
+  state.colour.xyz += state.weight.xyz * light_of(opaque, slot);
+  return true;
 }
 
 void main() {

@@ -28,16 +28,10 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   return false;
 }
 
-// What of each channel of the sun's light passes what is transparent on the way.
-vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
-  ViewRay in_view = view_from_grid(own, ray);
-  float length = own.ref_inside.w;
-#ifdef KEEPS_BODIES
-  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, 0, kInfinity);
-#else
-  BodyList list = BodyList(uvec2(0), 0, 0, kInfinity);
-#endif
-  vec3 passed = vec3(1.0);
+// The bodies of all instances along a ray in the space of grid `home`, and in view. `length`: of the ray's direction in
+// the world.
+void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max_t, float from_t, inout BodyList list,
+                 inout vec3 passed) {
   start_visit(in_view);
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
@@ -45,8 +39,19 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
     GridRay in_grid = ray;
     if (i != home) in_grid = grid_from_view(placed, in_view);
     if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
-    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, 0.0, list, passed);
+    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, from_t, list, passed);
   }
+}
+
+// What of each channel of the sun's light passes what is transparent on the way.
+vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
+#ifdef KEEPS_BODIES
+  BodyList list = BodyList(frame().sun_bodies, slot * kBodies, kBodies, 0, kInfinity);
+#else
+  BodyList list = BodyList(uvec2(0), 0, 0, 0, kInfinity);
+#endif
+  vec3 passed = vec3(1.0);
+  find_bodies(home, ray, view_from_grid(own, ray), own.ref_inside.w, max_t, 0.0, list, passed);
   uint i = 0;
   Body body;
   while (next_body(list, i, body)) {
@@ -55,22 +60,35 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   return passed;
 }
 
+// The lamps that may reach a voxel of an instance's tree: the first in the lists, and how many.
+uvec2 lamps_around(ivec4 voxel, Placed placed) {
+  return lamps_at(((voxel.xyz + placed.origin.xyz) << placed.origin.w) >> 4, voxel.w);
+}
+
+// What a lamp in the lists adds at a point in view, if nothing is in between; points the ray at it, up to `max_t`.
+vec3 light_of_lamp(uint number, vec3 in_view, vec3 normal, Placed placed, inout GridRay ray, out float max_t) {
+  Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[number]];
+  vec3 direction = vec3(0.0);
+  float reach = 0.0;
+  vec3 light = lamp_light(lamp, lamp.position.xyz - in_view, normal, direction, reach);
+  float voxel_size = placed.ref_inside.w;
+  ray.direction = turned(placed.grid_axes, direction) * voxel_size;
+  max_t = reach / voxel_size;
+  return light;
+}
+
 // What lamps add at a point: `voxel` of an instance's tree, w: which instance. `from`: where rays start, as in a
 // GridRay; `normal`: in view, unit.
 vec3 light_of_lamps(uint slot, ivec4 voxel, Placed placed, GridRay from, vec3 normal) {
-  uvec2 list = lamps_at(((voxel.xyz + placed.origin.xyz) << placed.origin.w) >> 4, voxel.w);
-  float voxel_size = placed.ref_inside.w;
+  uvec2 list = lamps_around(voxel, placed);
   vec3 in_view = view_from_grid(placed, from).origin;
   vec3 sum = vec3(0.0);
   for (uint i = 0; i < list.y; ++i) {
-    Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[list.x + i]];
-    vec3 direction;
-    float reach;
-    vec3 light = lamp_light(lamp, lamp.position.xyz - in_view, normal, direction, reach);
+    GridRay ray = from;
+    float max_t;
+    vec3 light = light_of_lamp(list.x + i, in_view, normal, placed, ray, max_t);
     if (light == vec3(0.0)) continue;
-    if (has(kShadows) && reach > 0.0) {
-      GridRay ray = GridRay(from.base, from.origin, turned(placed.grid_axes, direction) * voxel_size, 0.0);
-      float max_t = reach / voxel_size;
+    if (has(kShadows) && max_t > 0.0) {
       ++rays_taken;
       if (is_blocked(voxel.w, placed, ray, max_t)) continue;
       if (kHasGlass) light *= sunlight_passed(slot, voxel.w, placed, ray, max_t);

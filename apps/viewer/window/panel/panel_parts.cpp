@@ -113,7 +113,7 @@ void row(const char* name, const char* format, double value) {
   ImGui::Text(format, value);
 }
 
-void draw_sun(LightOptions& light) {
+void draw_sun(LightOptions& light, bool has_rays) {
   SunAngles sun = sun_angles(light.sun);
   auto azimuth = static_cast<float>(sun.azimuth);
   auto elevation = static_cast<float>(sun.elevation);
@@ -128,6 +128,11 @@ void draw_sun(LightOptions& light) {
   }
   ImGui::Checkbox("sky follows the sun", &light.sky_follows_sun);
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
+  if (!has_rays && ImGui::IsItemHovered()) {
+    ImGui::SetTooltip(
+        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror;\n"
+        "marched rays show all of it (F5)");
+  }
 }
 
 void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choice) {
@@ -328,7 +333,7 @@ void draw_light_part(ViewState& state) {
   ImGui::BeginDisabled(!shows_shadows);
   draw_shadow_distance(light);
   ImGui::EndDisabled();
-  draw_sun(light);
+  draw_sun(light, has_shadows);
   auto exposure = static_cast<float>(light.exposure);
   if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {

@@ -3,11 +3,15 @@
 #include "data.glsl"
 #include "srgb.glsl"
 
-// What is drawn: surfaces, the edges of their triangles, or one channel of what is transparent.
+// What is drawn: surfaces, the edges of their triangles, one channel of what is transparent; or, of that, where it is
+// nearest, what passes it and what is added.
 const uint kSurfaces = 0;
 const uint kEdgesOver = 1;
 const uint kEdgesOnly = 2;
 const uint kGlass = 3;  // and the channel
+const uint kGlassDepth = 7;
+const uint kGlassPassed = 8;
+const uint kGlassAdded = 9;
 
 // An instance, from a point of its grid that is not far from the camera. A grid's axes are unit in the world.
 struct MeshInstance {

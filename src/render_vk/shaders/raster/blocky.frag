@@ -5,25 +5,12 @@
 layout(constant_id = 1) const bool kIsGlass = false;
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
+layout(constant_id = 5) const uint kGlassStep = 0;  // what is drawn, if it is the nearest glass
 #include "face_colour.glsl"
 #include "mesh_light.glsl"
+#include "blocky_face.glsl"
 
-layout(location = 0) centroid in vec4 place;
-layout(location = 1) flat in ivec4 base;
-layout(location = 2) flat in vec4 edges;
-layout(location = 3) flat in uvec2 what;
-layout(location = 4) centroid in vec4 colour;
 layout(location = 0) out vec4 pixel;
-
-// On the face, a little inside its edges, and from there a little before it: what is interpolated can lie beside both.
-vec3 before_face(uint face, float lift) {
-  const float kInside = 1e-4;
-  vec3 at = place.xyz;
-  at[kFaceU[face]] = clamp(at[kFaceU[face]], edges.x + kInside, edges.z - kInside);
-  at[kFaceV[face]] = clamp(at[kFaceV[face]], edges.y + kInside, edges.w - kInside);
-  at[axis_of(face)] = round(at[axis_of(face)]) + lift * sign_of(face);
-  return at;
-}
 
 vec3 light_of(uint face) {
   MeshFrame f = mesh_frame();
@@ -39,6 +26,7 @@ vec3 light_of(uint face) {
 }
 
 void main() {
+  if (kGlassStep != 0 && is_beyond(what.x)) discard;
   vec4 seen = colour;
   if (kTraces) seen = colour_of_face(what.x, uint(base.w), what.y, light_of(what.x), place.w);
   // Between opaque corners is not always opaque: what is interpolated beyond a triangle's edge can be less.

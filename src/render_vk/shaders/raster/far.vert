@@ -32,7 +32,8 @@ void main() {
   point[u] += is_east ? half_size : -half_size;
   point[v] += is_north ? half_size : -half_size;
   Seen seen = Seen(push.clip, push.eye, push.room);
-  if (!put_corner(seen, face, point, is_east, is_north)) {
+  vec3 widened;
+  if (!put_corner(seen, face, point, is_east, is_north, widened)) {
     hide_corner();
     return;
   }

@@ -43,11 +43,12 @@ void main() {
   if (is_north) local[v] = high[v];
   // Whole numbers: neighbouring chunks have the same corners to the bit.
   precise vec3 point = local + offset;
-  if (!put_corner(seen, face, point, is_east, is_north)) {
+  vec3 widened;
+  if (!put_corner(seen, face, point, is_east, is_north, widened)) {
     hide_corner();
     return;
   }
   ivec4 home = mesh_frame().instances[placed].home;
-  put_face(face, bits.y >> 10 & 0xFFFF, placed, local, low, high, home.xyz + ivec3(offset),
+  put_face(face, bits.y >> 10 & 0xFFFF, placed, local + widened, low, high, home.xyz + ivec3(offset),
            openness_of(bits.x >> 30 | (bits.y & 63) << 2, corner));
 }

@@ -30,8 +30,10 @@ struct Seen {
   float room;
 };
 
-// Puts a face's corner, at `point`, in the picture; false where one cannot see the face.
-bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north) {
+// Puts a face's corner, at `point`, in the picture, and says by how much the face was widened there; false where one
+// cannot see the face.
+bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north, out vec3 widened) {
+  widened = vec3(0.0);
   int axis = axis_of(face);
   int u = kFaceU[face];
   int v = kFaceV[face];
@@ -44,9 +46,9 @@ bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north) {
   float wide = seen.room * max(at.w, 0.0) / max(abs(direction[axis]), 0.0625);
   float wide_u = wide * sqrt(max(1.0 - direction[v] * direction[v], 0.0));
   float wide_v = wide * sqrt(max(1.0 - direction[u] * direction[u], 0.0));
-  point[u] += is_east ? wide_u : -wide_u;
-  point[v] += is_north ? wide_v : -wide_v;
-  gl_Position = clip_from(seen.clip, point);
+  widened[u] = is_east ? wide_u : -wide_u;
+  widened[v] = is_north ? wide_v : -wide_v;
+  gl_Position = clip_from(seen.clip, point + widened);
   return true;
 }
 

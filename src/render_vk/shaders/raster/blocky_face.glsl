@@ -1,0 +1,24 @@
+// What fragments of faces of voxels are told, and where they lie.
+
+layout(location = 0) centroid in vec4 place;
+layout(location = 1) flat in ivec4 base;
+layout(location = 2) flat in vec4 edges;
+layout(location = 3) flat in uvec2 what;
+layout(location = 4) centroid in vec4 colour;
+
+// On the face, a little inside its edges, and from there a little before it: what is interpolated can lie beside both.
+vec3 before_face(uint face, float lift) {
+  const float kInside = 1e-4;
+  vec3 at = place.xyz;
+  at[kFaceU[face]] = clamp(at[kFaceU[face]], edges.x + kInside, edges.z - kInside);
+  at[kFaceV[face]] = clamp(at[kFaceV[face]], edges.y + kInside, edges.w - kInside);
+  at[axis_of(face)] = round(at[axis_of(face)]) + lift * sign_of(face);
+  return at;
+}
+
+// Whether the fragment lies on what the face was widened by. There another face has one too, and of glass each place
+// must be passed once.
+bool is_beyond(uint face) {
+  vec2 at = vec2(place[kFaceU[face]], place[kFaceV[face]]);
+  return any(lessThan(at, edges.xy)) || any(greaterThanEqual(at, edges.zw));
+}

@@ -1,0 +1,46 @@
+#version 460
+// What the nearest face of glass shows, with all that is seen through it.
+#include "mesh.glsl"
+
+layout(constant_id = 5) const uint kGlassStep = 0;
+const bool kTraces = true;
+const bool kHasGlass = true;
+#define HOLDS_BODIES
+#include "faces.glsl"
+#include "lit.glsl"
+#include "mesh_light.glsl"
+#include "corners.glsl"
+#include "sky.glsl"
+#include "lit_point.glsl"
+#include "seen_glass.glsl"
+#include "blocky_face.glsl"
+
+layout(location = 0) out vec4 pixel;
+
+vec3 normal_met(int instance, uint face, float t) {
+  return face_normal(placed_at(instance), face);
+}
+LitPoint point_of_body(Body body) {
+  Placed placed = placed_at(body.voxel.w);
+  uint face = body.what.y;
+  float diffuse = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
+  return point_of_body(body, placed, face_normal(placed, face), diffuse);
+}
+
+// The body of the fragment begins in its face; those of other instances in which the ray starts began before.
+void enter_first(inout BodyList list) {
+  for (uint i = 0; i < list.count; ++i) {
+    Body body = listed_body(list, i);
+    if (body.what.z == 0 || body.voxel.w != seen_home) continue;
+    body.what.y = what.x;
+    body.what.z = 0;
+    list_body(list, i, body);
+  }
+}
+
+void main() {
+  const float kWithin = 1e-4;
+  if (is_beyond(what.x)) discard;
+  // Vertices make no colours where light is traced: theirs is 0, and read so that nothing they write is left unread.
+  pixel = colour + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
+}

@@ -1,0 +1,42 @@
+// What light reaches a fragment of a mesh, by rays through what the picture's frame places. Those that include this say
+// whether there are any (`kTraces`), and whether there is glass (`kHasGlass`).
+#include "walk.glsl"
+#include "instances.glsl"
+#include "glass.glsl"
+#include "lamps.glsl"
+#include "rays.glsl"
+
+// The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
+// `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
+//
+// One loop over them all: compilers copy the walk to each place that asks for it, and that of lavapipe takes seconds
+// for each.
+vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
+  if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
+  Placed placed = placed_at(voxel.w);
+  GridRay ray = GridRay(base, from, vec3(0.0), 0.0);
+  uvec2 lamps = uvec2(0);
+  if (has(kLamps)) lamps = lamps_around(voxel, placed);
+  vec3 in_view = view_from_grid(placed, ray).origin;
+  vec3 sum = vec3(0.0);
+  for (int i = -1; i < int(lamps.y); ++i) {
+    vec3 light;
+    float max_t;
+    bool is_shadowed = has(kShadows);
+    if (i < 0) {
+      light = sunlight_of(diffuse);
+      ray.direction = placed.to_sun.xyz;
+      max_t = frame().shadow_distance / placed.ref_view.w;
+    } else {
+      light = light_of_lamp(lamps.x + uint(i), in_view, normal, placed, ray, max_t);
+      is_shadowed = is_shadowed && max_t > 0.0;
+    }
+    if (light == vec3(0.0)) continue;
+    if (is_shadowed) {
+      if (is_blocked(voxel.w, placed, ray, max_t)) continue;
+      if (kHasGlass) light *= sunlight_passed(0, voxel.w, placed, ray, max_t);
+    }
+    sum += light;
+  }
+  return sum;
+}

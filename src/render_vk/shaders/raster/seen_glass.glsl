@@ -1,0 +1,97 @@
+// What a fragment of glass shows: all that is transparent from there to what is opaque behind, as marched pictures show
+// it. Those that include this draw the nearest such fragment of each pixel, once what is opaque is drawn, and say which
+// step of that it is (`kGlassStep`).
+#include "see_through.glsl"
+
+// The ray from the fragment on. It starts within the body that the fragment is of.
+GridRay seen_ray;
+ViewRay seen_in_view;
+int seen_home;  // the instance
+
+// The ray in the space of an instance.
+GridRay seen_ray_in(int instance, Placed placed) {
+  GridRay ray = seen_ray;
+  if (instance != seen_home) ray = grid_from_view(placed, seen_in_view);
+  return ray;
+}
+
+// How far along the ray the first opaque voxel or solid of a field lies; kInfinity where there is none.
+float opaque_behind() {
+  float nearest = kInfinity;
+  start_visit(seen_in_view);
+  for (int i = next_instance(nearest); i >= 0; i = next_instance(nearest)) {
+    Placed placed = placed_at(i);
+    GridRay ray = seen_ray_in(i, placed);
+    Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
+    if (start_walk(opaque, ray.base, ray.origin, ray.direction, nearest, -1) && find_voxel(nearest)) nearest = walk_t;
+    if (kHasFields) {
+      Tree field = Grids(frame().grids).at[placed.ref_base.w].field;
+      FieldHit hit;
+      if (start_walk(field, ray.base, ray.origin, ray.direction, nearest, -1) && find_surface(nearest, hit)) {
+        nearest = min(nearest, hit.t);
+      }
+    }
+  }
+  return nearest;
+}
+
+// The face through which a body is entered, with the occlusion that a blocky mesh would carry there. `normal`: unit, in
+// the world; `diffuse`: of the sun.
+LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
+  uint face = body.what.y;
+  Surface surface = surface_of(body.what.x);
+  if (has(kDetailColours)) {
+    surface.colour = placed.detail_colour.xyz;
+    surface.emitted = vec3(0.0);
+  }
+  // From inside it shows only what it emits.
+  if (body.what.z != 0) surface.colour = vec3(0.0);
+  GridRay ray = seen_ray_in(body.voxel.w, placed);
+  vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
+  inside = on_face(inside, face);
+  float openness = 1.0;
+  if (has_occlusion()) {
+    Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
+    openness = 1.0 - occlusion_at(corner_occlusion(opaque, body.voxel.xyz, face), face, inside) / 3.0;
+  }
+  vec3 from = vec3(body.voxel.xyz & 63) + inside;
+  from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
+  return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, openness);
+}
+
+// Those that include this say how bodies are lit.
+LitPoint point_of_body(Body body);
+
+vec3 light_of_body(Body body, uint slot) {
+  if (kGlassStep == kGlassPassed) return vec3(0.0);
+  return colour_of(point_of_body(body));
+}
+
+// Those that include this define what begins in the fragment: the first body of a list.
+void enter_first(inout BodyList list);
+
+// What is seen from a point of instance `home` on, in its tree's coordinates from `base`: what of each channel passes,
+// or what is added to what is drawn behind.
+vec4 seen_from(int home, ivec3 base, vec3 from) {
+  // The voxels that rays meet have no such instance any more.
+  if (home < 0) discard;
+  Placed placed = placed_at(home);
+  seen_home = home;
+  seen_ray = GridRay(base & ~63, vec3(base & 63) + from, turned(placed.grid_axes, seen_direction()), 0.0);
+  seen_in_view = view_from_grid(placed, seen_ray);
+  float opaque_t = opaque_behind();
+  State state = State(vec4(1.0, 1.0, 1.0, -kNever), vec4(0.0));
+  vec3 unused = vec3(1.0);
+  Body last;
+  for (bool is_last = false, is_first = true; !is_last; is_first = false) {
+    BodyList list = BodyList(uvec2(0), 0, kHeldBodies, 0, kInfinity);
+    find_bodies(home, seen_ray, seen_in_view, 1.0, opaque_t, state.weight.w, list, unused);
+    if (is_first) enter_first(list);
+    is_last = list.dropped_t == kInfinity;
+    state.weight.w = list.dropped_t;
+    bool has_bodies = pass_bodies(list, is_last, !is_first, 0, state, last);
+    bool is_left = is_last && has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, opaque_t);
+    if (is_left) leave_into_air(last, state);
+  }
+  return kGlassStep == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
+}

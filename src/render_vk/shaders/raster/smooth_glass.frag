@@ -1,0 +1,85 @@
+#version 460
+// What the nearest point of a smooth body of glass shows, with all that is seen through it.
+#include "mesh.glsl"
+
+layout(constant_id = 5) const uint kGlassStep = 0;
+const bool kTraces = true;
+const bool kHasGlass = true;
+#define HOLDS_BODIES
+#include "faces.glsl"
+#include "lit.glsl"
+#include "mesh_light.glsl"
+#include "corners.glsl"
+#include "sky.glsl"
+#include "lit_point.glsl"
+#include "seen_glass.glsl"
+#include "smooth_point.glsl"
+
+layout(location = 0) out vec4 pixel;
+
+// Outwards at a point of a grid's surface, in its tree's coordinates from `base`: of all voxels, blurred by quadratic
+// splines; unit, or 0 where nothing is on one side rather than on the other.
+vec3 blurred_normal(GridTrees trees, ivec3 base, vec3 point) {
+  vec3 whole = floor(point);
+  vec3 off = point - whole - 0.5;
+  vec3 weights[3] = {0.5 * (0.5 - off) * (0.5 - off), 0.75 - off * off, 0.5 * (0.5 + off) * (0.5 + off)};
+  vec3 slopes[3] = {off - 0.5, -2.0 * off, off + 0.5};
+  vec3 inwards = vec3(0.0);
+  for (int i = 0; i < 27; ++i) {
+    ivec3 at = ivec3(i % 3, i / 3 % 3, i / 9);
+    ivec3 voxel = base + ivec3(whole) + at - 1;
+    if (!holds(trees.transparent, voxel) && !holds(trees.opaque, voxel)) continue;
+    vec3 w = vec3(weights[at.x].x, weights[at.y].y, weights[at.z].z);
+    inwards += vec3(slopes[at.x].x * w.y * w.z, w.x * slopes[at.y].y * w.z, w.x * w.y * slopes[at.z].z);
+  }
+  float size = length(inwards);
+  return size > 0.05 ? inwards / -size : vec3(0.0);
+}
+
+// The first surface is the fragment's; others are of voxels, between bodies that touch each other their faces.
+vec3 normal_met(int instance, uint face, float t) {
+  if (t <= 0.0) return own_normal();
+  Placed placed = placed_at(instance);
+  GridRay ray = seen_ray_in(instance, placed);
+  vec3 in_grid = blurred_normal(Grids(frame().grids).at[placed.ref_base.w], ray.base, ray.origin + t * ray.direction);
+  if (!(sign_of(face) * in_grid[axis_of(face)] > 0.0)) return face_normal(placed, face);
+  return normalize(turned(placed.view_axes, in_grid));
+}
+
+LitPoint point_of_body(Body body) {
+  if (body.lengths.x <= 0.0) return own_point();
+  vec4 sun = mesh_frame().sun;
+  vec3 met = normal_met(body.voxel.w, body.what.y, body.lengths.x);
+  return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
+}
+
+// The surface lies up to about a voxel before the voxels of its body, or within them. Where there are none, there is no
+// more than what counts as one voxel.
+void enter_first(inout BodyList list) {
+  const float kNear = 2.0;
+  float voxel_size = placed_at(seen_home).ref_inside.w;
+  if (list.count > 0) {
+    Body first = listed_body(list, 0);
+    if (first.voxel.w == seen_home && first.lengths.x < kNear * voxel_size) {
+      first.what.z = 0;
+      first.lengths.x = 0.0;
+      list_body(list, 0, first);
+      return;
+    }
+  }
+  vec3 in_grid = own_normal_in_grid();
+  vec3 size = abs(in_grid);
+  int axis = size.y > size.x ? 1 : 0;
+  if (size.z > size[axis]) axis = 2;
+  uint face = uint(2 * axis) + (in_grid[axis] < 0.0 ? 1 : 0);
+  Body thin;
+  thin.voxel = ivec4(base.xyz + ivec3(floor(place)), seen_home);
+  thin.lengths = vec4(0.0);
+  thin.what = uvec4(uint(base.w), face, 0, 8 * uint(seen_home) + face);
+  Body dropped;
+  if (insert_body(list, thin, dropped)) list.dropped_t = min(list.dropped_t, dropped.lengths.x);
+}
+
+void main() {
+  pixel = seen_from(mesh_frame().instances[push.instance].home.w, base.xyz, place);
+}
