@@ -17,6 +17,8 @@
 
 namespace quoin {
 
+class DensityGlass;
+
 /// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
 /// Lifetime: owns nothing; the tracer and its scene must outlive it, and an update ends it.
 struct PlacedGrid {
@@ -27,6 +29,8 @@ struct PlacedGrid {
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
   const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
+  const DensityTree* opaque_field = nullptr;   ///< what of the field is opaque: `field` itself where all is; or null
+  const DensityGlass* glass = nullptr;         ///< what of the field is transparent; null when nothing is
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units a voxel of `voxels`
@@ -77,6 +81,7 @@ class SceneTracer {
 
   /// In the order of the instances' handles.
   [[nodiscard]] const std::vector<PlacedGrid>& placed() const;
+  /// Whether any of them has transparent voxels, or anything transparent in its field.
   [[nodiscard]] bool has_transparent() const;
 
  private:

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <quoin/core/parallel.h>
+#include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -22,5 +23,8 @@ namespace quoin::smooth {
 /// transparent.
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
+
+/// A chunk of such a field.
+[[nodiscard]] DensityChunk chunk_of_body(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 
 }  // namespace quoin::smooth

@@ -45,6 +45,7 @@ struct Placement {
   std::uint64_t grids = 0;           ///< the table's address
   bool has_transparent = false;
   bool has_fields = false;
+  bool has_field_glass = false;  ///< something of these is transparent
   std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
 };
 /// Puts a table in place, or in a larger one.

@@ -136,15 +136,15 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 5> values;
-  std::array<VkSpecializationMapEntry, 5> entries;
+  std::array<VkBool32, 6> values;
+  std::array<VkSpecializationMapEntry, 6> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
   Stages(const MeshWay& way, const std::array<VkShaderModule, 2>& shaders)
       : values{way.ordered, is_glass(way), way.light != MeshLight::Plain, way.light == MeshLight::TracedThroughGlass,
-               way.fields},
-        constants{5, entries.data(), sizeof values, values.data()} {
+               way.fields, way.fields && way.light == MeshLight::TracedThroughGlass},
+        constants{6, entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }

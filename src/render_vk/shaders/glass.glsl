@@ -1,13 +1,20 @@
 // Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list of kBodies for each
 // pixel of the tile, nearest first; without KEEPS_BODIES there is no room for any.
 
+#include "field_glass.glsl"
+
 // ln of the share of light below which a body counts as closed.
 const float kClosed = -11.0;
+const float kDiagonal = 1.7320508;  // of a cube of 1
 // Lengths of t within which two bodies touch: the rounding of single precision.
 const float kTouching = 4e-6;
 
 bool reaches(Body body, float t) {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+}
+// No body of a field counts as longer than it is, nor one from within.
+bool has_own_length(Body body) {
+  return (body.what.z & kHowItBegins) != 0;
 }
 bool continues(Body body, Body next) {
   return next.what.x == body.what.x && reaches(body, next.lengths.x);
@@ -56,40 +63,132 @@ void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) 
   if (!insert_body(list, body, dropped)) return;
 #endif
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
-  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, dropped.what.z != 0);
+  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, has_own_length(dropped));
+}
+
+// The bodies of one instance that are found along a ray, in its order.
+struct BodyRun {
+  Body body;  // the last one
+  bool has_body;
+  float clarity;
+};
+
+void end_as(inout Body body, Body next) {
+  body.what.w = next.what.w;
+  if (kHasFieldGlass) body.what.z = (body.what.z & kHowItBegins) | (next.what.z & ~kHowItBegins);
+}
+
+void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list, inout vec3 passed) {
+  if (!(next.lengths.z > 0.0)) return;
+  run.clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
+  if (run.has_body && continues(run.body, next)) {
+    run.body.lengths.y = next.lengths.y;
+    run.body.lengths.z += next.lengths.z;
+    end_as(run.body, next);
+    return;
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+  run.body = next;
+  run.has_body = true;
 }
 
 // The bodies of one instance, along a ray whose walk has been started. `voxels_a_t`: of the full grid.
 void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
                     inout vec3 passed) {
   float room = max_t - ray.t;
-  float clarity = 0.0;
-  bool has_body = false;
-  Body body;
-  while (clarity > kClosed && find_voxel(room)) {
+  BodyRun run;
+  run.clarity = 0.0;
+  run.has_body = false;
+  while (run.clarity > kClosed && find_voxel(room)) {
     Body next;
     next.voxel = ivec4(walk_voxel, i);
-    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? 1 : 0, 0);
+    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kStartsInside : 0, 0);
     float enter_t = walk_t;
     bool goes_on = leave_block(0, room);
     float exit_t = min(walk_t, room);
     next.what.w = 8 * uint(i) + uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
     next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
-    if (next.lengths.z > 0.0) {
-      clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
-      if (has_body && continues(body, next)) {
-        body.lengths.y = next.lengths.y;
-        body.lengths.z += next.lengths.z;
-        body.what.w = next.what.w;
-      } else {
-        if (has_body) keep_body(list, body, from_t, passed);
-        body = next;
-        has_body = true;
+    add_to_run(run, next, from_t, list, passed);
+    if (!goes_on) break;
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+}
+
+// What of a field's cell is transparent from `enter_t` to `exit_t`. `next`: a body with what is the same for all of it.
+void add_glass_of_cell(GlassCell cell, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
+                       float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
+  float size = exit_t - enter_t;
+  vec3 place = vec3(next.voxel.xyz - ray_base);
+  vec3 entry = clamp(ray_origin + enter_t * ray_direction - place, vec3(0.0), vec3(1.0));
+  RayInGlass ray = ray_in_glass(cell, entry, ray_direction * size);
+  bool starts_inside = (next.what.z & kStartsInside) != 0;
+  float begin = 0.0;
+  while (begin < 1.0) {
+    float end = next_change(cell, ray, begin);
+    uint type = glass_at(cell, ray, 0.5 * (begin + end));
+    if (type != 0) {
+      float begin_t = begin <= 0.0 ? enter_t : enter_t + begin * size;
+      float end_t = end >= 1.0 ? exit_t : enter_t + end * size;
+      next.lengths = vec4(ray_t + begin_t, ray_t + end_t, (end_t - begin_t) * voxels_a_t, begin_t);
+      next.what.x = type;
+      next.what.z = kBeginsInField | kEndsInField | (starts_inside && begin <= 0.0 ? kStartsInside : 0);
+#ifdef KEEPS_BODIES
+      bool touches = run.has_body && reaches(run.body, next.lengths.x);
+      if (!touches || run.body.what.x != type) {
+        next.what.y = packed_normal(glass_normal(cell, entry + begin * ray.way, type, touches ? run.body.what.x : 0));
       }
+      if (ray.has_air) {
+        next.what.z |= packed_in_28(normal_in(cell.block, cell.first, entry + end * ray.way)) << kExitNormal;
+      }
+#endif
+      add_to_run(run, next, from_t, list, passed);
+    }
+    begin = end;
+  }
+}
+
+// The same of what is transparent of an instance's field.
+void find_glass_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
+                   inout vec3 passed) {
+  float room = max_t - ray.t;
+  BodyRun run;
+  run.clarity = 0.0;
+  run.has_body = false;
+  while (run.clarity > kClosed && find_voxel(room)) {
+    Body next;
+    next.voxel = ivec4(walk_voxel, i);
+    next.what = uvec4(0, kNoNormal, walk_axis < 0 ? kStartsInside : 0, 8 * uint(i));
+    float enter_t = walk_t;
+    Numbers block;
+    bool is_mixed = glass_block_found(block, next.what.x);
+    // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
+    float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
+    bool by_word = !is_mixed && run.clarity - kClosed > 4.0 * closing;
+    bool goes_on = leave_block(by_word ? 2 : 0, room);
+    float exit_t = min(walk_t, room);
+    if (is_mixed) {
+      add_glass_of_cell(glass_cell(block, next.voxel.xyz), next, enter_t, exit_t, ray.t, voxels_a_t, from_t, run, list,
+                        passed);
+    } else {
+      next.what.z |= kBeginsInField | kEndsInField;
+      next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
+      add_to_run(run, next, from_t, list, passed);
     }
     if (!goes_on) break;
   }
-  if (has_body) keep_body(list, body, from_t, passed);
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+}
+
+// All bodies of one instance along a ray.
+void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float max_t, float from_t,
+                 inout BodyList list, inout vec3 passed) {
+  float room = max_t - ray.t;
+  if (start_walk(trees.transparent, ray.base, ray.origin, ray.direction, room, -1)) {
+    find_bodies_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
+  }
+  if (kHasFieldGlass && start_walk(trees.glass, ray.base, ray.origin, ray.direction, room, -1)) {
+    find_glass_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
+  }
 }
 
 // The next body of a list, as one with those that it touches; false at the list's end.
@@ -102,7 +201,7 @@ bool next_body(BodyList list, inout uint i, out Body body) {
     if (!continues(body, next)) break;
     if (next.lengths.y > body.lengths.y) {
       body.lengths.y = next.lengths.y;
-      body.what.w = next.what.w;
+      end_as(body, next);
     }
     body.lengths.z += next.lengths.z;
     ++i;

@@ -111,12 +111,15 @@ vec3 on_face(vec3 inside, uint face) {
   return at;
 }
 
+vec3 face_normal(uint face) {
+  vec3 normal = vec3(0.0);
+  normal[axis_of(face)] = sign_of(face);
+  return normal;
+}
+
 // The upright of a surface point, in its grid.
 vec3 grid_normal(Point point) {
-  if (is_of_field(point)) return normal_of(point.what.y);
-  vec3 normal = vec3(0.0);
-  normal[axis_of(point.what.y)] = sign_of(point.what.y);
-  return normal;
+  return is_of_field(point) ? normal_of(point.what.y) : face_normal(point.what.y);
 }
 
 // A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: light/occlusion_directions.h.
@@ -229,40 +232,66 @@ vec3 light_of(Point point, uint slot) {
   return colour * frame().exposure;
 }
 
+// Of a body of a field: where it begins, from its cell's lower corner.
+vec3 place_in_field(Body body) {
+  Placed placed = placed_at(body.voxel.w);
+  ExactRay ray = exact_ray_in(placed, exact_direction());
+  Pair way = product_of(Pair(vec3(body.lengths.w), vec3(0.0)), ray.direction);
+  return sum_of(start_from(ray, placed, body.voxel.xyz), way).high;
+}
+
 Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
+  uint kind = (body.what.z & kStartsInside) != 0 ? kGlow : kSurface;
+  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
+    point.inside = vec4(place_in_field(body), body.lengths.x);
+    point.what = uvec4(body.what.xy, kIsField | kind, 0);
+    return point;
+  }
   vec3 place = exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y);
   point.inside = vec4(place, body.lengths.x);
-  point.what = uvec4(body.what.xy, body.what.z != 0 ? kGlow : kSurface, 0);
+  point.what = uvec4(body.what.xy, kind, 0);
   return point;
 }
 
-// The surface of a face, which mirrors the sky. `tint`: of what is mirrored.
-void meet_surface(int instance, uint face, float before, float behind, vec3 tint, inout State state) {
+// The normals of the surfaces through which a ray enters a body, and leaves it into air, in the grid.
+vec3 normal_entered(Body body) {
+  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) return normal_of(body.what.y);
+  return face_normal(body.what.y);
+}
+vec3 normal_left(Body body) {
+  if (kHasFieldGlass && (body.what.z & kEndsInField) != 0) return normal_from_28(body.what.z >> kExitNormal);
+  return face_normal(body.what.w & 7);
+}
+
+// A surface that mirrors the sky. `tint`: of what is mirrored.
+void meet_surface(int instance, vec3 normal_in_grid, float before, float behind, vec3 tint, inout State state) {
   Placed placed = placed_at(instance);
-  vec3 normal = sign_of(face) * placed.view_axes[axis_of(face)].xyz / placed.ref_inside.w;
+  vec3 normal = turned(placed.view_axes, normal_in_grid) / placed.ref_inside.w;
   vec2 mirror = mirror_at(camera_ray(picture_point()).direction, normal, before, behind);
   state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
   state.weight.xyz *= 1.0 - mirror.x;
 }
 // Where a ray leaves a body into air, or into another that touches it: what is mirrored passes it once more.
-void leave_body(Body from, int instance, uint face, float behind, inout State state) {
+void leave_body(Body from, int instance, vec3 normal, float behind, inout State state) {
   Surface surface = surface_of(from.what.x);
-  vec3 tint = passed_by(surface, from.lengths.z, from.what.z != 0);
-  meet_surface(instance, face, surface.ior, behind, tint, state);
+  vec3 tint = passed_by(surface, from.lengths.z, has_own_length(from));
+  meet_surface(instance, normal, surface.ior, behind, tint, state);
 }
 void leave_into_air(Body from, inout State state) {
-  leave_body(from, int(from.what.w >> 3), from.what.w & 7, 1.0, state);
+  leave_body(from, int(from.what.w >> 3), normal_left(from), 1.0, state);
 }
 void enter_body(Body from, bool has_from, Body to, inout State state) {
   float ior = surface_of(to.what.x).ior;
   if (has_from && reaches(from, to.lengths.x)) {
-    leave_body(from, to.voxel.w, to.what.y, ior, state);
+    leave_body(from, to.voxel.w, normal_entered(to), ior, state);
     return;
   }
   if (has_from) leave_into_air(from, state);
-  if (to.what.z == 0) meet_surface(to.voxel.w, to.what.y, 1.0, ior, vec3(1.0), state);
+  if ((to.what.z & kStartsInside) == 0) {
+    meet_surface(to.voxel.w, normal_entered(to), 1.0, ior, vec3(1.0), state);
+  }
 }
 
 // Whether something opaque leaves no air behind a body.
@@ -299,14 +328,14 @@ bool light_pixel(uint slot, inout State state) {
       if (has_surfaces && !(is_first && push.round > 0)) enter_body(last, !is_first, body, state);
       last = body;
       is_first = false;
-      bool starts_inside = body.what.z != 0;
+      bool starts_inside = (body.what.z & kStartsInside) != 0;
       // Where values are shown, glass is as good as stone, but for what one looks from.
       bool shows_values = has(kShowOcclusion) || has(kShowNormals);
       if (shows_values && starts_inside) continue;
       Surface surface = surface_of(body.what.x);
       point = point_of(body);
-      weight = state.weight.xyz * (shows_values ? 1.0 : own_share(surface, body.lengths.z, starts_inside));
-      state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, starts_inside);
+      weight = state.weight.xyz * (shows_values ? 1.0 : own_share(surface, body.lengths.z, has_own_length(body)));
+      state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, has_own_length(body));
     } else {
       is_done = true;
       if (!is_last) break;

@@ -38,6 +38,8 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
   placed.field = trees.field();
+  placed.opaque_field = trees.opaque_field();
+  placed.glass = trees.glass();
   placed.pivot = placed.grid->pivot / cell;
   placed.voxel_size *= cell;
   placed.level = level;
@@ -96,7 +98,7 @@ bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegist
   level.level = halvings;
   const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
   level.trees.update(*level.voxels, types);
-  level.trees.update(field);
+  level.trees.update(field, types);
   level.tight = unite(level.voxels->bounds(), field.bounds());
   return true;
 }
