@@ -28,8 +28,8 @@ bool continues(const GlassBody& body, const GlassBody& next) {
 // The bodies of one placed grid along a ray, in their order.
 class BodiesOfGrid {
  public:
-  BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid, double max_t,
-               double length, std::vector<GlassBody>& out)
+  BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
+               double max_t, double length, std::vector<GlassBody>& out)
       : placed_(view.tracer().placed()[static_cast<std::size_t>(index)]),
         surfaces_(surfaces),
         index_(index),

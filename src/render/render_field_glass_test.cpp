@@ -69,7 +69,7 @@ TEST(RenderFieldGlass, ASlabTintsByItsThicknessAndShowsItsOwnColour) {
       wall.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.red);
       place(s.scene, std::move(wall));
       DensityGrid slab;
-      const double low = thickness < 1.0F ? 2.75 : 3.0;  // around a layer of samples
+      const double low = thickness > 1.0F ? 3.0 : 3.0 - 0.5 * static_cast<double>(thickness);  // round a sample
       add_plate(slab, {-8, low, -8}, {8, low + static_cast<double>(thickness), 8}, is_glass ? s.glass : s.stone);
       place_field(s.scene, std::move(slab));
       RenderOptions options = sized(4, 4);
@@ -169,8 +169,8 @@ TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
   along.view_height = 1.0;
   const float all_own = 1.0F - std::pow(1.0F - kAlpha, 16.0F);
   const Vec3 sky = sky_colour(0.0F);
-  expect_near(pixel_at(taken(s.scene, along, options), 8, 8),
-              encoded(sky * through(16.0F) + linear(kGlass) * all_own), 1);
+  expect_near(pixel_at(taken(s.scene, along, options), 8, 8), encoded(sky * through(16.0F) + linear(kGlass) * all_own),
+              1);
 }
 
 TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
@@ -183,7 +183,7 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
   options.light.shading = Shading::Unlit;
   const Picture picture = taken(s.scene, from_above(0, 20, 0, 8), options);
   expect_near(pixel_at(picture, 4, 4), encoded(linear(kRed) * through(3.0F) + own(3.0F)), 1);
-  EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[0] - pixel_at(picture, 4, 4)[0]), 20);
+  EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "beside them it is deeper";
 }
 
 // A ball of clear glass before the sky: what its two surfaces mirror, by the field's own normals.
@@ -208,6 +208,8 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
     const double in_plane = (1.5 * cosine - inside) / (1.5 * cosine + inside);
     return 0.5 * (across * across + in_plane * in_plane);
   };
+  // Straight through: as the camera's own rays say of their direction.
+  const Picture empty = taken(Scene(), camera, options);
   int compared = 0;
   for (int y = 4; y < 57; y += 4) {
     for (int x = 4; x < 57; x += 4) {
@@ -219,17 +221,15 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
       const auto share = static_cast<float>(fresnel(normal.z));
       const auto up = static_cast<float>(2.0 * normal.z * normal.y);  // of (0, 0, -1), mirrored
       const Vec3 mirrored = share * (sky_colour(up) + (1.0F - share) * sky_colour(up));
-      // Straight through: as the camera's own ray says of its direction.
-      const Picture empty = taken(Scene(), camera, options);
       const Pixel plain = pixel_at(empty, x, y);
       const Vec3 behind = linear({plain[0], plain[1], plain[2], 255});
-      expect_near(pixel_at(picture, x, y), encoded(mirrored + (1.0F - share) * (1.0F - share) * behind), 3);
+      expect_near(pixel_at(picture, x, y), encoded(mirrored + (1.0F - share) * (1.0F - share) * behind), 5);
       ++compared;
     }
   }
   EXPECT_GT(compared, 60);
   options.light.glass_surfaces = false;
-  EXPECT_EQ(taken(scene, camera, options).colour.rgb, taken(Scene(), camera, options).colour.rgb);
+  EXPECT_EQ(taken(scene, camera, options).colour.rgb, empty.colour.rgb);
 }
 
 struct PondScene : GlassScene {
@@ -273,7 +273,7 @@ TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
     opaque.visibility = Visibility::Opaque;
     s.scene.types.replace(type, opaque);
   }
-  EXPECT_GT(count_different(one, taken(s.scene, camera, options), 4), 1000);
+  EXPECT_GT(count_different(one, taken(s.scene, camera, options), 4), 500);
 }
 
 TEST(RenderFieldGlass, ARendererFollowsEditsAndTypes) {
@@ -334,27 +334,27 @@ TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
   EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
 }
 
-// Far and halved: what is opaque is drawn coarser, glass by rays.
-TEST(RenderFieldGlass, InDetailGlassIsSeenThrough) {
+// What is opaque of it comes from an impostor, glass from rays; and none of it is halved.
+TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
   PondScene s;
   RenderOptions options = sized(96, 72);
   const Camera camera = towards({170, 120, 190}, {0, 0, 0});
   const Picture whole = taken(s.scene, camera, options);
   options.detail.emplace().far_pixels = 0;
   options.detail->cell_pixels = 3.0;
-  const Picture halved = taken(s.scene, camera, options);
+  EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb);
   options.detail->far_pixels = 1000;
   const Picture far = taken(s.scene, camera, options);
+  EXPECT_NE(far.colour.rgb, whole.colour.rgb);
+  EXPECT_LT(count_different(whole, far, 24), 250) << "edges";
   for (const VoxelType type : {s.glass, s.green}) {
     VoxelProperties opaque = s.scene.types[type];
     opaque.visibility = Visibility::Opaque;
     s.scene.types.replace(type, opaque);
   }
-  const int without = count_different(whole, taken(s.scene, camera, options), 24);
-  EXPECT_GT(without, 400);
-  EXPECT_LT(5 * count_different(whole, halved, 24), without);
-  EXPECT_LT(5 * count_different(whole, far, 24), without);
-  EXPECT_NE(halved.colour.rgb, far.colour.rgb);
+  EXPECT_GT(count_different(far, taken(s.scene, camera, options), 6), 150);
+  options.detail->far_pixels = 0;
+  EXPECT_NE(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb) << "without glass it is halved";
 }
 
 }  // namespace

@@ -31,7 +31,8 @@ std::uint64_t CellRows::either_end(int y, int z) const {
 
 Slab CellRows::read(int y, int z, SlabRows& rows) const {
   const auto ends = [this](int at_y, int at_z) { return either_end(at_y, at_z); };
-  return join_corners(y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a | b; }, rows);
+  return join_corners(
+      y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a | b; }, rows);
 }
 
 }  // namespace quoin::trace

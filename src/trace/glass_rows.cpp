@@ -13,7 +13,8 @@ class FullRows {
   explicit FullRows(const SolidRows& samples) : samples_(&samples) {}
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const {
     const auto ends = [this](int at_y, int at_z) { return samples_->at(at_y, at_z) & samples_->next(at_y, at_z); };
-    return join_corners(y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a & b; }, rows);
+    return join_corners(
+        y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a & b; }, rows);
   }
 
  private:
@@ -90,7 +91,8 @@ bool has_glass(const DensityChunk& samples, const VoxelRegistry& types) {
 
 Slab GlassRows::read(int y, int z, SlabRows& rows) const {
   const auto ends = [this](int at_y, int at_z) { return samples_.at(at_y, at_z) | samples_.next(at_y, at_z); };
-  return join_corners(y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a | b; }, rows);
+  return join_corners(
+      y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a | b; }, rows);
 }
 
 UniformBlocks uniform_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {

@@ -71,8 +71,8 @@ class SceneTracer {
 
   /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, voxels and
   /// field, or less often where that would change the volume of either by more than an eighth or leave more than an
-  /// eighth of the field's surface a sample thin. The others, which are out of the
-  /// picture but may cast shadows into it, stay as they are.
+  /// eighth of the field's surface a sample thin; never where anything of the field is transparent. The others, which
+  /// are out of the picture but may cast shadows into it, stay as they are.
   ///
   /// Lifetime: this one, which keeps the halved grids so that only the first picture pays for them, must outlive the
   ///           result, without an update. An update of the result makes it a tracer of whole grids.

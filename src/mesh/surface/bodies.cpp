@@ -71,9 +71,8 @@ DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, 
     places = std::move(near);
   }
   std::vector<std::optional<DensityChunk>> made(places.size());
-  parallel_for(places.size(), threads, [&](std::size_t i) {
-    made[i] = chunk_of_body(*whole.find_chunk(places[i]), types, body);
-  });
+  parallel_for(places.size(), threads,
+               [&](std::size_t i) { made[i] = chunk_of_body(*whole.find_chunk(places[i]), types, body); });
   for (std::size_t i = 0; i < places.size(); ++i) field.put_chunk(places[i], std::move(*made[i]));
   return field;
 }

@@ -145,7 +145,8 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
   });
   for (const auto& [known, grid] : all) {
     const TreeCache& trees = known->trees;
-    Status done = known->voxels.update(*memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
+    Status done = known->voxels.update(
+        *memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
     if (!done) return done;
   }
   return {};

@@ -46,7 +46,7 @@ struct Placement {
   bool has_transparent = false;
   bool has_fields = false;
   bool has_field_glass = false;  ///< something of these is transparent
-  std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
+  std::vector<ShaderFar> far;    ///< what shows of impostors, in the order of the instances
 };
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);

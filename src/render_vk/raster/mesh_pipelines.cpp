@@ -142,8 +142,12 @@ struct Stages {
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
   Stages(const MeshWay& way, const std::array<VkShaderModule, 2>& shaders)
-      : values{way.ordered, is_glass(way), way.light != MeshLight::Plain, way.light == MeshLight::TracedThroughGlass,
-               way.fields, way.fields && way.light == MeshLight::TracedThroughGlass},
+      : values{way.ordered,
+               is_glass(way),
+               way.light != MeshLight::Plain,
+               way.light == MeshLight::TracedThroughGlass,
+               way.fields,
+               way.fields && way.light == MeshLight::TracedThroughGlass},
         constants{6, entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};

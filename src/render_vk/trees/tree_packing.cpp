@@ -209,9 +209,8 @@ class RecordWriter {
         is_full = false;
         put_address(at + 2, record.words.size());
         const trace::Node* const words = node.bricks[place] == 1 ? nullptr : &nodes.brick(node.bricks[place]);
-        add_numbered(node.cells[place], words, first, [&](std::size_t cell, IVec3 word) {
-          return number_of(place, cell, word);
-        });
+        add_numbered(node.cells[place], words, first,
+                     [&](std::size_t cell, IVec3 word) { return number_of(place, cell, word); });
       }
       at += 4;
     }
@@ -228,8 +227,7 @@ class RecordWriter {
     record.words.resize(place + static_cast<std::size_t>(std::popcount(mask)));
     for (int i = 0; i < 64; ++i) {
       if ((mask >> i & 1) == 0) continue;
-      const std::uint32_t number =
-          number_of(static_cast<std::size_t>(i), first + IVec3{i & 3, i >> 2 & 3, i >> 4} * 4);
+      const std::uint32_t number = number_of(static_cast<std::size_t>(i), first + IVec3{i & 3, i >> 2 & 3, i >> 4} * 4);
       record.words[place++] = number;
     }
     // What comes next begins at a multiple of 8 bytes.

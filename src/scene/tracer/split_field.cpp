@@ -25,8 +25,7 @@ void SplitField::update(const VoxelRegistry& types, const DensityChanges& change
   for (const DensityChange& change : changes.items) {
     const DensityChunk* const chunk = whole_->find_chunk(change.chunk);
     const DensityChunk air(stored_density(opaque_field_.band(), opaque_field_.band()));
-    opaque_field_.put_chunk(change.chunk,
-                            chunk == nullptr ? air : smooth::chunk_of_body(*chunk, types, kOpaqueBody));
+    opaque_field_.put_chunk(change.chunk, chunk == nullptr ? air : smooth::chunk_of_body(*chunk, types, kOpaqueBody));
   }
   opaque_->update(opaque_field_.changes_since(followed_opaque_));
   glass_.update(types, changes);

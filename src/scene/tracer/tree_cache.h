@@ -40,9 +40,7 @@ class TreeCache {
   [[nodiscard]] bool has_transparent() const { return transparent_.has_value() || split_ != nullptr; }
 
  private:
-  static const DensityTree* if_any(const DensityTree& tree) {
-    return tree.cells().bounds().empty() ? nullptr : &tree;
-  }
+  static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }
   void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
   void update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 

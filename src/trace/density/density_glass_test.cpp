@@ -79,11 +79,12 @@ class Oracle {
 
 std::vector<GlassSpan> spans_along(const DensityGlass& glass, const Ray& ray, double max_t, double largest) {
   std::vector<GlassSpan> spans;
-  visit_glass(glass, ray, max_t, [&](VoxelType) { return largest; },
-              [&](const GlassSpan& span) {
-                spans.push_back(span);
-                return true;
-              });
+  visit_glass(
+      glass, ray, max_t, [&](VoxelType) { return largest; },
+      [&](const GlassSpan& span) {
+        spans.push_back(span);
+        return true;
+      });
   return spans;
 }
 
@@ -227,11 +228,12 @@ TEST(DensityGlass, ABallInWaterIsEnteredAndLeftWhereItIs) {
   EXPECT_NEAR(bodies[1].t_exit, 50.0 + 18.0, 0.05);
   EXPECT_NEAR(bodies[2].t_exit, 50.0 + floor, 0.05);
   const auto normal = [&](const GlassSpan& body, double t, VoxelType other) {
-    return glass_normal(glass, body.cell, {30, 50 - t, 30}, body.type, other);
+    return glass_normal(glass, {30, static_cast<int>(std::floor(50.0 - t)), 30}, {30, 50 - t, 30}, body.type, other);
   };
   EXPECT_GT(normal(bodies[0], bodies[0].t_enter, kAir).y, 0.999);
   EXPECT_GT(normal(bodies[1], bodies[1].t_enter, types.water).y, 0.99);
-  EXPECT_LT(normal(bodies[2], bodies[2].t_enter, types.glass).y, 0.0) << "out of the water, into the ball";
+  EXPECT_GT(normal(bodies[2], bodies[2].t_enter, types.glass).y, 0.99) << "out of the water, into the ball above";
+  EXPECT_LT(normal(bodies[1], bodies[1].t_exit, types.water).y, -0.99) << "out of the ball";
 }
 
 // Digging, painting and filling, beside trees that are built anew.
@@ -274,7 +276,8 @@ TEST(DensityGlass, EndsWhereTheVisitorOrTheRayDoes) {
   const DensityGlass glass(field, types.registry);
   const Ray down{{0, 50, 0}, {0, -2, 0}};
   int visits = 0;
-  visit_glass(glass, down, 100.0, [](VoxelType) { return 64.0; }, [&](const GlassSpan&) { return ++visits < 2; });
+  visit_glass(
+      glass, down, 100.0, [](VoxelType) { return 64.0; }, [&](const GlassSpan&) { return ++visits < 2; });
   EXPECT_EQ(visits, 2);
   EXPECT_TRUE(spans_along(glass, down, 20.0, 64.0).empty());
   const auto cut = joined(spans_along(glass, down, 22.0, 64.0));
