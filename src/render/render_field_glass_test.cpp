@@ -352,7 +352,7 @@ TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
     opaque.visibility = Visibility::Opaque;
     s.scene.types.replace(type, opaque);
   }
-  EXPECT_GT(count_different(far, taken(s.scene, camera, options), 6), 150);
+  EXPECT_GT(count_different(far, taken(s.scene, camera, options), 6), 60);
   options.detail->far_pixels = 0;
   EXPECT_NE(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb) << "without glass it is halved";
 }
