@@ -46,6 +46,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/sky.h", {"render"}},
     {"light/surfaces.h", {"io", "render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
+    {"mesh/blocky/occlusion_atlas.h", {"scene"}},
     {"mesh/surface/bodies.h", {"scene"}},
     {"mesh/surface/build.h", {"scene"}},
     {"mesh/surface/faces.h", {"live"}},

@@ -114,6 +114,46 @@ TEST_F(ToolRender, DepthIsTheDistanceAlongEachRay) {
   EXPECT_EQ(said["pixels_hit"], hit);
 }
 
+TEST_F(ToolRender, ACameraOfTheFileIsNamedByItsNumber) {
+  vox_test::FileBuilder file;
+  file.model(4, 4, 4, {{0, 0, 0, 1}, {3, 0, 0, 2}, {0, 3, 3, 3}});
+  for (const std::int32_t number : {0, 2, 5}) {
+    file.with("rCAM", [&](auto& out) {
+      out.i32(number);
+      out.dict({{"_angle", number == 0 ? "0 0 0" : "-20 " + std::to_string(10 * number) + " 0"},
+                {"_radius", number == 0 ? "0" : "12"},
+                {"_focus", number == 0 ? "0 0 0" : "0 0 2"}});
+    });
+  }
+  ASSERT_TRUE(write_file(folder_.file("seen.vox"), file.file()));
+  const Json listed = Json::parse(run("info seen.vox --json").out)["cameras"];
+  ASSERT_EQ(listed.size(), 2U) << "the first was never set";
+  EXPECT_EQ(listed[0]["number"], 2);
+  EXPECT_EQ(listed[1]["number"], 5);
+  EXPECT_NE(run("info seen.vox").out.find("Camera 5: at "), std::string::npos);
+  const std::string size = "seen.vox -o out.png --size 40x30 --samples 1 --camera ";
+  const Json camera = drawn(size + "file:5")["camera"];
+  EXPECT_EQ(camera["position"], listed[1]["position"]);
+  EXPECT_GT(triple(camera["position"]).y, 2.0) << "above its focus, since it looks down";
+  EXPECT_GT(triple(camera["position"]).x, 1.0) << "to the right, since it is turned to the left";
+  const std::string second = bytes("out.png");
+  drawn(size + "file:2");
+  EXPECT_NE(bytes("out.png"), second);
+  for (const std::string number : {"0", "1", "2147483647"}) {
+    const ToolRun none = run("render " + size + "file:" + number);
+    EXPECT_EQ(none.status, 1);
+    expect_one_error_line(none);
+    EXPECT_NE(none.err.find("the file has cameras 2, 5"), std::string::npos) << none.err;
+  }
+  EXPECT_NE(run("render tiny.vox -o out.png --camera file:0").err.find("no camera that was set"), std::string::npos);
+  for (const std::string wrong : {"file:", "file:-1", "file:x", "file:2147483648", "file:2 --look-at 0,0,0",
+                                  "file:2 --fov 30", "file:2 --view front"}) {
+    const ToolRun refused = run("render " + size + wrong);
+    EXPECT_EQ(refused.status, 2) << wrong;
+    expect_one_error_line(refused);
+  }
+}
+
 TEST_F(ToolRender, NegativeNumbersAreNoOptions) {
   const std::string size = "tiny.vox -o out.png --size 8x8 ";
   const Json camera = drawn(size + "--camera -3,5,2 --look-at -.5,-1e0,-0 --sun -1,.5,0")["camera"];

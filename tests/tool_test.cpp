@@ -110,6 +110,56 @@ TEST_F(Tool, ASceneFileHoldsWhatNoVoxDoes) {
   EXPECT_EQ(text_of(folder_.file("again.json")), text_of(folder_.file("whole.json")));
 }
 
+TEST_F(Tool, AnAtlasTakesFewerTriangles) {
+  std::string voxels;
+  for (int i = 0; i < 400; ++i) {
+    for (const int byte : {i % 20, i / 20, 0, 1}) voxels += static_cast<char>(byte);
+    if (i % 7 == 0) {
+      for (const int byte : {i % 20, i / 20, 1, 2}) voxels += static_cast<char>(byte);
+    }
+  }
+  std::ofstream(folder_.file("floor.vox"), std::ios::binary) << vox_file({20, 20, 2}, voxels);
+  const Json plain = Json::parse(run("convert floor.vox plain.glb --json").out);
+  const Json baked = Json::parse(run("convert floor.vox baked.glb --texture atlas --json").out);
+  EXPECT_EQ(baked["faces_visible"], plain["faces_visible"]);
+  EXPECT_LT(baked["triangles"].get<int>(), plain["triangles"].get<int>() * 0.7);
+  EXPECT_EQ(Json::parse(run("convert floor.vox floor.obj --texture atlas --json").out)["files"],
+            Json({"floor.obj", "floor.mtl", "floor_palette.png", "floor_atlas.png"}));
+  for (const std::string arguments :
+       {"out.ply --texture atlas", "out.vox --texture atlas", "out.glb --texture atlas --no-ao",
+        "out.glb --texture atlas --watertight", "out.glb --texture atlas --mesher smooth",
+        "out.glb --texture atlas --mesher culled", "out.glb --texture atlas --ao-attribute", "out.glb --texture x"}) {
+    const ToolRun refused = run("convert floor.vox " + arguments);
+    EXPECT_EQ(refused.status, 2) << arguments;
+    expect_one_error_line(refused);
+  }
+}
+
+TEST_F(Tool, FramesBecomeAnAnimation) {
+  vox_test::FileBuilder file;
+  file.model(1, 1, 1, {{0, 0, 0, 1}}).model(1, 1, 2, {{0, 0, 0, 2}, {0, 0, 1, 2}});
+  ASSERT_TRUE(write_file(folder_.file("film.vox"), file.file()));
+  EXPECT_EQ(Json::parse(run("info film.vox --json").out)["frames"], 2);
+  const ToolRun result = run("convert film.vox film.glb --animate --fps 4 --json");
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(Json::parse(result.out)["warnings"], Json::array());
+  const Json glb = parse_glb(read_file(folder_.file("film.glb")).value()).document;
+  ASSERT_EQ(glb["animations"].size(), 1U);
+  const std::size_t times = glb["animations"][0]["samplers"][0]["input"];
+  EXPECT_EQ(glb["accessors"][times]["max"], Json({0.5}));
+  EXPECT_EQ(run("convert film.vox smooth.gltf --animate --mesher smooth").status, 0);
+  EXPECT_NE(text_of(folder_.file("smooth.gltf")).find("\"animations\""), std::string::npos);
+  const ToolRun still = run("convert tiny.vox still.glb --animate");
+  EXPECT_EQ(still.status, 0);
+  EXPECT_NE(still.err.find("warning: nothing moves in it"), std::string::npos) << still.err;
+  for (const std::string arguments : {"out.obj --animate", "out.vox --animate", "out.glb --fps 3",
+                                      "out.glb --animate --fps 0", "out.glb --animate --frame 1"}) {
+    const ToolRun refused = run("convert film.vox " + arguments);
+    EXPECT_EQ(refused.status, 2) << arguments;
+    expect_one_error_line(refused);
+  }
+}
+
 // What an artist's file holds beside voxels goes along from .vox to .vox, and is told where it cannot.
 TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   vox_test::FileBuilder file;
@@ -118,7 +168,10 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   file.transform(2, 3, {{}}, {{"_name", "crew"}}, 1).group(3, {4});
   file.transform(4, 5, {{}}, {{"_name", "walker"}}, 0).shape(5, {{0, {{"_f", "0"}}}, {1, {{"_f", "3"}}}});
   file.layer(0, {}).layer(1, {{"_name", "people"}});
-  file.with("rCAM", [](auto& out) { out.dict({}); });
+  file.with("rCAM", [](auto& out) {
+    out.i32(0);
+    out.dict({});
+  });
   const auto bytes = file.file();
   ASSERT_TRUE(write_file(folder_.file("crew.vox"), bytes));
   const ToolRun same = run("convert crew.vox same.vox");

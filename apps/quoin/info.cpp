@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
+#include "progress_bar.h"
 #include "volume_info.h"
 
 namespace quoin::tool {
@@ -138,6 +139,17 @@ Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
   return entry;
 }
 
+/// What --camera file:N of render can name.
+Json cameras_json(const LoadedScene& loaded) {
+  Json list = Json::array();
+  for (const FileCamera& each : loaded.cameras) {
+    list.push_back({{"number", each.number},
+                    {"position", triple(each.camera.position)},
+                    {"forward", triple(each.camera.forward)}});
+  }
+  return list;
+}
+
 Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCounts& faces) {
   const Hierarchy hierarchy(loaded.scene);
   Json object = {{"format", loaded.format},
@@ -149,6 +161,8 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"lamps", loaded.scene.lamps.size()},
                  {"sun", loaded.sun ? triple(*loaded.sun) : Json()},
                  {"camera", loaded.camera ? triple(loaded.camera->position) : Json()},
+                 {"cameras", cameras_json(loaded)},
+                 {"frames", loaded.last_frame + 1},
                  {"grids", Json::array()},
                  {"groups", hierarchy.groups()},
                  {"layers", hierarchy.layers()},
@@ -226,7 +240,9 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
   if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
   if (loaded.sun) text += "Sun: towards " + three(*loaded.sun, ", ") + "\n";
-  if (loaded.camera) text += "Camera: at " + three(loaded.camera->position, ", ") + "\n";
+  for (const FileCamera& each : loaded.cameras) {
+    text += "Camera " + std::to_string(each.number) + ": at " + three(each.camera.position, ", ") + "\n";
+  }
   text += hierarchy_text(loaded);
   for (const GridReport& report : report_grids(scene)) text += grid_text(scene, report);
   return text;
@@ -234,7 +250,10 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
 
 Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
   if (holds_volume(options.input)) return run_volume_info(options, streams);
-  const auto loaded = load_scene(options.input, options.load);
+  const auto loaded = [&] {
+    ProgressBar bar;
+    return load_scene(options.input, options.load, bar.listener("reading"));
+  }();
   if (!loaded) return loaded.error();
   const FaceCounts faces = count_faces(loaded->scene, options.instances(), options.threads);
   if (options.json) return print_json(info_json(*loaded, options.instances(), faces));

@@ -4,6 +4,7 @@
 #include <quoin/io/volume.h>
 
 #include "output.h"
+#include "progress_bar.h"
 
 namespace quoin::tool {
 
@@ -78,7 +79,10 @@ bool holds_volume(const std::filesystem::path& path) {
 }
 
 Result<int> run_volume_info(const CommonOptions& options, const StandardStreams& streams) {
-  const auto volume = read_volume(options.input);
+  const auto volume = [&] {
+    ProgressBar bar;
+    return read_volume(options.input, {}, bar.listener("reading"));
+  }();
   if (!volume) return volume.error();
   if (options.json) return print_json(volume_json(*volume));
   print_warnings(volume->warnings);

@@ -55,14 +55,6 @@ bool can_write(const std::filesystem::path& path) {
   return format_to_write(path).has_value();
 }
 
-std::optional<FileStamp> FileStamp::of(const std::filesystem::path& path) {
-  std::error_code failed;
-  FileStamp stamp;
-  stamp.time = std::filesystem::last_write_time(path, failed);
-  if (!failed) stamp.bytes = std::filesystem::file_size(path, failed);
-  return failed ? std::nullopt : std::optional(stamp);
-}
-
 Document::Document(LoadedScene loaded, std::filesystem::path path)
     : loaded_(std::move(loaded)), path_(std::move(path)), stamp_(FileStamp::of(path_)) {
   faces_.update(loaded_.scene);
@@ -82,7 +74,7 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
 }
 
 bool Document::can_save_in_place() const {
-  return can_write(path_) && !loaded_.names_files;
+  return can_write(path_) && loaded_.named_files.empty();
 }
 
 std::string Document::name() const {
@@ -257,7 +249,7 @@ void Document::note_written(const std::filesystem::path& path, std::uint64_t sta
   path_ = path;
   stamp_ = FileStamp::of(path);
   if (std::exchange(has_newly_accepted_, false)) originals_.insert(path);
-  loaded_.names_files = false;
+  loaded_.named_files.clear();
   saved_state_ = state;
 }
 

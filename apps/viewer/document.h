@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <quoin/core/progress.h>
+#include <quoin/io/file.h>
 #include <quoin/io/vox.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>
@@ -18,15 +19,6 @@
 #include "sculpt.h"
 
 namespace quoin::viewer {
-
-/// What tells a file from a later one of the same name: nothing where there is none.
-struct FileStamp {
-  std::filesystem::file_time_type time{};
-  std::uintmax_t bytes = 0;
-  bool operator==(const FileStamp&) const = default;
-
-  [[nodiscard]] static std::optional<FileStamp> of(const std::filesystem::path& path);
-};
 
 /// A scene under edit, where it came from, and what can be undone.
 ///

@@ -355,7 +355,10 @@ std::filesystem::path write_layered(const ScratchFolder& folder) {
   file.transform(4, 5, {{}}, {{"_name", "walker"}}, 0).shape(5, {{0, {{"_f", "0"}}}, {1, {{"_f", "3"}}}});
   file.transform(6, 7, {{{"_t", "9 0 0"}}}, {{"_name", "hidden"}}, 1).shape(7, 1);
   file.layer(0, {{"_name", "shown"}}).layer(1, {{"_hidden", "1"}});
-  file.with("rCAM", [](auto& out) { out.dict({}); });
+  file.with("rCAM", [](auto& out) {
+    out.i32(0);
+    out.dict({});
+  });
   const auto path = folder.file("layered.vox");
   EXPECT_TRUE(write_file(path, file.file()));
   return path;

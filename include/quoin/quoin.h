@@ -63,6 +63,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_edit.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>

@@ -306,4 +306,12 @@ Status write_file(const std::filesystem::path& path, std::span<const std::byte> 
   return file->commit();
 }
 
+std::optional<FileStamp> FileStamp::of(const std::filesystem::path& path) {
+  std::error_code failed;
+  FileStamp stamp;
+  stamp.time = std::filesystem::last_write_time(path, failed);
+  if (!failed) stamp.bytes = std::filesystem::file_size(path, failed);
+  return failed ? std::nullopt : std::optional(stamp);
+}
+
 }  // namespace quoin

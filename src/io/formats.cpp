@@ -66,16 +66,25 @@ bool is_volume(const std::optional<FileFormat>& format) {
   return format && format_info(*format).is_volume;
 }
 
-Result<LoadedScene> scene_of_volume(Result<Volume> volume, const LoadOptions& options, const Progress& progress) {
+/// The half of some work that begins at `first`.
+Progress half_of(const Progress& progress, double first) {
+  if (!progress) return {};
+  return [&progress, first](double fraction) { return progress(first + 0.5 * fraction); };
+}
+
+/// `source`: a path, or bytes.
+template <class Source>
+Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, const Progress& progress) {
+  const auto volume = read_volume(source, {}, half_of(progress, 0.0));
   if (!volume) return volume.error();
   VolumeSceneOptions wanted;
   wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
-  auto scene = scene_from_volume(*volume, wanted, options.threads, progress);
+  auto scene = scene_from_volume(*volume, wanted, options.threads, half_of(progress, 0.5));
   if (!scene) return scene.error();
   LoadedScene loaded;
   loaded.scene = std::move(*scene);
   loaded.format = volume->format;
-  loaded.warnings = std::move(volume->warnings);
+  loaded.warnings = volume->warnings;
   return loaded;
 }
 
@@ -84,7 +93,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes);
-  if (is_volume(format)) return scene_of_volume(read_volume(bytes), options, progress);
+  if (is_volume(format)) return read_volume_as_scene(bytes, options, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
@@ -177,7 +186,7 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   // A volume's reader is given the path, which may lead to what lies beside it.
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (is_volume(*format)) return with_path(scene_of_volume(read_volume(path), options, progress), path);
+  if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
   if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, progress);

@@ -27,6 +27,9 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     return make_error(ErrorCode::Unsupported,
                       std::string("only .glb and .gltf are ") + (options.compress ? "compressed" : "quantized"));
   }
+  if (!meshes.atlas.rgb.empty() && format == FileFormat::Ply) {
+    return make_error(ErrorCode::Unsupported, "PLY has no textures; .glb, .gltf and .obj have");
+  }
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
   switch (format) {
     case FileFormat::Glb:
@@ -55,6 +58,7 @@ SceneMeshes without_occlusion(SceneMeshes meshes) {
   for (MeshPart& part : meshes.parts) {
     for (MeshView& view : part.surfaces) view = without_occlusion(view);
   }
+  meshes.atlas = {};
   return meshes;
 }
 
@@ -81,6 +85,10 @@ Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& o
   if (options.scale == 1.0 && options.up == UpAxis::Y) return meshes;
   for (MeshGroup& group : meshes.groups) group.world_from_group = placed_in(options, group.world_from_group);
   for (MeshPlacement& placement : meshes.placements) {
+    for (MeshKey& key : placement.keys) {
+      key.world_from_part = placed_in(options, key.world_from_part);
+      key.world_from_part.scale *= options.scale;
+    }
     if (auto* place = std::get_if<Similarity>(&placement.world_from_part)) {
       *place = placed_in(options, *place);
       place->scale *= options.scale;

@@ -43,7 +43,7 @@ bool all_finite(std::span<const Vec3> points) {
 
 const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
-                       is_none_or_one_a_vertex(view.block_occlusion, view);
+                       is_none_or_one_a_vertex(view.block_occlusion, view) && is_none_or_one_a_vertex(view.atlas, view);
   if (!has_all) return "arrays of different lengths";
   if (largest_of(view.types) >= types) return "a type that is not registered";
   if (largest_of(view.directions) > Direction::NegZ) return "a direction that is none of the six";
@@ -101,17 +101,49 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
   return is_within ? nullptr : "a vertex farther away than a float can say";
 }
 
+/// What is wrong with what a placement does.
+const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
+  const bool mirrors = glm::determinant(glm::dmat3(placement.matrix())) < 0.0;
+  double last = 0.0;
+  for (const MeshKey& key : placement.keys) {
+    const bool is_first = &key == &placement.keys.front();
+    if (!(is_first ? key.seconds == 0.0 : key.seconds > last) || !std::isfinite(key.seconds)) {
+      return "keys that do not ascend from 0 seconds";
+    }
+    last = key.seconds;
+    if (key.world_from_part.mirrored != mirrors)
+      return "a key that mirrors where the placement does not, or the other way round";
+    MeshPlacement at;
+    at.world_from_part = key.world_from_part;
+    if (const char* fault = fault_of_place(bounds, pivot, at.matrix())) return fault;
+  }
+  return nullptr;
+}
+
+/// What contradicts the texture that some opaque blocks of a scene are in, and then all of them are.
+const char* fault_of_atlas(const MeshView& view, const Image& atlas) {
+  const auto is_outside = [](const std::array<float, 2>& uv) {
+    return !(uv[0] >= 0.0F && uv[0] <= 1.0F && uv[1] >= 0.0F && uv[1] <= 1.0F);
+  };
+  if (std::ranges::any_of(view.atlas, is_outside)) return "a texture coordinate beyond 0 to 1";
+  if (!view.atlas.empty() && view.surface != SurfaceClass::Opaque) return "an atlas for what is not opaque";
+  if (!view.atlas.empty() && atlas.rgb.empty()) return "coordinates in an atlas that is not there";
+  const bool is_left_out = view.atlas.empty() && !view.positions.empty() && view.surface == SurfaceClass::Opaque;
+  return is_left_out && !view.has_albedo() && !atlas.rgb.empty() ? "opaque blocks that are not in the atlas" : nullptr;
+}
+
 Status unsound(const MeshPart& part, const char* fault) {
   return make_error(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
 }
 
 /// Adds the bounds of a sound part.
-Status check_part(const MeshPart& part, std::size_t types, std::vector<DBox>& bounds) {
+Status check_part(const MeshPart& part, const SceneMeshes& meshes, std::vector<DBox>& bounds) {
   if (!is_finite(part.pivot)) return unsound(part, "a pivot that is not finite");
   DBox& box = bounds.emplace_back();
   for (const MeshView& view : part.surfaces) {
     if (view.has_albedo() != part.surfaces.front().has_albedo()) return unsound(part, "surfaces of two kinds");
-    if (const char* fault = fault_of(view, types)) return unsound(part, fault);
+    if (const char* fault = fault_of(view, meshes.types.size())) return unsound(part, fault);
+    if (const char* fault = fault_of_atlas(view, meshes.atlas)) return unsound(part, fault);
     if (view.positions.empty()) continue;
     const DBox more = bounds_of(view);
     box.extend(more.min);
@@ -139,9 +171,17 @@ Status check_groups(const std::vector<MeshGroup>& groups) {
 }  // namespace
 
 Status check_meshes(const SceneMeshes& meshes) {
+  if (!(meshes.seconds >= 0.0) || !std::isfinite(meshes.seconds)) {
+    return make_error(ErrorCode::InvalidArgument, "an animation of no length");
+  }
+  const Image& atlas = meshes.atlas;
+  const bool is_sound = atlas.width >= 0 && atlas.height >= 0 &&
+                        atlas.rgb.size() == std::size_t{3} * static_cast<std::size_t>(atlas.width) *
+                                                static_cast<std::size_t>(atlas.height);
+  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "an atlas of another size than it says");
   std::vector<DBox> bounds;
   for (const MeshPart& part : meshes.parts) {
-    if (auto sound = check_part(part, meshes.types.size(), bounds); !sound) return sound;
+    if (auto sound = check_part(part, meshes, bounds); !sound) return sound;
   }
   for (const MeshPlacement& placement : meshes.placements) {
     if (placement.part >= meshes.parts.size()) {
@@ -150,6 +190,7 @@ Status check_meshes(const SceneMeshes& meshes) {
     }
     const MeshPart& part = meshes.parts[placement.part];
     const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());
+    if (fault == nullptr) fault = fault_of_keys(bounds[placement.part], part.pivot, placement);
     if (fault != nullptr) return unsound(part, fault);
     if (placement.group && *placement.group >= meshes.groups.size()) {
       return make_error(ErrorCode::InvalidArgument,
@@ -221,6 +262,7 @@ float openness_at(const MeshView& view, std::size_t vertex) {
 MeshView without_occlusion(const MeshView& view) {
   MeshView plain = view;
   plain.block_occlusion = {};
+  plain.atlas = {};
   plain.occlusion = {};
   return plain;
 }

@@ -88,7 +88,7 @@ class VertexTransform {
 /// What occlusion leaves of ambient light at a vertex: 1 open to 0 dark; 1 without any.
 [[nodiscard]] float openness_at(const MeshView& view, std::size_t vertex);
 
-/// The same mesh without occlusion.
+/// The same mesh without occlusion, and so without an atlas.
 [[nodiscard]] MeshView without_occlusion(const MeshView& view);
 
 /// Whether what lies behind surfaces of a class shows.

@@ -131,6 +131,15 @@ xdotool key --delay 80 Home
 xdotool mousemove 180 220
 sleep 0.5
 
+echo "a picture of what was shown when it was asked for"
+picture_becomes before.png home.png Home || fail "Home does not come back"
+xdotool key --delay 1 F12 shift+5
+until_true 120 test -s world-1.png || fail "F12 gives no picture (before another view)"
+mv world-1.png pressed.png
+cmp -s before.png pressed.png || fail "F12 saves the view that came after it"
+xdotool key --delay 80 Home
+sleep 0.5
+
 echo "edit, undo, redo"
 xdotool key --delay 80 3 bracketright bracketright
 drag 1 6 2

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
+#include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
 
@@ -14,6 +17,7 @@
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
+#include "watch.h"
 
 namespace quoin::tool {
 
@@ -35,13 +39,17 @@ struct ConvertOptions {
   std::optional<double> simplify;
   std::optional<double> smoothness;  ///< of smooth surfaces around voxels
   std::optional<std::string> colours;
-  bool apart = false;            ///< instances are not united
-  std::optional<RawVolume> raw;  ///< the input is a file of values alone
+  std::string texture = "palette";  ///< or "atlas"
+  bool animate = false;             ///< all frames, as an animation of glTF
+  double frames_per_second = 10.0;  ///< of `animate`
+  bool apart = false;               ///< instances are not united
+  std::optional<RawVolume> raw;     ///< the input is a file of values alone
   std::optional<double> scale;
   std::string up;          ///< "y", "z"; empty: z for .ply, else y
   bool compress = false;   ///< of glTF, as MeshFileOptions has it
   bool quantize = false;   ///< of glTF, as MeshFileOptions has it
   bool mesh_only = false;  ///< any option that only meshes heed was given
+  bool watch = false;      ///< goes on whenever the input changes
 };
 
 struct Seconds {
@@ -60,7 +68,8 @@ struct Outcome {
   std::optional<double> iso;  ///< of volumes
   bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  std::vector<std::filesystem::path> files;        ///< all that were written, OUT first
+  std::vector<std::filesystem::path> named_files;  ///< that were read beside IN
   Seconds seconds;
   std::vector<std::string> warnings;
 };
@@ -81,15 +90,20 @@ struct ManyOptions {
   bool recursive = false;
 };
 
-/// Converts each of the inputs, several at once; those that fail are named last. Returns the exit status.
-[[nodiscard]] int run_many(const ConvertOptions& options, const ManyOptions& many);
+/// What inputs were when they were converted.
+using Converted = std::map<std::filesystem::path, std::optional<FileStamp>>;
+
+/// Converts each of the inputs, several at once; those that fail are named last. `done`: those that are in it are left
+/// out until they change; gets what is converted now.
+[[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
 
 /// Writes what has been meshed, filling in `outcome`.
 [[nodiscard]] Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
                                   Outcome& outcome);
 
-/// Meshes a scene smoothly and writes it, filling in `outcome`.
-[[nodiscard]] Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome);
+/// Meshes a scene smoothly and writes it, filling in `outcome`. With `options.animate` it is that of the animation.
+[[nodiscard]] Status convert_smoothly(const Scene& scene, const SceneAnimation& animation,
+                                      const ConvertOptions& options, Outcome& outcome);
 
 /// Reads a volume, meshes it and writes it.
 [[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);

@@ -22,6 +22,7 @@ struct Task {
   fs::path output;
   std::optional<Outcome> outcome;
   std::optional<Error> error;
+  std::optional<FileStamp> stamp;  ///< of the input, before it is read
 };
 
 Error error_of(const fs::path& path, const std::error_code& code) {
@@ -74,7 +75,7 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
   std::vector<Task> tasks;
   const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
     const fs::path folder = !many.folder ? beside : below == "." ? *many.folder : *many.folder / below;
-    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}});
+    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}, {}});
   };
   for (const fs::path& input : many.inputs) {
     std::error_code unknown;
@@ -138,6 +139,27 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
     task.error = make_error(ErrorCode::LimitExceeded, "out of memory", task.input.string());
   }
   if (task.error && task.error->path.empty()) task.error->path = task.input.string();
+}
+
+/// What would come of what has not changed is there already.
+void leave_out(const Converted& done, std::vector<Task>& tasks, WatchedWork& work) {
+  for (Task& task : tasks) {
+    work.written.push_back(task.output);
+    task.stamp = FileStamp::of(task.input);
+  }
+  std::erase_if(tasks, [&](const Task& task) {
+    const auto found = done.find(task.input);
+    return found != done.end() && found->second == task.stamp;
+  });
+}
+
+/// What failed is tried again only once it has changed, too.
+void note(const std::vector<Task>& tasks, Converted& done, WatchedWork& work) {
+  for (const Task& task : tasks) {
+    done[task.input] = task.stamp;
+    if (!task.outcome) continue;
+    work.written.insert(work.written.end(), task.outcome->files.begin(), task.outcome->files.end());
+  }
 }
 
 /// Several at once; where there are fewer files than threads, each has its share of these.
@@ -205,32 +227,37 @@ int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors,
 
 }  // namespace
 
-int run_many(const ConvertOptions& options, const ManyOptions& many) {
+WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done) {
+  WatchedWork work;
+  work.read = many.inputs;
+  const auto ended = [&](int status) {
+    work.status = status;
+    return work;
+  };
+  const auto misused = [&](const std::string& fault) {
+    print_error(fault);
+    return ended(kWrongUsage);
+  };
   const std::string extension = (many.to.starts_with('.') ? "" : ".") + many.to;
   const auto format = format_for_writing("file" + extension);
-  if (!format) {
-    print_error("--to: " + format.error().message + ", not \"" + many.to + "\"");
-    return kWrongUsage;
-  }
-  if (const std::string fault = fault_of_format(options, *format); !fault.empty()) {
-    print_error(fault);
-    return kWrongUsage;
-  }
+  if (!format) return misused("--to: " + format.error().message + ", not \"" + many.to + "\"");
+  if (const std::string fault = fault_of_format(options, *format); !fault.empty()) return misused(fault);
   catch_interrupts();
   Stopwatch watch;
   std::vector<Error> errors;
   std::vector<Task> tasks = plan(many, extension, errors);
-  if (const std::string fault = fault_of_plan(tasks); !fault.empty()) {
-    print_error(fault);
-    return kWrongUsage;
-  }
+  if (const std::string fault = fault_of_plan(tasks); !fault.empty()) return misused(fault);
   std::vector<fs::path> inputs;
   inputs.reserve(tasks.size());
   for (const Task& task : tasks) inputs.push_back(task.input);
   ConvertOptions wanted = options;
   wanted.inputs = FileSet(inputs);
+  leave_out(done, tasks, work);
+  const bool is_again = !done.empty();
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
+  note(tasks, done, work);
+  if (is_again && tasks.empty() && errors.empty()) return ended(kDone);
 
   Totals totals;
   for (const Task& task : tasks) {
@@ -242,7 +269,7 @@ int run_many(const ConvertOptions& options, const ManyOptions& many) {
   const bool is_whole = totals.converted == tasks.size() && errors.empty();
   const int printed =
       options.common.json ? print_json(json_of(tasks, errors, totals)) : print_text(tasks, errors, totals);
-  return printed == kDone && !is_whole ? kFailed : printed;
+  return ended(printed == kDone && !is_whole ? kFailed : printed);
 }
 
 }  // namespace quoin::tool

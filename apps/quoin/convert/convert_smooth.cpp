@@ -31,7 +31,7 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   wanted.mesh.occlusion = mesh_options(options).occlusion;
   if (options.smoothness) wanted.mesh.smoothness = static_cast<float>(*options.smoothness);
   if (options.colours == "blended") wanted.mesh.colours = SurfaceColours::Blended;
-  wanted.unite = !options.apart;
+  wanted.unite = !options.apart && !options.animate;
   wanted.simplify_error = simplify_error(options);
   wanted.instances = options.common.instances();
   return wanted;
@@ -60,8 +60,10 @@ void warn_of_looks(const Scene& scene, InstanceFilter filter, const std::filesys
 }
 
 Result<Volume> read_input(const ConvertOptions& options) {
-  if (options.raw) return read_raw_volume(options.common.input, *options.raw);
-  return read_volume(options.common.input);
+  ProgressBar bar(!options.is_one_of_many);
+  const Progress progress = bar.listener("reading");
+  if (options.raw) return read_raw_volume(options.common.input, *options.raw, {}, progress);
+  return read_volume(options.common.input, {}, progress);
 }
 
 /// Puts a volume into the file's unit: glTF's is the metre, the others have none.
@@ -75,13 +77,14 @@ void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& me
 
 }  // namespace
 
-Status convert_smoothly(const Scene& scene, const ConvertOptions& options, Outcome& outcome) {
+Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, const ConvertOptions& options,
+                        Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar(!options.is_one_of_many);
   const InstanceFilter filter = options.common.instances();
-  const auto meshes =
-      mesh_scene_smoothly(scene, scene_options(options), options.common.threads, bar.listener("meshing"));
+  auto meshes = mesh_scene_smoothly(scene, scene_options(options), options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
+  if (options.animate) animation.animate(*meshes, options.frames_per_second);
   outcome.mesher = "smooth";
   outcome.faces = count_faces(scene, filter, options.common.threads);
   outcome.seconds.mesh = watch.lap();

@@ -40,6 +40,17 @@ TEST(CameraControl, TakesOverEveryView) {
   }
 }
 
+TEST(CameraControl, OfARolledCameraTheWayItLooksStays) {
+  CameraControl control;
+  Camera camera = look_at({10, 20, 30}, {1, 2, 3}, 0.7).value();
+  const DVec3 right = camera.right;
+  camera.right = camera.up;
+  camera.up = -right;
+  control.set(camera, {{0, 0, 0}, {5, 5, 5}});
+  EXPECT_LT(glm::length(control.camera().forward - camera.forward), 1e-12);
+  EXPECT_LT(glm::length(control.camera().right - right), 1e-12) << "upright";
+}
+
 TEST(CameraControl, TheFrameRateMakesNoDifference) {
   const CameraPush push{0.3, -0.2, 1.0};
   CameraControl coarse = framed();

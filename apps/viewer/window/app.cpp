@@ -243,14 +243,16 @@ void App::take_picture() {
   if (!state_.open.backend) return;
   if (auto frame = state_.open.backend->take()) take_frame(std::move(*frame));
   take_fault();
-  const bool is_current = state_.stats.is_settled && state_.stats.width == state_.picture_place.w &&
-                          state_.stats.height == state_.picture_place.h;
-  if (!is_current) return;
-  if (is_screenshot_wanted_) save_screenshot();
-  if (!options_.screenshot.empty() && is_running_) {
+  save_wanted_pictures();
+  if (!options_.screenshot.empty() && is_settled() && is_running_) {
     is_running_ = false;
     write_screenshot(options_.screenshot);
   }
+}
+
+bool App::is_settled() const {
+  return state_.stats.is_settled && state_.stats.width == state_.picture_place.w &&
+         state_.stats.height == state_.picture_place.h;
 }
 
 void App::take_frame(ViewFrame frame) {
@@ -373,9 +375,12 @@ void App::run_command(Command command) {
 void App::show_from(View view) {
   if (!state_.open.backend || !state_.has_picture_place()) return;
   const double aspect = static_cast<double>(state_.picture_place.w) / state_.picture_place.h;
-  const InstanceFilter filter = options_.instances();
+  look_through(frame_scene(state_.scene(), view, aspect, options_.instances()));
+}
+
+void App::look_through(const Camera& camera) {
   if (state_.camera.mode == CameraMode::Walk) state_.set_camera_mode(CameraMode::Orbit);
-  state_.camera.set(frame_scene(state_.scene(), view, aspect, filter), state_.scene().bounds(filter));
+  state_.camera.set(camera, state_.scene().bounds(options_.instances()));
 }
 
 void App::pick_type() {

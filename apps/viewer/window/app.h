@@ -44,6 +44,8 @@ class App {
   void place_picture(float left_top, float right, float bottom);
   void ask_for_picture();
   void take_picture();
+  /// Whether what is shown is all that was asked for last.
+  [[nodiscard]] bool is_settled() const;
   void take_frame(ViewFrame frame);
   void take_fault();
   void stand_in(const Error& why);
@@ -69,6 +71,7 @@ class App {
   void show_detail(bool is_shown);
   void run_file_command(Command command);
   void show_from(View view);
+  void look_through(const Camera& camera);
   void pick_type();
 
   // Files.
@@ -80,13 +83,23 @@ class App {
   void save(const std::filesystem::path& path, bool accepts_losses = false);
   void take_saved();
   void ask_where_to_save();
-  void save_screenshot();
+  void want_picture();
+  void save_wanted_pictures();
+  void save_picture(const Result<Image>& picture);
   void write_screenshot(const std::filesystem::path& path);
 
   /// A save that was not done, since it would lose something: the user is asked.
   struct LossySave {
     std::filesystem::path path;
     std::vector<std::string> losses;
+  };
+
+  /// A picture to be saved: what was asked for when the user wanted it, once that has settled; and what was shown then,
+  /// in case something else is asked for before.
+  struct WantedPicture {
+    ViewRequest request;
+    ChangeCursor scene;
+    Result<Image> shown;
   };
 
   /// What a look at the levels of detail changed.
@@ -107,7 +120,7 @@ class App {
   std::optional<LossySave> lossy_save_;
   std::vector<std::unique_ptr<Loader>> abandoned_;  // their threads end by themselves
   bool is_running_ = true;
-  bool is_screenshot_wanted_ = false;
+  std::vector<WantedPicture> wanted_;
   std::optional<ViewRequest> asked_;
   std::string told_fault_;  // of the backend, as long as it lasts; empty: none
   std::optional<SDL_Event> postponed_;

@@ -22,6 +22,10 @@ std::filesystem::path free_name(const std::string& stem) {
   return stem + ".png";
 }
 
+Result<Image> image_of(const ViewFrame& frame) {
+  return frame.on_device ? frame.on_device->read() : Result<Image>(frame.colour);
+}
+
 }  // namespace
 
 void App::run_file_command(Command command) {
@@ -31,9 +35,7 @@ void App::run_file_command(Command command) {
     case Command::Quit:
       return leave({true, {}});
     case Command::Screenshot:
-      if (state_.open.backend) is_screenshot_wanted_ = true;
-      if (!state_.stats.is_settled) state_.tell("the picture is saved once it is done");
-      return;
+      return want_picture();
     case Command::Save:
       if (!state_.can_edit()) return;
       if (!state_.open.document->can_save_in_place()) return ask_where_to_save();
@@ -55,6 +57,8 @@ void App::leave(Leaving leaving) {
 void App::go_on_leaving() {
   const Leaving leaving = *std::exchange(leaving_, std::nullopt);
   if (leaving.is_quit) {
+    asked_.reset();
+    save_wanted_pictures();
     is_running_ = false;
   } else if (!leaving.open.empty()) {
     load(leaving.open);
@@ -97,6 +101,8 @@ void App::take_loaded() {
 }
 
 void App::adopt(OpenDocument opened) {
+  asked_.reset();
+  save_wanted_pictures();
   input_.editing = {};
   state_.hover.reset();
   state_.open.backend.reset();  // before the document that it reads
@@ -105,7 +111,6 @@ void App::adopt(OpenDocument opened) {
   state_.picture = {};
   state_.message.reset();
   told_fault_.clear();
-  asked_.reset();
   lossy_save_.reset();
   screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
@@ -115,9 +120,8 @@ void App::adopt(OpenDocument opened) {
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
-  if (state_.camera.mode == CameraMode::Walk) state_.set_camera_mode(CameraMode::Orbit);
   if (loaded.camera) {
-    state_.camera.set(*loaded.camera, loaded.scene.bounds(options_.instances()));
+    look_through(*loaded.camera);
   } else {
     show_from(View::Iso);
   }
@@ -160,23 +164,43 @@ void App::take_saved() {
   if (leaving_ && !state_.open.document->is_dirty()) go_on_leaving();
 }
 
-void App::save_screenshot() {
-  is_screenshot_wanted_ = false;
+// What is on the screen now, however soon the view moves on: finished if it is left that long, else as it is.
+void App::want_picture() {
+  if (!state_.open.backend || !asked_ || state_.stats.width == 0) return;
+  const Result<Image> shown = image_of(state_.picture);
+  if (is_settled()) return save_picture(shown);
+  wanted_.push_back({*asked_, state_.scene().cursor(), shown});
+  state_.tell("the picture is saved once it is done");
+}
+
+void App::save_wanted_pictures() {
+  if (wanted_.empty()) return;
+  std::erase_if(wanted_, [&](const WantedPicture& wanted) {
+    const bool is_same_scene = !state_.scene().has_changed_since(wanted.scene);
+    const bool is_wanted_still = state_.open.backend && asked_ && is_same(*asked_, wanted.request) && is_same_scene;
+    if (is_wanted_still && !is_settled()) return false;
+    save_picture(is_wanted_still ? image_of(state_.picture) : wanted.shown);
+    return true;
+  });
+}
+
+void App::save_picture(const Result<Image>& picture) {
   const std::filesystem::path name = state_.open.document->path().stem();
-  write_screenshot(free_name(name.empty() ? "quoin" : name.string()));
+  const std::filesystem::path path = free_name(name.empty() ? "quoin" : name.string());
+  const auto written = picture ? write_png(*picture, path) : picture.error();
+  if (!written) return state_.tell(written.error());
+  std::error_code ignored;
+  const bool is_whole = picture->width >= state_.picture_place.w;
+  state_.tell("saved " + std::filesystem::absolute(path, ignored).string() +
+              (is_whole ? ""
+                        : ", as it was shown: " + std::to_string(picture->width) + " x " +
+                              std::to_string(picture->height) + " pixels"));
 }
 
 void App::write_screenshot(const std::filesystem::path& path) {
-  const ViewFrame& shown = state_.picture;
-  const auto image = shown.on_device ? shown.on_device->read() : Result<Image>(shown.colour);
+  const Result<Image> image = image_of(state_.picture);
   const auto written = image ? write_png(*image, path) : image.error();
-  if (!written) {
-    state_.tell(written.error());
-    if (!options_.screenshot.empty()) end_with(written.error());
-    return;
-  }
-  std::error_code ignored;
-  state_.tell("saved " + std::filesystem::absolute(path, ignored).string());
+  if (!written) end_with(written.error());
 }
 
 }  // namespace quoin::viewer

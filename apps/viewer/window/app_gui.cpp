@@ -90,6 +90,7 @@ void App::draw_bars() {
   if (state_.message) draw_message(state_, bottom);
   for (const Command command : choice.commands) run_command(command);
   if (choice.recent) leave({false, *choice.recent});
+  if (choice.camera) look_through(*choice.camera);
 }
 
 void App::draw_loading() {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -66,6 +68,15 @@ class FileBackup {
   FileBackup() = default;
   std::filesystem::path second_name_;  // empty: there is nothing to keep
   std::filesystem::path backup_;
+};
+
+/// What tells a file from a later one of the same name: nothing where there is none.
+struct FileStamp {
+  std::filesystem::file_time_type time{};
+  std::uintmax_t bytes = 0;
+  bool operator==(const FileStamp&) const = default;
+
+  [[nodiscard]] static std::optional<FileStamp> of(const std::filesystem::path& path);
 };
 
 /// Writes all of `bytes` to `path` by way of an AtomicFile.

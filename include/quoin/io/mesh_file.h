@@ -56,6 +56,11 @@ struct MeshFileOptions {
 ///            and one rough, opaque material.
 ///            OcclusionIn::Attribute: a scalar _AO (blocks have 1 - occlusion / 4: 1, 0.75, 0.5 or 0.25) of every
 ///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
+///            Of meshes with an atlas, opaque blocks that emit nothing have that as their colours, with a linear filter
+///            and without mipmaps, in TEXCOORD_0, no COLOR_0 and no occlusion of their own, and the palette's roughness
+///            in TEXCOORD_1.
+///            Keys of placements are one animation, "frames", of translations, rotations and scales, each value from
+///            its time on; what is hidden has a scale of 0. Other formats have the placements as they stand.
 ///            `quantize` needs clients that know KHR_mesh_quantization. Blocks lose nothing by it: positions are
 ///            whole voxels in 8 or 16 bits (floats where a shear or more than 65,535 voxels do not allow that), and a
 ///            node stands up to a voxel from its part's pivot where that lies between voxels, or near the middle of a
@@ -65,7 +70,8 @@ struct MeshFileOptions {
 ///            `compress` needs clients that know EXT_meshopt_compression, and loses nothing but the order of vertices
 ///            and which corner of a triangle is its first.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
-///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png; occlusion is grey after
+///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png, and of meshes with an
+///            atlas NAME_atlas.png; other occlusion is grey after
 ///            the coordinates of a vertex ("v x y z r g b"), an extension that many programs read. Transparent
 ///            types have a material each, with d, Tf and Ni. Smooth meshes: nine
 ///            digits, sRGB colours after the coordinates, no materials. Has no place for OcclusionIn::Attribute.
@@ -77,14 +83,13 @@ struct MeshFileOptions {
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
 ///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
 ///            the largest array as it is stored.
-/// Errors:    Unsupported for a format that is none of meshes, for OcclusionIn::Attribute in OBJ, for `quantize` and
-///            `compress` in others than glTF, and for `compress` where the build has no meshoptimizer; CannotWrite;
-///            Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or triangles of PLY; InvalidArgument
-///            when a transform is not finite, not affine or singular, the scale is not positive, a vertex comes to lie
-///            beyond the range of floats, or when a mesh contradicts itself (arrays of different lengths, indices of no
-///            vertex, types that are not registered, numbers that are not finite). Each file appears whole or not at
-///            all; of several,
-///            those before one that fails stay.
+/// Errors:    Unsupported for a format that is none of meshes, for an atlas in PLY, for OcclusionIn::Attribute in OBJ,
+///            for `quantize` and `compress` in others than glTF, and for `compress` where the build has no
+///            meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or
+///            triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular, the scale is
+///            not positive, a vertex comes to lie beyond the range of floats, or when a mesh contradicts itself (arrays
+///            of different lengths, indices of no vertex, types that are not registered, numbers that are not finite).
+///            Each file appears whole or not at all; of several, those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume and _ior; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/volume.h>
@@ -36,14 +37,16 @@ struct VolumeOptions {
 ///          a warning.
 /// Errors:  BadFormat with the byte offset, which counts decompressed bytes where the message says so; Unsupported for
 ///          colours, complex and 128-bit numbers, other NRRD encodings, detached NRRD headers, NIfTI pairs (only
-///          `read_volume` knows where their other half lies); LimitExceeded beyond `max_values`.
+///          `read_volume` knows where their other half lies); LimitExceeded beyond `max_values`; Cancelled.
 /// Memory:  4 bytes a value, and a value must be there before it is paid for: without compression that is at most four
 ///          times the file's size, with it what 1 byte of gzip can hold, 1,032 values, within `max_values`.
-[[nodiscard]] Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options = {});
+[[nodiscard]] Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options = {},
+                                         const Progress& progress = {});
 
 /// The same of a file, also of a NIfTI pair by its .hdr, with the .img or .img.gz beside it. A volume that has no name
 /// gets that of the file. Errors: also CannotRead; they name the file.
-[[nodiscard]] Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options = {});
+[[nodiscard]] Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options = {},
+                                         const Progress& progress = {});
 
 /// What a file of values alone holds.
 struct RawVolume {
@@ -57,9 +60,9 @@ struct RawVolume {
 /// Errors: InvalidArgument when a size is not positive; BadFormat when there are not exactly as many bytes as that
 ///         takes; LimitExceeded.
 [[nodiscard]] Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw,
-                                             const VolumeOptions& options = {});
+                                             const VolumeOptions& options = {}, const Progress& progress = {});
 /// The same of a file, whose name the volume gets. Errors: also CannotRead; they name the file.
 [[nodiscard]] Result<Volume> read_raw_volume(const std::filesystem::path& path, const RawVolume& raw,
-                                             const VolumeOptions& options = {});
+                                             const VolumeOptions& options = {}, const Progress& progress = {});
 
 }  // namespace quoin

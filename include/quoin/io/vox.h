@@ -20,14 +20,22 @@ namespace quoin {
 /// A .vox file as it was read, with all that a scene has no place for: see write_vox.
 struct VoxSource;
 
+/// A camera that a file has beside others, under a number.
+struct FileCamera {
+  std::int32_t number = 0;
+  Camera camera;
+};
+
 /// What reading a file gave.
 struct LoadedScene {
   Scene scene;
-  std::string format;                 ///< "vox", ...
-  std::vector<std::string> warnings;  ///< one line each: what was skipped, and why
-  std::optional<DVec3> sun;           ///< from the surface towards the sun, where the file says it
-  std::optional<Camera> camera;       ///< where the file has one
-  bool names_files = false;           ///< models came from other files, which saving would put into this one
+  std::string format;                                 ///< "vox", ...
+  std::vector<std::string> warnings;                  ///< one line each: what was skipped, and why
+  std::optional<DVec3> sun;                           ///< from the surface towards the sun, where the file says it
+  std::optional<Camera> camera;                       ///< to look through at first, where the file has such a one
+  std::vector<FileCamera> cameras;                    ///< all of the file, in its order
+  std::int64_t last_frame = 0;                        ///< of its animation; LoadOptions::frame says which one this is
+  std::vector<std::filesystem::path> named_files;     ///< whose models are in it, which saving would put into this one
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
 };
 
@@ -59,8 +67,9 @@ struct LoadOptions {
 /// Hidden:  nodes and layers that are hidden are kept; `is_shown` says what is to be drawn.
 /// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
 ///          sound.
-/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, cameras, render settings,
-///          notes and chunks that are not known are in LoadedScene::source alone: `only_in_source` names them.
+/// Cameras: those that were set, by the file's numbers; panoramas are skipped with a warning.
+/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, render settings, notes and
+///          chunks that are not known are in LoadedScene::source alone: `only_in_source` names them.
 /// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -11,7 +12,7 @@ namespace quoin {
 /// Triangles of one surface of any mesh, whichever mesher made them. Arrays of vertices have
 /// one entry a vertex. A view is one of two kinds:
 ///
-/// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or none.
+/// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or `atlas`, or none.
 /// Smooth: `normals` and `albedo`; `occlusion`, or none.
 ///
 /// Lifetime: owns nothing; the arrays must outlive it, unchanged.
@@ -23,6 +24,9 @@ struct MeshView {
   std::span<const Direction> directions;          ///< of the face
   std::span<const VoxelType> types;               ///< of blocks
   std::span<const std::uint8_t> block_occlusion;  ///< 0 (open) to 3 (dark)
+  /// Of opaque blocks whose colours and occlusion are in a texture (SceneMeshes::atlas): texture coordinates from its
+  /// upper left corner.
+  std::span<const std::array<float, 2>> atlas;
 
   std::span<const Vec3> normals;         ///< unit
   std::span<const LinearRgba16> albedo;  ///< without occlusion

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include <quoin/core/image.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -25,6 +26,14 @@ struct Similarity {
   DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length but 0
   double scale = 1.0;                  ///< positive
   bool mirrored = false;               ///< x is negated before the rotation
+  bool operator==(const Similarity&) const = default;
+};
+
+/// From a time on, whether a placement is shown, and where.
+struct MeshKey {
+  double seconds = 0.0;
+  bool visible = true;
+  Similarity world_from_part{};
 };
 
 /// A group of placements and other groups: SceneGroup, as files of meshes have it.
@@ -42,8 +51,12 @@ struct MeshPlacement {
   /// Takes points of the part, relative to its pivot, to the world. A matrix must be affine; a negative determinant
   /// mirrors.
   std::variant<Similarity, glm::dmat4> world_from_part{Similarity{}};
-  std::optional<std::size_t> group{};  ///< index into SceneMeshes::groups; nothing at the top
-  std::string layer{};                 ///< the name of its layer
+  std::optional<std::size_t> group{};        ///< index into SceneMeshes::groups; nothing at the top
+  std::string layer{};                       ///< the name of its layer
+  std::optional<InstanceHandle> instance{};  ///< of the scene that was meshed
+  /// What it does while time goes by (SceneAnimation), by ascending seconds from 0; none: it stands. Each mirrors as
+  /// `world_from_part` does.
+  std::vector<MeshKey> keys{};
 
   [[nodiscard]] glm::dmat4 matrix() const;
 };
@@ -86,12 +99,18 @@ struct SceneMeshes {
   std::vector<MeshPlacement> placements;
   std::vector<MeshGroup> groups{};  ///< parents first; of scenes those with a placement below
   VoxelRegistry types;              ///< the materials of blocks
+  double seconds = 0.0;             ///< how long its placements' keys take; 0 without any
+  Image atlas{};                    ///< what MeshView::atlas points into, colours times occlusion; perhaps empty
   MeshStats stats;
 };
 
 struct BlockySceneOptions {
   BlockyMeshOptions mesh{};
   InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
+  /// Whether the colours and occlusion of opaque blocks that emit nothing go into a texture, SceneMeshes::atlas. Faces
+  /// then merge across their occlusion, which leaves about a third fewer triangles. A linear filter shades each voxel's
+  /// face between its four corners as a saddle, where two triangles have an edge.
+  bool atlas = false;
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
@@ -100,7 +119,8 @@ struct BlockySceneOptions {
 ///
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
-///         size not positive; Cancelled when `progress` says so.
+///         size not positive, and for an atlas of faces that are not merged, are watertight or have no occlusion;
+///         LimitExceeded when an atlas of 16,384 texels a side does not hold them; Cancelled when `progress` says so.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 

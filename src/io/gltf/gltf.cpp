@@ -39,6 +39,10 @@ void write_buffer(const GltfLayout& layout, BlockWriter& out) {
     out.put(std::span<const std::byte>(image.png));
     out.align('\0');
   }
+  for (const GltfChannel& channel : layout.channels) {
+    out.put(std::as_bytes(std::span(channel.seconds)));
+    out.put(std::as_bytes(std::span(channel.values)));
+  }
 }
 
 void write_chunk_header(std::uint64_t bytes, std::uint32_t kind, BlockWriter& out) {

@@ -188,7 +188,10 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
       return write_positions(mesh.transform, view, array.component, out);
     case GltfArrayKind::Normal:
       return write_normals(mesh.transform, view, array.component, out);
-    case GltfArrayKind::TextureCoordinate:
+    case GltfArrayKind::AtlasCoordinate:
+      for (const std::array<float, 2>& uv : view.atlas) out.put(uv);
+      return;
+    case GltfArrayKind::PaletteCoordinate:
       return write_texture_coordinates(palette, view, array.component, out);
     case GltfArrayKind::Colour:
       return write_colours(palette, has_array(primitive, GltfArrayKind::Occlusion) ? without_occlusion(view) : view,

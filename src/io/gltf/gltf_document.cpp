@@ -15,6 +15,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 constexpr int kNearest = 9728;
+constexpr int kLinear = 9729;
 constexpr int kClampToEdge = 33071;
 
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
@@ -58,6 +59,15 @@ struct Arrays {
     return views.size() - 1;
   }
 
+  /// The accessor of floats, in a view of their own; returns its number.
+  std::size_t add_floats(const GltfView& view, std::uint64_t count, int components) {
+    accessors.push_back({{"bufferView", add_view(view)},
+                         {"componentType", static_cast<int>(GltfComponent::Float)},
+                         {"count", count},
+                         {"type", type_name(components)}});
+    return accessors.size() - 1;
+  }
+
   /// A view and the accessor of all of it; returns the accessor's number.
   std::size_t add(const GltfArray& array) {
     const bool is_index = array.kind == GltfArrayKind::Index;
@@ -83,14 +93,16 @@ struct Arrays {
 };
 
 /// Empty of indices.
-const char* attribute_name(GltfArrayKind kind) {
+const char* attribute_name(const GltfPrimitive& primitive, GltfArrayKind kind) {
   switch (kind) {
     case GltfArrayKind::Position:
       return "POSITION";
     case GltfArrayKind::Normal:
       return "NORMAL";
-    case GltfArrayKind::TextureCoordinate:
+    case GltfArrayKind::AtlasCoordinate:
       return "TEXCOORD_0";
+    case GltfArrayKind::PaletteCoordinate:
+      return primitive.view.atlas.empty() ? "TEXCOORD_0" : "TEXCOORD_1";
     case GltfArrayKind::Colour:
       return "COLOR_0";
     case GltfArrayKind::Occlusion:
@@ -116,7 +128,7 @@ Json primitive_json(const GltfPrimitive& primitive, Arrays& arrays) {
       accessor["min"] = json_from(primitive.min);
       accessor["max"] = json_from(primitive.max);
     }
-    attributes[attribute_name(array.kind)] = number;
+    attributes[attribute_name(primitive, array.kind)] = number;
   }
   return {{"attributes", std::move(attributes)}, {"indices", indices}, {"material", primitive.material}};
 }
@@ -135,9 +147,9 @@ Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
 }
 
 /// The factor goes up to 1, the extension beyond it, so that clients without the extension get weak lights right.
-void add_emission(const SurfaceMaterial& material, Json& entry) {
+void add_emission(const GltfLayout& layout, const SurfaceMaterial& material, Json& entry) {
   const float factor = std::min(material.emission, 1.0F);
-  entry["emissiveTexture"] = {{"index", 2}};
+  entry["emissiveTexture"] = {{"index", *layout.texture(GltfImageKind::Emissive)}};
   entry["emissiveFactor"] = {factor, factor, factor};
   entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
 }
@@ -159,11 +171,15 @@ Json materials_json(const GltfLayout& layout) {
   Json materials = Json::array();
   for (const SurfaceMaterial& material : layout.palette.materials()) {
     Json entry = {{"name", material.name}};
-    entry["pbrMetallicRoughness"] = {{"baseColorTexture", {{"index", 0}}},
-                                     {"metallicFactor", 1.0},
-                                     {"roughnessFactor", 1.0},
-                                     {"metallicRoughnessTexture", {{"index", 1}}}};
-    if (material.is_emissive()) add_emission(material, entry);
+    const auto atlas = material.surface == SurfaceClass::Opaque ? layout.texture(GltfImageKind::Atlas) : std::nullopt;
+    Json roughness = {{"index", *layout.texture(GltfImageKind::MetallicRoughness)}};
+    if (atlas) roughness["texCoord"] = 1;
+    entry["pbrMetallicRoughness"] = {
+        {"baseColorTexture", {{"index", atlas ? *atlas : *layout.texture(GltfImageKind::Palette)}}},
+        {"metallicFactor", 1.0},
+        {"roughnessFactor", 1.0},
+        {"metallicRoughnessTexture", std::move(roughness)}};
+    if (material.is_emissive()) add_emission(layout, material, entry);
     if (material.is_transparent()) add_glass(material, layout.palette.types()[material.type], entry);
     materials.push_back(std::move(entry));
   }
@@ -178,12 +194,16 @@ Json materials_json(const GltfLayout& layout) {
 }
 
 void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
-  document["samplers"] = Json::array(
-      {{{"magFilter", kNearest}, {"minFilter", kNearest}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}});
+  const auto sampler = [](int filter) {
+    return Json{{"magFilter", filter}, {"minFilter", filter}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}};
+  };
+  document["samplers"] = Json::array({sampler(kNearest)});
+  // Between the corners of voxels, and never between patches.
+  if (layout.texture(GltfImageKind::Atlas)) document["samplers"].push_back(sampler(kLinear));
   Json images = Json::array();
   Json textures = Json::array();
   for (const GltfImage& image : layout.images) {
-    textures.push_back({{"sampler", 0}, {"source", images.size()}});
+    textures.push_back({{"sampler", image.kind == GltfImageKind::Atlas ? 1 : 0}, {"source", images.size()}});
     images.push_back({{"name", image.name}, {"mimeType", "image/png"}, {"bufferView", arrays.add_view(image.view)}});
   }
   document["textures"] = std::move(textures);
@@ -218,12 +238,38 @@ void add_nodes(const GltfLayout& layout, Json& document) {
   if (!nodes.empty()) document["nodes"] = std::move(nodes);
 }
 
+const char* name_of(GltfChannel::Path path) {
+  constexpr std::array<const char*, 3> names = {"translation", "rotation", "scale"};
+  return names[static_cast<std::size_t>(path)];
+}
+
+/// One animation, in which nothing is interpolated.
+void add_animation(const GltfLayout& layout, Arrays& arrays, Json& document) {
+  if (layout.channels.empty()) return;
+  Json channels = Json::array();
+  Json samplers = Json::array();
+  for (const GltfChannel& channel : layout.channels) {
+    const auto count = static_cast<std::uint64_t>(channel.seconds.size());
+    const std::size_t times = arrays.add_floats(channel.seconds_view, count, 1);
+    arrays.accessors.back()["min"] = Json::array({channel.seconds.front()});
+    arrays.accessors.back()["max"] = Json::array({channel.seconds.back()});
+    const int components = channel.path == GltfChannel::Path::Rotation ? 4 : 3;
+    const std::size_t values = arrays.add_floats(channel.values_view, count, components);
+    channels.push_back(
+        {{"sampler", samplers.size()}, {"target", {{"node", channel.node}, {"path", name_of(channel.path)}}}});
+    samplers.push_back({{"input", times}, {"interpolation", "STEP"}, {"output", values}});
+  }
+  document["animations"] =
+      Json::array({{{"name", "frames"}, {"channels", std::move(channels)}, {"samplers", std::move(samplers)}}});
+}
+
 void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& document) {
   Arrays arrays;
   arrays.is_compressed = layout.is_compressed();
   document["meshes"] = meshes_json(layout, arrays);
   document["materials"] = materials_json(layout);
   if (!layout.images.empty()) add_textures(layout, arrays, document);
+  add_animation(layout, arrays, document);
   document["accessors"] = std::move(arrays.accessors);
   document["bufferViews"] = std::move(arrays.views);
   Json buffer = Json::object();

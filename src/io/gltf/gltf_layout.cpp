@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <tuple>
 #include <utility>
 
 namespace quoin {
@@ -117,8 +118,10 @@ class ArrayPlan {
     add(GltfArrayKind::Position, mesh_.stored.component, 3, vertices);
     add(GltfArrayKind::Normal, normal_component(), 3, vertices);
     const bool is_short = options_.quantize;
+    // Of an atlas a 65,535th may be a noticeable part of a texel.
+    if (!view_.atlas.empty()) add(GltfArrayKind::AtlasCoordinate, GltfComponent::Float, 2, vertices);
     if (!is_smooth)
-      add(GltfArrayKind::TextureCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
+      add(GltfArrayKind::PaletteCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
           vertices);
     if (is_smooth || (!is_apart && !view_.block_occlusion.empty()))
       add(GltfArrayKind::Colour, is_smooth ? GltfComponent::UnsignedShort : GltfComponent::UnsignedByte, 4, vertices);
@@ -215,18 +218,34 @@ std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMe
   return compress_gltf_array(array, bytes);
 }
 
-Status add_images(GltfLayout& layout) {
-  std::vector<std::pair<const char*, PngImage>> images;
-  images.emplace_back("palette", layout.palette.base_colour());
-  images.emplace_back("palette metallic-roughness", layout.palette.metallic_roughness());
-  if (layout.palette.has_emission()) images.emplace_back("palette emissive", layout.palette.emissive());
-  for (auto& [name, image] : images) {
+/// No image that no material uses.
+Status add_images(const Image& atlas, GltfLayout& layout) {
+  const MaterialPalette& palette = layout.palette;
+  const auto& materials = palette.materials();
+  const auto is_opaque = [](const SurfaceMaterial& material) { return material.surface == SurfaceClass::Opaque; };
+  const bool has_atlas = !atlas.rgb.empty() && std::ranges::any_of(materials, is_opaque);
+  std::vector<std::tuple<GltfImageKind, const char*, PngImage>> images;
+  if (!has_atlas || !std::ranges::all_of(materials, is_opaque)) {
+    images.emplace_back(GltfImageKind::Palette, "palette", palette.base_colour());
+  }
+  images.emplace_back(GltfImageKind::MetallicRoughness, "palette metallic-roughness", palette.metallic_roughness());
+  if (palette.has_emission()) images.emplace_back(GltfImageKind::Emissive, "palette emissive", palette.emissive());
+  if (has_atlas) images.emplace_back(GltfImageKind::Atlas, "atlas", png_of(atlas));
+  for (auto& [kind, name, image] : images) {
     auto png = encode_png(image);
     if (!png) return png.error();
     const GltfView view = reserve_view(png->size(), layout.buffer_bytes);
-    layout.images.push_back({name, std::move(*png), view});
+    layout.images.push_back({kind, name, std::move(*png), view});
   }
   return {};
+}
+
+/// Of a mesh whose positions are stored so, what a node of `transform` has.
+GltfTransform from_stored(const GltfQuantization& stored, GltfTransform transform) {
+  if (stored.component == GltfComponent::Float) return transform;
+  transform.translation += transform.rotation * (transform.scale * stored.origin);
+  transform.scale *= stored.step;
+  return transform;
 }
 
 /// Lays out the meshes that nodes ask for: a part's one after the other, those of blocks as they are before reflected.
@@ -247,10 +266,7 @@ class MeshLayout {
       if (layout_.surfaces[part].surfaces().empty()) continue;
       GltfNode& node = layout_.nodes[i];
       node.mesh = mesh_of(part, node.transform.baked);
-      const GltfQuantization& stored = layout_.meshes[*node.mesh].stored;
-      if (stored.component == GltfComponent::Float) continue;
-      node.transform.translation += node.transform.rotation * (node.transform.scale * stored.origin);
-      node.transform.scale *= stored.step;
+      node.transform = from_stored(layout_.meshes[*node.mesh].stored, node.transform);
     }
   }
 
@@ -350,7 +366,81 @@ void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) 
   }
 }
 
+/// A scale of 0 is how glTF hides a node.
+void hide_at_first(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) {
+  for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
+    const auto& keys = meshes.placements[i].keys;
+    if (!keys.empty() && !keys.front().visible) nodes[i].transform.scale = DVec3(0.0);
+  }
+}
+
+/// Collects the values of one property; those that follow an equal one are left out but for the last.
+class ChannelBuilder {
+ public:
+  ChannelBuilder(std::size_t node, GltfChannel::Path path) : channel_{.node = node, .path = path} {}
+
+  void add(double seconds, std::span<const float> value, bool is_last) {
+    const std::span<const float> all(channel_.values);
+    const bool is_same = !all.empty() && std::ranges::equal(all.last(value.size()), value);
+    has_changes_ |= !all.empty() && !is_same;
+    if (is_same && !is_last) return;
+    channel_.seconds.push_back(static_cast<float>(seconds));
+    channel_.values.insert(channel_.values.end(), value.begin(), value.end());
+  }
+  /// Nothing when the property never changes.
+  [[nodiscard]] std::optional<GltfChannel> channel() const {
+    return has_changes_ ? std::optional(channel_) : std::nullopt;
+  }
+
+ private:
+  GltfChannel channel_;
+  bool has_changes_ = false;
+};
+
+std::array<float, 3> floats_of(const DVec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
+std::array<float, 4> floats_of(const DQuat& q) {
+  return {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z), static_cast<float>(q.w)};
+}
+
+/// What the nodes of placements do, up to the end of the last frame, so that a loop shows it as long as the others.
+void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
+  for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
+    const MeshPlacement& placement = meshes.placements[i];
+    const GltfNode& node = layout.nodes[i];
+    if (placement.keys.empty() || !node.mesh) continue;
+    ChannelBuilder translation(i, GltfChannel::Path::Translation);
+    ChannelBuilder rotation(i, GltfChannel::Path::Rotation);
+    ChannelBuilder scale(i, GltfChannel::Path::Scale);
+    const auto add = [&](const MeshKey& key, double seconds, bool is_last) {
+      GltfTransform transform = transform_of(key.world_from_part);
+      if (placement.group) transform = below(meshes.groups[*placement.group].world_from_group, transform);
+      transform = from_stored(layout.meshes[*node.mesh].stored, transform);
+      translation.add(seconds, floats_of(transform.translation), is_last);
+      rotation.add(seconds, floats_of(transform.rotation), is_last);
+      scale.add(seconds, floats_of(key.visible ? transform.scale : DVec3(0.0)), is_last);
+    };
+    for (const MeshKey& key : placement.keys) add(key, key.seconds, false);
+    if (meshes.seconds > placement.keys.back().seconds) add(placement.keys.back(), meshes.seconds, true);
+    for (const ChannelBuilder* const each : {&translation, &rotation, &scale}) {
+      auto channel = each->channel();
+      if (!channel) continue;
+      channel->seconds_view = reserve_view(channel->seconds.size() * sizeof(float), layout.buffer_bytes);
+      channel->values_view = reserve_view(channel->values.size() * sizeof(float), layout.buffer_bytes);
+      layout.channels.push_back(std::move(*channel));
+    }
+  }
+}
+
 }  // namespace
+
+std::optional<std::size_t> GltfLayout::texture(GltfImageKind kind) const {
+  const auto found = std::ranges::find(images, kind, &GltfImage::kind);
+  if (found == images.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - images.begin());
+}
 
 Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options) {
   if (options.compress && !can_compress_gltf()) {
@@ -368,9 +458,11 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
   }
   hang_below_groups(meshes, layout.nodes);
   MeshLayout(meshes, options, layout).lay_out();
+  hide_at_first(meshes, layout.nodes);
   if (!layout.palette.materials().empty() && !layout.meshes.empty()) {
-    if (auto added = add_images(layout); !added) return added.error();
+    if (auto added = add_images(meshes.atlas, layout); !added) return added.error();
   }
+  add_channels(meshes, layout);
   return layout;
 }
 

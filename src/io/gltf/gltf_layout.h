@@ -24,7 +24,15 @@ struct GltfView {
 };
 
 /// What an array of a primitive holds.
-enum class GltfArrayKind : std::uint8_t { Position, Normal, TextureCoordinate, Colour, Occlusion, Index };
+enum class GltfArrayKind : std::uint8_t {
+  Position,
+  Normal,
+  AtlasCoordinate,
+  PaletteCoordinate,  ///< the first of all coordinates, but for those of an atlas
+  Colour,
+  Occlusion,
+  Index,
+};
 
 /// glTF 2.0's numbers for the types of components, which are OpenGL's.
 enum class GltfComponent : std::uint16_t {
@@ -92,7 +100,23 @@ struct GltfNode {
   bool is_at_top = true;
 };
 
+/// What a node does while time goes by: one of its three properties, each value from its time on.
+struct GltfChannel {
+  enum class Path : std::uint8_t { Translation, Rotation, Scale };
+
+  std::size_t node = 0;
+  Path path{};
+  std::vector<float> seconds{};
+  std::vector<float> values{};  ///< three or, of rotations, four a time
+  GltfView seconds_view{};
+  GltfView values_view{};
+};
+
+/// Which of a file's images is which.
+enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas };
+
 struct GltfImage {
+  GltfImageKind kind{};
   std::string name;
   std::vector<std::byte> png;
   GltfView view;
@@ -103,12 +127,15 @@ struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
-  std::vector<GltfImage> images;           ///< of blocks: base colour, metallic-roughness, perhaps emissive
+  std::vector<GltfImage> images;           ///< of blocks; the first is the first texture
   std::vector<MaterialSurfaces> surfaces;  ///< of every part
+  std::vector<GltfChannel> channels{};     ///< of its animation; lies after the images
   std::uint64_t buffer_bytes = 0;
   std::uint64_t decoded_bytes = 0;  ///< of a compressed file, of the buffer that its arrays are decoded into; else 0
 
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
+  /// The number of the texture; nothing when the file has none of that kind.
+  [[nodiscard]] std::optional<std::size_t> texture(GltfImageKind kind) const;
 };
 
 /// Requires: sound meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder; Unsupported for

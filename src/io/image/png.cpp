@@ -105,7 +105,7 @@ Result<std::vector<std::byte>> write_png(const Image& picture) {
   if (picture.width <= 0 || picture.height <= 0 || picture.rgb.size() != std::size_t{3} * width * height) {
     return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
   }
-  return encode_png({width, height, 3, picture.rgb}, PngEffort::Quick);
+  return encode_png(png_of(picture), PngEffort::Quick);
 }
 
 Result<std::uint64_t> write_png(const Image& picture, const std::filesystem::path& path) {

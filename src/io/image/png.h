@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/image.h>
 #include <quoin/core/result.h>
 
 namespace quoin {
@@ -16,6 +17,10 @@ struct PngImage {
   std::uint32_t channels = 3;  ///< 3 RGB, 4 RGBA
   std::vector<std::uint8_t> pixels;
 };
+
+[[nodiscard]] inline PngImage png_of(const Image& picture) {
+  return {static_cast<std::uint32_t>(picture.width), static_cast<std::uint32_t>(picture.height), 3, picture.rgb};
+}
 
 /// What to spend on a small file.
 enum class PngEffort : std::uint8_t {

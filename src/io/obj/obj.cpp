@@ -122,33 +122,34 @@ std::string mtl_glass(const SurfaceMaterial& material, const VoxelProperties& pr
   return text;
 }
 
-/// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
-std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const std::string& texture,
-                     const std::string& emissive_texture) {
-  std::string text = "# Quoin " QUOIN_VERSION "\n";
-  for (const SurfaceMaterial& material : palette.materials()) {
-    text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
-    text.append("map_Kd ").append(texture).append("\n");
-    if (material.is_transparent()) text.append(mtl_glass(material, meshes.types[material.type]));
-    if (material.is_emissive()) {
-      const std::string strength = shortest(material.emission);
-      text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
-      text.append("\nmap_Ke ").append(emissive_texture).append("\n");
-    }
-  }
-  return text;
-}
-
 /// The names of the files that belong to one OBJ.
 struct ObjNames {
   std::filesystem::path library;
   std::filesystem::path palette;
   std::filesystem::path emissive;
+  std::filesystem::path atlas;
 };
 
 ObjNames names_beside(const std::filesystem::path& path) {
   const std::string stem = (path.parent_path() / path.stem()).string();
-  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png"};
+  return {stem + ".mtl", stem + "_palette.png", stem + "_emissive.png", stem + "_atlas.png"};
+}
+
+/// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
+std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names) {
+  std::string text = "# Quoin " QUOIN_VERSION "\n";
+  for (const SurfaceMaterial& material : palette.materials()) {
+    text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+    const bool is_in_atlas = material.surface == SurfaceClass::Opaque && !meshes.atlas.rgb.empty();
+    text.append("map_Kd ").append((is_in_atlas ? names.atlas : names.palette).filename().string()).append("\n");
+    if (material.is_transparent()) text.append(mtl_glass(material, meshes.types[material.type]));
+    if (material.is_emissive()) {
+      const std::string strength = shortest(material.emission);
+      text.append("Ke ").append(strength).append(" ").append(strength).append(" ").append(strength);
+      text.append("\nmap_Ke ").append(names.emissive.filename().string()).append("\n");
+    }
+  }
+  return text;
 }
 
 /// Smooth meshes need no materials.
@@ -181,9 +182,15 @@ class ObjText {
   void write_texture_coordinates() {
     for (std::size_t type = 1; type < meshes_.types.size(); ++type) {
       const auto centre = palette_.texel_centre(static_cast<VoxelType>(type));
-      // OBJ counts v from the bottom; the centres have few binary digits, so both forms are exact.
-      out_.put_text("vt " + shortest(centre[0]) + " " + shortest(1.0F - centre[1]) + "\n");
+      write_texture_coordinate(centre);
     }
+    textures_ = meshes_.types.size() - 1;
+  }
+
+  /// OBJ counts v from the bottom; those of textures whose sides are powers of two have few binary digits, so that both
+  /// forms are exact.
+  void write_texture_coordinate(const std::array<float, 2>& uv) {
+    out_.put_text("vt " + shortest(uv[0]) + " " + shortest(1.0F - uv[1]) + "\n");
   }
 
   void write_object(const MeshPlacement& placement) {
@@ -201,10 +208,13 @@ class ObjText {
       }
       write_vertices(view, transform);
       out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
-      write_faces(view, transform.mirrors(), [&view = view](std::uint32_t corner) {
-        return std::pair(static_cast<std::uint64_t>(view.directions[corner]), view.types[corner]);
+      for (const std::array<float, 2>& uv : view.atlas) write_texture_coordinate(uv);
+      write_faces(view, transform.mirrors(), [&view = view, this](std::uint32_t corner) {
+        const std::uint64_t texture = view.atlas.empty() ? view.types[corner] : textures_ + corner + 1;
+        return std::pair(static_cast<std::uint64_t>(view.directions[corner]), texture);
       });
       vertices_ += view.positions.size();
+      textures_ += view.atlas.size();
     }
     if (!is_smooth) normals_ += kDirections.size();
   }
@@ -261,7 +271,7 @@ class ObjText {
       out_.put('\n');
     }
     write_faces(view, transform.mirrors(),
-                [](std::uint32_t corner) { return std::pair(std::uint64_t{corner}, VoxelType{0}); });
+                [](std::uint32_t corner) { return std::pair(std::uint64_t{corner}, std::uint64_t{0}); });
     vertices_ += view.positions.size();
     normals_ += view.positions.size();
   }
@@ -273,6 +283,7 @@ class ObjText {
   std::array<std::string, 4> greys_;  ///< " r g b" by occlusion
   std::uint64_t vertices_ = 0;
   std::uint64_t normals_ = 0;
+  std::uint64_t textures_ = 0;
 };
 
 /// A guess, for progress only.
@@ -313,8 +324,10 @@ Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::fil
         return added.error();
       }
     }
-    std::string text =
-        mtl_text(meshes, *palette, names.palette.filename().string(), names.emissive.filename().string());
+    if (!meshes.atlas.rgb.empty()) {
+      if (auto added = add_image(names.atlas, png_of(meshes.atlas), files); !added) return added.error();
+    }
+    std::string text = mtl_text(meshes, *palette, names);
     files.push_back({names.library, 0, [text = std::move(text)](BlockWriter& out) { out.put_text(text); }});
   }
   const auto write = [&meshes, palette, library = names.library.filename().string()](BlockWriter& out) {
@@ -328,6 +341,7 @@ std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes, con
   if (!has_materials(meshes)) return {};
   const ObjNames names = names_beside(path);
   std::vector<std::filesystem::path> files = {names.library, names.palette};
+  if (!meshes.atlas.rgb.empty()) files.push_back(names.atlas);
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       const bool emits = view.surface == SurfaceClass::Emissive || view.surface == SurfaceClass::EmissiveTransparent;

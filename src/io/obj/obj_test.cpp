@@ -140,6 +140,32 @@ TEST_F(Obj, TextureCoordinatesMeetThePalette) {
   EXPECT_EQ(seen, (std::set<std::array<int, 3>>{{90, 80, 70}, {10, 200, 220}, {250, 240, 10}}));
 }
 
+TEST_F(Obj, AnAtlasIsThePictureOfOpaqueBlocks) {
+  place({0, 0, 0});
+  place({50, 0, 0});
+  meshes_ = mesh_scene(scene_, {.atlas = true}).value();
+  const auto path = folder_.file("my model.obj");
+  ASSERT_TRUE(write_mesh(meshes_, path).has_value());
+  const ParsedObj obj = parse_obj(path);
+  const std::string library = text_of(folder_.file("my model.mtl"));
+  EXPECT_NE(library.find("map_Kd my model_atlas.png\n"), std::string::npos);
+  EXPECT_NE(library.find("map_Kd my model_palette.png\n"), std::string::npos) << "of what glows";
+  const PngImage atlas = *decode_png(*read_file(folder_.file("my model_atlas.png")));
+  std::set<std::array<int, 3>> seen;
+  for (const auto& face : obj.faces) {
+    const auto uv = obj.textures.at(face[0].texture);
+    if (face[0].texture < meshes_.types.size() - 1) continue;
+    const auto x = static_cast<std::size_t>(uv[0] * atlas.width);
+    const auto y = static_cast<std::size_t>((1.0 - uv[1]) * atlas.height);
+    const std::uint8_t* texel = atlas.pixels.data() + (y * atlas.width + x) * 4;
+    seen.insert({texel[0], texel[1], texel[2]});
+  }
+  EXPECT_TRUE(seen.contains({90, 80, 70}));
+  const auto files = mesh_files(meshes_, path).value();
+  for (const auto& file : files) EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  EXPECT_EQ(files.size(), folder_.count());
+}
+
 TEST_F(Obj, MaterialsAreInTheLibraryBesideIt) {
   place({0, 0, 0});
   const ParsedObj obj = write();

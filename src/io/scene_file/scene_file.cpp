@@ -154,6 +154,7 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
     auto body = take_over(part->scene, loaded.scene);
     if (!body) return body.error();
     bodies.emplace(source.id, std::move(*body));
+    loaded.named_files.push_back(folder / source.file);
   }
   return bodies;
 }
@@ -164,7 +165,7 @@ LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
   loaded.format = "scene";
   loaded.sun = file.sun;
   loaded.camera = file.camera;
-  loaded.names_files = !file.sources.empty();
+  if (file.camera) loaded.cameras.push_back({0, *file.camera});
   loaded.scene.types = std::move(file.types);
   loaded.scene.lamps = std::move(file.lamps);
   for (SceneGrid& grid : file.grids) grids.push_back(loaded.scene.add_grid(std::move(grid)));

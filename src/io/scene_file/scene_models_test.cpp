@@ -303,7 +303,7 @@ TEST(SceneModels, StandBesideFilesOfModels) {
   ASSERT_TRUE(write_scene_file(file, folder.file("both.json")));
   const auto read = load_scene(folder.file("both.json"));
   ASSERT_TRUE(read) << to_string(read.error());
-  EXPECT_TRUE(read->names_files);
+  EXPECT_FALSE(read->named_files.empty());
   EXPECT_EQ(read->scene.grids().size(), ship.grids().size() + 1);
   EXPECT_EQ(read->scene.instances().size(), ship.instances().size() + 1);
   const Instance& first = read->scene.instances()[read->scene.instances().handles()[0]];

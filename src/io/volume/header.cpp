@@ -212,6 +212,9 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
     decode(volume.type, piece.data(), header.order, {header.slope, header.intercept}, values);
     survey.add(values);
     done += now;
+    if (header.progress && !header.progress(static_cast<double>(done) / static_cast<double>(count))) {
+      return make_error(ErrorCode::Cancelled, "cancelled");
+    }
   }
   tell(survey, volume);
   return {};

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include <quoin/core/progress.h>
 #include <quoin/io/volume.h>
 
 #include "io/byte_stream.h"
@@ -15,6 +16,7 @@ namespace quoin {
 
 /// What the header of a volume says: all of the volume but its values, and where and how those are stored.
 struct VolumeHeader {
+  Progress progress;  ///< of reading the values
   Volume volume;
   std::endian order = std::endian::little;
   double slope = 1.0;  ///< a value is slope times what is stored, plus intercept

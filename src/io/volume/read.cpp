@@ -112,12 +112,13 @@ Result<Volume> read_pair(const std::filesystem::path& header_path, VolumeHeader&
 }
 
 /// `path` is empty when it is not known.
-Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::path& path,
-                      const VolumeOptions& options) {
+Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::path& path, const VolumeOptions& options,
+                      const Progress& progress) {
   const auto beginning = beginning_of(bytes);
   if (!beginning) return beginning.error();
   auto header = header_of(*beginning, options);
   if (!header) return header.error();
+  header->progress = progress;
   if (auto status = check_combination(*header, beginning->compression); !status) {
     return status.error();
   }
@@ -133,23 +134,25 @@ std::string name_from(std::filesystem::path path) {
 
 }  // namespace
 
-Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options) {
-  return decode(bytes, {}, options);
+Result<Volume> read_volume(std::span<const std::byte> bytes, const VolumeOptions& options, const Progress& progress) {
+  return decode(bytes, {}, options, progress);
 }
 
-Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options) {
+Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOptions& options, const Progress& progress) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
-    auto volume = decode(bytes, path, options);
+    auto volume = decode(bytes, path, options, progress);
     if (volume && volume->name.empty()) volume->name = name_from(path);
     return volume;
   });
 }
 
-Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options) {
+Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options,
+                               const Progress& progress) {
   if (raw.size.x < 1 || raw.size.y < 1 || raw.size.z < 1) {
     return make_error(ErrorCode::InvalidArgument, "a volume of " + text_of_size(raw.size) + " values");
   }
   VolumeHeader header;
+  header.progress = progress;
   header.order = raw.order;
   header.volume.format = "raw";
   header.volume.type = raw.type;
@@ -168,9 +171,10 @@ Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume
   return volume;
 }
 
-Result<Volume> read_raw_volume(const std::filesystem::path& path, const RawVolume& raw, const VolumeOptions& options) {
+Result<Volume> read_raw_volume(const std::filesystem::path& path, const RawVolume& raw, const VolumeOptions& options,
+                               const Progress& progress) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
-    auto volume = read_raw_volume(bytes, raw, options);
+    auto volume = read_raw_volume(bytes, raw, options, progress);
     if (volume) volume->name = name_from(path);
     return volume;
   });

@@ -146,6 +146,18 @@ Status parse_index_map(ChunkReader& chunk, Document& out) {
   return {};
 }
 
+/// A damaged one is no reason to refuse the voxels: it is kept as it is, like chunks that nobody knows.
+void parse_camera(ChunkReader& chunk, Document& out) {
+  CameraChunk camera;
+  camera.id = chunk.i32();
+  camera.attributes = chunk.dict();
+  if (chunk.failed()) {
+    out.warnings.push_back("a camera skipped: " + chunk.too_short().message);
+  } else {
+    out.cameras.push_back(std::move(camera));
+  }
+}
+
 /// Whether the last SIZE still waits for its XYZI.
 struct ModelState {
   bool has_size = false;
@@ -195,7 +207,8 @@ Status parse_chunk(ChunkReader& chunk, ModelState& state, Document& out) {
   if (id == "nSHP") return parse_shape(chunk, out);
   if (id == "LAYR") return parse_layer(chunk, out);
   if (id == "META") return parse_animation_range(chunk, out);
-  return {};  // PACK repeats the number of models; cameras, lights and notes have no place in a scene.
+  if (id == "rCAM") parse_camera(chunk, out);
+  return {};  // PACK repeats the number of models; lights and notes have no place in a scene.
 }
 
 Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::size_t end, Document& out) {

@@ -79,6 +79,12 @@ struct Layer {
   std::string_view name;
 };
 
+/// An rCAM chunk.
+struct CameraChunk {
+  std::int32_t id = 0;
+  Dict attributes;
+};
+
 /// What a chunk within MAIN says, in the order of the file.
 enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVoxels, Palette, Material, Node, Layer };
 
@@ -105,6 +111,7 @@ struct Document {
   std::vector<TransformKey> transform_keys;  ///< of one node: by ascending frame
   std::vector<ModelKey> model_keys;          ///< likewise
   std::vector<Layer> layers;
+  std::vector<CameraChunk> cameras;
   std::int32_t last_frame = 0;       ///< of the keys and META's range
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is no colour index
   std::vector<std::string> warnings;

@@ -6,6 +6,7 @@
 #include <quoin/io/vox.h>
 
 #include "io/text.h"
+#include "io/vox/cameras.h"
 #include "io/vox/chunks.h"
 #include "io/vox/materials.h"
 #include "io/vox/read.h"
@@ -152,6 +153,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   LoadedScene loaded;
   loaded.format = "vox";
   loaded.warnings = source->document.warnings;
+  if (vox::is_animated(source->document)) loaded.last_frame = vox::last_frame(source->document);
   source->type_of = vox::types_by_colour_index(source->document, loaded.warnings);
   if (Status status = vox::register_palette(source->document, source->type_of, loaded.scene.types); !status) {
     return status.error();
@@ -160,6 +162,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   const Result<std::vector<GridHandle>> grids = add_grids(source->document, builder, bytes, progress, loaded.scene);
   if (!grids) return grids.error();
   add_instances(source->placements, *grids, add_layers(*source, loaded.scene), loaded.scene);
+  loaded.cameras = vox::cameras_of(source->document, loaded.scene.bounds(InstanceFilter::All), loaded.warnings);
   warn("materials of no colour skipped", source->document.stray_materials, loaded.warnings);
   add_warnings(source->placements, builder.losses(), loaded.warnings);
   if (options.keep_source) {

@@ -56,12 +56,14 @@ std::optional<std::size_t> MeshHierarchy::group_of(GroupHandle handle) {
   return found == groups_.end() ? std::nullopt : std::optional(found->second);
 }
 
-MeshPlacement MeshHierarchy::place(const Instance& instance, std::size_t part) {
+MeshPlacement MeshHierarchy::place(InstanceHandle handle, std::size_t part) {
+  const Instance& instance = scene_.instances()[handle];
   const DQuat rotation = unit_rotation(instance.rotation);
   MeshPlacement placement{part, instance.name,
                           Similarity{instance.position, rotation, instance.voxel_size, instance.mirrored}};
   placement.group = group_of(instance.group);
   placement.layer = layer_name(instance.layer);
+  placement.instance = handle;
   return placement;
 }
 
@@ -106,7 +108,7 @@ Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, Inst
     for (const InstanceHandle placed : scene.instances().handles()) {
       const Instance& instance = scene.instances()[placed];
       if (instance.grid != handle || !is_drawn(scene, instance, filter)) continue;
-      meshes.placements.push_back(hierarchy.place(instance, meshes.parts.size()));
+      meshes.placements.push_back(hierarchy.place(placed, meshes.parts.size()));
     }
     meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
   }

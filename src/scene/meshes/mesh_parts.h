@@ -22,7 +22,7 @@ class MeshHierarchy {
  public:
   MeshHierarchy(const Scene& scene, SceneMeshes& meshes) : scene_(scene), meshes_(meshes) {}
   /// Where an instance stands, of a part.
-  [[nodiscard]] MeshPlacement place(const Instance& instance, std::size_t part);
+  [[nodiscard]] MeshPlacement place(InstanceHandle handle, std::size_t part);
 
  private:
   [[nodiscard]] std::optional<std::size_t> group_of(GroupHandle handle);

@@ -7,6 +7,7 @@
 
 #include <quoin/grid/voxel_field.h>
 
+#include "mesh/blocky/occlusion_atlas.h"
 #include "scene/glass_thickness.h"
 #include "scene/instance_axes.h"
 #include "scene/meshes/mesh_parts.h"
@@ -88,15 +89,67 @@ void add_stats(const BlockyMesh& mesh, MeshStats& stats) {
   stats.vertices += mesh.vertex_count();
 }
 
+using Coordinates = std::vector<std::array<float, 2>>;
+
+BlockyTriangles& opaque_of(BlockyMesh& mesh) {
+  return mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Opaque)];
+}
+
+Status check_atlas(const BlockyMeshOptions& options) {
+  if (options.merge && options.occlusion && !options.watertight) return {};
+  return make_error(ErrorCode::InvalidArgument,
+                    "an atlas is of faces that are merged, not watertight, and have occlusion");
+}
+
+/// Merges the opaque faces of the meshes across their occlusion, which goes into the atlas of `meshes`. Returns the
+/// texture coordinates of each mesh's.
+Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
+                                                 MeshResults& results, Threads threads, const Progress& progress,
+                                                 SceneMeshes& meshes) {
+  MeshResults merged = mesh_all(scene, grids, {.occlusion = false}, threads, progress);
+  OcclusionAtlas atlas;
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (!merged[i] || !*merged[i])
+      return merged[i] ? merged[i]->error() : make_error(ErrorCode::Cancelled, "cancelled");
+    BlockyMesh& mesh = **results[i];
+    BlockyTriangles& opaque = opaque_of(mesh);
+    BlockyTriangles& whole = opaque_of(**merged[i]);
+    atlas.add(opaque, whole, scene.types);
+    mesh.quads +=
+        (static_cast<std::int64_t>(whole.positions.size()) - static_cast<std::int64_t>(opaque.positions.size())) / 4;
+    opaque = std::move(whole);
+    merged[i].reset();
+  }
+  auto drawn = atlas.draw();
+  if (!drawn) return drawn.error();
+  meshes.atlas = std::move(*drawn);
+  std::vector<Coordinates> coordinates(grids.size());
+  for (std::size_t i = 0; i < grids.size(); ++i) coordinates[i] = atlas.coordinates(i);
+  return coordinates;
+}
+
+/// The part with coordinates for its opaque faces, which it owns from now on.
+MeshPart with_atlas(MeshPart part, Coordinates coordinates) {
+  using Owned = std::pair<std::shared_ptr<const void>, Coordinates>;
+  const auto owner = std::make_shared<const Owned>(std::move(part.owner), std::move(coordinates));
+  for (MeshView& view : part.surfaces) {
+    if (view.surface != SurfaceClass::Opaque) continue;
+    view.atlas = owner->second;
+    view.block_occlusion = {};
+  }
+  part.owner = owner;
+  return part;
+}
+
 }  // namespace
 
 glm::dmat4 MeshPlacement::matrix() const {
   if (const auto* matrix = std::get_if<glm::dmat4>(&world_from_part)) return *matrix;
   const auto& place = std::get<Similarity>(world_from_part);
-  Instance instance;
-  instance.rotation = place.rotation;
-  instance.mirrored = place.mirrored;
-  glm::dmat4 matrix(world_axes(instance) * place.scale);
+  Instance turned;
+  turned.rotation = place.rotation;
+  turned.mirrored = place.mirrored;
+  glm::dmat4 matrix(world_axes(turned) * place.scale);
   matrix[3] = glm::dvec4(place.position, 1.0);
   return matrix;
 }
@@ -122,17 +175,28 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
                                const Progress& progress) {
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
-  MeshResults results = mesh_all(scene, grids, options.mesh, threads, progress);
+  if (options.atlas) {
+    if (auto sound = check_atlas(options.mesh); !sound) return sound.error();
+  }
+  const double first_share = options.atlas ? 0.5 : 1.0;
+  MeshResults results = mesh_all(scene, grids, options.mesh, threads, part_of(progress, 0.0, first_share));
   for (const auto& result : results) {
     if (result && !*result) return result->error();
   }
   SceneMeshes meshes;
   meshes.types = scene.types;
+  std::vector<Coordinates> coordinates;
+  if (options.atlas) {
+    auto moved = move_into_atlas(scene, grids, results, threads, part_of(progress, first_share, 1.0), meshes);
+    if (!moved) return moved.error();
+    coordinates = std::move(*moved);
+  }
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const SceneGrid& grid = scene.grids()[grids[i]];
     add_stats(**results[i], meshes.stats);
     MeshPart& part = meshes.parts.emplace_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
     part.thickness = glass_thickness(grid.grid, part.surfaces);
+    if (options.atlas) part = with_atlas(std::move(part), std::move(coordinates[i]));
     for (MeshView& view : part.surfaces) {
       if (!options.mesh.occlusion) view.block_occlusion = {};
     }
@@ -142,7 +206,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     const Instance& instance = scene.instances()[handle];
     if (!is_drawn(scene, instance, options.instances)) continue;
     const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    meshes.placements.push_back(hierarchy.place(instance, static_cast<std::size_t>(part)));
+    meshes.placements.push_back(hierarchy.place(handle, static_cast<std::size_t>(part)));
   }
   SmoothMeshOptions smooth;
   if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;

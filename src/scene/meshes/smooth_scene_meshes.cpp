@@ -275,11 +275,10 @@ std::vector<Unit> units_of(const Scene& scene, const SmoothSceneOptions& options
 }
 
 /// Adds a part, unless it is empty, and its placements.
-void add_part(const Scene& scene, MeshPart part, std::span<const LatticeMember> members, MeshHierarchy& hierarchy,
-              SceneMeshes& meshes) {
+void add_part(MeshPart part, std::span<const LatticeMember> members, MeshHierarchy& hierarchy, SceneMeshes& meshes) {
   if (part.surfaces.empty()) return;
   for (const LatticeMember& member : members) {
-    MeshPlacement placement = hierarchy.place(scene.instances()[member.instance], meshes.parts.size());
+    MeshPlacement placement = hierarchy.place(member.instance, meshes.parts.size());
     // As a matrix: of two rotations that are the same, files then have the one with a positive w.
     placement.world_from_part = placement.matrix();
     meshes.placements.push_back(std::move(placement));
@@ -297,7 +296,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
     auto bodies = mesher.mesh(grid.grid, nullptr, progress);
     if (!bodies) return bodies.error();
     MeshPart part = part_of_bodies(grid, {std::move((*bodies)[0].mesh), std::move((*bodies)[1].mesh)});
-    add_part(scene, std::move(part), unit.members, hierarchy, meshes);
+    add_part(std::move(part), unit.members, hierarchy, meshes);
     return {};
   }
   UnitedGrid united(scene, std::move(unit.members));
@@ -308,7 +307,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
   for (std::size_t i = 0; i < united.members().size(); ++i) {
     const LatticeMember& member = united.members()[i];
     MeshPart part = part_of_bodies(grid_of(member), {std::move(opaque[i]), std::move(transparent[i])});
-    add_part(scene, std::move(part), {&member, 1}, hierarchy, meshes);
+    add_part(std::move(part), {&member, 1}, hierarchy, meshes);
   }
   return {};
 }

@@ -130,6 +130,17 @@ void draw_sun(LightOptions& light) {
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
 }
 
+void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choice) {
+  if (cameras.empty()) return;
+  ImGui::TextUnformatted("of the file:");
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (i % 5 != 0) ImGui::SameLine();
+    ImGui::PushID(static_cast<int>(i));
+    if (ImGui::SmallButton(std::to_string(cameras[i].number).c_str())) choice.camera = cameras[i].camera;
+    ImGui::PopID();
+  }
+}
+
 }  // namespace
 
 bool heading(const char* name, bool is_open) {
@@ -184,6 +195,7 @@ void draw_camera_part(ViewState& state, MenuChoice& choice) {
     if (i % 3 != 0) ImGui::SameLine();
     command_button(kViews[i].first, kViews[i].second, choice);
   }
+  draw_file_cameras(state.open.document->loaded().cameras, choice);
 }
 
 void draw_slice_place(SlicePlace& slice) {

@@ -14,6 +14,7 @@ inline constexpr const char* kDetailLegend = "green: in full; yellow to red: in 
 struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::string> recent;  ///< a file to open
+  std::optional<Camera> camera;       ///< one of the file's, to look through
 };
 
 /// The bar at the top. Answers its height, in the window's units.

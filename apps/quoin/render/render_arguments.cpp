@@ -1,13 +1,15 @@
-#include "render_arguments.h"
+#include "render/render_arguments.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 
 #include "field_occlusion.h"
 #include "parse.h"
+#include "standard_streams.h"
 
 namespace quoin::tool {
 
@@ -73,7 +75,9 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
                   "That many pictures once round the scene, framed alike: OUT-00.png, ...")
       ->check(CLI::Range(2, 100'000));
   add_text_option(command, "--frames", "A:B", "A picture of each of these frames of an animation, framed alike");
-  add_text_option(command, "--camera", "X,Y,Z", "Where the camera stands; with --look-at, instead of --view");
+  add_text_option(command, "--camera", "X,Y,Z|file:N",
+                  "Where the camera stands; with --look-at, instead of --view. Or camera N of the file, which "
+                  "quoin info lists");
   add_text_option(command, "--look-at", "X,Y,Z", "The point in the middle of the picture");
   add_text_option(command, "--fov", "DEGREES", "Vertical field of view of --camera (default 45)");
 }
@@ -185,6 +189,25 @@ std::string fault_of_files(const RenderArguments& arguments) {
   return "";
 }
 
+/// What --camera says.
+struct CameraPlace {
+  std::optional<DVec3> position;
+  std::optional<int> number;
+};
+
+/// "1,2,3", or "file:4".
+std::optional<CameraPlace> read_camera(const std::string& text) {
+  const std::string prefix = "file:";
+  if (!text.starts_with(prefix)) {
+    const auto position = parse_triple(text);
+    return position ? std::optional(CameraPlace{*position, std::nullopt}) : std::nullopt;
+  }
+  const auto number = parse_unsigned(std::string_view(text).substr(prefix.size()));
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
+  if (!number || *number > kMost) return std::nullopt;
+  return CameraPlace{std::nullopt, static_cast<int>(*number)};
+}
+
 /// "0:24".
 std::optional<FrameRange> read_frames(const std::string& text) {
   const std::size_t colon = text.find(':');
@@ -218,12 +241,18 @@ std::string fault_of_films(const CLI::App& command) {
   return "";
 }
 
+std::string fault_of_watching(const RenderArguments& arguments) {
+  if (!arguments.watch) return "";
+  if (arguments.common.json) return "--watch: --json prints one object, and ends";
+  return arguments.common.input == kStandardStream ? "--watch is for files, not for standard input" : "";
+}
+
 std::string fault_of_camera(const CLI::App& command, const RenderArguments& arguments) {
-  const bool has_position = command.count("--camera") > 0;
+  const bool has_position = arguments.position.has_value();
   const bool has_target = command.count("--look-at") > 0;
   if (has_position && !has_target) return "--camera needs --look-at";
-  if (has_target && !has_position) return "--look-at needs --camera";
-  if (has_position && command.count("--view") > 0) return "--view and --camera exclude each other";
+  if (has_target && !has_position) return "--look-at needs --camera X,Y,Z";
+  if (command.count("--camera") > 0 && command.count("--view") > 0) return "--view and --camera exclude each other";
   if (command.count("--fov") > 0 && !has_position) return "--fov needs --camera and --look-at; views frame the scene";
   if (!arguments.position || !arguments.target) return "";
   const auto camera = look_at(*arguments.position, *arguments.target, 1.0);
@@ -307,10 +336,11 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   LightOptions& light = arguments.render.light;
   PictureSize size{arguments.render.width, arguments.render.height};
   SlicePlace slice;
+  CameraPlace camera;
   const std::array faults = {
       read_option(command, "--size", read_size,
                   "WIDTHxHEIGHT of at most 2^28 pixels and 1000000 a side, as in 1280x720", size),
-      read_option(command, "--camera", parse_triple, three, arguments.position),
+      read_option(command, "--camera", read_camera, three + ", or a camera of the file, as in file:0", camera),
       read_option(command, "--look-at", parse_triple, three, arguments.target),
       read_option(command, "--fov", read_angle, "more than 0 and less than 180", arguments.fov_degrees),
       is_sun_off(command) ? ""
@@ -327,6 +357,8 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth),
       read_option(command, "--iso", read_float, "a number", arguments.iso)};
+  arguments.position = camera.position;
+  arguments.file_camera = camera.number;
   arguments.slice.axis = slice.axis;
   arguments.slice.at = slice.at;
   arguments.render.width = size.width;
@@ -360,14 +392,16 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--slice", "AXIS:PLACE",
                   "Of --preset density: where it cuts, x, y or z, from 0 to 1 of the fields' bounds (default y:0.5)");
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
+  command.add_flag("--watch", arguments.watch, "Draw again whenever what is read changes, until Ctrl-C");
   add_detail_options(command, arguments);
   add_backend_options(command, arguments);
 }
 
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
-  for (const std::string& fault : {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command),
-                                   fault_of_camera(command, arguments), fault_of_slice(command, arguments),
-                                   fault_of_light(command, arguments), fault_of_backend(command, arguments)}) {
+  for (const std::string& fault :
+       {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command),
+        fault_of_camera(command, arguments), fault_of_slice(command, arguments), fault_of_light(command, arguments),
+        fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
     if (!fault.empty()) return fault;
   }
   if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";

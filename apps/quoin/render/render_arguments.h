@@ -28,6 +28,7 @@ struct RenderArguments {
   View view = View::Iso;
   std::optional<DVec3> position;  ///< with `target`, instead of the view
   std::optional<DVec3> target;
+  std::optional<int> file_camera;  ///< number of a camera of the file, instead of the view
   double fov_degrees = 45.0;
   std::optional<double> azimuth;  ///< with or without `elevation`, instead of the view
   std::optional<double> elevation;
@@ -37,6 +38,7 @@ struct RenderArguments {
   bool has_sun = false;              ///< likewise
   bool has_fixed_sky = false;
   bool has_plain_glass = false;
+  bool watch = false;  ///< draws again whenever the input changes
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";

@@ -14,11 +14,12 @@
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
-#include "render_arguments.h"
+#include "render/render_arguments.h"
 #include "scene_warnings.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
 #include "volume_info.h"
+#include "watch.h"
 
 namespace quoin::tool {
 
@@ -31,7 +32,8 @@ struct Outcome {
   FaceCounts faces;
   bool is_volume = false;
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
+  std::vector<std::filesystem::path> files;        ///< all that were written, OUT first
+  std::vector<std::filesystem::path> named_files;  ///< that were read beside IN
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
@@ -72,7 +74,18 @@ double aspect_of(const RenderArguments& arguments) {
   return static_cast<double>(arguments.render.width) / arguments.render.height;
 }
 
+Result<Camera> camera_of_file(const LoadedScene& loaded, int number) {
+  std::string all;
+  for (const FileCamera& each : loaded.cameras) {
+    if (each.number == number) return each.camera;
+    all += (all.empty() ? "" : ", ") + std::to_string(each.number);
+  }
+  return make_error(ErrorCode::InvalidArgument, "--camera file:" + std::to_string(number) + ": the file has " +
+                                                    (all.empty() ? "no camera that was set" : "cameras " + all));
+}
+
 Result<Camera> camera_for(const LoadedScene& loaded, const RenderArguments& arguments) {
+  if (arguments.file_camera) return camera_of_file(loaded, *arguments.file_camera);
   if (loaded.camera && !arguments.has_view && !arguments.position) return *loaded.camera;
   if (arguments.position) {
     return look_at(*arguments.position, *arguments.target, arguments.fov_degrees * std::numbers::pi / 180.0);
@@ -196,7 +209,7 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
 Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
   const FrameRange& frames = *arguments.frames;
   const InstanceFilter filter = arguments.common.instances();
-  const bool has_camera = arguments.position || (first.camera && !arguments.has_view);
+  const bool has_camera = arguments.position || arguments.file_camera || (first.camera && !arguments.has_view);
   SceneFraming framing(arguments.forward(), aspect_of(arguments));
   framing.add(first.scene, filter);
   // The last one first: it says whether all are there.
@@ -247,6 +260,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   const Scene& scene = loaded->scene;
   Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
+  outcome.named_files = std::move(loaded->named_files);
   if (arguments.frames) std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
   outcome.read = watch.lap();
   outcome.is_volume = is_volume;
@@ -266,10 +280,12 @@ Json triple(DVec3 v) {
 }
 
 Json camera_json(const Camera& camera) {
-  return {{"position", triple(camera.position)},
-          {"forward", triple(camera.forward)},
-          {"up", triple(camera.up)},
-          {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}};
+  Json json = {{"position", triple(camera.position)},
+               {"forward", triple(camera.forward)},
+               {"up", triple(camera.up)},
+               {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}};
+  if (camera.projection == Camera::Projection::Orthographic) json["view_height"] = camera.view_height;
+  return json;
 }
 
 Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
@@ -324,19 +340,28 @@ Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams
   return render(arguments);
 }
 
-int run_render(RenderArguments& arguments) {
+WatchedWork run_render(RenderArguments& arguments) {
   StandardStreams streams;
+  WatchedWork work;
+  work.read = {arguments.common.input};
   const auto outcome = render_from(arguments, streams);
   if (!outcome) {
     const Error error = streams.named(outcome.error());
     streams.remove();
     die_if_interrupted();
     print_error(error);
-    return kFailed;
+    work.status = kFailed;
+    return work;
   }
-  if (arguments.common.json) return print_json(outcome_json(arguments, *outcome));
-  print_warnings(outcome->warnings);
-  return print_summary(outcome_text(*outcome));
+  work.read.insert(work.read.end(), outcome->named_files.begin(), outcome->named_files.end());
+  work.written = outcome->files;
+  if (arguments.common.json) {
+    work.status = print_json(outcome_json(arguments, *outcome));
+  } else {
+    print_warnings(outcome->warnings);
+    work.status = print_summary(outcome_text(*outcome));
+  }
+  return work;
 }
 
 }  // namespace
@@ -359,7 +384,8 @@ void add_render_command(CLI::App& app, int& status) {
       status = kWrongUsage;
       return;
     }
-    status = run_render(*arguments);
+    const auto work = [&] { return run_render(*arguments); };
+    status = arguments->watch ? watch(work) : work().status;
   });
 }
 

@@ -1,0 +1,93 @@
+#include "watch.h"
+
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include <quoin/io/file.h>
+
+#include "commands.h"
+#include "interrupt.h"
+#include "output.h"
+
+namespace quoin::tool {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr auto kInterval = std::chrono::milliseconds(250);
+
+/// What files are now, by their names.
+using Stamps = std::map<fs::path, std::optional<FileStamp>>;
+
+void add_folder(const fs::path& folder, Stamps& stamps) {
+  std::error_code code;
+  for (fs::recursive_directory_iterator at(folder, code); !code && at != fs::recursive_directory_iterator();
+       at.increment(code)) {
+    std::error_code unknown;
+    if (at->is_regular_file(unknown)) stamps[at->path().lexically_normal()] = FileStamp::of(at->path());
+  }
+}
+
+Stamps stamps_of(const WatchedWork& work) {
+  Stamps stamps;
+  for (const fs::path& path : work.read) {
+    std::error_code unknown;
+    if (fs::is_directory(path, unknown)) {
+      add_folder(path, stamps);
+    } else {
+      stamps[path.lexically_normal()] = FileStamp::of(path);
+    }
+  }
+  for (const fs::path& path : work.written) stamps.erase(path.lexically_normal());
+  return stamps;
+}
+
+/// Until the files are others than `known`, and have been so for an interval: who writes one may not be done yet.
+void wait_for_change(const WatchedWork& work, const Stamps& known) {
+  Stamps last = known;
+  while (!was_interrupted()) {
+    std::this_thread::sleep_for(kInterval);
+    Stamps now = stamps_of(work);
+    if (now != known && now == last) return;
+    last = std::move(now);
+  }
+}
+
+void tell_of_watching(const WatchedWork& work) {
+  if (is_quiet()) return;
+  const std::string more = work.read.size() > 1 ? " and " + std::to_string(work.read.size() - 1) + " more" : "";
+  std::fprintf(stderr, "quoin: watching %s%s; Ctrl-C ends\n", on_one_line(work.read.front().string()).c_str(),
+               more.c_str());
+}
+
+}  // namespace
+
+int watch(const std::function<WatchedWork()>& work) {
+  catch_interrupts();
+  bool is_first = true;
+  WatchedWork done;
+  while (!was_interrupted()) {
+    // What changes while the work goes on has changed since: of files that were read before, too.
+    const Stamps before = stamps_of(done);
+    WatchedWork now = work();
+    // What failed may not have come to all that it reads.
+    if (now.status == kFailed && now.read.size() < done.read.size()) now.read = done.read;
+    done = std::move(now);
+    if (is_first && done.status == kWrongUsage) return done.status;
+    if (is_first) tell_of_watching(done);
+    is_first = false;
+    Stamps known = stamps_of(done);
+    for (auto& [path, stamp] : known) {
+      if (const auto found = before.find(path); found != before.end()) stamp = found->second;
+    }
+    wait_for_change(done, known);
+  }
+  die_if_interrupted();
+  return kDone;
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_meshes.h>
+
+namespace quoin {
+
+/// A scene that changes from frame to frame, as one whose instances come, go and move: for animations in files of
+/// meshes. Each frame is shown until the next one; nothing is interpolated.
+///
+///   quoin::SceneAnimation animation;
+///   for (const quoin::Scene& frame : frames) animation.add(frame);
+///   auto meshes = quoin::mesh_scene(animation.scene());
+///   animation.animate(*meshes, 12.0);               // frames a second
+///   quoin::write_mesh(*meshes, "walk.glb");
+class SceneAnimation {
+ public:
+  /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of
+  /// their handles; of the grids, types, groups and layers those of the first frame are taken, which the same handles
+  /// mean in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
+  /// Cost: O(instances). Errors: InvalidArgument where the number of instances or grids is another than before.
+  [[nodiscard]] Status add(const Scene& frame, InstanceFilter filter = InstanceFilter::Visible);
+
+  /// All that any frame shows: an instance that shows several grids one after the other is as many.
+  [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] std::size_t frame_count() const { return frames_; }
+
+  /// Gives the placements their tracks, and where they stand in the first frame. Requires: `meshes` are those of
+  /// `scene()`, each instance by itself; `frames_per_second` is positive.
+  void animate(SceneMeshes& meshes, double frames_per_second) const;
+
+ private:
+  /// What an instance is at one time: a part of its own in a file, since a node shows one mesh.
+  struct Look {
+    GridHandle grid;
+    bool mirrored = false;
+    bool operator==(const Look&) const = default;
+  };
+  struct Shown {
+    Look look;
+    InstanceHandle instance;                    ///< in scene_
+    std::vector<std::optional<Similarity>> at;  ///< by frame, as many as there were until it was last shown
+  };
+
+  Shown& shown_as(std::size_t place, const Instance& instance);
+
+  Scene scene_;
+  std::size_t frames_ = 0;
+  std::vector<std::vector<Shown>> instances_;  ///< by their place in the order
+};
+
+}  // namespace quoin

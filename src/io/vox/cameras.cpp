@@ -1,0 +1,129 @@
+#include "io/vox/cameras.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "io/text.h"
+
+namespace quoin::vox {
+
+namespace {
+
+/// A camera's keys, as MagicaVoxel has them where nobody set any.
+struct Keys {
+  DVec3 focus{0.0};
+  DVec3 angle{0.0};  ///< pitch, yaw, roll, in degrees
+  double radius = 0.0;
+  double fov = 45.0;
+  std::string_view mode = "pers";
+};
+
+/// Three numbers with blanks between them.
+std::optional<DVec3> parse_three(std::string_view text) {
+  DVec3 numbers(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+    const std::size_t length = std::min(text.find(' '), text.size());
+    const std::optional<float> number = parse_float(text.substr(0, length));
+    if (!number) return std::nullopt;
+    numbers[axis] = static_cast<double>(*number);
+    text.remove_prefix(length);
+  }
+  if (text.find_first_not_of(' ') != std::string_view::npos) return std::nullopt;
+  return numbers;
+}
+
+/// Reads a key, where the camera has it; says which one is none.
+template <class Parse, class Value>
+void read_key(const Dict& attributes, std::string_view key, Parse parse, Value& value, std::string& fault) {
+  const std::string_view text = attributes.get(key);
+  if (text.empty()) return;
+  if (const auto read = parse(text)) {
+    value = static_cast<Value>(*read);
+  } else if (fault.empty()) {
+    fault = std::string(key) + " is \"" + printable(text) + "\"";
+  }
+}
+
+Keys read_keys(const Dict& attributes, std::string& fault) {
+  Keys keys;
+  read_key(attributes, "_focus", parse_three, keys.focus, fault);
+  read_key(attributes, "_angle", parse_three, keys.angle, fault);
+  read_key(attributes, "_radius", parse_float, keys.radius, fault);
+  read_key(attributes, "_fov", parse_float, keys.fov, fault);
+  if (const std::string_view mode = attributes.get("_mode"); !mode.empty()) keys.mode = mode;
+  return keys;
+}
+
+bool is_orthographic(const Keys& keys) {
+  return keys.mode == "orth" || keys.mode == "iso";
+}
+
+/// Nobody looked through it: older versions write a radius of 1, newer ones 0.
+bool was_never_set(const Keys& keys) {
+  const bool is_near = keys.radius == 0.0 || keys.radius == 1.0;
+  return is_near && keys.focus == DVec3(0.0) && keys.angle == DVec3(0.0);
+}
+
+std::string fault_of(const Keys& keys) {
+  const bool is_known = keys.mode == "pers" || keys.mode == "free" || is_orthographic(keys);
+  if (!is_known) return "_mode \"" + printable(keys.mode) + "\" is not drawn";
+  if (!(keys.fov > 0.0 && keys.fov < 180.0)) return "_fov is not between 0 and 180";
+  if (keys.radius < 0.0) return "_radius is less than 0";
+  if (is_orthographic(keys) && keys.radius == 0.0) return "_radius is 0";
+  return {};
+}
+
+/// How far from `focus` everything lies in front of a plane across `forward`.
+double distance_before(const DBox& bounds, DVec3 focus, DVec3 forward) {
+  if (bounds.empty()) return 0.0;
+  double nearest = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    nearest +=
+        std::min(forward[axis] * (bounds.min[axis] - focus[axis]), forward[axis] * (bounds.max[axis] - focus[axis]));
+  }
+  return 1.0 - nearest;
+}
+
+Camera camera_from(const Keys& keys, const DBox& bounds) {
+  const DVec3 radians = keys.angle * (std::numbers::pi / 180.0);
+  const double level = std::cos(radians.x);
+  Camera camera;
+  camera.forward = {-std::sin(radians.y) * level, std::sin(radians.x), -std::cos(radians.y) * level};
+  const DVec3 right(std::cos(radians.y), 0.0, -std::sin(radians.y));
+  const DVec3 up = glm::cross(right, camera.forward);
+  camera.right = right * std::cos(radians.z) + up * std::sin(radians.z);
+  camera.up = up * std::cos(radians.z) - right * std::sin(radians.z);
+  camera.vertical_fov = keys.fov * (std::numbers::pi / 180.0);
+  const DVec3 focus(keys.focus.x, keys.focus.z, -keys.focus.y);
+  double distance = keys.radius;
+  if (is_orthographic(keys)) {
+    camera.projection = Camera::Projection::Orthographic;
+    camera.view_height = 2.0 * keys.radius * std::tan(camera.vertical_fov / 2.0);
+    distance = std::max(distance, distance_before(bounds, focus, camera.forward));
+  }
+  camera.position = focus - camera.forward * distance;
+  return camera;
+}
+
+}  // namespace
+
+std::vector<FileCamera> cameras_of(const Document& document, const DBox& bounds, std::vector<std::string>& warnings) {
+  std::vector<FileCamera> cameras;
+  for (const CameraChunk& chunk : document.cameras) {
+    std::string fault;
+    const Keys keys = read_keys(chunk.attributes, fault);
+    if (fault.empty() && was_never_set(keys)) continue;
+    if (fault.empty()) fault = fault_of(keys);
+    if (fault.empty()) {
+      cameras.push_back({chunk.id, camera_from(keys, bounds)});
+    } else {
+      warnings.push_back("camera " + std::to_string(chunk.id) + " skipped: " + fault);
+    }
+  }
+  return cameras;
+}
+
+}  // namespace quoin::vox

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/image.h>
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/blocky_mesh.h>
+
+namespace quoin {
+
+/// Colours and occlusion of faces in a texture, so that faces may be merged across their occlusion.
+///
+///   a merged face of 4 x 1 voxels        its patch: a texel a corner of a voxel, at whose centres the
+///   +---+---+---+---+                    vertices lie, so that a linear filter never reads beyond it
+///   |   |   |   |   |                    o-------o-------o-------o-------o
+///   +---+---+---+---+                    |       |       |       |       |
+///                                        o-------o-------o-------o-------o
+///
+/// Where occlusion does not change along an axis the patch is one texel wide; equal patches are one. A filter turns the
+/// four levels of a voxel's face into a saddle, where two triangles have an edge; at the corners they are the same.
+class OcclusionAtlas {
+ public:
+  /// Longest side of a texture that devices take.
+  static constexpr int kMaxEdge = 16'384;
+
+  /// Adds the faces of a surface. `split` and `merged` are the same faces of the same grid, as build_blocky_mesh makes
+  /// them with and without occlusion. Returns where the vertices of `merged` lie, for `coordinates`.
+  std::size_t add(const BlockyTriangles& split, const BlockyTriangles& merged, const VoxelRegistry& types);
+
+  /// Places all that was added; sides are powers of two. The same additions give the same texture.
+  /// Errors: LimitExceeded beyond kMaxEdge.
+  [[nodiscard]] Result<Image> draw();
+
+  /// Texture coordinates of the vertices of an addition, 0 to 1 from the upper left corner. Requires: drawn.
+  [[nodiscard]] std::vector<std::array<float, 2>> coordinates(std::size_t addition) const;
+
+ private:
+  /// A texel a corner, rows from v = 0.
+  struct Patch {
+    int columns = 1;
+    int rows = 1;
+    int x = 0;
+    int y = 0;
+    Rgba8 colour{};
+    std::size_t first_level = 0;  ///< in levels_
+  };
+
+  [[nodiscard]] std::size_t patch_of(const BlockyTriangles& merged, std::size_t first_vertex, Rgba8 colour);
+  [[nodiscard]] bool place(const std::vector<std::size_t>& order, int edge, int& height);
+  void paint(const BlockyTriangles& split, std::size_t first_vertex);
+
+  std::vector<std::uint8_t> levels_;
+  std::vector<Patch> patches_;
+  std::unordered_map<std::string, std::size_t> known_;
+  std::vector<std::vector<std::size_t>> additions_;  ///< of each face the patch
+  std::vector<std::uint8_t> faces_;                  ///< of a chunk, by direction, layer, v and u: four levels each
+  std::string key_;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+}  // namespace quoin

@@ -1,0 +1,92 @@
+#include <quoin/scene/scene_animation.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+
+#include <quoin/core/assert.h>
+
+#include "scene/instance_axes.h"
+
+namespace quoin {
+
+namespace {
+
+Similarity place_of(const Instance& instance) {
+  return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
+}
+
+/// Where the placement is in each frame; while it is not shown it stays where it was, or will be first.
+std::vector<MeshKey> keys_of(const std::vector<std::optional<Similarity>>& at, std::size_t frames,
+                             double frames_per_second) {
+  const auto first = std::ranges::find_if(at, [](const auto& place) { return place.has_value(); });
+  std::vector<MeshKey> keys;
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    const bool is_shown = frame < at.size() && at[frame];
+    MeshKey key{static_cast<double>(frame) / frames_per_second, is_shown,
+                is_shown       ? *at[frame]
+                : keys.empty() ? **first
+                               : keys.back().world_from_part};
+    const bool is_new =
+        keys.empty() || keys.back().visible != key.visible || keys.back().world_from_part != key.world_from_part;
+    if (is_new) keys.push_back(key);
+  }
+  return keys;
+}
+
+}  // namespace
+
+Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
+  const std::size_t count = frame.instances().size();
+  if (frames_ == 0) {
+    scene_ = frame.snapshot();
+    for (const InstanceHandle handle : scene_.instances().handles()) scene_.remove_instance(handle);
+    instances_.resize(count);
+  }
+  if (count != instances_.size() || frame.grids().size() != scene_.grids().size()) {
+    return make_error(ErrorCode::InvalidArgument,
+                      "frame " + std::to_string(frames_) + " has other instances or grids than those before it");
+  }
+  std::size_t place = 0;
+  for (const InstanceHandle handle : frame.instances().handles()) {
+    const Instance& instance = frame.instances()[handle];
+    if (is_drawn(frame, instance, filter)) {
+      Shown& shown = shown_as(place, instance);
+      shown.at.resize(frames_);
+      shown.at.emplace_back(place_of(instance));
+    }
+    ++place;
+  }
+  ++frames_;
+  return {};
+}
+
+SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Instance& instance) {
+  const Look look{instance.grid, instance.mirrored};
+  auto& all = instances_[place];
+  const auto known = std::ranges::find(all, look, &Shown::look);
+  if (known != all.end()) return *known;
+  Instance taken = instance;
+  taken.visible = true;
+  return all.emplace_back(Shown{look, scene_.add_instance(std::move(taken)), {}});
+}
+
+void SceneAnimation::animate(SceneMeshes& meshes, double frames_per_second) const {
+  QUOIN_ASSERT(frames_per_second > 0.0, "frames_per_second is positive");
+  std::map<InstanceHandle, const Shown*> by_instance;
+  for (const auto& all : instances_) {
+    for (const Shown& shown : all) by_instance.emplace(shown.instance, &shown);
+  }
+  meshes.seconds = static_cast<double>(frames_) / frames_per_second;
+  for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
+    MeshPlacement& placement = meshes.placements[i];
+    const auto found = placement.instance ? by_instance.find(*placement.instance) : by_instance.end();
+    QUOIN_ASSERT(found != by_instance.end(), "the meshes are those of the animation's scene");
+    placement.keys = keys_of(found->second->at, frames_, frames_per_second);
+    placement.world_from_part = placement.keys.front().world_from_part;
+    if (placement.keys.size() == 1) placement.keys.clear();
+  }
+}
+
+}  // namespace quoin
