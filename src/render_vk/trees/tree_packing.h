@@ -42,8 +42,8 @@ struct ChunkRecord {
 /// from the header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
 /// Requires: `cells` holds some of the chunk.
 [[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
-/// What is transparent of a field's chunk: a tree of the cells that touch it. The number of a word says where its samples
-/// lie, densities and bodies, or of which type all of it is. No brick or chunk counts as full.
+/// What is transparent of a field's chunk: a tree of the cells that touch it. The number of a word says where its
+/// samples lie, densities and bodies, or of which type all of it is. No brick or chunk counts as full.
 [[nodiscard]] ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk);
 /// How far beyond a chunk's own samples such a record reads.
 constexpr int kFieldRecordReach = 2;

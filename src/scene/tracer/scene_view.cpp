@@ -134,8 +134,8 @@ struct SceneView::Impl {
     }
   }
 
-  // What is opaque of a placed grid's field and lies nearer than what `hits` knows; the rays are in its grid and go no further.
-  // Returns which lanes met it.
+  // What is opaque of a placed grid's field and lies nearer than what `hits` knows; the rays are in its grid and go no
+  // further. Returns which lanes met it.
   static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
                                  SceneHits& hits) {
     DensityPacketHits found;
