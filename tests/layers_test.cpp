@@ -66,9 +66,11 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/scene_view.h", {"light", "render"}},
     {"scene/tracer/halved_grid_cache.h", {"render_vk"}},
     {"scene/tracer/instance_tree.h", {"render_vk"}},
-    {"scene/tracer/tree_cache.h", {"render_vk"}},
+    {"scene/tracer/tree_cache.h", {"render", "render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
+    {"trace/density/density_glass.h", {"light", "render_vk", "scene"}},
     {"trace/density/smooth_normal.h", {"render", "scene"}},
+    {"trace/glass_rows.h", {"scene"}},
     {"trace/tree_view.h", {"light", "render", "render_vk"}},
     {"trace/walk.h", {"light"}},
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <optional>
 
 #include <glm/geometric.hpp>
 
@@ -76,6 +77,45 @@ float share_of_area(const DVec3& gradient) {
   return sum > 0.0 ? static_cast<float>(glm::length(gradient) / sum) : 1.0F;
 }
 
+// Where the surface of a solid sample's body crosses an edge of the lattice, from the sample, and how much of its area
+// counts there.
+struct Crossing {
+  DVec3 place{0.0};
+  float share = 1.0F;
+};
+
+// The gradient of a body's own field at a sample: what is solid of others is as far out as it is in.
+DVec3 gradient_of_body(const DensityGrid& field, const VoxelRegistry& types, IVec3 sample, VoxelType type) {
+  const auto own = [&](IVec3 at) {
+    const double density = field.density(at);
+    if (!(density < 0.0)) return density;
+    const VoxelType other = field.material(at);
+    const bool is_same = other == type || (types.is_opaque(other) && types.is_opaque(type));
+    return is_same ? density : -density;
+  };
+  DVec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    IVec3 step{0};
+    step[axis] = 1;
+    gradient[axis] = own(sample + step) - own(sample - step);
+  }
+  return gradient;
+}
+
+// `out`: along the edge. Nothing where it does not, or what is opaque lies there.
+std::optional<Crossing> crossing(const DensityGrid& field, const VoxelRegistry& types, IVec3 sample, VoxelType type,
+                                 IVec3 out) {
+  const double own = field.density(sample);
+  const double next = field.density(sample + out);
+  if (!(next < 0.0)) {
+    const DVec3 place = own / (own - next) * DVec3(out);
+    return Crossing{place, share_of_area(field.gradient_at(DVec3(sample) + place))};
+  }
+  const VoxelType other = field.material(sample + out);
+  if (other == type || !types.is_transparent(other)) return std::nullopt;
+  return Crossing{own / (own + next) * DVec3(out), share_of_area(gradient_of_body(field, types, sample, type))};
+}
+
 }  // namespace
 
 void EmissiveCells::look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
@@ -120,16 +160,12 @@ void EmissiveCells::look_at(const DensityGrid& field, const VoxelRegistry& types
         const VoxelType type = chunk->materials().get(x, y, z);
         if (type >= types.size() || !(types[type].emission > 0.0F)) continue;
         const IVec3 sample = corner + IVec3{x, y, z};
-        const double own = field.density(sample);
         for (const Direction face : kDirections) {
-          const IVec3 out = normal_of(face);
-          const double next = field.density(sample + out);
-          if (next < 0.0) continue;
+          const std::optional<Crossing> found = crossing(field, types, sample, type, normal_of(face));
+          if (!found) continue;
           Sum& sum = sums[((z / kEdge) * kAcross + y / kEdge) * kAcross + x / kEdge];
           sum.add_box(sample, {sample - 1, sample + 1});
-          const DVec3 place = own / (own - next) * DVec3(out);
-          const Vec3 light = emitted_by(types[type]) * share_of_area(field.gradient_at(DVec3(sample) + place));
-          sum.add(DVec3(sample - sum.origin) + place, face, light);
+          sum.add(DVec3(sample - sum.origin) + found->place, face, emitted_by(types[type]) * found->share);
         }
       }
     }

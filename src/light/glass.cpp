@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "light/light_model.h"
+#include "trace/density/density_glass.h"
 #include "trace/walk.h"
 
 namespace quoin {
@@ -24,6 +25,98 @@ bool continues(const GlassBody& body, const GlassBody& next) {
   return next.type == body.type && reaches(body, next.t_enter);
 }
 
+// The bodies of one placed grid along a ray, in their order.
+class BodiesOfGrid {
+ public:
+  BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
+               double max_t, double length, std::vector<GlassBody>& out)
+      : placed_(view.tracer().placed()[static_cast<std::size_t>(index)]),
+        surfaces_(surfaces),
+        index_(index),
+        ray_(ray_in_grid),
+        max_t_(max_t),
+        length_(length),
+        voxels_per_cell_(placed_.voxels_per_cell()),
+        out_(out) {}
+
+  void add_voxels() {
+    begin();
+    GridReader voxels_of(*placed_.voxels);
+    VoxelType type = kAir;
+    const auto largest = [&](IVec3 voxel) {
+      type = voxels_of.get(voxel);
+      return largest_block(type);
+    };
+    trace::visit_blocks(*placed_.transparent, ray_, max_t_, largest, [&](const trace::WalkSpan& span) {
+      GlassBody next = body_of(span.voxel, type, span.t_enter, std::min(span.t_exit, max_t_), span.starts_inside);
+      next.face = span.face;
+      next.exit_face = span.exit_face;
+      return add(next);
+    });
+  }
+
+  void add_field() {
+    begin();
+    const auto largest = [this](VoxelType type) { return largest_block(type); };
+    visit_glass(*placed_.glass, ray_, max_t_, largest, [&](const GlassSpan& span) {
+      GlassBody next = body_of(span.cell, span.type, span.t_enter, span.t_exit, span.starts_inside);
+      next.in_field = next.exit_in_field = true;
+      if (out_.size() > first_ && reaches(out_.back(), next.t_enter)) next.before = out_.back().type;
+      return add(next);
+    });
+  }
+
+ private:
+  void begin() {
+    first_ = out_.size();
+    clarity_ = 0.0;
+  }
+
+  // Blocks along whose diagonal it does not close: it closes at the same voxel as by single ones.
+  [[nodiscard]] double largest_block(VoxelType type) const {
+    const double closing = -static_cast<double>(surfaces_[type].log_clarity) * voxels_per_cell_ * kDiagonal;
+    return (clarity_ - kClosed) / std::max(closing, kLeastClosing);
+  }
+
+  [[nodiscard]] GlassBody body_of(IVec3 voxel, VoxelType type, double t_enter, double t_exit,
+                                  bool starts_inside) const {
+    GlassBody body;
+    body.placed = body.exit_placed = index_;
+    body.voxel = voxel;
+    body.type = type;
+    body.starts_inside = starts_inside;
+    body.t_enter = t_enter;
+    body.t_exit = t_exit;
+    body.voxels = (t_exit - t_enter) * length_ / placed_.voxel_size * voxels_per_cell_;
+    return body;
+  }
+
+  // False where nothing is seen any more.
+  bool add(const GlassBody& next) {
+    if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
+    if (out_.size() > first_ && continues(out_.back(), next)) {
+      out_.back().t_exit = next.t_exit;
+      out_.back().exit_face = next.exit_face;
+      out_.back().voxels += next.voxels;
+    } else {
+      out_.push_back(next);
+    }
+    clarity_ += static_cast<double>(surfaces_[next.type].log_clarity) * next.voxels;
+    return clarity_ > kClosed;
+  }
+
+  const PlacedGrid& placed_;
+  const Surfaces& surfaces_;
+  std::int32_t index_;
+  const Ray& ray_;
+  double max_t_;
+  double length_;  // of the ray's direction, in the world
+  double voxels_per_cell_;
+  std::vector<GlassBody>& out_;
+  std::size_t first_ = 0;
+  double clarity_ = 0.0;
+};
+
 // Puts bodies in the ray's order and makes those one that touch, of neighbouring grids.
 void join_touching(std::vector<GlassBody>& bodies) {
   std::sort(bodies.begin(), bodies.end(), [](const GlassBody& a, const GlassBody& b) {
@@ -36,6 +129,7 @@ void join_touching(std::vector<GlassBody>& bodies) {
         bodies[kept].t_exit = bodies[i].t_exit;
         bodies[kept].exit_placed = bodies[i].exit_placed;
         bodies[kept].exit_face = bodies[i].exit_face;
+        bodies[kept].exit_in_field = bodies[i].exit_in_field;
       }
       bodies[kept].voxels += bodies[i].voxels;
     } else {
@@ -53,39 +147,15 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
   const double length = glm::length(ray_in_view.direction);
   view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
     const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(index)];
-    const double voxels_per_cell = placed.voxels_per_cell();
-    const std::size_t first = out.size();
-    GridReader voxels_of(*placed.voxels);
-    VoxelType type = kAir;
-    double clarity = 0.0;
-    // Blocks along whose diagonal it does not close: it closes at the same voxel as by single ones.
-    const auto largest = [&](IVec3 voxel) {
-      type = voxels_of.get(voxel);
-      const double closing = -static_cast<double>(surfaces[type].log_clarity) * voxels_per_cell * kDiagonal;
-      return (clarity - kClosed) / std::max(closing, kLeastClosing);
-    };
-    trace::visit_blocks(*placed.transparent, ray, max_t, largest, [&](const trace::WalkSpan& span) {
-      const double t_exit = std::min(span.t_exit, max_t);
-      const double voxels = (t_exit - span.t_enter) * length / placed.voxel_size * voxels_per_cell;
-      if (!(voxels > 0.0)) return true;  // an edge that it only touches
-      const GlassBody next{index,        span.voxel, span.face, type,  span.starts_inside,
-                           span.t_enter, t_exit,     voxels,    index, span.exit_face};
-      if (out.size() > first && continues(out.back(), next)) {
-        out.back().t_exit = t_exit;
-        out.back().exit_face = span.exit_face;
-        out.back().voxels += voxels;
-      } else {
-        out.push_back(next);
-      }
-      clarity += surfaces[type].log_clarity * voxels;
-      return clarity > kClosed;
-    });
+    BodiesOfGrid bodies(view, surfaces, index, ray, max_t, length, out);
+    if (placed.transparent != nullptr) bodies.add_voxels();
+    if (placed.glass != nullptr) bodies.add_field();
   });
   join_touching(out);
 }
 
 GlassLook look_of(const Surface& surface, const GlassBody& body) {
-  const auto length = static_cast<float>(std::max(body.voxels, body.starts_inside ? 0.0 : 1.0));
+  const auto length = static_cast<float>(std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0));
   // No length, no matter how dark the material: minus infinity times 0 is not a number.
   const auto through = [&](float logarithm) { return length > 0.0F ? std::exp(logarithm * length) : 1.0F; };
   GlassLook look;
@@ -103,10 +173,24 @@ bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBo
   return t <= body.t_exit + kRayLift * placed.voxel_size / glm::length(ray_in_view.direction);
 }
 
-Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, Direction face, float ior,
-                 float other_ior) {
+DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
+  if (!body.in_field) return DVec3(normal_of(body.face));
+  const DVec3 point = view.grid_from_view(body.placed, ray_in_view.origin + ray_in_view.direction * body.t_enter);
+  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.placed)];
+  return glass_normal(*placed.glass, body.voxel, point, body.type, body.before);
+}
+
+DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
+  if (!body.exit_in_field) return DVec3(normal_of(body.exit_face));
+  const DVec3 point = view.grid_from_view(body.exit_placed, ray_in_view.origin + ray_in_view.direction * body.t_exit);
+  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.exit_placed)];
+  return glass_normal(*placed.glass, IVec3(0), point, body.type, kAir);
+}
+
+Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, const DVec3& normal_in_grid,
+                 float ior, float other_ior) {
   const glm::dmat3& axes = view.tracer().placed()[static_cast<std::size_t>(placed)].world_axes;
-  const Vec3 normal(axes * DVec3(normal_of(face)));
+  const Vec3 normal(axes * normal_in_grid);
   const Vec3 direction(glm::normalize(ray_in_view.direction));
   const float along = glm::dot(direction, normal);
   const float cosine = std::min(std::abs(along), 1.0F);

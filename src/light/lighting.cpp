@@ -309,9 +309,10 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
 
 float Lighting::smooth_openness(const SurfacePoint& point) const {
   const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
+  if (placed.opaque_field == nullptr) return 1.0F;  // glass darkens nothing
   SmoothOcclusionOptions options = options_.smooth;
   options.spread /= static_cast<float>(placed.voxels_per_cell());  // as far as in the full field
-  return 1.0F - smooth_occlusion(placed.field->field(), point.position, point.normal, options);
+  return 1.0F - smooth_occlusion(placed.opaque_field->field(), point.position, point.normal, options);
 }
 
 std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const {

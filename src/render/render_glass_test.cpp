@@ -182,7 +182,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   // At an angle to the upper face, from outside or, with a cosine below 0, from inside.
   const auto at = [&](double cosine, float ior, float other) {
     const DVec3 direction = axes * DVec3(std::sqrt(1.0 - cosine * cosine), -cosine, 0.0);
-    return mirror_at(view, {DVec3(0.0), 7.0 * direction}, 0, Direction::PosY, ior, other);
+    return mirror_at(view, {DVec3(0.0), 7.0 * direction}, 0, DVec3(0, 1, 0), ior, other);
   };
   EXPECT_NEAR(at(1.0, 1.0F, 1.5F).share, 0.04F, 1e-6F);
   EXPECT_NEAR(at(1.0, 1.0F, 1.5F).up, axes[1].y, 1e-6);

@@ -123,41 +123,58 @@ Tile::Sight Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {
   const bool has_surfaces = light.glass_surfaces && light.shading == Shading::Lit;
   const GlassBody* last = nullptr;
   for (const GlassBody& body : glass_) {
-    if (has_surfaces && last != nullptr && reaches(*last, body.t_enter)) {
-      meet_surface(ray, last, &body, sight);
-    } else if (has_surfaces) {
-      if (last != nullptr) meet_surface(ray, last, nullptr, sight);
-      if (!body.starts_inside) meet_surface(ray, nullptr, &body, sight);
+    const DVec3 normal = normal_entered(*context_->view, ray, body);
+    const bool touches = last != nullptr && reaches(*last, body.t_enter);
+    if (has_surfaces && last != nullptr && !touches) leave_body(ray, *last, sight);
+    if (has_surfaces && (touches || !body.starts_inside)) {
+      enter_body(ray, touches ? last : nullptr, body, normal, sight);
     }
     last = &body;
     if (as_solid && body.starts_inside) continue;
     const GlassLook look = as_solid ? GlassLook{Vec3(0.0F), 1.0F} : look_of(surfaces[body.type], body);
-    SurfacePoint& point = add_point(pixel, sight.passed * look.own);
-    point.voxel = body.voxel;
-    point.face = body.face;
-    point.placed = body.placed;
-    point.position = on_face(context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter),
-                             body.voxel, body.face);
-    // Seen from inside, it tints and glows but has no surface.
-    if (body.starts_inside) point.kind = PointKind::Glow;
+    fill_in(ray, body, normal, add_point(pixel, sight.passed * look.own));
     sight.passed *= look.passed;
   }
   if (has_surfaces && last != nullptr && !lies_on_opaque(*context_->view, ray, *last, max_t)) {
-    meet_surface(ray, last, nullptr, sight);
+    leave_body(ray, *last, sight);
   }
   return sight;
 }
 
-void Tile::meet_surface(const Ray& ray, const GlassBody* from, const GlassBody* to, Sight& sight) const {
+void Tile::fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const {
+  point.voxel = body.voxel;
+  point.face = body.face;
+  point.placed = body.placed;
+  point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
+  if (body.in_field) {
+    point.in_field = true;
+    point.normal = Vec3(normal);
+    point.face = nearest_direction(normal);
+    point.type = body.type;
+  } else {
+    point.position = on_face(point.position, body.voxel, body.face);
+  }
+  // Seen from inside, it tints and glows but has no surface.
+  if (body.starts_inside) point.kind = PointKind::Glow;
+}
+
+void Tile::enter_body(const Ray& ray, const GlassBody* from, const GlassBody& to, const DVec3& normal,
+                      Sight& sight) const {
   const Surfaces& surfaces = context_->lighting->surfaces();
   const float before = from != nullptr ? surfaces[from->type].ior : 1.0F;
-  const float behind = to != nullptr ? surfaces[to->type].ior : 1.0F;
-  const Mirror mirror = to != nullptr
-                            ? mirror_at(*context_->view, ray, to->placed, to->face, before, behind)
-                            : mirror_at(*context_->view, ray, from->exit_placed, from->exit_face, before, behind);
+  meet_surface(mirror_at(*context_->view, ray, to.placed, normal, before, surfaces[to.type].ior), from, sight);
+}
+
+void Tile::leave_body(const Ray& ray, const GlassBody& from, Sight& sight) const {
+  const float ior = context_->lighting->surfaces()[from.type].ior;
+  const DVec3 normal = normal_left(*context_->view, ray, from);
+  meet_surface(mirror_at(*context_->view, ray, from.exit_placed, normal, ior, 1.0F), &from, sight);
+}
+
+void Tile::meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sight) const {
   Vec3 mirrored = sight.passed * mirror.share * context_->lighting->sky(mirror.up);
   // From within it goes through the body once more.
-  if (from != nullptr) mirrored *= look_of(surfaces[from->type], *from).passed;
+  if (from != nullptr) mirrored *= look_of(context_->lighting->surfaces()[from->type], *from).passed;
   sight.mirrored += mirrored;
   sight.passed *= 1.0F - mirror.share;
 }

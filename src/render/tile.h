@@ -59,8 +59,13 @@ class Tile {
   };
   // Adds what is seen of the glass before `max_t`, but for what its surfaces mirror.
   Sight add_glass(const Ray& ray, double max_t, std::size_t pixel);
-  // The surface between two bodies that touch, or between one and air, which is null.
-  void meet_surface(const Ray& ray, const GlassBody* from, const GlassBody* to, Sight& sight) const;
+  // Where a ray enters a body, from air (null) or from one that touches it; `normal`: of that surface, in its grid.
+  void enter_body(const Ray& ray, const GlassBody* from, const GlassBody& to, const DVec3& normal, Sight& sight) const;
+  // Where it leaves a body into air.
+  void leave_body(const Ray& ray, const GlassBody& from, Sight& sight) const;
+  // What the surface mirrors on the way from a body, or from air, which is null.
+  void meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sight) const;
+  void fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const;
   // A point that is to be filled in: what it sends counts so much in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
   void light_points();

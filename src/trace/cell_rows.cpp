@@ -30,18 +30,9 @@ std::uint64_t CellRows::either_end(int y, int z) const {
 }
 
 Slab CellRows::read(int y, int z, SlabRows& rows) const {
-  // Along x, then along y, then along z.
-  std::array<std::uint64_t, 4> before{};
-  for (int dz = 0; dz <= 4; ++dz) {
-    std::array<std::uint64_t, 5> ends;
-    for (int dy = 0; dy <= 4; ++dy) ends[static_cast<std::size_t>(dy)] = either_end(y + dy, z + dz);
-    for (std::size_t dy = 0; dy < 4; ++dy) {
-      const std::uint64_t both = ends[dy] | ends[dy + 1];
-      if (dz > 0) rows[static_cast<std::size_t>(dz - 1) * 4 + dy] = before[dy] | both;
-      before[dy] = both;
-    }
-  }
-  return slab_of(rows);
+  const auto ends = [this](int at_y, int at_z) { return either_end(at_y, at_z); };
+  return join_corners(
+      y, z, ends, [](std::uint64_t a, std::uint64_t b) { return a | b; }, rows);
 }
 
 }  // namespace quoin::trace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <quoin/grid/density_grid.h>
@@ -8,6 +9,24 @@
 #include "trace/chunk_rows.h"
 
 namespace quoin::trace {
+
+/// 4x4 rows of cells between samples, of what `join` makes of their eight corners. `ends(y, z)`: of a row of samples,
+/// which cells along x have one of their two ends, or both; y and z up to 64.
+template <class Ends, class Join>
+Slab join_corners(int y, int z, const Ends& ends, const Join& join, SlabRows& rows) {
+  // Along x, then along y, then along z.
+  std::array<std::uint64_t, 4> before{};
+  for (int dz = 0; dz <= 4; ++dz) {
+    std::array<std::uint64_t, 5> along_x;
+    for (int dy = 0; dy <= 4; ++dy) along_x[static_cast<std::size_t>(dy)] = ends(y + dy, z + dz);
+    for (std::size_t dy = 0; dy < 4; ++dy) {
+      const std::uint64_t both = join(along_x[dy], along_x[dy + 1]);
+      if (dz > 0) rows[static_cast<std::size_t>(dz - 1) * 4 + dy] = join(before[dy], both);
+      before[dy] = both;
+    }
+  }
+  return slab_of(rows);
+}
 
 /// Rows of 64^3 cells between samples as bits: those with a solid corner. Cell (x, y, z) of a chunk lies between its
 /// sample (x, y, z) and the sample one further along each axis, which may be the next chunk's.

@@ -76,20 +76,7 @@ UniformBlocks uniform_blocks(const Chunk& chunk, const VoxelRegistry& types) {
   constexpr int kCell = 64;
   UniformBlocks blocks;
   for (const VoxelType type : chunk.types()) {
-    if (!types.is_transparent(type) || chunk.count(type) < kCell) continue;
-    const ChunkRows rows(chunk, type);
-    RowsBox unused;
-    BrickRow four;
-    for (std::size_t row = 0; row < 16; ++row) {
-      const bool is_mixed = four.read(rows, static_cast<int>(row & 3) * 16, static_cast<int>(row >> 2) * 16, unused);
-      for (std::size_t x = 0; x < 4; ++x) {
-        std::uint64_t cells = is_mixed || !four.is_full ? 0 : kAll;
-        for (std::size_t i = 0; is_mixed && i < 64; ++i) cells |= std::uint64_t{four.bricks[x][i] == kAll} << i;
-        blocks.cells[x + 4 * row] |= cells;
-        blocks.bricks |= std::uint64_t{cells == kAll} << (x + 4 * row);
-      }
-    }
-    blocks.is_whole |= chunk.count(type) == static_cast<int>(kChunkVoxels);
+    if (types.is_transparent(type) && chunk.count(type) >= kCell) add_uniform(ChunkRows(chunk, type), blocks);
   }
   return blocks;
 }

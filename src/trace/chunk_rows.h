@@ -125,4 +125,24 @@ bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
   return empty != 16 && full != 16;
 }
 
+/// Adds the blocks that are full in some rows, of one type.
+template <class Rows>
+void add_uniform(const Rows& rows, UniformBlocks& blocks) {
+  constexpr std::uint64_t kAll = ~std::uint64_t{0};
+  std::uint64_t bricks = 0;
+  RowsBox unused;
+  BrickRow four;
+  for (std::size_t row = 0; row < 16; ++row) {
+    const bool is_mixed = four.read(rows, static_cast<int>(row & 3) * 16, static_cast<int>(row >> 2) * 16, unused);
+    for (std::size_t x = 0; x < 4; ++x) {
+      std::uint64_t cells = is_mixed || !four.is_full ? 0 : kAll;
+      for (std::size_t i = 0; is_mixed && i < 64; ++i) cells |= std::uint64_t{four.bricks[x][i] == kAll} << i;
+      blocks.cells[x + 4 * row] |= cells;
+      bricks |= std::uint64_t{cells == kAll} << (x + 4 * row);
+    }
+  }
+  blocks.bricks |= bricks;
+  blocks.is_whole |= bricks == kAll;
+}
+
 }  // namespace quoin::trace

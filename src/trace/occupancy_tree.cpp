@@ -10,6 +10,7 @@
 #include "grid/coordinate_hash.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
+#include "trace/glass_rows.h"
 #include "trace/tree_view.h"
 
 namespace quoin {
@@ -49,6 +50,18 @@ unsigned bit_of(IVec3 unit) {
 // A chunk and those below it, some of whose cells end in it.
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
+
+// The chunks whose cells end in what an edit of a field changed.
+std::vector<IVec3> cells_reached(const DensityChanges& changes) {
+  std::vector<IVec3> reached;
+  for (const DensityChange& each : changes.items) {
+    for (const IVec3 offset : kBelow) {
+      if (each.affects(offset, 1)) reached.push_back(each.chunk + offset);
+    }
+  }
+  sort_and_unite(reached);
+  return reached;
+}
 
 // Where cells between the samples of some chunks lie.
 std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
@@ -233,14 +246,23 @@ struct OccupancyTree::Impl {
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
     if (voxels == nullptr) return drop(chunk);
     const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk);
-    if (which == Occupancy::Transparent) find_uniform(*voxels, types, chunk);
+    if (which == Occupancy::Transparent) {
+      set_uniform_blocks(chunk, [&] { return trace::uniform_blocks(*voxels, types); });
+    }
     return changed;
   }
 
-  void find_uniform(const Chunk& voxels, const VoxelRegistry& types, IVec3 chunk) {
+  std::uint64_t put_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
+    const std::uint64_t changed = put(trace::GlassRows(field, types, chunk), chunk);
+    set_uniform_blocks(chunk, [&] { return trace::uniform_glass(field, types, chunk); });
+    return changed;
+  }
+
+  template <class Find>
+  void set_uniform_blocks(IVec3 chunk, const Find& find_blocks) {
     uniform.resize(chunk_nodes.size());
     const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
-    if (index != 0) uniform[index] = trace::uniform_blocks(voxels, types);
+    if (index != 0) uniform[index] = find_blocks();
   }
 
   // Puts 4 bits in place of those at `bit`.
@@ -376,6 +398,15 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field) {
   return tree;
 }
 
+OccupancyTree OccupancyTree::build(const DensityGrid& field, const VoxelRegistry& types) {
+  OccupancyTree tree(Occupancy::Transparent);
+  std::vector<IVec3> chunks = field.chunks();
+  std::erase_if(chunks, [&](IVec3 chunk) { return !trace::has_glass(*field.find_chunk(chunk), types); });
+  for (const IVec3 chunk : cells_of(chunks)) tree.impl_->put_glass(field, types, chunk);
+  tree.finish_build();
+  return tree;
+}
+
 void OccupancyTree::finish_build() {
   impl_->chunk_nodes.shrink_to_fit();
   impl_->bricks.shrink_to_fit();
@@ -403,17 +434,22 @@ void OccupancyTree::update(const DensityGrid& field, const DensityChanges& chang
     *this = build(field);
     return;
   }
-  std::vector<IVec3> reached;
-  for (const DensityChange& each : changes.items) {
-    for (const IVec3 offset : kBelow) {
-      if (each.affects(offset, 1)) reached.push_back(each.chunk + offset);
-    }
-  }
-  sort_and_unite(reached);
   std::vector<Impl::Changed> changed;
-  changed.reserve(reached.size());
-  for (const IVec3 chunk : reached) {
+  for (const IVec3 chunk : cells_reached(changes)) {
     changed.push_back({chunk, impl_->put(trace::CellRows(field, chunk), chunk)});
+  }
+  impl_->finish(changed);
+  view_ = impl_->kernel_view();
+}
+
+void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
+  if (changes.all) {
+    *this = build(field, types);
+    return;
+  }
+  std::vector<Impl::Changed> changed;
+  for (const IVec3 chunk : cells_reached(changes)) {
+    changed.push_back({chunk, impl_->put_glass(field, types, chunk)});
   }
   impl_->finish(changed);
   view_ = impl_->kernel_view();

@@ -57,10 +57,10 @@ struct Picture {
 /// Light:       see LightOptions; computed linearly, each sample clamped to 0..1, averaged, and rounded to sRGB bytes
 ///              exactly. Behind the scene is a sky, which the exposure does not change, and the sun only with
 ///              LightOptions::sky_follows_sun.
-/// Transparent: a run of voxels of one type is one body, whatever chunks and grids it crosses. It tints what is behind
-///              it by its length (one voxel of alpha a and colour c lets (1 - a) (1 - a (1 - c)) through; no body
-///              counts as less than one voxel), shows its own lit colour in place of what it covers, tints the sun's
-///              light and does not occlude. From inside it tints and glows but has no surface.
+/// Transparent: a run of voxels, or of a field's solid, of one type is one body, whatever chunks and grids it crosses.
+///              It tints what is behind it by its length (one voxel of alpha a and colour c lets
+///              (1 - a) (1 - a (1 - c)) through; none of voxels counts as less than one), shows its own lit colour for
+///              what it covers, tints the sun's light and does not occlude. From inside it tints and glows, no more.
 /// Solid:       from inside an opaque voxel everything is that voxel's own colour, unlit.
 ///
 /// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.

@@ -71,7 +71,8 @@ class Impostor {
   /// The same, with a tree of its own.
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
 
-  /// Of voxels and field. Cost: besides, two microseconds a piece of the field's surface and 10 ns for each view.
+  /// Of what is opaque of voxels and field. Cost: besides, two microseconds a piece of the field's surface and 10 ns for
+  /// each view.
   static Impostor build(const SceneGrid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
 
   /// The impostor of the same grid after an edit: what `build` with the same options would give, bit by bit. Only
@@ -86,7 +87,7 @@ class Impostor {
   [[nodiscard]] const ImpostorOptions& options() const { return options_; }
   /// Around all voxels of the grid, transparent ones too, and its field.
   [[nodiscard]] const ContentSphere& content() const { return content_; }
-  /// Of the opaque voxels and the field.
+  /// Of the opaque voxels and of what is opaque of the field.
   [[nodiscard]] const IBox& box() const { return box_; }
   [[nodiscard]] bool is_empty() const { return box_.empty(); }
   /// It is empty and the grid is to be traced: it has a field with more faces than there are texels, or more than a
@@ -98,7 +99,7 @@ class Impostor {
 
  private:
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                        const DensityTree* field, const ImpostorOptions& options);
+                        const DensityTree* field, const IBox& whole, const ImpostorOptions& options);
 
   ImpostorOptions options_;
   ContentSphere content_;
@@ -139,7 +140,8 @@ struct FarInstance {
 /// Depth:    nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
 ///           show nothing of an instance keep their colour and depth.
 /// Left out: instances whose content's centre is at or behind the camera's plane or not finite, or whose content's
-///           radius spans less than a pixel; those that `scene` does not hold or holds halved; transparent voxels.
+///           radius spans less than a pixel; those that `scene` does not hold or holds halved; what is transparent of
+///           voxels and fields.
 ///
 /// Requires: the camera and options are such that CpuRenderer accepts them; `picture` has their size, and depth.
 ///           One sample a pixel is taken, at its centre.

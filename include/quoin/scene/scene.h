@@ -28,8 +28,8 @@ struct SceneGrid {
   /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may
   /// lie outside after edits; `declared_box` says how large the grid counts as.
   IBox canvas;
-  /// The densities; its materials are types of the scene's registry. In pictures transparent ones count as opaque; in
-  /// meshes (mesh_scene_smoothly) each is a body of its own.
+  /// The densities; its materials are types of the scene's registry. Pictures by rays see through transparent ones.
+  /// Where these meet opaque ones in the solid, samples of both are to have their distance to where they meet.
   DensityGrid field = DensityGrid();
 
   /// The smallest box of whole coordinates around the voxels and the field's solid; empty where there are none.

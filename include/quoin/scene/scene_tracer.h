@@ -17,6 +17,8 @@
 
 namespace quoin {
 
+class DensityGlass;
+
 /// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
 /// Lifetime: owns nothing; the tracer and its scene must outlive it, and an update ends it.
 struct PlacedGrid {
@@ -27,6 +29,8 @@ struct PlacedGrid {
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
   const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
+  const DensityTree* opaque_field = nullptr;   ///< what of the field is opaque: `field` itself where all is; or null
+  const DensityGlass* glass = nullptr;         ///< what of the field is transparent; null when nothing is
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units a voxel of `voxels`
@@ -67,8 +71,8 @@ class SceneTracer {
 
   /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, voxels and
   /// field, or less often where that would change the volume of either by more than an eighth or leave more than an
-  /// eighth of the field's surface a sample thin. The others, which are out of the
-  /// picture but may cast shadows into it, stay as they are.
+  /// eighth of the field's surface a sample thin; never where anything of the field is transparent. The others, which
+  /// are out of the picture but may cast shadows into it, stay as they are.
   ///
   /// Lifetime: this one, which keeps the halved grids so that only the first picture pays for them, must outlive the
   ///           result, without an update. An update of the result makes it a tracer of whole grids.
@@ -77,6 +81,7 @@ class SceneTracer {
 
   /// In the order of the instances' handles.
   [[nodiscard]] const std::vector<PlacedGrid>& placed() const;
+  /// Whether any of them has transparent voxels, or anything transparent in its field.
   [[nodiscard]] bool has_transparent() const;
 
  private:

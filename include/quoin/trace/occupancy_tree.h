@@ -47,6 +47,10 @@ class OccupancyTree {
   /// Cost: as that of a grid.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field);
 
+  /// Of a field: of those cells the ones with a solid corner of a transparent material. Cost: 40 to 100 microseconds a
+  /// chunk that has such.
+  static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
+
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///
   /// Requires: `changes` are those since the last update, or what was built; no type has another visibility since then
@@ -58,6 +62,8 @@ class OccupancyTree {
   /// The same of the field of which it was built. Cost: as that of a grid; for an edit on a chunk's lower faces also
   /// the chunks below.
   void update(const DensityGrid& field, const DensityChanges& changes);
+  /// The same of what is transparent of the field.
+  void update(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
   /// The smallest box around the occupied voxels, to the voxel.
   [[nodiscard]] IBox bounds() const;

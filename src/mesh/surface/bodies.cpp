@@ -56,6 +56,10 @@ std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vect
   return bodies;
 }
 
+DensityChunk chunk_of_body(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body) {
+  return holds_others(whole, types, body) ? without_others(whole, types, body) : whole;
+}
+
 DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body, Threads threads) {
   DensityGrid field(whole.band());
   std::vector<IVec3> places = whole.chunks();
@@ -70,10 +74,8 @@ DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, 
     places = std::move(near);
   }
   std::vector<std::optional<DensityChunk>> made(places.size());
-  parallel_for(places.size(), threads, [&](std::size_t i) {
-    const DensityChunk& chunk = *whole.find_chunk(places[i]);
-    made[i] = holds_others(chunk, types, body) ? without_others(chunk, types, body) : chunk;
-  });
+  parallel_for(places.size(), threads,
+               [&](std::size_t i) { made[i] = chunk_of_body(*whole.find_chunk(places[i]), types, body); });
   for (std::size_t i = 0; i < places.size(); ++i) field.put_chunk(places[i], std::move(*made[i]));
   return field;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <quoin/core/parallel.h>
+#include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -27,5 +28,8 @@ namespace quoin::smooth {
 /// are no others; chunks that are not near the body are left out where it is transparent.
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
+
+/// A chunk of such a field.
+[[nodiscard]] DensityChunk chunk_of_body(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 
 }  // namespace quoin::smooth

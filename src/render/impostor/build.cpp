@@ -13,6 +13,7 @@
 #include "light/occlusion_directions.h"
 #include "render/impostor/seen.h"
 #include "render/shell/shell.h"
+#include "scene/tracer/tree_cache.h"
 
 namespace quoin {
 namespace {
@@ -119,7 +120,7 @@ struct Subject {
   const Grid* grid;
   const VoxelRegistry* types;
   const OccupancyTree* opaque;
-  const DensityTree* field;  // null: none
+  const DensityTree* field;  // what is opaque of its field; null: none
   ContentSphere content;
   IBox box;  // of what is drawn
   int edge = 0;
@@ -128,11 +129,10 @@ struct Subject {
   bool is_left_to_rays = false;
 
   Subject(const Grid& of_grid, const VoxelRegistry& of_types, const OccupancyTree& tree, const DensityTree* of_field,
-          const ImpostorOptions& options)
+          const IBox& whole, const ImpostorOptions& options)
       : grid(&of_grid), types(&of_types), opaque(&tree), field(of_field) {
-    const IBox of_surface = field == nullptr ? IBox{} : field->field().bounds();
-    content = content_sphere(unite(of_grid.bounds(), of_surface));
-    box = unite(tree.bounds(), of_surface);
+    content = content_sphere(whole);
+    box = unite(tree.bounds(), field == nullptr ? IBox{} : field->field().bounds());
     if (box.empty()) return;
     edge = edge_for(content, options);
     // Beyond that, a ray for each texel takes less time.
@@ -213,9 +213,9 @@ std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const I
 }  // namespace
 
 Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                         const DensityTree* field, const ImpostorOptions& options) {
+                         const DensityTree* field, const IBox& whole, const ImpostorOptions& options) {
   QUOIN_ASSERT(options.edge >= 16 && options.edge <= 1024, "16 to 1,024 texels");
-  const Subject subject(grid, types, opaque, field, options);
+  const Subject subject(grid, types, opaque, field, whole, options);
   Impostor made;
   made.options_ = options;
   made.content_ = subject.content;
@@ -232,21 +232,22 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
 
 Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
                          const ImpostorOptions& options) {
-  return build(grid, types, opaque, nullptr, options);
+  return build(grid, types, opaque, nullptr, grid.bounds(), options);
 }
 
 Impostor Impostor::build(const SceneGrid& grid, const VoxelRegistry& types, const ImpostorOptions& options) {
   const OccupancyTree opaque = OccupancyTree::build(grid.grid, types, Occupancy::Opaque);
-  if (grid.field.chunk_count() == 0) return build(grid.grid, types, opaque, nullptr, options);
-  const DensityTree field(grid.field);
-  return build(grid.grid, types, opaque, field.cells().bounds().empty() ? nullptr : &field, options);
+  TreeCache trees;
+  trees.update(grid.field, types);
+  const IBox whole = unite(grid.grid.bounds(), grid.field.bounds());
+  return build(grid.grid, types, opaque, trees.opaque_field(), whole, options);
 }
 
 Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const {
   if (changes.empty()) return *this;
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
   const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
-  const Subject subject(grid, types, opaque, nullptr, options_);
+  const Subject subject(grid, types, opaque, nullptr, grid.bounds(), options_);
   const bool is_comparable = !is_empty() && changed && faces_->is_whole && subject.shell &&
                              subject.edge == faces_->edge && subject.content.centre == content_.centre &&
                              subject.content.radius == content_.radius;

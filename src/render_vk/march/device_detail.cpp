@@ -114,8 +114,9 @@ Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::
   Level& known = levels_[{grid, coarse.level}];
   level = &known;
   if (known.last_use == picture_) return {};
+  const TreeCache& trees = coarse.trees;
   Status done = known.voxels.update(
-      *memory_, {coarse.voxels, &coarse.trees.opaque(), coarse.trees.transparent(), coarse.trees.field()});
+      *memory_, {coarse.voxels, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
   known.last_use = picture_;
   known.index = static_cast<std::int32_t>(table.size());
   table.push_back(known.voxels.shader_grid());

@@ -141,11 +141,12 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
   }
   parallel_for(all.size(), threads, [&](std::size_t i) {
     all[i].first->trees.update(all[i].second->grid, scene.types);
-    all[i].first->trees.update(all[i].second->field);
+    all[i].first->trees.update(all[i].second->field, scene.types);
   });
   for (const auto& [known, grid] : all) {
     const TreeCache& trees = known->trees;
-    Status done = known->voxels.update(*memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.field()});
+    Status done = known->voxels.update(
+        *memory_, {&grid->grid, &trees.opaque(), trees.transparent(), trees.opaque_field(), trees.glass()});
     if (!done) return done;
   }
   return {};
@@ -166,10 +167,12 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   if (Status done = update_grids(scene, changed, threads); !done) return done;
   if (places) finish_placed(scene);
   if (places || !changed.empty()) {
-    placement_.has_transparent = std::any_of(grids_.begin(), grids_.end(),
-                                             [](const auto& grid) { return grid.second.voxels.has_transparent(); });
-    placement_.has_fields =
-        std::any_of(grids_.begin(), grids_.end(), [](const auto& grid) { return grid.second.voxels.has_field(); });
+    const auto any = [this](bool (DeviceGrid::*has)() const) {
+      return std::any_of(grids_.begin(), grids_.end(), [=](const auto& grid) { return (grid.second.voxels.*has)(); });
+    };
+    placement_.has_transparent = any(&DeviceGrid::has_transparent);
+    placement_.has_fields = any(&DeviceGrid::has_field);
+    placement_.has_field_glass = any(&DeviceGrid::has_field_glass);
   }
   if (!scene.types.changes_since(followed_types_).empty()) {
     if (Status done = put_surfaces(scene.types); !done) return done;

@@ -45,7 +45,8 @@ struct Placement {
   std::uint64_t grids = 0;           ///< the table's address
   bool has_transparent = false;
   bool has_fields = false;
-  std::vector<ShaderFar> far;  ///< what shows of impostors, in the order of the instances
+  bool has_field_glass = false;  ///< something of these is transparent
+  std::vector<ShaderFar> far;    ///< what shows of impostors, in the order of the instances
 };
 /// Puts a table in place, or in a larger one.
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);

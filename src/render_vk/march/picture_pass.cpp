@@ -197,7 +197,7 @@ Status PicturePass::finish_glass(ShaderPush push) {
       const VkDeviceSize pending = offsetof(ShaderCounters, pending);
       device_->api().vkCmdFillBuffer(commands, output_.handle(), pending, 4, 0);
       device_->separate(commands);
-      pipelines_->dispatch(commands, Pass::Glass, push);
+      pipelines_->dispatch(commands, variant_of(Pass::Glass), push);
       pipelines_->dispatch(commands, variant_of(Pass::LightWithGlass), push);
       const VkBufferCopy counters{0, 0, sizeof(ShaderCounters)};
       device_->api().vkCmdCopyBuffer(commands, output_.handle(), results_.handle(), 1, &counters);

@@ -62,7 +62,10 @@ class PicturePass {
   Status take_sample(std::span<const Tile> tiles, int sample);
   Status resolve(std::span<const Tile> tiles);
   Status finish_glass(ShaderPush push);
-  [[nodiscard]] Pass variant_of(Pass pass) const { return placement_->has_fields ? with_fields(pass) : pass; }
+  [[nodiscard]] Pass variant_of(Pass pass) const {
+    if (placement_->has_field_glass) return with_field_glass(pass);
+    return placement_->has_fields ? with_fields(pass) : pass;
+  }
   Status read_tile(const Tile& tile, Picture& picture);
   Status read_counters(ShaderCounters& counters);
   [[nodiscard]] ShaderPush push_for(const Tile& tile) const;

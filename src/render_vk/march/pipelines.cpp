@@ -43,6 +43,7 @@ std::span<const std::uint32_t> code_of(Pass pass) {
     case Pass::PrimaryWithFields:
       return kPrimary;
     case Pass::Glass:
+    case Pass::FieldGlass:
       return kGlass;
     case Pass::Resolve:
       return kResolve;
@@ -56,6 +57,9 @@ std::span<const std::uint32_t> code_of(Pass pass) {
 bool is_of_fields(Pass pass) {
   return pass == Pass::PrimaryWithFields || pass == Pass::LightWithFields || pass == Pass::LightWithGlassAndFields;
 }
+bool is_of_field_glass(Pass pass) {
+  return pass == Pass::FieldGlass || pass == Pass::LightWithFieldGlass;
+}
 
 }  // namespace
 
@@ -64,17 +68,25 @@ Result<std::unique_ptr<Pipelines>> Pipelines::create(Device& device) {
   VkResult result = make_push_layout(device, VK_SHADER_STAGE_COMPUTE_BIT, sizeof(ShaderPush), made->layout_);
   for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
     const auto pass = static_cast<Pass>(i);
-    if (!is_of_fields(pass)) result = made->make(pass);
+    if (!is_of_fields(pass) && !is_of_field_glass(pass)) result = made->make(pass);
   }
   if (Status status = device.check(result, "compiling shaders"); !status) return status.error();
   return made;
 }
 
 Status Pipelines::add_fields() {
+  return add(is_of_fields);
+}
+
+Status Pipelines::add_field_glass() {
+  return add(is_of_field_glass);
+}
+
+Status Pipelines::add(bool (*is_wanted)(Pass)) {
   VkResult result = VK_SUCCESS;
   for (std::size_t i = 0; i < kPassCount && result == VK_SUCCESS; ++i) {
     const auto pass = static_cast<Pass>(i);
-    if (is_of_fields(pass) && pipelines_[i] == VK_NULL_HANDLE) result = make(pass);
+    if (is_wanted(pass) && pipelines_[i] == VK_NULL_HANDLE) result = make(pass);
   }
   return device_->check(result, "compiling shaders");
 }
@@ -95,11 +107,13 @@ VkResult Pipelines::make(Pass pass) {
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
   info.stage.pName = "main";
   // Passes of one shader differ in its constants.
-  const bool is_second =
-      pass == Pass::LightWithGlass || pass == Pass::LightWithGlassAndFields || pass == Pass::FarFaces;
-  const std::array<VkBool32, 2> values{is_second, is_of_fields(pass)};
+  const bool is_second = pass == Pass::LightWithGlass || pass == Pass::LightWithGlassAndFields ||
+                         pass == Pass::LightWithFieldGlass || pass == Pass::FarFaces;
+  const bool has_field_glass = is_of_field_glass(pass);
+  const std::array<VkBool32, 3> values{is_second, is_of_fields(pass) || has_field_glass, has_field_glass};
   constexpr std::array kEntries = {VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
-                                   VkSpecializationMapEntry{4, sizeof(VkBool32), sizeof(VkBool32)}};
+                                   VkSpecializationMapEntry{4, sizeof(VkBool32), sizeof(VkBool32)},
+                                   VkSpecializationMapEntry{6, 2 * sizeof(VkBool32), sizeof(VkBool32)}};
   const VkSpecializationInfo constants{kEntries.size(), kEntries.data(), sizeof values, values.data()};
   info.stage.pSpecializationInfo = &constants;
   VkResult result = make_shader(*device_, code_of(pass), info.stage.module);

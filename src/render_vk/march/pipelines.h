@@ -22,10 +22,12 @@ enum class Pass : std::uint8_t {
   PrimaryWithFields,  ///< these where grids have fields
   LightWithFields,
   LightWithGlassAndFields,
+  FieldGlass,  ///< these where something of fields is transparent
+  LightWithFieldGlass,
   Resolve,  ///< the samples' mean as bytes
   Swap,     ///< red and blue change places, of a whole picture
 };
-constexpr std::size_t kPassCount = 11;
+constexpr std::size_t kPassCount = 13;
 
 /// A pass as it is where grids have fields.
 [[nodiscard]] constexpr Pass with_fields(Pass pass) {
@@ -34,12 +36,20 @@ constexpr std::size_t kPassCount = 11;
   return pass == Pass::LightWithGlass ? Pass::LightWithGlassAndFields : pass;
 }
 
+/// A pass as it is where something of grids' fields is transparent.
+[[nodiscard]] constexpr Pass with_field_glass(Pass pass) {
+  if (pass == Pass::Glass) return Pass::FieldGlass;
+  return pass == Pass::LightWithGlass ? Pass::LightWithFieldGlass : with_fields(pass);
+}
+
 class Pipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
   /// Makes what `with_fields` names, once.
   [[nodiscard]] Status add_fields();
+  /// Makes what `with_field_glass` names besides, once.
+  [[nodiscard]] Status add_field_glass();
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
@@ -53,6 +63,7 @@ class Pipelines {
  private:
   explicit Pipelines(Device& device) : device_(&device) {}
   VkResult make(Pass pass);
+  Status add(bool (*is_wanted)(Pass));
   void dispatch(VkCommandBuffer commands, Pass pass, std::span<const std::byte> push, std::uint32_t across,
                 std::uint32_t down) const;
 

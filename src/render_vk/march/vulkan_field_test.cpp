@@ -1,5 +1,6 @@
 // Pictures of fields of densities by a device, beside those of the processor.
 
+#include <array>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -189,6 +190,159 @@ TEST_F(VulkanField, EditsAreTakenOver) {
   EXPECT_EQ(taken(scene, camera, options).pixels_hit, 0);
   field.add_sphere({0.0, 0.0, 0.0}, 20.0, types.stone);
   compare(scene, camera, options, "field_again");
+}
+
+// Hills with a lake, a ball of glass half in it, another beside a house, which has a window; in one field.
+SceneGrid lakeside(const FieldTypes& types, VoxelType water) {
+  SceneGrid grid;
+  grid.field.edit({{-90, -60, -90}, {90, 40, 90}}, [&](IVec3 p, DensitySample) {
+    const double hill = 12.0 * std::sin(0.05 * p.x) * std::cos(0.06 * p.z);
+    const double ground = 0.8 * (p.y - hill);
+    const double level = p.y + 2.3;
+    const double ball = glm::distance(DVec3(p), DVec3{-32, 0, 20}) - 9.0;
+    const double depth = std::min({std::abs(ground), std::abs(level), std::abs(ball)});
+    if (ground < 0.0) return DensitySample{static_cast<float>(level < 0.0 ? -depth : ground), types.ground};
+    if (ball < 0.0) return DensitySample{static_cast<float>(-depth), types.glass};
+    return DensitySample{static_cast<float>(level < 0.0 ? -depth : std::min({ground, level, ball})), water};
+  });
+  grid.field.add_sphere({40, 14, 50}, 7.0, types.glass);
+  grid.grid.fill_box({{30, -2, 30}, {44, 22, 44}}, types.stone);
+  grid.grid.fill_box({{33, 4, 44}, {41, 14, 45}}, types.glass);
+  grid.grid.fill_box({{-40, -8, -40}, {-36, 10, -20}}, types.stone);
+  return grid;
+}
+
+VoxelType add_water(Scene& scene) {
+  VoxelProperties water;
+  water.colour = {60, 120, 160, 40};
+  water.visibility = Visibility::Transparent;
+  water.ior = 1.33F;
+  return scene.types.add(water).value();
+}
+
+TEST_F(VulkanField, ALakeAndBallsOfGlass) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  place_grid(scene, lakeside(types, add_water(scene)));
+  const Camera camera = towards({110, 70, 130}, {10, 0, 10});
+  RenderOptions options = sized(160, 120);
+  const Picture plain = render_test::taken(scene, camera, options);
+  compare(scene, camera, options, "field_lake");
+  options.light.glass_surfaces = true;
+  compare(scene, camera, options, "field_lake_surfaces");
+  EXPECT_GT(render_test::count_different(plain, render_test::taken(scene, camera, options), 3), 1000);
+  compare(scene, from_above(0.3, 100, -0.7, 150), options, "field_lake_from_above");
+  compare(scene, towards({-60, -1.5, 60}, {-32, 0, 20}), options, "field_lake_low");
+  compare(scene, towards({-50, -6, 30}, {-32, 0, 20}), options, "field_lake_from_within");
+  options.light.occlusion_rays = 16;
+  options.light.lamps = 8;
+  compare(scene, camera, options, "field_lake_lamps");
+  for (const Shading shading : {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
+    options.light.shading = shading;
+    compare(scene, camera, options, "field_lake_shading_" + std::to_string(static_cast<int>(shading)));
+  }
+  // Where all of it is opaque, another picture.
+  options = sized(160, 120);
+  for (const VoxelType type : {types.glass, static_cast<VoxelType>(types.glass + 1)}) {
+    VoxelProperties opaque = scene.types[type];
+    opaque.visibility = Visibility::Opaque;
+    scene.types.replace(type, opaque);
+  }
+  compare(scene, camera, options, "field_lake_opaque");
+  EXPECT_GT(render_test::count_different(plain, render_test::taken(scene, camera, options), 8), 1000);
+}
+
+// Of several transparent materials in every cell, and opaque ones.
+TEST_F(VulkanField, MixedGlassInEveryCell) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  const VoxelType water = add_water(scene);
+  VoxelProperties amber;
+  amber.colour = {230, 150, 20, 60};
+  amber.visibility = Visibility::Transparent;
+  const VoxelType third = scene.types.add(amber).value();
+  SceneGrid grid;
+  grid.field.edit({{44, 44, 44}, {84, 84, 84}}, [&](IVec3 p, DensitySample) {
+    const double ball = glm::distance(DVec3(p), DVec3(64.3)) - 15.0;
+    const IVec3 part = p / 8;
+    const std::array all{types.glass, water, third, types.stone, types.glass, water, third};
+    const auto type = all[static_cast<std::size_t>((part.x + 3 * part.y + 5 * part.z) % 7)];
+    return DensitySample{static_cast<float>(ball), type};
+  });
+  place_grid(scene, std::move(grid));
+  RenderOptions options = sized(120, 120);
+  options.light.shading = Shading::Unlit;
+  compare(scene, towards({100, 94, 104}, {64, 64, 64}), options, "field_mixed_glass_unlit");
+  options.light.shading = Shading::Lit;
+  options.light.glass_surfaces = true;
+  compare(scene, towards({100, 94, 104}, {64, 64, 64}), options, "field_mixed_glass");
+}
+
+TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  const DVec3 far{3e6, -2e5, 7e5};
+  SceneGrid ground;
+  ground.field = hills(types, 60);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(ground));
+  instance.position = far;
+  instance.rotation = glm::angleAxis(0.3, glm::normalize(DVec3(1.0, 2.0, 0.5)));
+  scene.add_instance(instance);
+  SceneGrid ball;
+  ball.field.add_sphere({0, 0, 0}, 10, types.glass);
+  ball.field.remove_box({-20, 2, -20}, {20, 20, 20}, 0.0, 2.0);
+  instance.grid = scene.add_grid(std::move(ball));
+  for (int i = 0; i < 5; ++i) {
+    instance.position = far + DVec3(20.0 * i - 50.0, 40.0, 10.0 * (i % 2));
+    instance.rotation = glm::angleAxis(0.7 * i, glm::normalize(DVec3(0.3, 0.2, 1.0)));
+    instance.voxel_size = 0.4 + 0.3 * i;
+    scene.add_instance(instance);
+  }
+  RenderOptions options = sized(160, 120);
+  options.light.glass_surfaces = true;
+  compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_instances");
+  options.detail.emplace().far_pixels = 0;
+  options.detail->cell_pixels = 4.0;
+  compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_halved");
+  options.detail->far_pixels = 1000;
+  compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_far");
+}
+
+TEST_F(VulkanField, EditsOfGlassAreTakenOver) {
+  Scene scene;
+  const FieldTypes types = add_types(scene);
+  const VoxelType water = add_water(scene);
+  const InstanceHandle placed = place_grid(scene, village(types));
+  const GridHandle handle = scene.instances()[placed].grid;
+  const Camera camera = towards({80, 70, 90}, {0, 0, 0});
+  RenderOptions options = sized(80, 60);
+  options.light.glass_surfaces = true;
+  compare(scene, camera, options, "field_glass_none");
+  DensityGrid& field = scene.edit(handle).field;
+  const auto paint = [&](IBox box, VoxelType type) {
+    field.edit(box, [&](IVec3, DensitySample now) {
+      now.material = type;
+      return now;
+    });
+  };
+  paint({{-20, -100, -20}, {60, 40, 30}}, water);
+  compare(scene, camera, options, "field_painted_water");
+  const std::uint64_t all = renderer_->uploaded_bytes();
+  std::mt19937 random(5);
+  for (int i = 0; i < 4; ++i) {
+    const auto at = [&] { return static_cast<double>(random() % 100) - 50.0; };
+    field.remove_sphere({at(), 4.0, at()}, 7.0);
+    field.add_sphere({at(), 12.0, at()}, 6.0, i % 2 == 0 ? water : types.glass, 3.0);
+    compare(scene, camera, options, "field_glass_edited");
+    EXPECT_LT(renderer_->uploaded_bytes(), all);
+  }
+  paint({{-100, -100, -100}, {100, 60, 100}}, types.stone);
+  compare(scene, camera, options, "field_all_stone");
+  paint({{-100, -100, -100}, {100, 60, 100}}, water);
+  compare(scene, camera, options, "field_all_water");
+  field.clear();
+  compare(scene, camera, options, "field_glass_gone");
 }
 
 TEST_F(VulkanField, MaterialsComeFromTheChunkOfTheSample) {

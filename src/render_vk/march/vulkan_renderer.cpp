@@ -65,6 +65,7 @@ Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads
   try {
     Status done = impl_->scene.update(scene, filter, threads);
     if (done && impl_->scene.placement().has_fields) done = impl_->pipelines->add_fields();
+    if (done && impl_->scene.placement().has_field_glass) done = impl_->pipelines->add_field_glass();
     impl_->uploaded = impl_->memory.written() - before;
     impl_->look_at(done ? &scene : nullptr, filter);
     return done;

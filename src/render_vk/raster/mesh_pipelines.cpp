@@ -152,8 +152,8 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
 
 // The two shaders with what of a way they are made for.
 struct Stages {
-  std::array<VkBool32, 6> values;
-  std::array<VkSpecializationMapEntry, 6> entries;
+  std::array<VkBool32, 7> values;
+  std::array<VkSpecializationMapEntry, 7> entries;
   VkSpecializationInfo constants;
   std::array<VkPipelineShaderStageCreateInfo, 2> all{};
 
@@ -163,8 +163,9 @@ struct Stages {
                way.light != MeshLight::Plain,
                way.light == MeshLight::TracedThroughGlass,
                way.fields,
-               is_nearest_glass(way.mode) ? way.mode : 0},
-        constants{6, entries.data(), sizeof values, values.data()} {
+               is_nearest_glass(way.mode) ? way.mode : 0,
+               way.fields && way.light == MeshLight::TracedThroughGlass},
+        constants{static_cast<std::uint32_t>(entries.size()), entries.data(), sizeof values, values.data()} {
     for (std::uint32_t i = 0; i < entries.size(); ++i) {
       entries[i] = {i, i * static_cast<std::uint32_t>(sizeof(VkBool32)), sizeof(VkBool32)};
     }

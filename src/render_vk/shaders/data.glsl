@@ -4,6 +4,8 @@
 
 // Whether any grid has a field; where none has, shaders are made without.
 layout(constant_id = 4) const bool kHasFields = false;
+// Whether anything of them is transparent.
+layout(constant_id = 6) const bool kHasFieldGlass = false;
 
 const uint kPerspective = 1;
 const uint kLit = 2;
@@ -42,7 +44,8 @@ struct Tree {
 struct GridTrees {
   Tree opaque;
   Tree transparent;
-  Tree field;  // of the cells that touch its solid
+  Tree field;  // of the cells that touch what is opaque of it
+  Tree glass;  // of those that touch what is transparent of it
 };
 
 // An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
@@ -77,14 +80,21 @@ struct Point {
 // Of a field the kind has kIsField, and instead of a face there is a normal, as `packed_normal` has it.
 // Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
-// A run of transparent voxels of one type. w of `voxel`: the instance; `lengths`: t of enter and exit, voxels, and t of
-// enter from the start of the instance's ray; `what`: type, face, whether the ray starts inside, and where it leaves:
-// 8 times the instance, and the face.
+// A run of transparent voxels, or of what is transparent of a field, of one type. w of `voxel`: the instance; `lengths`:
+// t of enter and exit, voxels, and t of enter from the start of the instance's ray; `what`: type, face, how, and where
+// it leaves: 8 times the instance, and the face. Of a field the face is a normal, as `packed_normal` has it.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
   uvec4 what;
 };
+
+// How a body begins and ends; from kExitNormal on, the normal where it ends, see normal_from_28.
+const uint kStartsInside = 1;
+const uint kBeginsInField = 2;
+const uint kEndsInField = 4;
+const uint kHowItBegins = 3;
+const uint kExitNormal = 4;  // bits
 
 // A pixel on the way: what is still seen past the glass so far, where to go on, and the sample's colour so far.
 struct State {

@@ -25,10 +25,9 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   start_visit(ray);
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = rounded(placed, exact_ray_in(placed, direction), (placed.start.w - depth) * scale);
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t - in_grid.t, -1)) continue;
-    find_bodies_in(i, in_grid, placed.ref_view.w / placed.ref_inside.w, max_t, state.weight.w, list, unused);
+    find_bodies(i, Grids(frame().grids).at[placed.ref_base.w], in_grid, placed.ref_view.w / placed.ref_inside.w, max_t,
+                state.weight.w, list, unused);
   }
   first_t = list.count > 0 ? depth * scale + Bodies(list.address).at[list.first].lengths.x : kInfinity;
   state.weight.w = list.dropped_t;

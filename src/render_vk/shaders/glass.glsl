@@ -3,11 +3,16 @@
 
 // ln of the share of light below which a body counts as closed.
 const float kClosed = -11.0;
+const float kDiagonal = 1.7320508;  // of a cube of 1
 // Lengths of t within which two bodies touch: the rounding of single precision.
 const float kTouching = 4e-6;
 
 bool reaches(Body body, float t) {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
+}
+// No body of a field counts as longer than it is, nor one from within.
+bool has_own_length(Body body) {
+  return (body.what.z & kHowItBegins) != 0;
 }
 bool continues(Body body, Body next) {
   return next.what.x == body.what.x && reaches(body, next.lengths.x);
@@ -70,40 +75,317 @@ void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) 
   Body dropped;
   if (!insert_body(list, body, dropped)) return;
   list.dropped_t = min(list.dropped_t, dropped.lengths.x);
-  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, dropped.what.z != 0);
+  passed *= passed_by(surface_of(dropped.what.x), dropped.lengths.z, has_own_length(dropped));
+}
+
+// The bodies of one instance that are found along a ray, in its order.
+struct BodyRun {
+  Body body;  // the last one
+  bool has_body;
+  float clarity;
+};
+
+void end_as(inout Body body, Body next) {
+  body.what.w = next.what.w;
+  if (kHasFieldGlass) body.what.z = (body.what.z & kHowItBegins) | (next.what.z & ~kHowItBegins);
+}
+
+void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list, inout vec3 passed) {
+  if (!(next.lengths.z > 0.0)) return;
+  run.clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
+  if (run.has_body && continues(run.body, next)) {
+    run.body.lengths.y = next.lengths.y;
+    run.body.lengths.z += next.lengths.z;
+    end_as(run.body, next);
+    return;
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+  run.body = next;
+  run.has_body = true;
 }
 
 // The bodies of one instance, along a ray whose walk has been started. `voxels_a_t`: of the full grid.
 void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
                     inout vec3 passed) {
   float room = max_t - ray.t;
-  float clarity = 0.0;
-  bool has_body = false;
-  Body body;
-  while (clarity > kClosed && find_voxel(room)) {
+  BodyRun run;
+  run.clarity = 0.0;
+  run.has_body = false;
+  while (run.clarity > kClosed && find_voxel(room)) {
     Body next;
     next.voxel = ivec4(walk_voxel, i);
-    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? 1 : 0, 0);
+    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kStartsInside : 0, 0);
     float enter_t = walk_t;
     bool goes_on = leave_block(0, room);
     float exit_t = min(walk_t, room);
     next.what.w = 8 * uint(i) + uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
     next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
-    if (next.lengths.z > 0.0) {
-      clarity += surface_of(next.what.x).log_clarity * next.lengths.z;
-      if (has_body && continues(body, next)) {
-        body.lengths.y = next.lengths.y;
-        body.lengths.z += next.lengths.z;
-        body.what.w = next.what.w;
-      } else {
-        if (has_body) keep_body(list, body, from_t, passed);
-        body = next;
-        has_body = true;
+    add_to_run(run, next, from_t, list, passed);
+    if (!goes_on) break;
+  }
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+}
+
+// What is transparent of a field: trace/density/density_glass.h on the processor's side. Its tree holds the
+// cells with a transparent corner; a word of 4^3 cells is of one material throughout, or has the samples around it and
+// what bodies these of its corners belong to.
+
+const uint kOpaqueBody = 0xFFFF;  // no type's number
+const int kBodiesEdge = 5;
+const uint kBodiesBegin = 172;  // in a block, after its densities
+const uint kIsUniform = 0x80000000u;
+
+// A cell and its corners, by x + 2 y, of z and z + 1: densities, and 0 for air, kOpaqueBody, or a transparent type.
+struct GlassCell {
+  Numbers block;
+  ivec3 first;  // its least corner in the block
+  vec4 low;
+  vec4 high;
+  uvec4 body_low;
+  uvec4 body_high;
+};
+
+// False where the word that was found is of one type.
+bool glass_block_found(out Numbers block, out uint type) {
+  uvec4 brick = walk_stack[1];
+  uint child = child_of(brick, index_in(walk_voxel, 1));
+  uint words = bitCount(brick.x) + bitCount(brick.y);
+  uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
+  block = Numbers(address_after(record_found(), 4 * from));
+  type = from & 0xFFFF;
+  return (from & kIsUniform) == 0;
+}
+
+uint body_of(Numbers block, ivec3 at) {
+  uint i = uint((at.z * kBodiesEdge + at.y) * kBodiesEdge + at.x);
+  return block.at[kBodiesBegin + (i >> 1)] >> (16 * (i & 1)) & 0xFFFF;
+}
+uvec4 bodies_of(Numbers block, ivec3 at) {
+  return uvec4(body_of(block, at), body_of(block, at + ivec3(1, 0, 0)), body_of(block, at + ivec3(0, 1, 0)),
+               body_of(block, at + ivec3(1, 1, 0)));
+}
+
+GlassCell glass_cell(Numbers block, ivec3 voxel) {
+  GlassCell cell;
+  cell.block = block;
+  cell.first = (voxel & 3) + 1;
+  corners_of(block, cell.first, cell.low, cell.high);
+  cell.body_low = bodies_of(block, voxel & 3);
+  cell.body_high = bodies_of(block, (voxel & 3) + ivec3(0, 0, 1));
+  return cell;
+}
+
+uint body_at_corner(GlassCell cell, int i) {
+  return i < 4 ? cell.body_low[i] : cell.body_high[i - 4];
+}
+bool is_transparent(uint body) {
+  return body != 0 && body != kOpaqueBody;
+}
+
+// The field of one body: what is solid of others is as far out as it is in.
+void corners_of_body(GlassCell cell, uint body, out vec4 low, out vec4 high) {
+  low = mix(abs(cell.low), cell.low, equal(cell.body_low, uvec4(body)));
+  high = mix(abs(cell.high), cell.high, equal(cell.body_high, uvec4(body)));
+}
+
+// A ray in a cell, and the cubics that say what it comes to.
+struct RayInGlass {
+  vec3 entry;
+  vec3 way;
+  vec4 solid;
+  vec4 opaque;
+  bool has_air;
+  bool has_opaque;
+  bool has_several;  // transparent types
+  uint type;         // the first of these
+};
+
+vec4 cubic_of_body(GlassCell cell, RayInGlass ray, uint body) {
+  vec4 low;
+  vec4 high;
+  corners_of_body(cell, body, low, high);
+  return cubic_of(low, high, ray.entry, ray.way);
+}
+
+RayInGlass ray_in_glass(GlassCell cell, vec3 entry, vec3 way) {
+  RayInGlass ray;
+  ray.entry = entry;
+  ray.way = way;
+  ray.solid = cubic_of(cell.low, cell.high, entry, way);
+  ray.has_air = ray.has_opaque = ray.has_several = false;
+  ray.type = 0;
+  for (int i = 0; i < 8; ++i) {
+    uint body = body_at_corner(cell, i);
+    ray.has_air = ray.has_air || body == 0;
+    ray.has_opaque = ray.has_opaque || body == kOpaqueBody;
+    if (!is_transparent(body)) continue;
+    ray.has_several = ray.has_several || (ray.type != 0 && body != ray.type);
+    ray.type = body;
+  }
+  ray.opaque = ray.has_opaque ? cubic_of_body(cell, ray, kOpaqueBody) : vec4(1.0, 0.0, 0.0, 0.0);
+  return ray;
+}
+
+// The first place beyond `after` at which a cubic changes its sign; 1 where there is none before.
+float change_after(vec4 f, float after) {
+  float a = 3.0 * f.w;
+  float b = 2.0 * f.z;
+  float discriminant = b * b - 4.0 * a * f.y;
+  vec2 extremes = vec2(-1.0);
+  if (discriminant > 0.0) {
+    float q = -0.5 * (b + (b < 0.0 ? -1.0 : 1.0) * sqrt(discriminant));
+    float one = a != 0.0 ? q / a : -1.0;
+    float other = q != 0.0 ? f.y / q : -1.0;
+    extremes = vec2(min(one, other), max(one, other));
+  }
+  float low = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    float high = i == 0 ? extremes.x : i == 1 ? extremes.y : 1.0;
+    if (!(high > low && high <= 1.0)) continue;
+    bool falls = value_at(f, high) < 0.0;
+    if ((value_at(f, low) < 0.0) != falls) {
+      float s = root_between(falls ? f : -f, low, high);
+      if (s > after) return s;
+    }
+    low = high;
+  }
+  return 1.0;
+}
+
+float next_change(GlassCell cell, RayInGlass ray, float after) {
+  float next = ray.has_air ? change_after(ray.solid, after) : 1.0;
+  if (ray.has_opaque) next = min(next, change_after(ray.opaque, after));
+  for (int i = 0; ray.has_several && i < 8; ++i) {
+    uint one = body_at_corner(cell, i);
+    for (int k = 0; is_transparent(one) && k < i; ++k) {
+      uint other = body_at_corner(cell, k);
+      if (!is_transparent(other) || other == one) continue;
+      next = min(next, change_after(cubic_of_body(cell, ray, one) - cubic_of_body(cell, ray, other), after));
+    }
+  }
+  return next;
+}
+
+// The transparent type there; 0 where there is none.
+uint glass_at(GlassCell cell, RayInGlass ray, float s) {
+  if (!(value_at(ray.solid, s) < 0.0) || value_at(ray.opaque, s) < 0.0) return 0;
+  if (!ray.has_several) return ray.type;
+  uint nearest = 0;
+  float least = kNever;
+  for (int i = 0; i < 8; ++i) {
+    uint body = body_at_corner(cell, i);
+    if (!is_transparent(body)) continue;
+    float own = value_at(cubic_of_body(cell, ray, body), s);
+    if (own > least || (own == least && body >= nearest)) continue;
+    least = own;
+    nearest = body;
+  }
+  return nearest;
+}
+
+// The normal of a body's surface in the cell, towards air (`other` is 0) or another transparent type.
+vec3 glass_normal(GlassCell cell, vec3 inside, uint type, uint other) {
+  if (other == 0) return normal_in(cell.block, cell.first, inside);
+  vec4 low;
+  vec4 high;
+  vec4 other_low;
+  vec4 other_high;
+  corners_of_body(cell, type, low, high);
+  corners_of_body(cell, other, other_low, other_high);
+  vec3 gradient = gradient_of(low - other_low, high - other_high, inside);
+  float size = length(gradient);
+  return size > 0.0 ? gradient / size : vec3(0.0);
+}
+
+// A unit vector, or 0, in 28 bits: as unit_vector's word, but rougher.
+const float kNormalSteps = 8191.0;
+uint packed_in_28(vec3 n) {
+  uint word = packed_normal(n);
+  if (word == kNoNormal) return 0;
+  uvec2 at = uvec2(round(unpackSnorm2x16(word) * kNormalSteps) + kNormalSteps) + 1;
+  return at.x | at.y << 14;
+}
+vec3 normal_from_28(uint word) {
+  if (word == 0) return vec3(0.0);
+  vec2 at = vec2(uvec2(word & 0x3FFF, word >> 14) - 1) / kNormalSteps - 1.0;
+  return unit_vector(packSnorm2x16(at));
+}
+
+// What of a field's cell is transparent from `enter_t` to `exit_t`. `next`: a body with what is the same for all of it.
+void add_glass_of_cell(GlassCell cell, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
+                       float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
+  float size = exit_t - enter_t;
+  vec3 place = vec3(next.voxel.xyz - ray_base);
+  vec3 entry = clamp(ray_origin + enter_t * ray_direction - place, vec3(0.0), vec3(1.0));
+  RayInGlass ray = ray_in_glass(cell, entry, ray_direction * size);
+  bool starts_inside = (next.what.z & kStartsInside) != 0;
+  float begin = 0.0;
+  while (begin < 1.0) {
+    float end = next_change(cell, ray, begin);
+    uint type = glass_at(cell, ray, 0.5 * (begin + end));
+    if (type != 0) {
+      float begin_t = begin <= 0.0 ? enter_t : enter_t + begin * size;
+      float end_t = end >= 1.0 ? exit_t : enter_t + end * size;
+      next.lengths = vec4(ray_t + begin_t, ray_t + end_t, (end_t - begin_t) * voxels_a_t, begin_t);
+      next.what.x = type;
+      next.what.z = kBeginsInField | kEndsInField | (starts_inside && begin <= 0.0 ? kStartsInside : 0);
+#if defined(KEEPS_BODIES) || defined(HOLDS_BODIES)
+      bool touches = run.has_body && reaches(run.body, next.lengths.x);
+      if (!touches || run.body.what.x != type) {
+        next.what.y = packed_normal(glass_normal(cell, entry + begin * ray.way, type, touches ? run.body.what.x : 0));
       }
+      if (ray.has_air) {
+        next.what.z |= packed_in_28(normal_in(cell.block, cell.first, entry + end * ray.way)) << kExitNormal;
+      }
+#endif
+      add_to_run(run, next, from_t, list, passed);
+    }
+    begin = end;
+  }
+}
+
+// The same of what is transparent of an instance's field.
+void find_glass_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
+                   inout vec3 passed) {
+  float room = max_t - ray.t;
+  BodyRun run;
+  run.clarity = 0.0;
+  run.has_body = false;
+  while (run.clarity > kClosed && find_voxel(room)) {
+    Body next;
+    next.voxel = ivec4(walk_voxel, i);
+    next.what = uvec4(0, kNoNormal, walk_axis < 0 ? kStartsInside : 0, 8 * uint(i));
+    float enter_t = walk_t;
+    Numbers block;
+    bool is_mixed = glass_block_found(block, next.what.x);
+    // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
+    float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
+    bool by_word = !is_mixed && run.clarity - kClosed > 4.0 * closing;
+    bool goes_on = leave_block(by_word ? 2 : 0, room);
+    float exit_t = min(walk_t, room);
+    if (is_mixed) {
+      add_glass_of_cell(glass_cell(block, next.voxel.xyz), next, enter_t, exit_t, ray.t, voxels_a_t, from_t, run, list,
+                        passed);
+    } else {
+      next.what.z |= kBeginsInField | kEndsInField;
+      next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
+      add_to_run(run, next, from_t, list, passed);
     }
     if (!goes_on) break;
   }
-  if (has_body) keep_body(list, body, from_t, passed);
+  if (run.has_body) keep_body(list, run.body, from_t, passed);
+}
+
+// All bodies of one instance along a ray.
+void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float max_t, float from_t,
+                 inout BodyList list, inout vec3 passed) {
+  float room = max_t - ray.t;
+  if (start_walk(trees.transparent, ray.base, ray.origin, ray.direction, room, -1)) {
+    find_bodies_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
+  }
+  if (kHasFieldGlass && start_walk(trees.glass, ray.base, ray.origin, ray.direction, room, -1)) {
+    find_glass_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
+  }
 }
 
 // The next body of a list, as one with those that it touches; false at the list's end.
@@ -115,7 +397,7 @@ bool next_body(BodyList list, inout uint i, out Body body) {
     if (!continues(body, next)) break;
     if (next.lengths.y > body.lengths.y) {
       body.lengths.y = next.lengths.y;
-      body.what.w = next.what.w;
+      end_as(body, next);
     }
     body.lengths.z += next.lengths.z;
     ++i;

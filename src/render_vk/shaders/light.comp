@@ -63,12 +63,16 @@ float openness_of_far(Point point) {
   return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
 }
 
+// Of a face, in the grid.
+vec3 face_normal(uint face) {
+  vec3 normal = vec3(0.0);
+  normal[axis_of(face)] = sign_of(face);
+  return normal;
+}
+
 // The upright of a surface point, in its grid.
 vec3 grid_normal(Point point) {
-  if (is_of_field(point)) return normal_of(point.what.y);
-  vec3 normal = vec3(0.0);
-  normal[axis_of(point.what.y)] = sign_of(point.what.y);
-  return normal;
+  return is_of_field(point) ? normal_of(point.what.y) : face_normal(point.what.y);
 }
 
 // A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: light/occlusion_directions.h.
@@ -181,18 +185,32 @@ vec3 light_of(Point point, uint slot) {
   return colour * frame().exposure;
 }
 
+// Of a body of a field: where it begins, from its cell's lower corner.
+vec3 place_in_field(Body body) {
+  Placed placed = placed_at(body.voxel.w);
+  ExactRay ray = exact_ray_in(placed, exact_direction());
+  Pair way = product_of(Pair(vec3(body.lengths.w), vec3(0.0)), ray.direction);
+  return sum_of(start_from(ray, placed, body.voxel.xyz), way).high;
+}
+
 Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
+  uint kind = (body.what.z & kStartsInside) != 0 ? kGlow : kSurface;
+  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
+    point.inside = vec4(place_in_field(body), body.lengths.x);
+    point.what = uvec4(body.what.xy, kIsField | kind, 0);
+    return point;
+  }
   vec3 place = exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y);
   point.inside = vec4(place, body.lengths.x);
-  point.what = uvec4(body.what.xy, body.what.z != 0 ? kGlow : kSurface, 0);
+  point.what = uvec4(body.what.xy, kind, 0);
   return point;
 }
 
 vec3 light_of_body(Body body, uint slot) {
   Point point = point_of(body);
-  point.inside.xyz = on_face(point.inside.xyz, point.what.y);
+  if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
   return light_of(point, slot);
 }
 vec3 seen_direction() {

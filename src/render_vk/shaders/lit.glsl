@@ -17,12 +17,13 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
-vec3 passed_by(Surface surface, float voxels, bool starts_inside) {
-  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+// `has_own_length`: else it counts as one voxel long at least.
+vec3 passed_by(Surface surface, float voxels, bool has_own_length) {
+  float length = max(voxels, has_own_length ? 0.0 : 1.0);
   return length > 0.0 ? exp(surface.log_transmittance * length) : vec3(1.0);
 }
-float own_share(Surface surface, float voxels, bool starts_inside) {
-  float length = max(voxels, starts_inside ? 0.0 : 1.0);
+float own_share(Surface surface, float voxels, bool has_own_length) {
+  float length = max(voxels, has_own_length ? 0.0 : 1.0);
   return length > 0.0 ? 1.0 - exp(surface.log_clarity * length) : 0.0;
 }
 

@@ -3,8 +3,8 @@
 
 uint rays_taken;
 
-// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel, or the solid
-// of a field, of any instance.
+// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel, or what is opaque of a field,
+// of any instance.
 bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   ViewRay in_view = view_from_grid(own, ray);
   start_visit(in_view);
@@ -35,11 +35,10 @@ void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max
   start_visit(in_view);
   for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
     Placed placed = placed_at(i);
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].transparent;
     GridRay in_grid = ray;
     if (i != home) in_grid = grid_from_view(placed, in_view);
-    if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, max_t, -1)) continue;
-    find_bodies_in(i, in_grid, length * placed.ref_view.w / placed.ref_inside.w, max_t, from_t, list, passed);
+    find_bodies(i, Grids(frame().grids).at[placed.ref_base.w], in_grid,
+                length * placed.ref_view.w / placed.ref_inside.w, max_t, from_t, list, passed);
   }
 }
 
@@ -55,7 +54,7 @@ vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) 
   uint i = 0;
   Body body;
   while (next_body(list, i, body)) {
-    passed *= passed_by(surface_of(body.what.x), body.lengths.z, body.what.z != 0);
+    passed *= passed_by(surface_of(body.what.x), body.lengths.z, has_own_length(body));
   }
   return passed;
 }

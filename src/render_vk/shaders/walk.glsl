@@ -322,6 +322,23 @@ void corners_of(Numbers block, ivec3 first, out vec4 low, out vec4 high) {
               sample_of(block, first + ivec3(0, 1, 1)), sample_of(block, first + ivec3(1, 1, 1)));
 }
 
+// The field of a cell along a ray, in powers of s. `entry` is a point in the cell, 0 to 1 on each axis, and `way` leads
+// from it to where s is 1.
+vec4 cubic_of(vec4 low, vec4 high, vec3 entry, vec3 way) {
+  vec4 rise = high - low;
+  vec4 z0 = low + rise * entry.z;
+  vec4 z1 = rise * way.z;
+  vec2 rise0 = z0.zw - z0.xy;
+  vec2 rise1 = z1.zw - z1.xy;
+  vec2 y0 = z0.xy + rise0 * entry.y;
+  vec2 y1 = z1.xy + rise1 * entry.y + rise0 * way.y;
+  vec2 y2 = rise1 * way.y;
+  float x0 = y0.y - y0.x;
+  float x1 = y1.y - y1.x;
+  float x2 = y2.y - y2.x;
+  return vec4(y0.x + x0 * entry.x, y1.x + x1 * entry.x + x0 * way.x, y2.x + x2 * entry.x + x1 * way.x, x2 * way.x);
+}
+
 // What was found of a field.
 struct FieldHit {
   float t;
@@ -352,19 +369,7 @@ bool meet_cell(float max_t, out FieldHit hit) {
   vec4 low;
   vec4 high;
   corners_of(block, (walk_voxel & 3) + 1, low, high);
-  vec4 rise = high - low;
-  vec4 z0 = low + rise * entry.z;
-  vec4 z1 = rise * way.z;
-  vec2 rise0 = z0.zw - z0.xy;
-  vec2 rise1 = z1.zw - z1.xy;
-  vec2 y0 = z0.xy + rise0 * entry.y;
-  vec2 y1 = z1.xy + rise1 * entry.y + rise0 * way.y;
-  vec2 y2 = rise1 * way.y;
-  float x0 = y0.y - y0.x;
-  float x1 = y1.y - y1.x;
-  float x2 = y2.y - y2.x;
-  float s = first_negative(vec4(y0.x + x0 * entry.x, y1.x + x1 * entry.x + x0 * way.x,
-                                y2.x + x2 * entry.x + x1 * way.x, x2 * way.x));
+  float s = first_negative(cubic_of(low, high, entry, way));
   if (s < 0.0) return false;
   hit.t = t_in + s * size;
   hit.inside = entry + s * way;
@@ -395,21 +400,25 @@ float field_in_block(Numbers block, vec3 at) {
   return mixed_corners(low, high, at - first);
 }
 
-// The normal with which the hit is lit: trace/density/smooth_normal.h on the processor's side. Unit, or 0.
-vec3 normal_found(vec3 inside) {
-  Numbers block;
-  if (!block_found(block)) return vec3(0.0);
-  vec3 at = vec3((walk_voxel & 3) + 1) + inside;
-  vec4 low;
-  vec4 high;
-  corners_of(block, (walk_voxel & 3) + 1, low, high);
-  // Of the cell itself.
+// The gradient of a cell's field.
+vec3 gradient_of(vec4 low, vec4 high, vec3 inside) {
   vec4 z = mix(low, high, inside.z);
   vec4 along_z = high - low;
   vec2 y = mix(z.xy, z.zw, inside.y);
   vec2 along_y = z.zw - z.xy;
   vec2 z_y = mix(along_z.xy, along_z.zw, inside.y);
-  vec3 own = vec3(y.y - y.x, mix(along_y.x, along_y.y, inside.x), mix(z_y.x, z_y.y, inside.x));
+  return vec3(y.y - y.x, mix(along_y.x, along_y.y, inside.x), mix(z_y.x, z_y.y, inside.x));
+}
+
+// The normal with which a field is lit in a cell, whose least corner is `first` of a block:
+// trace/density/smooth_normal.h on the processor's side. Unit, or 0.
+vec3 normal_in(Numbers block, ivec3 first, vec3 inside) {
+  vec3 at = vec3(first) + inside;
+  vec4 low;
+  vec4 high;
+  corners_of(block, first, low, high);
+  // Of the cell itself.
+  vec3 own = gradient_of(low, high, inside);
   float own_size = length(own);
   own = own_size > 0.0 ? own / own_size : vec3(0.0);
   vec3 gradient;
@@ -420,6 +429,10 @@ vec3 normal_found(vec3 inside) {
   }
   float size = length(gradient);
   return dot(gradient, own) > 0.5 * size ? gradient / size : own;
+}
+vec3 normal_found(vec3 inside) {
+  Numbers block;
+  return block_found(block) ? normal_in(block, (walk_voxel & 3) + 1, inside) : vec3(0.0);
 }
 
 // The material of the solid sample that is nearest to the hit.

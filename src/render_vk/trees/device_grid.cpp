@@ -14,36 +14,59 @@ ShaderTree shader_tree(const DeviceTree& tree, const OccupancyTree* of, IVec3 or
 }  // namespace
 
 void DeviceGrid::release(DeviceMemory& memory) {
-  drop_all(memory, chunks_);
-  drop_all(memory, field_chunks_);
-  for (DeviceTree* const tree : {&opaque_, &transparent_, &field_}) tree->release(memory);
+  for (Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_}) drop_all(memory, *chunks);
+  for (DeviceTree* const tree : {&opaque_, &transparent_, &field_, &glass_}) tree->release(memory);
   *this = {};
 }
 
 std::uint64_t DeviceGrid::bytes() const {
-  std::uint64_t sum = opaque_.bytes() + transparent_.bytes() + field_.bytes();
-  for (const Chunks* const chunks : {&chunks_, &field_chunks_}) {
+  std::uint64_t sum = opaque_.bytes() + transparent_.bytes() + field_.bytes() + glass_.bytes();
+  for (const Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_}) {
     for (const auto& [at, chunk] : *chunks) sum += chunk.place.size;
   }
   return sum;
 }
 
 Status DeviceGrid::update(DeviceMemory& memory, const Content& content) {
-  const bool is_field_same =
-      content.field == nullptr ? field_chunks_.empty() : !content.field->field().has_changed_since(followed_field_);
-  if (is_field_same && !content.voxels->has_changed_since(followed_)) return {};
-  if (Status done = update_voxels(memory, content); !done) return done;
-  if (Status done = update_field(memory, content.field); !done) return done;
+  const DensityGrid* const field = content.field == nullptr ? nullptr : &content.field->field();
+  const DensityGrid* const glass = content.glass == nullptr ? nullptr : &content.glass->field();
+  const auto is_same = [](const DensityGrid* now, const Chunks& chunks, const ChangeCursor& followed) {
+    return now == nullptr ? chunks.empty() : !now->has_changed_since(followed);
+  };
+  if (is_same(field, field_chunks_, followed_field_) && is_same(glass, glass_chunks_, followed_glass_) &&
+      !content.voxels->has_changed_since(followed_)) {
+    return {};
+  }
+  Status done = update_voxels(memory, content);
+  if (done) {
+    done = update_field(memory, field, field_chunks_, followed_field_, [&](IVec3 chunk) {
+      return put_field(memory, field_chunks_, chunk, pack_field_chunk(content.field->cells(), *field, chunk));
+    });
+  }
+  if (done) {
+    done = update_field(memory, glass, glass_chunks_, followed_glass_, [&](IVec3 chunk) {
+      return put_field(memory, glass_chunks_, chunk, pack_glass_chunk(*content.glass, chunk));
+    });
+  }
+  return done ? update_tops(memory, content) : done;
+}
+
+// What lies above the chunks.
+Status DeviceGrid::update_tops(DeviceMemory& memory, const Content& content) {
+  const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
+  const OccupancyTree* const glass = content.glass == nullptr ? nullptr : &content.glass->cells();
   IBox bounds = content.voxels->bounds();
-  if (content.field != nullptr) bounds = unite(bounds, content.field->cells().bounds());
+  for (const OccupancyTree* const tree : {cells, glass}) {
+    if (tree != nullptr) bounds = unite(bounds, tree->bounds());
+  }
   origin_ = chunk_of(bounds.min);
   if (Status done = put_top(memory, opaque_, chunks_, &DeviceChunk::opaque); !done) return done;
   if (Status done = put_top(memory, transparent_, chunks_, &DeviceChunk::transparent); !done) return done;
   if (Status done = put_top(memory, field_, field_chunks_, &DeviceChunk::field); !done) return done;
-  const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
+  if (Status done = put_top(memory, glass_, glass_chunks_, &DeviceChunk::glass); !done) return done;
   shader_grid_ = {shader_tree(opaque_, content.opaque, this->origin()),
                   shader_tree(transparent_, content.transparent, this->origin()),
-                  shader_tree(field_, cells, this->origin())};
+                  shader_tree(field_, cells, this->origin()), shader_tree(glass_, glass, this->origin())};
   return {};
 }
 
@@ -63,19 +86,22 @@ Status DeviceGrid::update_voxels(DeviceMemory& memory, const Content& content) {
   return {};
 }
 
-Status DeviceGrid::update_field(DeviceMemory& memory, const DensityTree* field) {
+// Null: there is none.
+template <class PutChunk>
+Status DeviceGrid::update_field(DeviceMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
+                                const PutChunk& put_chunk) {
   if (field == nullptr) {
-    drop_all(memory, field_chunks_);
-    followed_field_ = {};
+    drop_all(memory, chunks);
+    followed = {};
     return {};
   }
-  ChangeCursor now = followed_field_;
-  const DensityChanges changes = field->field().changes_since(now);
-  if (changes.all) drop_all(memory, field_chunks_);
-  for (const IVec3 chunk : chunks_to_mesh(field->field(), changes, kFieldRecordReach)) {
-    if (Status done = put_field(memory, *field, chunk); !done) return done;
+  ChangeCursor now = followed;
+  const DensityChanges changes = field->changes_since(now);
+  if (changes.all) drop_all(memory, chunks);
+  for (const IVec3 chunk : chunks_to_mesh(*field, changes, kFieldRecordReach)) {
+    if (Status done = put_chunk(chunk); !done) return done;
   }
-  followed_field_ = now;
+  followed = now;
   return {};
 }
 
@@ -100,13 +126,12 @@ Status DeviceGrid::put_voxels(DeviceMemory& memory, const Content& content, IVec
   return put_record(memory, chunks_[chunk], pack_chunk(*content.opaque, content.transparent, *voxels, chunk));
 }
 
-Status DeviceGrid::put_field(DeviceMemory& memory, const DensityTree& field, IVec3 chunk) {
-  ChunkRecord record = pack_field_chunk(field.cells(), field.field(), chunk);
-  if (record.field.mask == 0) {
-    drop(memory, field_chunks_, chunk);
+Status DeviceGrid::put_field(DeviceMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record) {
+  if (record.field.mask == 0 && record.glass.mask == 0) {
+    drop(memory, chunks, chunk);
     return {};
   }
-  return put_record(memory, field_chunks_[chunk], std::move(record));
+  return put_record(memory, chunks[chunk], std::move(record));
 }
 
 Status DeviceGrid::put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record) {
@@ -118,6 +143,7 @@ Status DeviceGrid::put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRec
   entry.opaque = record.opaque;
   entry.transparent = record.transparent;
   entry.field = record.field;
+  entry.glass = record.glass;
   return memory.write(entry.place, std::as_bytes(std::span(record.words)));
 }
 

@@ -16,12 +16,13 @@ namespace quoin::vulkan {
 /// One grid's voxels and field in device memory.
 class DeviceGrid {
  public:
-  /// What rays know of a grid: its trees as it is. Null: there is no such voxel, no field.
+  /// What rays know of a grid: its trees as it is, what of its field is opaque, and transparent. Null: there is none.
   struct Content {
     const Grid* voxels = nullptr;
     const OccupancyTree* opaque = nullptr;
     const OccupancyTree* transparent = nullptr;
     const DensityTree* field = nullptr;
+    const DensityGlass* glass = nullptr;
   };
 
   /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the
@@ -32,8 +33,10 @@ class DeviceGrid {
   void release(DeviceMemory& memory);
 
   [[nodiscard]] IVec3 origin() const { return origin_ * kChunkEdge; }  ///< of the trees' coordinates, in the grid
-  [[nodiscard]] bool has_transparent() const { return !transparent_.empty(); }
-  [[nodiscard]] bool has_field() const { return !field_.empty(); }
+  [[nodiscard]] bool has_transparent() const { return !transparent_.empty() || has_field_glass(); }
+  /// What of a field is opaque or transparent.
+  [[nodiscard]] bool has_field() const { return !field_.empty() || has_field_glass(); }
+  [[nodiscard]] bool has_field_glass() const { return !glass_.empty(); }
   /// What shaders know it by.
   [[nodiscard]] const ShaderGrid& shader_grid() const { return shader_grid_; }
   /// Of device memory.
@@ -45,13 +48,17 @@ class DeviceGrid {
     Node opaque;
     Node transparent;
     Node field;
+    Node glass;
   };
   using Chunks = std::map<IVec3, DeviceChunk, ByPlace>;
 
   Status update_voxels(DeviceMemory& memory, const Content& content);
-  Status update_field(DeviceMemory& memory, const DensityTree* field);
+  template <class PutChunk>
+  static Status update_field(DeviceMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
+                             const PutChunk& put_chunk);
+  Status update_tops(DeviceMemory& memory, const Content& content);
   Status put_voxels(DeviceMemory& memory, const Content& content, IVec3 chunk);
-  Status put_field(DeviceMemory& memory, const DensityTree& field, IVec3 chunk);
+  static Status put_field(DeviceMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record);
   static Status put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record);
   static void drop(DeviceMemory& memory, Chunks& chunks, IVec3 chunk);
   static void drop_all(DeviceMemory& memory, Chunks& chunks);
@@ -59,12 +66,15 @@ class DeviceGrid {
 
   ChangeCursor followed_;
   ChangeCursor followed_field_;
+  ChangeCursor followed_glass_;
   Chunks chunks_;
   Chunks field_chunks_;
+  Chunks glass_chunks_;
   IVec3 origin_{0};  // in chunks
   DeviceTree opaque_;
   DeviceTree transparent_;
   DeviceTree field_;
+  DeviceTree glass_;
   ShaderGrid shader_grid_;
 };
 

@@ -19,6 +19,12 @@ using IVec4 = glm::ivec4;
 /// before its first corner to the one past its last, along each axis.
 constexpr int kFieldBlockEdge = 7;
 constexpr std::size_t kFieldBlockWords = 172;  ///< two halves a word
+/// A record of what is transparent of it keeps likewise, after these, what bodies the corners of the cells belong to; a
+/// word of cells that are all of one type has that type's number in place of a block's.
+constexpr int kGlassBlockEdge = 5;
+constexpr std::size_t kGlassBlockWords = 63;      ///< two numbers a word
+constexpr std::uint32_t kOpaqueBody = 0xFFFF;     ///< no type's number
+constexpr std::uint32_t kIsUniform = 0x80000000;  ///< what follows is a type
 
 /// A node of a sparse tree with 4^3 places a node; see data.glsl.
 struct Node {
@@ -37,6 +43,7 @@ struct ShaderGrid {
   ShaderTree opaque;
   ShaderTree transparent;
   ShaderTree field;
+  ShaderTree glass;
 };
 
 struct ShaderPlaced {
@@ -237,7 +244,7 @@ struct SwapPush {
 };
 
 static_assert(sizeof(SwapPush) == 24);
-static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 144);
+static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
 static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 17 * 16 + 24 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);

@@ -65,6 +65,26 @@ class FieldSamples {
   std::vector<Half> halves_;
 };
 
+// What bodies the samples of a chunk belong to, and those next to it: 0 for air, kOpaqueBody, or a transparent type.
+class FieldBodies {
+ public:
+  FieldBodies(const DensityGlass& glass, IVec3 chunk)
+      : around_(glass.field().neighbourhood(chunk)), types_(&glass.types()) {}
+
+  [[nodiscard]] std::uint32_t operator()(IVec3 sample) const {
+    const IVec3 chunk = chunk_of(sample);
+    const DensityChunk* const samples = around_.at(chunk.x, chunk.y, chunk.z);
+    const IVec3 at = local_of(sample);
+    if (samples == nullptr || !DensityChunk::is_solid(samples->get(at.x, at.y, at.z))) return 0;
+    const VoxelType material = samples->materials().get(at);
+    return types_->is_transparent(material) ? material : kOpaqueBody;
+  }
+
+ private:
+  DensityNeighbourhood around_;
+  const VoxelRegistry* types_;
+};
+
 // Bit of a place in its node.
 int place_of(IVec3 at) {
   return (at.x & 3) + 4 * (at.y & 3) + 16 * (at.z & 3);
@@ -106,32 +126,28 @@ class RecordWriter {
   Node add_field(const OccupancyTree& cells, const DensityGrid& of, IVec3 chunk) {
     const trace::TreeNodes nodes(cells);
     const trace::ChunkNode* node = nodes.find_chunk(chunk);
-    Node root;
-    if (node == nullptr) return root;
+    if (node == nullptr) return {};
     const FieldSamples samples(of, chunk);
-    headers_.push_back(0);
-    for (unsigned i = 0; i < 64; ++i) root.mask |= std::uint64_t{node->cells[i] != 0} << i;
-    const std::size_t bricks = 4;
-    record.words.resize(bricks + 4 * static_cast<std::size_t>(std::popcount(root.mask)));
-    std::size_t at = bricks;
-    bool is_full = root.mask == kAll;
-    for (int i = 0; i < 64; ++i) {
-      const auto place = static_cast<std::size_t>(i);
-      if (node->cells[place] == 0) continue;
-      const IVec3 first = IVec3{i & 3, i >> 2 & 3, i >> 4} * 16;
-      put(at, node->cells[place]);
-      if (node->bricks[place] == 1 && samples.is_solid(first, first + 17)) {
-        put(at + 2, 1);
-      } else {
-        is_full = false;
-        put_address(at + 2, record.words.size());
-        const trace::Node* const words = node->bricks[place] == 1 ? nullptr : &nodes.brick(node->bricks[place]);
-        add_cells(node->cells[place], words, samples, first);
-      }
-      at += 4;
-    }
-    root.children = bricks * 4 + (is_full ? 1 : 0);
-    return root;
+    const auto is_solid = [&](IVec3 brick) { return samples.is_solid(brick, brick + 17); };
+    return add_cells(nodes, *node, is_solid, [&](std::size_t, std::size_t, IVec3 word) {
+      return samples.is_solid(word, word + 5) ? 0U : add_block(samples, word - 1);
+    });
+  }
+
+  Node add_glass(const DensityGlass& glass, IVec3 chunk) {
+    const trace::TreeNodes nodes(glass.cells());
+    const trace::ChunkNode* node = nodes.find_chunk(chunk);
+    if (node == nullptr) return {};
+    const FieldSamples samples(glass.field(), chunk);
+    const FieldBodies bodies(glass, chunk);
+    const trace::UniformBlocks& uniform = nodes.uniform_blocks(*node);
+    const auto never = [](IVec3) { return false; };
+    return add_cells(nodes, *node, never, [&](std::size_t brick, std::size_t cell, IVec3 word) {
+      if ((uniform.cells[brick] >> cell & 1) != 0) return kIsUniform | bodies(word);
+      const std::uint32_t place = add_block(samples, word - 1);
+      add_bodies(bodies, word);
+      return place;
+    });
   }
 
   void add_types(const Chunk& voxels) {
@@ -170,8 +186,40 @@ class RecordWriter {
     record.words.resize(record.words.size() + 2);
     put(record.words.size() - 2, value);
   }
-  // The words of a brick's cells (null: all are full), and where the samples of each lie.
-  void add_cells(std::uint64_t mask, const trace::Node* words, const FieldSamples& samples, IVec3 first) {
+  // A chunk's node with a number for each word of its cells, of which bricks that are full and `is_plain(first)` have
+  // none. `number_of(brick, cell, first)` may add to the record.
+  template <class IsPlain, class NumberOf>
+  Node add_cells(const trace::TreeNodes& nodes, const trace::ChunkNode& node, const IsPlain& is_plain,
+                 const NumberOf& number_of) {
+    Node root;
+    headers_.push_back(0);
+    for (unsigned i = 0; i < 64; ++i) root.mask |= std::uint64_t{node.cells[i] != 0} << i;
+    const std::size_t bricks = 4;
+    record.words.resize(bricks + 4 * static_cast<std::size_t>(std::popcount(root.mask)));
+    std::size_t at = bricks;
+    bool is_full = root.mask == kAll;
+    for (int i = 0; i < 64; ++i) {
+      const auto place = static_cast<std::size_t>(i);
+      if (node.cells[place] == 0) continue;
+      const IVec3 first = IVec3{i & 3, i >> 2 & 3, i >> 4} * 16;
+      put(at, node.cells[place]);
+      if (node.bricks[place] == 1 && is_plain(first)) {
+        put(at + 2, 1);
+      } else {
+        is_full = false;
+        put_address(at + 2, record.words.size());
+        const trace::Node* const words = node.bricks[place] == 1 ? nullptr : &nodes.brick(node.bricks[place]);
+        add_numbered(node.cells[place], words, first,
+                     [&](std::size_t cell, IVec3 word) { return number_of(place, cell, word); });
+      }
+      at += 4;
+    }
+    root.children = bricks * 4 + (is_full ? 1 : 0);
+    return root;
+  }
+  // The words of a brick's cells (null: all are full), and a number for each.
+  template <class NumberOf>
+  void add_numbered(std::uint64_t mask, const trace::Node* words, IVec3 first, const NumberOf& number_of) {
     for (std::size_t i = 0; i < 64; ++i) {
       if ((mask >> i & 1) != 0) add(words == nullptr ? kAll : (*words)[i]);
     }
@@ -179,17 +227,14 @@ class RecordWriter {
     record.words.resize(place + static_cast<std::size_t>(std::popcount(mask)));
     for (int i = 0; i < 64; ++i) {
       if ((mask >> i & 1) == 0) continue;
-      const IVec3 word = first + IVec3{i & 3, i >> 2 & 3, i >> 4} * 4;
-      if (!samples.is_solid(word, word + 5)) {
-        record.words[place] = static_cast<std::uint32_t>(record.words.size());
-        add_block(samples, word - 1);
-      }
-      ++place;
+      const std::uint32_t number = number_of(static_cast<std::size_t>(i), first + IVec3{i & 3, i >> 2 & 3, i >> 4} * 4);
+      record.words[place++] = number;
     }
     // What comes next begins at a multiple of 8 bytes.
     if (record.words.size() % 2 != 0) record.words.push_back(0);
   }
-  void add_block(const FieldSamples& samples, IVec3 first) {
+  // Returns where it lies.
+  std::uint32_t add_block(const FieldSamples& samples, IVec3 first) {
     const std::size_t begin = record.words.size();
     record.words.resize(begin + kFieldBlockWords);
     std::size_t i = 0;
@@ -197,6 +242,19 @@ class RecordWriter {
       for (int y = 0; y < kFieldBlockEdge; ++y) {
         for (int x = 0; x < kFieldBlockEdge; ++x, ++i) {
           record.words[begin + i / 2] |= std::uint32_t{samples(first + IVec3{x, y, z})} << (16 * (i % 2));
+        }
+      }
+    }
+    return static_cast<std::uint32_t>(begin);
+  }
+  void add_bodies(const FieldBodies& bodies, IVec3 first) {
+    const std::size_t begin = record.words.size();
+    record.words.resize(begin + kGlassBlockWords);
+    std::size_t i = 0;
+    for (int z = 0; z < kGlassBlockEdge; ++z) {
+      for (int y = 0; y < kGlassBlockEdge; ++y) {
+        for (int x = 0; x < kGlassBlockEdge; ++x, ++i) {
+          record.words[begin + i / 2] |= bodies(first + IVec3{x, y, z}) << (16 * (i % 2));
         }
       }
     }
@@ -216,7 +274,7 @@ void ChunkRecord::move_to(std::uint64_t address) {
     words[at] = static_cast<std::uint32_t>(moved);
     words[at + 1] = static_cast<std::uint32_t>(moved >> 32);
   }
-  for (Node* node : {&opaque, &transparent, &field}) {
+  for (Node* node : {&opaque, &transparent, &field, &glass}) {
     if (node->mask != 0) node->children += address;
   }
 }
@@ -236,6 +294,14 @@ ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& fiel
   writer.record.field = writer.add_field(cells, field, chunk);
   const DensityChunk* const samples = field.find_chunk(chunk);
   writer.add_types(samples == nullptr ? none : samples->materials());
+  return std::move(writer.record);
+}
+
+ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk) {
+  static const Chunk none;
+  RecordWriter writer;
+  writer.record.glass = writer.add_glass(glass, chunk);
+  writer.add_types(none);
   return std::move(writer.record);
 }
 

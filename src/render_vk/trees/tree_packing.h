@@ -9,6 +9,7 @@
 #include <quoin/trace/occupancy_tree.h>
 
 #include "render_vk/trees/shader_data.h"
+#include "trace/density/density_glass.h"
 
 namespace quoin::vulkan {
 
@@ -22,6 +23,7 @@ struct ChunkRecord {
   Node opaque;  ///< of the whole chunk; mask 0 where there is none
   Node transparent;
   Node field;
+  Node glass;
 
   /// Addresses count from the record's beginning until they are moved to where it lies.
   void move_to(std::uint64_t address);
@@ -40,6 +42,9 @@ struct ChunkRecord {
 /// from the header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
 /// Requires: `cells` holds some of the chunk.
 [[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
+/// What is transparent of a field's chunk: a tree of the cells that touch it. The number of a word says where its
+/// samples lie, densities and bodies, or of which type all of it is. No brick or chunk counts as full.
+[[nodiscard]] ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk);
 /// How far beyond a chunk's own samples such a record reads.
 constexpr int kFieldRecordReach = 2;
 

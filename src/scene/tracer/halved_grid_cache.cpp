@@ -38,6 +38,8 @@ void CoarseLevel::put_in(PlacedGrid& placed) const {
   placed.opaque = &trees.opaque();
   placed.transparent = trees.transparent();
   placed.field = trees.field();
+  placed.opaque_field = trees.opaque_field();
+  placed.glass = trees.glass();
   placed.pivot = placed.grid->pivot / cell;
   placed.voxel_size *= cell;
   placed.level = level;
@@ -56,7 +58,9 @@ void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& ty
   }
   followed = now;
   followed_field = field_now;
-  for (int level = static_cast<int>(levels.size()) + 1; level <= halvings && !is_coarsest; ++level) {
+  const int known = static_cast<int>(levels.size());
+  if (known < halvings && !is_coarsest) is_coarsest = has_glass(grid.field, types);
+  for (int level = known + 1; level <= halvings && !is_coarsest; ++level) {
     pyramid.update(grid.grid, types, level, threads);
     fields.update(grid.field, level, threads);
     is_coarsest = !take_level(grid, types, level);
@@ -65,10 +69,11 @@ void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& ty
 
 // Brings what there is up to date with an edit.
 void HalvedGridCache::Entry::renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  is_coarsest = has_glass(grid.field, types);
+  if (is_coarsest) return levels.clear();
   const int most = std::max(pyramid.levels(), fields.levels());
   pyramid.update(grid.grid, types, most, threads);
   fields.update(grid.field, most, threads);
-  is_coarsest = false;
   for (int level = 1; level <= most && !is_coarsest; ++level) is_coarsest = !take_level(grid, types, level);
 }
 
@@ -96,7 +101,7 @@ bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegist
   level.level = halvings;
   const DensityGrid& field = level.field == nullptr ? no_field() : *level.field;
   level.trees.update(*level.voxels, types);
-  level.trees.update(field);
+  level.trees.update(field, types);
   level.tight = unite(level.voxels->bounds(), field.bounds());
   return true;
 }

@@ -36,7 +36,8 @@ struct CoarseLevel {
 /// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
 /// bridge's deck, becomes twice as thick, and shows. Likewise its field, of whose surface besides at most an eighth may
 /// be one sample thin: what is, loses its shape next, and then holes come. Where a grid has both, both are halved as
-/// often. Threads: any number may call.
+/// often. Not at all where anything of the field is transparent: a halved sample may take a neighbour's material, and
+/// then the shore of a lake is in pieces. Threads: any number may call.
 class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;

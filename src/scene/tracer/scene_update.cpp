@@ -10,10 +10,25 @@
 namespace quoin {
 namespace {
 
-bool has_type_of(const Grid& grid, const std::vector<VoxelType>& ascending) {
-  const std::vector<VoxelType> types = grid.types();
+bool is_any_of(const std::vector<VoxelType>& types, const std::vector<VoxelType>& ascending) {
   return std::any_of(types.begin(), types.end(),
                      [&](VoxelType type) { return std::binary_search(ascending.begin(), ascending.end(), type); });
+}
+
+bool has_type_of(const SceneGrid& grid, const std::vector<VoxelType>& ascending) {
+  if (is_any_of(grid.grid.types(), ascending)) return true;
+  const std::vector<IVec3> chunks = grid.field.chunks();
+  return std::any_of(chunks.begin(), chunks.end(), [&](IVec3 chunk) {
+    return is_any_of(grid.field.find_chunk(chunk)->materials().types(), ascending);
+  });
+}
+
+void put_trees(const TreeCache& trees, PlacedGrid& placed) {
+  placed.opaque = &trees.opaque();
+  placed.transparent = trees.transparent();
+  placed.field = trees.field();
+  placed.opaque_field = trees.opaque_field();
+  placed.glass = trees.glass();
 }
 
 }  // namespace
@@ -70,7 +85,8 @@ bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
     // Edited meanwhile, it may have lost the last voxel of such a type.
     const SceneGrid* grid = scene->grids().find(each->handle);
     if (changes.all || grid == nullptr || grid->grid.has_changed_since(each->trees.followed()) ||
-        has_type_of(grid->grid, changed)) {
+        (each->trees.field() != nullptr && grid->field.has_changed_since(each->trees.followed_field())) ||
+        has_type_of(*grid, changed)) {
       each->trees.forget();
       has_forgotten = true;
     } else {
@@ -141,9 +157,7 @@ void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instan
   placed[i].instance = handle;
   placed[i].grid = grid.grid;
   placed[i].voxels = &grid.grid->grid;
-  placed[i].opaque = &grid.trees.opaque();
-  placed[i].transparent = grid.trees.transparent();
-  placed[i].field = grid.trees.field();
+  put_trees(grid.trees, placed[i]);
   placed[i].pivot = grid.pivot;
   placed[i].world_axes = world_axes(instance);
   placed[i].position = instance.position;
@@ -243,22 +257,20 @@ void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads thread
   std::vector<std::uint8_t> is_other(used.size());
   parallel_for(used.size(), threads, [&](std::size_t i) {
     const bool has_other_voxels = used[i]->trees.update(used[i]->grid->grid, scene->types);
-    const bool has_other_field = used[i]->trees.update(used[i]->grid->field);
+    const bool has_other_field = used[i]->trees.update(used[i]->grid->field, scene->types);
     is_other[i] = static_cast<std::uint8_t>(has_other_voxels || has_other_field);
   });
   has_other_trees |= std::find(is_other.begin(), is_other.end(), 1) != is_other.end();
   if (!changes.all && !has_other_trees) return;
   has_transparent = std::any_of(grids.begin(), grids.end(), [](const auto& grid) {
-    return grid != nullptr && grid->is_placed && grid->trees.transparent() != nullptr;
+    return grid != nullptr && grid->is_placed && grid->trees.has_transparent();
   });
   if (!has_other_trees) return;
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const TracedGrid& grid = *sources[i].grid;
     placed[i].grid = grid.grid;
     placed[i].voxels = &grid.grid->grid;
-    placed[i].opaque = &grid.trees.opaque();
-    placed[i].transparent = grid.trees.transparent();
-    placed[i].field = grid.trees.field();
+    put_trees(grid.trees, placed[i]);
   }
 }
 

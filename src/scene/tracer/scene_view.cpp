@@ -9,6 +9,7 @@
 #include "scene/tracer/packet_tree.h"
 #include "scene/tracer/scene_tracer_impl.h"
 #include "scene/tracer/scene_view.h"
+#include "trace/density/density_glass.h"
 #include "trace/density/smooth_normal.h"
 
 namespace quoin {
@@ -76,13 +77,17 @@ bool has_opaque(const PlacedGrid& placed) {
   return !placed.opaque->bounds().empty();
 }
 
+bool has_transparent(const PlacedGrid& placed) {
+  return placed.transparent != nullptr || placed.glass != nullptr;
+}
+
 // Rays in the space of a placed grid.
 std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid) {
   std::uint32_t blocked = has_opaque(placed) ? quoin::any_hits(*placed.opaque, rays_in_grid) : 0;
-  if (placed.field == nullptr || blocked == rays_in_grid.active) return blocked;
+  if (placed.opaque_field == nullptr || blocked == rays_in_grid.active) return blocked;
   RayPacket rest = rays_in_grid;
   rest.active &= ~blocked;
-  return blocked | quoin::any_hits(*placed.field, rest);
+  return blocked | quoin::any_hits(*placed.opaque_field, rest);
 }
 
 // How far the rays that count go at most.
@@ -136,7 +141,7 @@ struct SceneView::Impl {
     move(grid_from_view.front(), rays_in_view, rays);
     if (has_opaque(placed)) quoin::first_hits(*placed.opaque, rays, hits.grids);
     hits.placed.fill(0);
-    if (placed.field == nullptr) return;
+    if (placed.opaque_field == nullptr) return;
     for (std::size_t i = 0; i < kLanes; ++i) {
       if ((hits.grids.hit >> i & 1U) != 0) rays.max_t[i] = hits.grids.t[i];
     }
@@ -159,7 +164,7 @@ struct SceneView::Impl {
       met = found.hit;
       take_nearer(index, found, left, hits);
     }
-    if (placed.field == nullptr) return met;
+    if (placed.opaque_field == nullptr) return met;
     rays.max_t = left.max_t;
     const std::uint32_t taken = add_field(placed, index, rays, hits);
     for (std::uint32_t each = taken; each != 0; each &= each - 1) {
@@ -169,12 +174,12 @@ struct SceneView::Impl {
     return met | taken;
   }
 
-  // What of a placed grid's field lies nearer than what `hits` knows; the rays are in its grid and go no further.
-  // Returns which lanes met it.
+  // What is opaque of a placed grid's field and lies nearer than what `hits` knows; the rays are in its grid and go no
+  // further. Returns which lanes met it.
   static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
                                  SceneHits& hits) {
     DensityPacketHits found;
-    quoin::first_hits(*placed.field, rays_in_grid, found);
+    quoin::first_hits(*placed.opaque_field, rays_in_grid, found);
     std::uint32_t taken = 0;
     for (std::uint32_t left = found.hit; left != 0; left &= left - 1) {
       const int lane = std::countr_zero(left);
@@ -188,7 +193,7 @@ struct SceneView::Impl {
       hits.grids.set(lane, {hit.cell, nearest_direction(hit.normal), hit.t, hit.starts_inside});
       hits.placed[i] = static_cast<std::int32_t>(index);
       const Ray ray = rays_in_grid.ray(lane);
-      const DVec3 normal = smooth_normal(placed.field->field(), ray.origin + ray.direction * hit.t, hit);
+      const DVec3 normal = smooth_normal(placed.opaque_field->field(), ray.origin + ray.direction * hit.t, hit);
       hits.normal_x[i] = static_cast<float>(normal.x);
       hits.normal_y[i] = static_cast<float>(normal.y);
       hits.normal_z[i] = static_cast<float>(normal.z);
@@ -289,13 +294,16 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
   RoomFor<RayPacket> room_for_rays;
   RayPacket& rays = *room_for_rays;
   impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
-    const OccupancyTree* tree = impl_->tracer->placed()[i].transparent;
-    if (tree == nullptr) return true;
+    const PlacedGrid& placed = impl_->tracer->placed()[i];
+    if (!has_transparent(placed)) return true;
     const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
     if (near == 0) return true;
     move(impl_->grid_from_view[i], left, rays);
     rays.active = near;
-    left.active &= ~quoin::any_hits(*tree, rays);
+    std::uint32_t met = placed.transparent == nullptr ? 0 : quoin::any_hits(*placed.transparent, rays);
+    rays.active &= ~met;
+    if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), rays);
+    left.active &= ~met;
     return left.active != 0;
   });
   return rays_in_view.active & ~left.active;
@@ -304,7 +312,7 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
                                   FunctionRef<void(std::int32_t, const Ray&)> visit) const {
   const auto visit_one = [&](std::size_t i) {
-    if (impl_->tracer->placed()[i].transparent == nullptr) return;
+    if (!has_transparent(impl_->tracer->placed()[i])) return;
     const Affine& to_grid = impl_->grid_from_view[i];
     visit(static_cast<std::int32_t>(i), {to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction});
   };

@@ -45,19 +45,19 @@ class SceneView {
   /// They still stop other rays. Cost: O(instances * log instances).
   void leave_to_impostors(std::span<const std::int32_t> placed);
 
-  /// The nearest opaque voxel or field of all instances for each ray, in view space; of equally near ones the instance
-  /// that comes first, in it the voxel.
+  /// The nearest opaque voxel, or what is opaque of a field, of all instances for each ray, in view space; of equally
+  /// near ones the instance that comes first, in it the voxel.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Which rays meet an opaque voxel or a field of any instance. They are in the space of grid `home`, which is asked
-  /// first.
+  /// Which rays meet an opaque voxel, or what is opaque of a field, of any instance. They are in the space of grid
+  /// `home`, which is asked first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
 
-  /// Which rays meet a transparent voxel of any instance.
+  /// Which rays meet a transparent voxel of any instance, or a cell of a field that may hold something transparent.
   [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
 
-  /// Calls `visit` for each instance with transparent voxels that one ray may meet before `max_t`: an index into
-  /// SceneTracer::placed, and the ray in its grid.
+  /// Calls `visit` for each instance with transparent voxels, or a field of which something is transparent, that one
+  /// ray may meet before `max_t`: an index into SceneTracer::placed, and the ray in its grid.
   void visit_transparent(const Ray& ray_in_view, double max_t,
                          FunctionRef<void(std::int32_t placed, const Ray& ray_in_grid)> visit) const;
 

@@ -26,23 +26,37 @@ bool TreeCache::update(const Grid& grid, const VoxelRegistry& types) {
   return true;
 }
 
-bool TreeCache::update(const DensityGrid& field) {
+bool TreeCache::update(const DensityGrid& field, const VoxelRegistry& types) {
   ChangeCursor now = followed_field_;
   const bool is_known = field_ && &field_->field() == &field;
   if (!is_known && field.chunk_count() == 0) {
     field_.reset();
+    split_.reset();
     return false;
   }
-  const DensityChanges changes = field.changes_since(now);
+  DensityChanges changes = field.changes_since(now);
   if (is_known && changes.empty()) return false;
+  changes.all |= !is_known;
   followed_field_ = {};  // stays so when memory runs out
   if (is_known) {
     field_->update(changes);
   } else {
     field_.emplace(field);
   }
+  update_split(field, types, changes);
   followed_field_ = now;
   return true;
+}
+
+// Where there was no glass, there is none but in what changed.
+void TreeCache::update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
+  if (changes.all) split_.reset();
+  if (split_ != nullptr) {
+    split_->update(types, changes);
+  } else if (changes.all ? has_glass(field, types) : has_glass(field, types, changes)) {
+    split_ = std::make_unique<SplitField>(field, types);
+  }
+  if (split_ != nullptr && split_->glass().cells().bounds().empty()) split_.reset();
 }
 
 // Where there was no tree, there was no transparent voxel but in what changed.

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <memory>
 #include <optional>
+
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
+
+#include "scene/tracer/split_field.h"
 
 namespace quoin {
 
@@ -17,27 +21,35 @@ class TreeCache {
   /// Requires: the types' visibility is that of the last time; otherwise `forget` first.
   /// Cost:     that of OccupancyTree::update for the chunks that changed.
   bool update(const Grid& grid, const VoxelRegistry& types);
-  /// The same of a field. Lifetime: as DensityTree.
-  bool update(const DensityGrid& field);
+  /// The same of a field. Lifetime: as DensityTree. Cost: where it has transparent materials also that of SplitField.
+  bool update(const DensityGrid& field, const VoxelRegistry& types);
   void forget() { *this = {}; }
   [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
+  [[nodiscard]] const ChangeCursor& followed_field() const { return followed_field_; }
 
   [[nodiscard]] const OccupancyTree& opaque() const { return opaque_; }
   /// Null when the grid has no transparent voxel.
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
-  /// Null when the field has no solid.
-  [[nodiscard]] const DensityTree* field() const {
-    return field_ && !field_->cells().bounds().empty() ? &*field_ : nullptr;
-  }
+  /// All that is solid of the field; null when there is none.
+  [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
+  /// What of it is opaque, the same where all is; null when there is none.
+  [[nodiscard]] const DensityTree* opaque_field() const { return split_ ? if_any(split_->opaque()) : field(); }
+  /// What of it is transparent; null when there is none.
+  [[nodiscard]] const DensityGlass* glass() const { return split_ ? &split_->glass() : nullptr; }
+  /// Whether there are transparent voxels, or anything transparent in the field.
+  [[nodiscard]] bool has_transparent() const { return transparent_.has_value() || split_ != nullptr; }
 
  private:
+  static const DensityTree* if_any(const DensityTree& tree) { return tree.cells().bounds().empty() ? nullptr : &tree; }
   void update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes);
+  void update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
   ChangeCursor followed_;
   OccupancyTree opaque_{Occupancy::Opaque};
   std::optional<OccupancyTree> transparent_;
   ChangeCursor followed_field_;
   std::optional<DensityTree> field_;
+  std::unique_ptr<SplitField> split_;  // where the field has anything transparent
 };
 
 }  // namespace quoin

@@ -22,6 +22,10 @@ vec3 normal_met(int instance, uint face, float t) {
 }
 LitPoint point_of_body(Body body) {
   Placed placed = placed_at(body.voxel.w);
+  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
+    vec3 normal = normal_entered(body);
+    return point_of_body(body, placed, normal, max(dot(normal, mesh_frame().sun.xyz), 0.0));
+  }
   uint face = body.what.y;
   float diffuse = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
   return point_of_body(body, placed, face_normal(placed, face), diffuse);
@@ -31,9 +35,9 @@ LitPoint point_of_body(Body body) {
 void enter_first(inout BodyList list) {
   for (uint i = 0; i < list.count; ++i) {
     Body body = listed_body(list, i);
-    if (body.what.z == 0 || body.voxel.w != seen_home) continue;
+    if ((body.what.z & kHowItBegins) != kStartsInside || body.voxel.w != seen_home) continue;
     body.what.y = what.x;
-    body.what.z = 0;
+    body.what.z &= ~kHowItBegins;
     list_body(list, i, body);
   }
 }

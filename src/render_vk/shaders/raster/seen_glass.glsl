@@ -45,9 +45,14 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
     surface.emitted = vec3(0.0);
   }
   // From inside it shows only what it emits.
-  if (body.what.z != 0) surface.colour = vec3(0.0);
+  if ((body.what.z & kStartsInside) != 0) surface.colour = vec3(0.0);
   GridRay ray = seen_ray_in(body.voxel.w, placed);
   vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
+  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
+    vec3 above = inside + frame().lift / placed.ref_view.w * normal_of(body.what.y);
+    vec3 at = vec3(body.voxel.xyz & 63) + above;
+    return LitPoint(body.voxel, body.voxel.xyz & ~63, at, normal, diffuse, surface.colour, surface.emitted, 1.0);
+  }
   inside = on_face(inside, face);
   float openness = 1.0;
   if (has_occlusion()) {

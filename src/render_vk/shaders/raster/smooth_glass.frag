@@ -49,7 +49,7 @@ vec3 normal_met(int instance, uint face, float t) {
 LitPoint point_of_body(Body body) {
   if (body.lengths.x <= 0.0) return own_point();
   vec4 sun = mesh_frame().sun;
-  vec3 met = normal_met(body.voxel.w, body.what.y, body.lengths.x);
+  vec3 met = normal_entered(body);
   return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
 }
 
@@ -60,8 +60,9 @@ void enter_first(inout BodyList list) {
   float voxel_size = placed_at(seen_home).ref_inside.w;
   if (list.count > 0) {
     Body first = listed_body(list, 0);
-    if (first.voxel.w == seen_home && first.lengths.x < kNear * voxel_size) {
-      first.what.z = 0;
+    bool is_of_voxels = (first.what.z & kBeginsInField) == 0;
+    if (is_of_voxels && first.voxel.w == seen_home && first.lengths.x < kNear * voxel_size) {
+      first.what.z &= ~kHowItBegins;
       first.lengths.x = 0.0;
       list_body(list, 0, first);
       return;
