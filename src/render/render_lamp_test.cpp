@@ -357,6 +357,35 @@ TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
   EXPECT_GT(most, 100U);
 }
 
+// A glowing ball in a lake of the same field shines as in air; in stone it does not.
+TEST(EmissiveCells, OfFieldsShineIntoGlassAroundThem) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, kWhite);
+  const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
+  const VoxelType water = add_type(scene, {60, 120, 160, 40}, Visibility::Transparent);
+  const auto power_in = [&](VoxelType around) {
+    DensityGrid field;
+    field.edit({{0, 0, 0}, {40, 40, 40}}, [&](IVec3 p, DensitySample) {
+      const double ball = glm::distance(DVec3(p), DVec3(20.3)) - 7.0;
+      const double sides = std::min({p.x, p.y, p.z, 39 - p.x, 39 - p.y, 39 - p.z}) - 0.5;
+      if (ball < 0.0) return DensitySample{static_cast<float>(ball), torch};
+      if (around == kAir || sides < 0.0) return DensitySample{static_cast<float>(ball), kAir};
+      return DensitySample{static_cast<float>(-std::max(std::min(ball, sides), 0.01)), around};
+    });
+    EmissiveCells cells;
+    cells.update(field, scene.types);
+    double sum = 0.0;
+    cells.for_each([&](const EmissiveCell& cell) {
+      for (const Vec3& power : cell.power) sum += static_cast<double>(power.x);
+    });
+    return sum;
+  };
+  const double in_air = power_in(kAir);
+  EXPECT_GT(in_air, 0.0);
+  EXPECT_NEAR(power_in(water), in_air, 0.08 * in_air);
+  EXPECT_EQ(power_in(stone), 0.0);
+}
+
 TEST(EmissiveCells, FollowEditsAsIfMadeAnew) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
