@@ -2,11 +2,9 @@
 
 #include <chrono>
 #include <cstdio>
-#include <map>
-#include <optional>
 #include <thread>
 
-#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 
 #include "commands.h"
 #include "interrupt.h"
@@ -20,28 +18,17 @@ namespace fs = std::filesystem;
 
 constexpr auto kInterval = std::chrono::milliseconds(250);
 
-/// What files are now, by their names.
-using Stamps = std::map<fs::path, std::optional<FileStamp>>;
-
 void add_folder(const fs::path& folder, Stamps& stamps) {
   std::error_code code;
-  for (fs::recursive_directory_iterator at(folder, code); !code && at != fs::recursive_directory_iterator();
-       at.increment(code)) {
+  for (fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, code);
+       !code && at != fs::recursive_directory_iterator(); at.increment(code)) {
     std::error_code unknown;
     if (at->is_regular_file(unknown)) stamps[at->path().lexically_normal()] = FileStamp::of(at->path());
   }
 }
 
 Stamps stamps_of(const WatchedWork& work) {
-  Stamps stamps;
-  for (const fs::path& path : work.read) {
-    std::error_code unknown;
-    if (fs::is_directory(path, unknown)) {
-      add_folder(path, stamps);
-    } else {
-      stamps[path.lexically_normal()] = FileStamp::of(path);
-    }
-  }
+  Stamps stamps = tool::stamps_of(work.read);
   for (const fs::path& path : work.written) stamps.erase(path.lexically_normal());
   return stamps;
 }
@@ -66,17 +53,34 @@ void tell_of_watching(const WatchedWork& work) {
 
 }  // namespace
 
-int watch(const std::function<WatchedWork()>& work) {
+Stamps stamps_of(const std::vector<fs::path>& paths) {
+  Stamps stamps;
+  for (const fs::path& path : paths) {
+    std::error_code unknown;
+    if (fs::is_directory(path, unknown)) {
+      add_folder(path, stamps);
+    } else {
+      stamps[path.lexically_normal()] = FileStamp::of(path);
+    }
+  }
+  return stamps;
+}
+
+std::vector<fs::path> files_read(const fs::path& input) {
+  std::vector<fs::path> files = files_read_beside(input);
+  files.insert(files.begin(), input);
+  return files;
+}
+
+int watch(const std::vector<fs::path>& read, const std::function<WatchedWork()>& work) {
   catch_interrupts();
   bool is_first = true;
   WatchedWork done;
+  done.read = read;
   while (!was_interrupted()) {
     // What changes while the work goes on has changed since: of files that were read before, too.
     const Stamps before = stamps_of(done);
-    WatchedWork now = work();
-    // What failed may not have come to all that it reads.
-    if (now.status == kFailed && now.read.size() < done.read.size()) now.read = done.read;
-    done = std::move(now);
+    done = work();
     if (is_first && done.status == kWrongUsage) return done.status;
     if (is_first) tell_of_watching(done);
     is_first = false;

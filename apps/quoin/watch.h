@@ -2,7 +2,11 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <optional>
 #include <vector>
+
+#include <quoin/io/file.h>
 
 namespace quoin::tool {
 
@@ -13,9 +17,16 @@ struct WatchedWork {
   std::vector<std::filesystem::path> written;  ///< whose changes count for nothing
 };
 
+/// What files are, by their names; of folders all that is in them.
+using Stamps = std::map<std::filesystem::path, std::optional<FileStamp>>;
+[[nodiscard]] Stamps stamps_of(const std::vector<std::filesystem::path>& paths);
+
+/// A file, and all that is read beside it, as far as can be known before.
+[[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& input);
+
 /// Does a piece of work, and again whenever what it read has changed and rests, until the program is interrupted, which
-/// ends it. Returns only where the first time was wrong usage. Files are looked at, not listened to, so that any file
+/// ends it. `read`: what it will read, as far as is known. Returns only where the first time was wrong usage. Files are looked at, not listened to, so that any file
 /// system will do: four times a second.
-[[nodiscard]] int watch(const std::function<WatchedWork()>& work);
+[[nodiscard]] int watch(const std::vector<std::filesystem::path>& read, const std::function<WatchedWork()>& work);
 
 }  // namespace quoin::tool

@@ -9,6 +9,7 @@
 #include <quoin/scene/volume_scene.h>
 
 #include "io/byte_stream.h"
+#include "io/read_beside.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 
@@ -180,6 +181,13 @@ Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, con
 
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {
   return read_bytes({}, bytes, options, progress);
+}
+
+std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path) {
+  const auto format = detect_format(path);
+  if (!format || !*format) return {};
+  if (**format == FileFormat::Scene) return files_named_in_scene(path);
+  return **format == FileFormat::Nifti ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options,

@@ -103,13 +103,15 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
 /// What is wrong with what a placement does.
 const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
   const bool mirrors = glm::determinant(glm::dmat3(placement.matrix())) < 0.0;
-  double last = 0.0;
+  // Files have floats.
+  float last = 0.0F;
   for (const MeshKey& key : placement.keys) {
     const bool is_first = &key == &placement.keys.front();
-    if (!(is_first ? key.seconds == 0.0 : key.seconds > last) || !std::isfinite(key.seconds)) {
+    const auto seconds = static_cast<float>(key.seconds);
+    if (!(is_first ? seconds == 0.0F : seconds > last) || !std::isfinite(seconds)) {
       return "keys that do not ascend from 0 seconds";
     }
-    last = key.seconds;
+    last = seconds;
     if (key.world_from_part.mirrored != mirrors)
       return "a key that mirrors where the placement does not, or the other way round";
     MeshPlacement at;
@@ -126,6 +128,7 @@ const char* fault_of_atlas(const MeshView& view, const Image& atlas) {
   };
   if (std::ranges::any_of(view.atlas, is_outside)) return "a texture coordinate beyond 0 to 1";
   if (!view.atlas.empty() && view.surface != SurfaceClass::Opaque) return "an atlas for what is not opaque";
+  if (!view.atlas.empty() && !view.block_occlusion.empty()) return "occlusion beside that of an atlas";
   if (!view.atlas.empty() && atlas.rgb.empty()) return "coordinates in an atlas that is not there";
   const bool is_left_out = view.atlas.empty() && !view.positions.empty() && view.surface == SurfaceClass::Opaque;
   return is_left_out && !view.has_albedo() && !atlas.rgb.empty() ? "opaque blocks that are not in the atlas" : nullptr;
@@ -170,8 +173,8 @@ Status check_groups(const std::vector<MeshGroup>& groups) {
 }  // namespace
 
 Status check_meshes(const SceneMeshes& meshes) {
-  if (!(meshes.seconds >= 0.0) || !std::isfinite(meshes.seconds)) {
-    return make_error(ErrorCode::InvalidArgument, "an animation of no length");
+  if (!(meshes.seconds >= 0.0) || !std::isfinite(static_cast<float>(meshes.seconds))) {
+    return make_error(ErrorCode::InvalidArgument, "an animation whose length is no number");
   }
   const Image& atlas = meshes.atlas;
   const bool is_sound = atlas.width >= 0 && atlas.height >= 0 &&

@@ -58,18 +58,19 @@ void keep_what_is_asked_for(const ConvertOptions& options, const FormatInfo& for
 
 /// All frames of a file, of which the first is there.
 Status read_frames(const LoadedScene& first, const ConvertOptions& options, SceneAnimation& animation) {
+  constexpr std::int64_t kMaxFrames = 100'000;
+  if (first.last_frame >= kMaxFrames) {
+    return make_error(ErrorCode::LimitExceeded, std::to_string(first.last_frame + 1) + " frames are too many",
+                      options.common.input.string());
+  }
   const InstanceFilter filter = options.common.instances();
   if (auto added = animation.add(first.scene, filter); !added) return added;
-  LoadOptions load = options.common.load;
-  load.threads = options.common.threads;
-  load.keep_source = false;
   ProgressBar bar(!options.is_one_of_many);
   const Progress progress = bar.listener("frames");
   for (std::int64_t frame = 1; frame <= first.last_frame; ++frame) {
-    load.frame = static_cast<int>(frame);
-    const auto loaded = load_scene(options.common.input, load);
-    if (!loaded) return loaded.error();
-    if (auto added = animation.add(loaded->scene, filter); !added) return added;
+    auto scene = scene_at_frame(*first.source, static_cast<int>(frame));
+    if (!scene) return scene.error();
+    if (auto added = animation.add(*scene, filter); !added) return added;
     if (!progress(static_cast<double>(frame) / static_cast<double>(first.last_frame))) {
       return make_error(ErrorCode::Cancelled, "cancelled", options.common.input.string());
     }
@@ -81,14 +82,13 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.threads = options.common.threads;
-  load.keep_source = !format.is_mesh;
+  load.keep_source = !format.is_mesh || options.animate;
   auto loaded = [&] {
     ProgressBar bar(!options.is_one_of_many);
     return load_scene(options.common.input, load, bar.listener("reading"));
   }();
   if (!loaded) return loaded.error();
   Outcome outcome;
-  outcome.named_files = std::move(loaded->named_files);
   outcome.voxels = loaded->scene.voxel_count();
   outcome.warnings = std::move(loaded->warnings);
   outcome.seconds.read = watch.lap();
@@ -96,7 +96,13 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   if (format.is_mesh) {
     SceneAnimation animation;
     if (options.animate) {
-      if (loaded->last_frame == 0) outcome.warnings.emplace_back("nothing moves in it: a single frame");
+      if (loaded->last_frame == 0) {
+        outcome.warnings.emplace_back(loaded->named_files.empty()
+                                          ? "nothing moves in it: a single frame"
+                                          : "only a .vox file itself is animated, not what a scene names");
+      }
+      // The animation has no instance that is never shown.
+      warn_of_left_out(loaded->scene, options.common.instances(), outcome.warnings);
       if (auto read = read_frames(*loaded, options, animation); !read) return read.error();
       std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
       outcome.seconds.read += watch.lap();
@@ -158,6 +164,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   }
   if (is_volume && options.texture == "atlas")
     return "--texture atlas is for voxels, and the input is a volume of values";
+  if (is_volume && options.animate) return "--animate is for .vox files, and the input is a volume of values";
   if (is_volume && (options.smoothness || options.colours || options.apart)) {
     return "--smoothness, --colours and --no-unite are for voxels, and the input is a volume of values";
   }
@@ -226,7 +233,7 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   const bool is_to_stream = options.output == kStandardStream;
   StandardStreams streams;
   WatchedWork work;
-  work.read = {options.common.input};
+  work.read = files_read(options.common.input);
   const auto ended = [&](int status) {
     work.status = status;
     return work;
@@ -254,7 +261,6 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   const auto outcome = convert_file(options, *format, fault);
   if (!fault.empty()) return misused(fault);
   if (!outcome) return failed(outcome.error());
-  work.read.insert(work.read.end(), outcome->named_files.begin(), outcome->named_files.end());
   work.written = outcome->files;
   if (options.common.json) return ended(print_json(outcome_json(*outcome)));
   print_warnings(outcome->warnings);
@@ -278,7 +284,8 @@ std::string fault_of_watching(const ConvertOptions& options, const ManyOptions& 
 int run(ConvertOptions& options, const ManyOptions& many) {
   Converted done;
   const auto work = [&] { return many.inputs.empty() ? run_one(options, many) : run_many(options, many, done); };
-  return options.watch ? watch(work) : work().status;
+  if (!options.watch) return work().status;
+  return watch(many.inputs.empty() ? files_read(options.common.input) : many.inputs, work);
 }
 
 void add_mesh_options(CLI::App& command, ConvertOptions& options) {
@@ -312,9 +319,11 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
       ->check(CLI::IsMember({"palette", "atlas"}));
   command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
-  command.add_flag("--animate", options.animate, "All frames of a .vox file, as an animation of glTF (.glb, .gltf)");
+  command.add_flag(
+      "--animate", options.animate,
+      "All frames of a .vox file, as an animation of glTF (.glb, .gltf); smooth models are meshed each by itself");
   command.add_option("--fps", options.frames_per_second, "Frames a second of --animate (default 10)")
-      ->check(positive());
+      ->check(CLI::Range(0.001, 1000.0));
   command.add_option("--scale", options.scale, "Units of the mesh a voxel (default 1; 0.1: ten voxels are a metre)")
       ->check(positive());
   command
@@ -529,7 +538,8 @@ void add_convert_command(CLI::App& app, int& status) {
   command->footer(
       "Reads " + readable_extensions() + "; writes " + writable_extensions() +
       ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
-      "NAME_emissive.png, but for smooth meshes, whose colours are in the vertices. They replace files of these\n"
+      "NAME_emissive.png, and NAME_atlas.png with an atlas, but for smooth meshes, whose colours are in the vertices. "
+      "They replace files of these\n"
       "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
       "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
       "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"

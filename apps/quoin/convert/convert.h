@@ -68,8 +68,7 @@ struct Outcome {
   std::optional<double> iso;  ///< of volumes
   bool is_iso_found = false;  ///< between two groups of values rather than given, or all there is
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;        ///< all that were written, OUT first
-  std::vector<std::filesystem::path> named_files;  ///< that were read beside IN
+  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   Seconds seconds;
   std::vector<std::string> warnings;
 };
@@ -90,8 +89,8 @@ struct ManyOptions {
   bool recursive = false;
 };
 
-/// What inputs were when they were converted.
-using Converted = std::map<std::filesystem::path, std::optional<FileStamp>>;
+/// By input, what it and all that is read beside it were when it was converted.
+using Converted = std::map<std::filesystem::path, Stamps>;
 
 /// Converts each of the inputs, several at once; those that fail are named last. `done`: those that are in it are left
 /// out until they change; gets what is converted now.

@@ -22,7 +22,7 @@ struct Task {
   fs::path output;
   std::optional<Outcome> outcome;
   std::optional<Error> error;
-  std::optional<FileStamp> stamp;  ///< of the input, before it is read
+  Stamps stamps{};  ///< of the input and what is read beside it, before it is read
 };
 
 Error error_of(const fs::path& path, const std::error_code& code) {
@@ -75,7 +75,7 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
   std::vector<Task> tasks;
   const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
     const fs::path folder = !many.folder ? beside : below == "." ? *many.folder : *many.folder / below;
-    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}, {}});
+    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}});
   };
   for (const fs::path& input : many.inputs) {
     std::error_code unknown;
@@ -145,18 +145,20 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
 void leave_out(const Converted& done, std::vector<Task>& tasks, WatchedWork& work) {
   for (Task& task : tasks) {
     work.written.push_back(task.output);
-    task.stamp = FileStamp::of(task.input);
+    const std::vector<fs::path> read = files_read(task.input);
+    work.read.insert(work.read.end(), read.begin(), read.end());
+    task.stamps = stamps_of(read);
   }
   std::erase_if(tasks, [&](const Task& task) {
     const auto found = done.find(task.input);
-    return found != done.end() && found->second == task.stamp;
+    return found != done.end() && found->second == task.stamps;
   });
 }
 
 /// What failed is tried again only once it has changed, too.
 void note(const std::vector<Task>& tasks, Converted& done, WatchedWork& work) {
   for (const Task& task : tasks) {
-    done[task.input] = task.stamp;
+    done[task.input] = task.stamps;
     if (!task.outcome) continue;
     work.written.insert(work.written.end(), task.outcome->files.begin(), task.outcome->files.end());
   }

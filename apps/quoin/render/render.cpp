@@ -32,8 +32,7 @@ struct Outcome {
   FaceCounts faces;
   bool is_volume = false;
   std::uint64_t bytes = 0;
-  std::vector<std::filesystem::path> files;        ///< all that were written, OUT first
-  std::vector<std::filesystem::path> named_files;  ///< that were read beside IN
+  std::vector<std::filesystem::path> files;  ///< all that were written, OUT first
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
@@ -260,7 +259,6 @@ Result<Outcome> render(const RenderArguments& arguments) {
   const Scene& scene = loaded->scene;
   Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
-  outcome.named_files = std::move(loaded->named_files);
   if (arguments.frames) std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
   outcome.read = watch.lap();
   outcome.is_volume = is_volume;
@@ -343,7 +341,7 @@ Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams
 WatchedWork run_render(RenderArguments& arguments) {
   StandardStreams streams;
   WatchedWork work;
-  work.read = {arguments.common.input};
+  work.read = files_read(arguments.common.input);
   const auto outcome = render_from(arguments, streams);
   if (!outcome) {
     const Error error = streams.named(outcome.error());
@@ -353,7 +351,6 @@ WatchedWork run_render(RenderArguments& arguments) {
     work.status = kFailed;
     return work;
   }
-  work.read.insert(work.read.end(), outcome->named_files.begin(), outcome->named_files.end());
   work.written = outcome->files;
   if (arguments.common.json) {
     work.status = print_json(outcome_json(arguments, *outcome));
@@ -385,7 +382,7 @@ void add_render_command(CLI::App& app, int& status) {
       return;
     }
     const auto work = [&] { return run_render(*arguments); };
-    status = arguments->watch ? watch(work) : work().status;
+    status = arguments->watch ? watch(files_read(arguments->common.input), work) : work().status;
   });
 }
 

@@ -32,7 +32,8 @@ void CameraControl::set(const Camera& camera, const DBox& bounds) {
   if (!is_finite(camera.position) || !is_finite(camera.forward) || !is_finite(camera.right)) return;
   camera_ = camera;
   pitch_ = std::asin(std::clamp(camera.forward.y, -1.0, 1.0));
-  const bool is_upright = std::abs(camera.right.y) < 1e-9 || std::hypot(camera.forward.x, camera.forward.z) < 1e-9;
+  const bool is_vertical = std::hypot(camera.forward.x, camera.forward.z) < 1e-9;
+  const bool is_upright = is_vertical || (std::abs(camera.right.y) < 1e-9 && camera.up.y >= 0.0);
   yaw_ = is_upright ? std::atan2(camera.right.z, camera.right.x) : std::atan2(camera.forward.x, -camera.forward.z);
   const bool has_bounds = !bounds.empty() && is_finite(bounds.min) && is_finite(bounds.max);
   const DVec3 middle = has_bounds ? 0.5 * bounds.min + 0.5 * bounds.max : DVec3{0.0};

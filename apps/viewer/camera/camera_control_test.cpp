@@ -49,6 +49,11 @@ TEST(CameraControl, OfARolledCameraTheWayItLooksStays) {
   control.set(camera, {{0, 0, 0}, {5, 5, 5}});
   EXPECT_LT(glm::length(control.camera().forward - camera.forward), 1e-12);
   EXPECT_LT(glm::length(control.camera().right - right), 1e-12) << "upright";
+  camera.right = -right;
+  camera.up = glm::cross(camera.right, camera.forward);
+  control.set(camera, {{0, 0, 0}, {5, 5, 5}});
+  EXPECT_LT(glm::length(control.camera().forward - camera.forward), 1e-12) << "upside down";
+  EXPECT_LT(glm::length(control.camera().right - right), 1e-12);
 }
 
 TEST(CameraControl, TheFrameRateMakesNoDifference) {

@@ -101,6 +101,7 @@ void App::take_loaded() {
 }
 
 void App::adopt(OpenDocument opened) {
+  state_.message.reset();
   asked_.reset();
   save_wanted_pictures();
   input_.editing = {};
@@ -109,7 +110,6 @@ void App::adopt(OpenDocument opened) {
   state_.open = std::move(opened);
   state_.stats = {};
   state_.picture = {};
-  state_.message.reset();
   told_fault_.clear();
   lossy_save_.reset();
   screen_->forget_picture();
@@ -125,7 +125,8 @@ void App::adopt(OpenDocument opened) {
   } else {
     show_from(View::Iso);
   }
-  if (!loaded.warnings.empty()) {
+  const bool has_fault = state_.message && state_.message->is_error;
+  if (!loaded.warnings.empty() && !has_fault) {
     const std::size_t more = loaded.warnings.size() - 1;
     state_.tell(loaded.warnings.front() + (more > 0 ? " (and " + std::to_string(more) + " more warnings)" : ""));
   }
@@ -169,7 +170,10 @@ void App::want_picture() {
   if (!state_.open.backend || !asked_ || state_.stats.width == 0) return;
   const Result<Image> shown = image_of(state_.picture);
   if (is_settled()) return save_picture(shown);
-  wanted_.push_back({*asked_, state_.scene().cursor(), shown});
+  // A key that is held down asks for one picture.
+  const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, *asked_) &&
+                         !state_.scene().has_changed_since(wanted_.back().scene);
+  if (!is_wanted) wanted_.push_back({*asked_, state_.scene().cursor(), shown});
   state_.tell("the picture is saved once it is done");
 }
 

@@ -59,6 +59,10 @@ struct FormatInfo {
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
                                              const Progress& progress = {});
 
+/// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, and the
+/// values of a NIfTI pair. Nothing where the file cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
+
 /// The same of bytes. Errors: Unsupported also for scene files that name others, which only a path finds.
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                              const Progress& progress = {});

@@ -45,6 +45,11 @@ namespace quoin {
 [[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {},
                                            const Progress& progress = {});
 
+/// The scene of another frame of a file, whose models and colours are shared with the one that was read, as it was
+/// read: its grids, groups and layers have the same handles. Cost: that of the scene graph, however many voxels there
+/// are. Errors: InvalidArgument for a frame that is not there.
+[[nodiscard]] Result<Scene> scene_at_frame(const VoxSource& source, int frame);
+
 /// What a file holds that its scene does not, for people, a line each: "animation of 24 frames", "10 cameras". A .vox
 /// file written by write_vox keeps it; any other format loses it.
 [[nodiscard]] std::vector<std::string> only_in_source(const VoxSource& source);

@@ -23,7 +23,7 @@ class SceneAnimation {
   /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of
   /// their handles; of the grids, types, groups and layers those of the first frame are taken, which the same handles
   /// mean in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
-  /// Cost: O(instances). Errors: InvalidArgument where the number of instances or grids is another than before.
+  /// Cost: O(instances), times the grids that each has shown; memory for what changes. Errors: InvalidArgument where the number of instances or grids is another than before.
   [[nodiscard]] Status add(const Scene& frame, InstanceFilter filter = InstanceFilter::Visible);
 
   /// All that any frame shows: an instance that shows several grids one after the other is as many.
@@ -41,13 +41,21 @@ class SceneAnimation {
     bool mirrored = false;
     bool operator==(const Look&) const = default;
   };
+  /// From a frame on; nothing: it is not shown.
+  struct Change {
+    std::size_t frame = 0;
+    std::optional<Similarity> at;
+  };
   struct Shown {
     Look look;
-    InstanceHandle instance;                    ///< in scene_
-    std::vector<std::optional<Similarity>> at;  ///< by frame, as many as there were until it was last shown
+    InstanceHandle instance;  ///< in scene_
+    std::vector<Change> changes;
+    std::size_t frames_until_last = 0;  ///< how many there were when it was last shown
   };
 
   Shown& shown_as(std::size_t place, const Instance& instance);
+  static void show(Shown& shown, std::size_t frame, const Similarity& place);
+  [[nodiscard]] std::vector<MeshKey> keys_of(const Shown& shown, double frames_per_second) const;
 
   Scene scene_;
   std::size_t frames_ = 0;

@@ -120,7 +120,8 @@ struct BlockySceneOptions {
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
 ///         size not positive, and for an atlas of faces that are not merged, are watertight or have no occlusion;
-///         LimitExceeded when an atlas of 16,384 texels a side does not hold them; Cancelled when `progress` says so.
+///         LimitExceeded when an atlas of 16,384 texels a side does not hold them, or
+///         voxels of it lie beyond 2^24; Cancelled when `progress` says so.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 

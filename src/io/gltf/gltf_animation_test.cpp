@@ -126,6 +126,16 @@ TEST_F(GltfAnimation, ModelsComeAndGoAndWhatStandsHasNoChannels) {
   EXPECT_EQ(glb.document["accessors"][times]["max"], Json({1.5})) << "the last frame is as long as the others";
 }
 
+std::size_t triangles_of(const ParsedGlb& glb, const Json& mesh) {
+  std::size_t triangles = 0;
+  for (const Json& primitive : mesh["primitives"]) triangles += glb.indices(primitive).size() / 3;
+  return triangles;
+}
+std::size_t mesh_triangles(const Scene& scene, GridHandle grid) {
+  const auto mesh = build_blocky_mesh(scene.grids()[grid].grid, scene.types, {});
+  return static_cast<std::size_t>(mesh->triangle_count());
+}
+
 /// Every node of a file is, in every frame, where the frame's own scene has it.
 void expect_same_places(const std::vector<std::byte>& file, const SceneAnimation& animation, const ParsedGlb& glb) {
   for (int frame = 0; frame < static_cast<int>(animation.frame_count()); ++frame) {
@@ -143,6 +153,10 @@ void expect_same_places(const std::vector<std::byte>& file, const SceneAnimation
         if (moment.scale == DVec3(0.0)) continue;
         ++shown;
         EXPECT_LT(glm::length(moment.translation - instance.position), 1e-4) << instance.name << frame;
+        const std::size_t mesh = glb.document["nodes"][*node]["mesh"];
+        const Json& shape = glb.document["meshes"][mesh];
+        EXPECT_EQ(shape["name"].get<std::string>().ends_with(" (mirrored)"), instance.mirrored);
+        EXPECT_EQ(triangles_of(glb, shape), mesh_triangles(scene, instance.grid)) << "the model of this frame";
         EXPECT_NEAR(std::abs(glm::dot(moment.rotation, glm::normalize(instance.rotation))), 1.0, 1e-6);
       }
       EXPECT_EQ(shown, 1) << instance.name << " in frame " << frame;
@@ -154,8 +168,8 @@ TEST_F(GltfAnimation, EveryFrameIsThatFrame) {
   vox_test::FileBuilder builder;
   std::mt19937 random(7);
   const auto number = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most)); };
-  builder.model(2, 2, 3, {{0, 0, 0, 1}, {1, 1, 2, 1}}).model(2, 4, 2, {{0, 0, 0, 2}, {1, 1, 1, 2}});
-  builder.model(3, 1, 1, {{0, 0, 0, 3}, {2, 0, 0, 1}});
+  builder.model(2, 2, 3, {{0, 0, 0, 1}, {1, 1, 2, 1}}).model(2, 4, 2, {{0, 0, 0, 2}});
+  builder.model(3, 1, 3, {{0, 0, 0, 3}, {2, 0, 0, 1}, {1, 0, 2, 1}});
   std::vector<std::int32_t> children;
   for (int i = 0; i < 8; ++i) children.push_back(2 + 2 * i);
   builder.transform(0, 1, {{}}, {}, -1).group(1, children);

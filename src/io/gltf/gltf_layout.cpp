@@ -423,7 +423,9 @@ void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
       scale.add(seconds, floats_of(key.visible ? transform.scale : DVec3(0.0)), is_last);
     };
     for (const MeshKey& key : placement.keys) add(key, key.seconds, false);
-    if (meshes.seconds > placement.keys.back().seconds) add(placement.keys.back(), meshes.seconds, true);
+    const MeshKey& last = placement.keys.back();
+    const bool is_longer = static_cast<float>(meshes.seconds) > static_cast<float>(last.seconds);
+    if (is_longer) add(last, meshes.seconds, true);
     for (const ChannelBuilder* const each : {&translation, &rotation, &scale}) {
       auto channel = each->channel();
       if (!channel) continue;

@@ -6,6 +6,7 @@
 
 #include <quoin/io/formats.h>
 
+#include "io/read_beside.h"
 #include "io/text.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
@@ -257,6 +258,14 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
   Placer(*file, grids, *bodies, loaded.scene).place();
   if (options.show_hidden) show_all(loaded.scene);
   return loaded;
+}
+
+std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {
+  const auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
+  std::vector<std::filesystem::path> named;
+  if (!file) return named;
+  for (const SceneFile::Source& source : file->sources) named.push_back(path.parent_path() / source.file);
+  return named;
 }
 
 Result<LoadedScene> read_scene_file(std::span<const std::byte> text) {

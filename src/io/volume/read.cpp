@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "io/read_beside.h"
 #include "io/text.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
@@ -144,6 +145,15 @@ Result<Volume> read_volume(const std::filesystem::path& path, const VolumeOption
     if (volume && volume->name.empty()) volume->name = name_from(path);
     return volume;
   });
+}
+
+std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path) {
+  const auto bytes = read_file(path);
+  const auto beginning = bytes ? beginning_of(*bytes) : Result<Beginning>(bytes.error());
+  if (!beginning) return {};
+  const auto header = header_of(*beginning, {});
+  if (!header || !header->is_data_elsewhere) return {};
+  return {image_beside(path)};
 }
 
 Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options,

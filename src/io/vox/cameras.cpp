@@ -117,6 +117,10 @@ std::vector<FileCamera> cameras_of(const Document& document, const DBox& bounds,
     const Keys keys = read_keys(chunk.attributes, fault);
     if (fault.empty() && was_never_set(keys)) continue;
     if (fault.empty()) fault = fault_of(keys);
+    if (fault.empty() && chunk.id < 0) fault = "its number is less than 0";
+    if (fault.empty() && std::ranges::find(cameras, chunk.id, &FileCamera::number) != cameras.end()) {
+      fault = "there was one of this number before";
+    }
     if (fault.empty()) {
       cameras.push_back({chunk.id, camera_from(keys, bounds)});
     } else {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/io/vox.h>
 
 #include "io/text.h"
@@ -171,6 +172,25 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   }
   if (options.show_hidden) show_all(loaded.scene);
   return loaded;
+}
+
+Result<Scene> scene_at_frame(const VoxSource& source, int frame) {
+  const auto placements = vox::place_models(source.document, frame, source.bytes.size());
+  if (!placements) return placements.error();
+  Scene scene = source.scene.snapshot();
+  const std::vector<InstanceHandle> instances = scene.instances().handles();
+  const std::vector<GroupHandle> groups = scene.groups().handles();
+  const std::vector<GridHandle> grids = scene.grids().handles();
+  QUOIN_ASSERT(placements->all.size() == instances.size() && placements->groups.size() == groups.size(),
+               "frames differ in places and models alone");
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    Instance& instance = scene.edit(instances[i]);
+    const vox::Placement& placement = placements->all[i];
+    instance.grid = grids[placement.model];
+    put_place(placement.world, instance);
+  }
+  for (std::size_t i = 0; i < groups.size(); ++i) put_place(placements->groups[i].world, scene.edit(groups[i]));
+  return scene;
 }
 
 Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options, const Progress& progress) {

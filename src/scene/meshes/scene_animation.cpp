@@ -17,24 +17,6 @@ Similarity place_of(const Instance& instance) {
   return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
 }
 
-/// Where the placement is in each frame; while it is not shown it stays where it was, or will be first.
-std::vector<MeshKey> keys_of(const std::vector<std::optional<Similarity>>& at, std::size_t frames,
-                             double frames_per_second) {
-  const auto first = std::ranges::find_if(at, [](const auto& place) { return place.has_value(); });
-  std::vector<MeshKey> keys;
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    const bool is_shown = frame < at.size() && at[frame];
-    MeshKey key{static_cast<double>(frame) / frames_per_second, is_shown,
-                is_shown       ? *at[frame]
-                : keys.empty() ? **first
-                               : keys.back().world_from_part};
-    const bool is_new =
-        keys.empty() || keys.back().visible != key.visible || keys.back().world_from_part != key.world_from_part;
-    if (is_new) keys.push_back(key);
-  }
-  return keys;
-}
-
 }  // namespace
 
 Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
@@ -52,9 +34,7 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
   for (const InstanceHandle handle : frame.instances().handles()) {
     const Instance& instance = frame.instances()[handle];
     if (is_drawn(frame, instance, filter)) {
-      Shown& shown = shown_as(place, instance);
-      shown.at.resize(frames_);
-      shown.at.emplace_back(place_of(instance));
+      show(shown_as(place, instance), frames_, place_of(instance));
     }
     ++place;
   }
@@ -72,20 +52,43 @@ SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Instanc
   return all.emplace_back(Shown{look, scene_.add_instance(std::move(taken)), {}});
 }
 
+void SceneAnimation::show(Shown& shown, std::size_t frame, const Similarity& place) {
+  auto& changes = shown.changes;
+  const bool was_hidden = !changes.empty() && shown.frames_until_last < frame;
+  if (was_hidden) changes.push_back({shown.frames_until_last, std::nullopt});
+  if (changes.empty() || changes.back().at != place) changes.push_back({frame, place});
+  shown.frames_until_last = frame + 1;
+}
+
+// While it is not shown it stays where it was, or will be first.
+std::vector<MeshKey> SceneAnimation::keys_of(const Shown& shown, double frames_per_second) const {
+  std::vector<MeshKey> keys;
+  const auto add = [&](std::size_t frame, bool visible, const Similarity& place) {
+    keys.push_back({static_cast<double>(frame) / frames_per_second, visible, place});
+  };
+  const Change& first = shown.changes.front();
+  if (first.frame > 0) add(0, false, *first.at);
+  for (const Change& change : shown.changes) {
+    add(change.frame, change.at.has_value(), change.at ? *change.at : keys.back().world_from_part);
+  }
+  if (shown.frames_until_last < frames_) add(shown.frames_until_last, false, keys.back().world_from_part);
+  return keys;
+}
+
 void SceneAnimation::animate(SceneMeshes& meshes, double frames_per_second) const {
   QUOIN_ASSERT(frames_per_second > 0.0, "frames_per_second is positive");
   std::map<InstanceHandle, const Shown*> by_instance;
   for (const auto& all : instances_) {
     for (const Shown& shown : all) by_instance.emplace(shown.instance, &shown);
   }
-  meshes.seconds = static_cast<double>(frames_) / frames_per_second;
   for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
     MeshPlacement& placement = meshes.placements[i];
     const auto found = placement.instance ? by_instance.find(*placement.instance) : by_instance.end();
     QUOIN_ASSERT(found != by_instance.end(), "the meshes are those of the animation's scene");
-    placement.keys = keys_of(found->second->at, frames_, frames_per_second);
+    placement.keys = keys_of(*found->second, frames_per_second);
     placement.world_from_part = placement.keys.front().world_from_part;
     if (placement.keys.size() == 1) placement.keys.clear();
+    if (!placement.keys.empty()) meshes.seconds = static_cast<double>(frames_) / frames_per_second;
   }
 }
 

@@ -95,10 +95,19 @@ BlockyTriangles& opaque_of(BlockyMesh& mesh) {
   return mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Opaque)];
 }
 
-Status check_atlas(const BlockyMeshOptions& options) {
-  if (options.merge && options.occlusion && !options.watertight) return {};
-  return make_error(ErrorCode::InvalidArgument,
-                    "an atlas is of faces that are merged, not watertight, and have occlusion");
+Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, const BlockyMeshOptions& options) {
+  if (!options.merge || !options.occlusion || options.watertight) {
+    return make_error(ErrorCode::InvalidArgument,
+                      "an atlas is of faces that are merged, not watertight, and have occlusion");
+  }
+  constexpr int kFarthest = 1 << 24;  // beyond it floats do not tell voxels apart
+  for (const GridHandle handle : grids) {
+    const IBox bounds = scene.grids()[handle].grid.bounds();
+    const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthest))) &&
+                                            glm::all(glm::lessThanEqual(bounds.max, IVec3(kFarthest))));
+    if (!is_near) return make_error(ErrorCode::LimitExceeded, "an atlas of voxels beyond 2^24");
+  }
+  return {};
 }
 
 /// Merges the opaque faces of the meshes across their occlusion, which goes into the atlas of `meshes`. Returns the
@@ -120,10 +129,11 @@ Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::
     opaque = std::move(whole);
     merged[i].reset();
   }
+  std::vector<Coordinates> coordinates(grids.size());
+  if (atlas.is_empty()) return coordinates;
   auto drawn = atlas.draw();
   if (!drawn) return drawn.error();
   meshes.atlas = std::move(*drawn);
-  std::vector<Coordinates> coordinates(grids.size());
   for (std::size_t i = 0; i < grids.size(); ++i) coordinates[i] = atlas.coordinates(i);
   return coordinates;
 }
@@ -176,7 +186,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
   if (options.atlas) {
-    if (auto sound = check_atlas(options.mesh); !sound) return sound.error();
+    if (auto sound = check_atlas(scene, grids, options.mesh); !sound) return sound.error();
   }
   const double first_share = options.atlas ? 0.5 : 1.0;
   MeshResults results = mesh_all(scene, grids, options.mesh, threads, part_of(progress, 0.0, first_share));
@@ -196,7 +206,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     add_stats(**results[i], meshes.stats);
     MeshPart& part = meshes.parts.emplace_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
     part.thickness = glass_thickness(grid.grid, part.surfaces);
-    if (options.atlas) part = with_atlas(std::move(part), std::move(coordinates[i]));
+    if (!meshes.atlas.rgb.empty()) part = with_atlas(std::move(part), std::move(coordinates[i]));
     for (MeshView& view : part.surfaces) {
       if (!options.mesh.occlusion) view.block_occlusion = {};
     }
