@@ -72,6 +72,25 @@ TEST_F(ToolWatch, APictureFollowsTheModelsThatASceneNames) {
   EXPECT_EQ(bytes("out.png"), bytes("second.png"));
 }
 
+// A model that is broken when it is first read is mended, and one that a scene names beside other inputs changes.
+TEST_F(ToolWatch, WhatAScenesModelsBecomeIsSeenWhateverTheyWere) {
+  std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "ship.vox"}],)"
+                                            << R"( "instances": [{"file": "a"}]})";
+  const ToolRun result = script(
+      "cp broken.vox ship.vox\n"
+      "start convert fleet.json fleet.glb --watch\n"
+      "until_true 'grep -q watching log'\n"
+      "cp tiny.vox ship.vox\n"
+      "until_true 'test -e fleet.glb'\n"
+      "finish INT; rm -f log\n"
+      "start convert fleet.json other.vox --to ply --watch\n"
+      "until_true 'grep -q watching log'\n"
+      "cp fleet.ply before.ply; cp other.vox ship.vox\n"
+      "until_true '! cmp -s fleet.ply before.ply'\n"
+      "finish INT");
+  EXPECT_EQ(result.out.find("never"), std::string::npos) << result.out;
+}
+
 // Of a folder only what has changed is converted again, and what is new; what is written there starts nothing.
 TEST_F(ToolWatch, AFolderIsFollowedFileByFile) {
   const ToolRun result = script(

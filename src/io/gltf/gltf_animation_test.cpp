@@ -255,6 +255,9 @@ TEST_F(GltfAnimation, OddFramesAndKeysAreRefused) {
   EXPECT_EQ(animation.frame_count(), 1U);
   auto meshes = mesh_scene(animation.scene()).value();
   for (const std::vector<MeshKey>& keys : {std::vector<MeshKey>{{1.0}},
+                                           {{0.0}, {1e-50}},
+                                           {{0.0}, {1e50}},
+                                           {{0.0}, {100.0}, {100.000001}},
                                            {{0.0}, {0.0}},
                                            {{0.0}, {std::nan("")}},
                                            {{0.0, true, {.mirrored = true}}},

@@ -103,6 +103,24 @@ TEST_F(GltfAtlas, FewerTrianglesOfTheSameFaces) {
   EXPECT_EQ(with_atlas.vertices, 4 * with_atlas.quads);
 }
 
+TEST_F(GltfAtlas, OfNothingOpaqueThereIsNone) {
+  Scene scene;
+  VoxelProperties glass;
+  glass.visibility = Visibility::Transparent;
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, *scene.types.add(glass));
+  place(scene, scene.add_grid(std::move(grid)), {0, 0, 0});
+  EXPECT_TRUE(mesh_scene(scene, {.atlas = true}).value().atlas.rgb.empty());
+  EXPECT_TRUE(mesh_scene(Scene(), {.atlas = true}).value().atlas.rgb.empty());
+}
+
+TEST_F(GltfAtlas, VoxelsThatFloatsDoNotTellApartAreRefused) {
+  SceneGrid far;
+  far.grid.set({1 << 25, 0, 0}, 1);
+  place(scene_, scene_.add_grid(std::move(far)), {0, 0, 0});
+  EXPECT_EQ(mesh_scene(scene_, {.atlas = true}).error().code, ErrorCode::LimitExceeded);
+}
+
 TEST_F(GltfAtlas, WhatContradictsItIsRefused) {
   for (const BlockyMeshOptions mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.occlusion = false},
                                        BlockyMeshOptions{.watertight = true}}) {

@@ -75,5 +75,14 @@ TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
   EXPECT_EQ(read_volume(folder.file("b.nii")).error().path, folder.file("b.nii").string());
 }
 
+TEST(VolumeFiles, ReadingEndsWhenItsListenerSaysSo) {
+  int told = 0;
+  const Bytes values(std::size_t{1} << 16);
+  const RawVolume raw{{64, 32, 32}, ScalarType::UInt8, std::endian::little};
+  const auto cancelled = read_raw_volume(values, raw, {}, [&](double) { return ++told < 2; });
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+  EXPECT_EQ(told, 2);
+}
+
 }  // namespace
 }  // namespace quoin

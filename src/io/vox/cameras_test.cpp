@@ -107,6 +107,21 @@ TEST(VoxCameras, WhatCannotBeDrawnIsSkippedAndSaid) {
                                       "camera 4 skipped: _radius is less than 0", "camera 5 skipped: _radius is 0"}));
 }
 
+TEST(VoxCameras, ThoseThatNobodyCanNameAreSkippedAndSaid) {
+  FileBuilder file;
+  file.model(1, 1, 1, {{0, 0, 0, 1}});
+  for (const std::int32_t id : {-1, 4, 4}) {
+    file.with("rCAM", [&](auto& out) {
+      out.i32(id);
+      out.dict({{"_radius", "9"}});
+    });
+  }
+  const LoadedScene loaded = read_vox(file.file()).value();
+  ASSERT_EQ(loaded.cameras.size(), 1U);
+  EXPECT_EQ(loaded.warnings, (std::vector<std::string>{"camera -1 skipped: its number is less than 0",
+                                                       "camera 4 skipped: there was one of this number before"}));
+}
+
 TEST(VoxCameras, ADamagedOneIsNoReasonToRefuseTheVoxels) {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
