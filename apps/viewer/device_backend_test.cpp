@@ -460,7 +460,7 @@ TEST_F(DeviceBackendTest, PausesWithoutAnEditLoseNothing) {
 
 TEST_F(DeviceBackendTest, EndsWhileChunksAreMeshed) {
   const Document document = wide_document();
-  for (int attempt = 0; attempt < 5; ++attempt) {
+  for (int attempt = 0; attempt < 2; ++attempt) {
     const auto backend = backend_of(document, false);
     backend->show(request_for(document, DrawMode::Blocks));
     ASSERT_TRUE(comes([&] { return backend->activity().starts_with("meshing "); }));
