@@ -25,8 +25,8 @@ using Stamps = std::map<std::filesystem::path, std::optional<FileStamp>>;
 [[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& input);
 
 /// Does a piece of work, and again whenever what it read has changed and rests, until the program is interrupted, which
-/// ends it. `read`: what it will read, as far as is known. Returns only where the first time was wrong usage. Files are looked at, not listened to, so that any file
-/// system will do: four times a second.
+/// ends it. `read`: what it will read, as far as is known. Returns only where the first time was wrong usage. Files are
+/// looked at, not listened to, so that any file system will do: four times a second.
 [[nodiscard]] int watch(const std::vector<std::filesystem::path>& read, const std::function<WatchedWork()>& work);
 
 }  // namespace quoin::tool

@@ -64,7 +64,7 @@ struct Mirror {
 
 /// Of a surface in a placed grid with that normal, between media of these indices of refraction: Fresnel's equations
 /// without polarisation. Since rays go straight on, their angle is taken for that in the thinner medium, on whichever
-/// side they come from: through both faces of a pane the same share is mirrored, as with refraction, and none all of it.
+/// side they come from: through both faces of a pane the same share is mirrored, as with refraction, and never all.
 [[nodiscard]] Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed,
                                const DVec3& normal_in_grid, float ior, float other_ior);
 

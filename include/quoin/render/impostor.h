@@ -71,7 +71,7 @@ class Impostor {
   /// The same, with a tree of its own.
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
 
-  /// Of what is opaque of voxels and field. Cost: besides, two microseconds a piece of the field's surface and 10 ns for
+  /// Of what is opaque of voxels and field. Cost: besides, two microseconds a piece of the field's surface, 10 ns for
   /// each view.
   static Impostor build(const SceneGrid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
 

@@ -23,7 +23,8 @@ class SceneAnimation {
   /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of
   /// their handles; of the grids, types, groups and layers those of the first frame are taken, which the same handles
   /// mean in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
-  /// Cost: O(instances), times the grids that each has shown; memory for what changes. Errors: InvalidArgument where the number of instances or grids is another than before.
+  /// Cost: O(instances), times the grids that each has shown; memory for what changes.
+  /// Errors: InvalidArgument where the number of instances or grids is another than before.
   [[nodiscard]] Status add(const Scene& frame, InstanceFilter filter = InstanceFilter::Visible);
 
   /// All that any frame shows: an instance that shows several grids one after the other is as many.
