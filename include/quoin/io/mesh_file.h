@@ -84,12 +84,12 @@ struct MeshFileOptions {
 ///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
 ///            the largest array as it is stored.
 /// Errors:    Unsupported for a format that is none of meshes, for an atlas in PLY with its occlusion, for
-///            OcclusionIn::Attribute in OBJ, for `quantize` and `compress` in others than glTF, and for `compress` where the build has no
-///            meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 - 1 vertices or
-///            triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular, the scale is
-///            not positive, a vertex comes to lie beyond the range of floats, or when a mesh contradicts itself (arrays
-///            of different lengths, indices of no vertex, types that are not registered, numbers that are not finite).
-///            Each file appears whole or not at all; of several, those before one that fails stay.
+///            OcclusionIn::Attribute in OBJ, for `quantize` and `compress` in others than glTF, and for `compress`
+///            where the build has no meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 -
+///            1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular,
+///            the scale is not positive, a vertex comes to lie beyond the range of floats, or when a mesh contradicts
+///            itself (arrays of different lengths, indices of no vertex, types that are not registered, numbers that
+///            are not finite). Each file appears whole or not at all; of several, those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
 ///            _volume and _ior; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,

@@ -31,8 +31,9 @@ class OcclusionAtlas {
   /// Whether no face was added.
   [[nodiscard]] bool is_empty() const { return patches_.empty(); }
 
-  /// Adds the faces of a surface, whose voxels lie within 2^24 of the origin. `split` and `merged` are the same faces of
-  /// the same grid, as build_blocky_mesh makes them with and without occlusion. Returns where the vertices of `merged` lie, for `coordinates`.
+  /// Adds the faces of a surface, whose voxels lie within 2^24 of the origin. `split` and `merged` are the same faces
+  /// of the same grid, as build_blocky_mesh makes them with and without occlusion. Returns where the vertices of
+  /// `merged` lie, for `coordinates`.
   std::size_t add(const BlockyTriangles& split, const BlockyTriangles& merged, const VoxelRegistry& types);
 
   /// Places all that was added; sides are powers of two. The same additions give the same texture.

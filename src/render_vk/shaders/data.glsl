@@ -81,8 +81,8 @@ struct Point {
 // Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
 // A run of transparent voxels, or of what is transparent of a field, of one type. w of `voxel`: the instance;
-// `lengths`: t of enter and exit, voxels, and t of enter from the start of the instance's ray; `what`: type, face, how, and where
-// it leaves: 8 times the instance, and the face. Of a field the face is a normal, as `packed_normal` has it.
+// `lengths`: t of enter and exit, voxels, and t of enter from the start of the instance's ray; `what`: type, face, how,
+// and where it leaves: 8 times the instance, and the face. Of a field the face is a normal, as `packed_normal` has it.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
