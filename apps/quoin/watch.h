@@ -10,7 +10,7 @@
 
 namespace quoin::tool {
 
-/// What a piece of work came to, for `watch`.
+/// What a piece of work came to. Of files `watch` alone needs to know.
 struct WatchedWork {
   int status = 0;
   std::vector<std::filesystem::path> read;     ///< files, and folders for all that is in them

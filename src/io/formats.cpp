@@ -8,6 +8,7 @@
 #include <quoin/io/vox.h>
 #include <quoin/scene/volume_scene.h>
 
+#include "core/progress_part.h"
 #include "io/byte_stream.h"
 #include "io/read_beside.h"
 #include "io/volume/header.h"
@@ -68,20 +69,14 @@ bool is_volume(const std::optional<FileFormat>& format) {
   return format && format_info(*format).is_volume;
 }
 
-/// The half of some work that begins at `first`.
-Progress half_of(const Progress& progress, double first) {
-  if (!progress) return {};
-  return [&progress, first](double fraction) { return progress(first + 0.5 * fraction); };
-}
-
 /// `source`: a path, or bytes.
 template <class Source>
 Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, const Progress& progress) {
-  const auto volume = read_volume(source, {}, half_of(progress, 0.0));
+  const auto volume = read_volume(source, {}, part_of(progress, 0.0, 0.5));
   if (!volume) return volume.error();
   VolumeSceneOptions wanted;
   wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
-  auto scene = scene_from_volume(*volume, wanted, options.threads, half_of(progress, 0.5));
+  auto scene = scene_from_volume(*volume, wanted, options.threads, part_of(progress, 0.5, 1.0));
   if (!scene) return scene.error();
   LoadedScene loaded;
   loaded.scene = std::move(*scene);

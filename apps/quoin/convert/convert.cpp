@@ -233,7 +233,7 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   const bool is_to_stream = options.output == kStandardStream;
   StandardStreams streams;
   WatchedWork work;
-  work.read = files_read(options.common.input);
+  if (options.watch) work.read = files_read(options.common.input);
   const auto ended = [&](int status) {
     work.status = status;
     return work;

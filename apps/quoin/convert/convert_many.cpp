@@ -254,11 +254,11 @@ WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Con
   for (const Task& task : tasks) inputs.push_back(task.input);
   ConvertOptions wanted = options;
   wanted.inputs = FileSet(inputs);
-  leave_out(done, tasks, work);
   const bool is_again = !done.empty();
+  if (options.watch) leave_out(done, tasks, work);
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
-  note(tasks, done, work);
+  if (options.watch) note(tasks, done, work);
   if (is_again && tasks.empty() && errors.empty()) return ended(kDone);
 
   Totals totals;

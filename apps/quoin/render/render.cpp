@@ -341,7 +341,7 @@ Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams
 WatchedWork run_render(RenderArguments& arguments) {
   StandardStreams streams;
   WatchedWork work;
-  work.read = files_read(arguments.common.input);
+  if (arguments.watch) work.read = files_read(arguments.common.input);
   const auto outcome = render_from(arguments, streams);
   if (!outcome) {
     const Error error = streams.named(outcome.error());

@@ -168,12 +168,11 @@ void App::take_saved() {
 // What is on the screen now, however soon the view moves on: finished if it is left that long, else as it is.
 void App::want_picture() {
   if (!state_.open.backend || !asked_ || state_.stats.width == 0) return;
-  const Result<Image> shown = image_of(state_.picture);
-  if (is_settled()) return save_picture(shown);
+  if (is_settled()) return save_picture(image_of(state_.picture));
   // A key that is held down asks for one picture.
   const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, *asked_) &&
                          !state_.scene().has_changed_since(wanted_.back().scene);
-  if (!is_wanted) wanted_.push_back({*asked_, state_.scene().cursor(), shown});
+  if (!is_wanted) wanted_.push_back({*asked_, state_.scene().cursor(), image_of(state_.picture)});
   state_.tell("the picture is saved once it is done");
 }
 

@@ -6,6 +6,7 @@
 
 #include <quoin/io/formats.h>
 
+#include "core/progress_part.h"
 #include "io/read_beside.h"
 #include "io/text.h"
 #include "io/whole_file.h"
@@ -140,11 +141,10 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
                             const LoadOptions& options, LoadedScene& loaded, const Progress& progress) {
   Bodies bodies;
   for (const SceneFile::Source& source : sources) {
-    const double before = static_cast<double>(bodies.size());
-    Progress of_source;
-    if (progress) {
-      of_source = [&](double share) { return progress((before + share) / static_cast<double>(sources.size())); };
-    }
+    const auto share = [&](std::size_t read) {
+      return static_cast<double>(read) / static_cast<double>(sources.size());
+    };
+    const Progress of_source = part_of(progress, share(bodies.size()), share(bodies.size() + 1));
     auto part = load_source(folder / source.file, options, of_source);
     if (!part) {
       Error error = part.error();

@@ -67,11 +67,6 @@ MeshPlacement MeshHierarchy::place(InstanceHandle handle, std::size_t part) {
   return placement;
 }
 
-Progress part_of(const Progress& whole, double begin, double end) {
-  if (!whole) return {};
-  return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
-}
-
 Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vector<std::uint32_t>& tags,
                           MeshStats& stats) {
   if (error) {

@@ -9,6 +9,8 @@
 
 #include <quoin/scene/scene_meshes.h>
 
+#include "core/progress_part.h"
+
 namespace quoin {
 
 /// Errors: InvalidArgument, naming the first drawn instance that has no place.
@@ -32,9 +34,6 @@ class MeshHierarchy {
   SceneMeshes& meshes_;
   std::map<GroupHandle, std::size_t> groups_;
 };
-
-/// A listener for the stretch from `begin` to `end` of another's work. Lifetime: `whole` must outlive it.
-[[nodiscard]] Progress part_of(const Progress& whole, double begin, double end);
 
 struct SurfaceOptions {
   const SmoothMeshOptions& mesh;
