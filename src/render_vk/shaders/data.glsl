@@ -6,6 +6,9 @@
 layout(constant_id = 4) const bool kHasFields = false;
 // Whether anything of them is transparent.
 layout(constant_id = 6) const bool kHasFieldGlass = false;
+// What a grid's trees hold: its voxels, then its field.
+const int kContents = kHasFields ? 2 : 1;
+const int kGlassContents = kHasFieldGlass ? 2 : 1;
 
 const uint kPerspective = 1;
 const uint kLit = 2;

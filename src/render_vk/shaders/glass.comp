@@ -23,7 +23,9 @@ void find_glass(uint slot, inout State state, out float first_t, out bool has_hi
   BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, 0, kInfinity);
   vec3 unused = vec3(1.0);
   start_visit(ray);
-  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
+  for (;;) {
+    int i = next_instance(max_t);
+    if (i < 0) break;
     Placed placed = placed_at(i);
     GridRay in_grid = rounded(placed, exact_ray_in(placed, direction), (placed.start.w - depth) * scale);
     find_bodies(i, Grids(frame().grids).at[placed.ref_base.w], in_grid, placed.ref_view.w / placed.ref_inside.w, max_t,

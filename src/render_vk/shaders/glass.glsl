@@ -104,28 +104,6 @@ void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list,
   run.has_body = true;
 }
 
-// The bodies of one instance, along a ray whose walk has been started. `voxels_a_t`: of the full grid.
-void find_bodies_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
-                    inout vec3 passed) {
-  float room = max_t - ray.t;
-  BodyRun run;
-  run.clarity = 0.0;
-  run.has_body = false;
-  while (run.clarity > kClosed && find_voxel(room)) {
-    Body next;
-    next.voxel = ivec4(walk_voxel, i);
-    next.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kStartsInside : 0, 0);
-    float enter_t = walk_t;
-    bool goes_on = leave_block(0, room);
-    float exit_t = min(walk_t, room);
-    next.what.w = 8 * uint(i) + uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
-    next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
-    add_to_run(run, next, from_t, list, passed);
-    if (!goes_on) break;
-  }
-  if (run.has_body) keep_body(list, run.body, from_t, passed);
-}
-
 // What is transparent of a field: trace/density/density_glass.h on the processor's side. Its tree holds the
 // cells with a transparent corner; a word of 4^3 cells is of one material throughout, or has the samples around it and
 // what bodies these of its corners belong to.
@@ -252,15 +230,25 @@ float change_after(vec4 f, float after) {
   return 1.0;
 }
 
+// Where a ray next comes from one body, or air, into another. One loop over the cubics that say so: what is solid, what
+// is opaque, and which of two transparent types is nearer.
 float next_change(GlassCell cell, RayInGlass ray, float after) {
-  float next = ray.has_air ? change_after(ray.solid, after) : 1.0;
-  if (ray.has_opaque) next = min(next, change_after(ray.opaque, after));
-  for (int i = 0; ray.has_several && i < 8; ++i) {
-    uint one = body_at_corner(cell, i);
-    for (int k = 0; is_transparent(one) && k < i; ++k) {
-      uint other = body_at_corner(cell, k);
-      if (!is_transparent(other) || other == one) continue;
-      next = min(next, change_after(cubic_of_body(cell, ray, one) - cubic_of_body(cell, ray, other), after));
+  const int kSolid = -2;
+  float next = 1.0;
+  for (int i = kSolid; i < (ray.has_several ? 8 : 0); ++i) {
+    for (int k = 0; k < max(i, 1); ++k) {
+      vec4 f = ray.solid;
+      if (i < 0) {
+        if (!(i == kSolid ? ray.has_air : ray.has_opaque)) break;
+        if (i != kSolid) f = ray.opaque;
+      } else {
+        uint one = body_at_corner(cell, i);
+        uint other = body_at_corner(cell, k);
+        if (!is_transparent(one)) break;
+        if (!is_transparent(other) || other == one) continue;
+        f = cubic_of_body(cell, ray, one) - cubic_of_body(cell, ray, other);
+      }
+      next = min(next, change_after(f, after));
     }
   }
   return next;
@@ -311,32 +299,49 @@ vec3 normal_from_28(uint word) {
   return unit_vector(packSnorm2x16(at));
 }
 
-// What of a field's cell is transparent from `enter_t` to `exit_t`. `next`: a body with what is the same for all of it.
-void add_glass_of_cell(GlassCell cell, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
-                       float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
+// The normals with which a body of a cell begins and ends, from `begin` to `end` of a ray's way in it.
+void put_normals(GlassCell cell, RayInGlass ray, float begin, float end, BodyRun run, inout Body body) {
+  bool touches = run.has_body && reaches(run.body, body.lengths.x);
+  bool is_entered = !touches || run.body.what.x != body.what.x;
+  for (int side = 0; side < 2; ++side) {
+    bool is_begin = side == 0;
+    if (!(is_begin ? is_entered : ray.has_air)) continue;
+    vec3 at = ray.entry + (is_begin ? begin : end) * ray.way;
+    vec3 normal = glass_normal(cell, at, body.what.x, is_begin && touches ? run.body.what.x : 0);
+    if (is_begin) {
+      body.what.y = packed_normal(normal);
+    } else {
+      body.what.z |= packed_in_28(normal) << kExitNormal;
+    }
+  }
+}
+
+// The bodies of a voxel, of a cell of a field, or of a word of it that is all of one type, from `enter_t` to `exit_t`.
+// `next`: a body with what is the same for all of it; `cell`: if it is mixed.
+void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
+                float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
   float size = exit_t - enter_t;
-  vec3 place = vec3(next.voxel.xyz - ray_base);
-  vec3 entry = clamp(ray_origin + enter_t * ray_direction - place, vec3(0.0), vec3(1.0));
-  RayInGlass ray = ray_in_glass(cell, entry, ray_direction * size);
-  bool starts_inside = (next.what.z & kStartsInside) != 0;
+  RayInGlass ray;
+  if (is_mixed) {
+    vec3 place = vec3(next.voxel.xyz - ray_base);
+    vec3 entry = clamp(ray_origin + enter_t * ray_direction - place, vec3(0.0), vec3(1.0));
+    ray = ray_in_glass(cell, entry, ray_direction * size);
+  }
+  uint how = next.what.z;
   float begin = 0.0;
   while (begin < 1.0) {
-    float end = next_change(cell, ray, begin);
-    uint type = glass_at(cell, ray, 0.5 * (begin + end));
-    if (type != 0) {
+    float end = 1.0;
+    if (is_mixed) {
+      end = next_change(cell, ray, begin);
+      next.what.x = glass_at(cell, ray, 0.5 * (begin + end));
+      next.what.z = begin <= 0.0 ? how : how & ~kStartsInside;
+    }
+    if (next.what.x != 0) {
       float begin_t = begin <= 0.0 ? enter_t : enter_t + begin * size;
       float end_t = end >= 1.0 ? exit_t : enter_t + end * size;
       next.lengths = vec4(ray_t + begin_t, ray_t + end_t, (end_t - begin_t) * voxels_a_t, begin_t);
-      next.what.x = type;
-      next.what.z = kBeginsInField | kEndsInField | (starts_inside && begin <= 0.0 ? kStartsInside : 0);
 #if defined(KEEPS_BODIES) || defined(HOLDS_BODIES)
-      bool touches = run.has_body && reaches(run.body, next.lengths.x);
-      if (!touches || run.body.what.x != type) {
-        next.what.y = packed_normal(glass_normal(cell, entry + begin * ray.way, type, touches ? run.body.what.x : 0));
-      }
-      if (ray.has_air) {
-        next.what.z |= packed_in_28(normal_in(cell.block, cell.first, entry + end * ray.way)) << kExitNormal;
-      }
+      if (is_mixed) put_normals(cell, ray, begin, end, run, next);
 #endif
       add_to_run(run, next, from_t, list, passed);
     }
@@ -344,34 +349,40 @@ void add_glass_of_cell(GlassCell cell, Body next, float enter_t, float exit_t, f
   }
 }
 
-// The same of what is transparent of an instance's field.
-void find_glass_in(int i, GridRay ray, float voxels_a_t, float max_t, float from_t, inout BodyList list,
-                   inout vec3 passed) {
+// The bodies of an instance's voxels, or of its field, along a ray whose walk has been started. `voxels_a_t`: of the
+// full grid.
+void find_bodies_in(int i, bool is_of_field, GridRay ray, float voxels_a_t, float max_t, float from_t,
+                    inout BodyList list, inout vec3 passed) {
   float room = max_t - ray.t;
   BodyRun run;
   run.clarity = 0.0;
   run.has_body = false;
-  while (run.clarity > kClosed && find_voxel(room)) {
+  bool goes_on = true;
+  while (goes_on && run.clarity > kClosed && find_voxel(room)) {
     Body next;
     next.voxel = ivec4(walk_voxel, i);
-    next.what = uvec4(0, kNoNormal, walk_axis < 0 ? kStartsInside : 0, 8 * uint(i));
+    uint inside = walk_axis < 0 ? kStartsInside : 0;
     float enter_t = walk_t;
-    Numbers block;
-    bool is_mixed = glass_block_found(block, next.what.x);
-    // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
-    float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
-    bool by_word = !is_mixed && run.clarity - kClosed > 4.0 * closing;
-    bool goes_on = leave_block(by_word ? 2 : 0, room);
-    float exit_t = min(walk_t, room);
-    if (is_mixed) {
-      add_glass_of_cell(glass_cell(block, next.voxel.xyz), next, enter_t, exit_t, ray.t, voxels_a_t, from_t, run, list,
-                        passed);
+    GlassCell cell;
+    bool is_mixed = false;
+    int shift = 0;
+    if (is_of_field) {
+      Numbers block;
+      is_mixed = glass_block_found(block, next.what.x);
+      next.what = uvec4(next.what.x, kNoNormal, inside | kBeginsInField | kEndsInField, 8 * uint(i));
+      // A whole word, along whose diagonal it does not close: it closes at the same cell as by single ones.
+      float closing = -surface_of(next.what.x).log_clarity * voxels_a_t / length(ray_direction) * kDiagonal;
+      if (is_mixed) {
+        cell = glass_cell(block, walk_voxel);
+      } else if (run.clarity - kClosed > 4.0 * closing) {
+        shift = 2;
+      }
     } else {
-      next.what.z |= kBeginsInField | kEndsInField;
-      next.lengths = vec4(ray.t + enter_t, ray.t + exit_t, (exit_t - enter_t) * voxels_a_t, enter_t);
-      add_to_run(run, next, from_t, list, passed);
+      next.what = uvec4(type_found(), face_found(), inside, 8 * uint(i));
     }
-    if (!goes_on) break;
+    goes_on = leave_block(shift, room);
+    if (!is_of_field) next.what.w += uint(2 * walk_axis + (ray_forward[walk_axis] ? 0 : 1));
+    add_bodies(cell, is_mixed, next, enter_t, min(walk_t, room), ray.t, voxels_a_t, from_t, run, list, passed);
   }
   if (run.has_body) keep_body(list, run.body, from_t, passed);
 }
@@ -379,12 +390,12 @@ void find_glass_in(int i, GridRay ray, float voxels_a_t, float max_t, float from
 // All bodies of one instance along a ray.
 void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float max_t, float from_t,
                  inout BodyList list, inout vec3 passed) {
-  float room = max_t - ray.t;
-  if (start_walk(trees.transparent, ray.base, ray.origin, ray.direction, room, -1)) {
-    find_bodies_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
-  }
-  if (kHasFieldGlass && start_walk(trees.glass, ray.base, ray.origin, ray.direction, room, -1)) {
-    find_glass_in(i, ray, voxels_a_t, max_t, from_t, list, passed);
+  for (int content = 0; content < kGlassContents; ++content) {
+    bool is_of_field = kHasFieldGlass && content == 1;
+    Tree tree = trees.transparent;
+    if (is_of_field) tree = trees.glass;
+    if (!start_walk(tree, ray.base, ray.origin, ray.direction, max_t - ray.t, -1)) continue;
+    find_bodies_in(i, is_of_field, ray, voxels_a_t, max_t, from_t, list, passed);
   }
 }
 

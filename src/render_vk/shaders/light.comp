@@ -94,8 +94,9 @@ GridRay ray_from(Point point, Placed placed) {
   return ray;
 }
 
-// Sunlight and openness of a surface point.
-void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out float openness) {
+// What reaches a surface point: the sun's light and that of lamps, and its openness. One loop over all rays, for the
+// reason that rays.glsl gives.
+void trace_light(Point point, Placed placed, uint slot, out vec3 light, out float openness) {
   const uint kUp = 2;
   bool is_field = is_of_field(point);
   // Directions about a field's surface are those of an upper face, turned with it.
@@ -104,115 +105,111 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 sunlight, out f
   float cells = placed.ref_view.w;
   float cosine = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
   if (is_field) cosine = max(dot(normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
-  sunlight = sunlight_of(cosine);
-  openness = 0.0;
+  vec3 sunlight = sunlight_of(cosine);
   GridRay ray = ray_from(point, placed);
-  int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
+  GridRay from = ray;
   bool is_far = (point.what.z & kIsFar) != 0;
   // A field has no faces with corners.
   bool traces_occlusion = has(kOcclusionRays) || (is_field && has(kOcclusionVertex));
-  int count = traces_occlusion && !is_far ? frame().occlusion_count : 0;
+  int open_count = traces_occlusion && !is_far ? frame().occlusion_count : 0;
+  uvec2 lamps = uvec2(0);
+  if (has(kLit) && has(kLamps)) lamps = lamps_around(point.voxel, placed);
+  vec3 in_view = view_from_grid(placed, from).origin;
+  vec3 normal_in_view = turned(placed.view_axes, normal) / placed.ref_inside.w;
   ivec2 pixel = push.corner + tile_pixel();
   uint hash = hash_of(uint(pixel.x), uint(pixel.y)) ^ push.seed;
+  vec3 of_lamps = vec3(0.0);
   int open = 0;
-  for (int i = first; i < count; ++i) {
+  int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
+  for (int i = first; i < open_count + int(lamps.y); ++i) {
     bool is_sun = i < 0;
-    ray.direction = is_sun ? placed.to_sun.xyz : occlusion_direction(face, i, hash);
-    if (is_field && !is_sun) ray.direction = turned_from_up(ray.direction, normal);
+    bool is_lamp = i >= open_count;
+    vec3 brought = vec3(0.0);
     float max_t = (is_sun ? frame().shadow_distance : frame().occlusion_distance) / cells;
-    bool blocked = is_blocked(point.voxel.w, placed, ray, max_t);
+    if (is_sun) {
+      ray.direction = placed.to_sun.xyz;
+    } else if (!is_lamp) {
+      ray.direction = occlusion_direction(face, i, hash);
+      if (is_field) ray.direction = turned_from_up(ray.direction, normal);
+    } else {
+      brought = light_of_lamp(lamps.x + uint(i - open_count), in_view, normal_in_view, placed, ray, max_t);
+      if (brought == vec3(0.0)) continue;
+      if (!(has(kShadows) && max_t > 0.0)) {
+        of_lamps += brought;
+        continue;
+      }
+    }
     ++rays_taken;
-    if (!is_sun) {
-      if (!blocked) ++open;
-    } else if (blocked) {
-      sunlight = vec3(0.0);
-    } else if (kHasGlass) {
-      sunlight *= sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
+    bool is_open = !is_blocked(point.voxel.w, placed, ray, max_t);
+    if (is_sun || is_lamp) {
+      vec3 passed = vec3(is_open ? 1.0 : 0.0);
+      if (kHasGlass && is_open) passed = sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
+      if (is_sun) {
+        sunlight *= passed;
+      } else {
+        of_lamps += brought * passed;
+      }
+    } else if (is_open) {
+      ++open;
     }
   }
+  light = sunlight + of_lamps;
+  openness = 0.0;
   if (is_far) {
     openness = openness_of_far(point);
-    return;
-  }
-  if (traces_occlusion) openness = float(open) / float(frame().occlusion_count);
-  if (has(kOcclusionVertex) && !is_field) {
+  } else if (has(kOcclusionVertex) && !is_field) {
     Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
     openness = 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
+  } else if (traces_occlusion) {
+    openness = float(open) / float(frame().occlusion_count);
   }
-}
-
-vec3 unlit_colour(Point point, uint slot, vec3 colour) {
-  bool shows_values = has(kShowOcclusion) || has(kShowNormals);
-  if (kind_of(point) != kSurface) return shows_values || kind_of(point) == kGlow ? vec3(0.0) : colour;
-  if (has(kShowNormals)) {
-    Placed placed = placed_at(point.voxel.w);
-    return linear_from_srgb(0.5 + 0.5 * turned(placed.view_axes, grid_normal(point)) / placed.ref_inside.w);
-  }
-  if (!has(kShowOcclusion) && !has(kUnlitOcclusion)) return colour;
-  vec3 sunlight;
-  float openness = 1.0;
-  if (has(kOcclusionRays) || has(kOcclusionVertex)) {
-    trace_light(point, placed_at(point.voxel.w), slot, sunlight, openness);
-  }
-  if (has(kShowOcclusion)) return linear_from_srgb(vec3(openness));
-  return colour * left_by_occlusion(openness);
 }
 
 vec3 light_of(Point point, uint slot) {
   Surface surface = surface_of(point.what.x);
+  Placed placed = placed_at(point.voxel.w);
   if (has(kDetailColours)) {
-    surface.colour = placed_at(point.voxel.w).detail_colour.xyz;
+    surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
   }
   // As in smooth meshes, a field without materials is white.
   if (is_of_field(point) && point.what.x == 0) {
     surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0), 1.0);
   }
-  if (!has(kLit)) return unlit_colour(point, slot, surface.colour);
-  if (kind_of(point) == kUnlit) return surface.colour;
-  vec3 colour = surface.emitted;
-  if (kind_of(point) == kSurface) {
-    vec3 sunlight;
-    float openness;
-    Placed placed = placed_at(point.voxel.w);
-    trace_light(point, placed, slot, sunlight, openness);
-    if (has(kLamps)) {
-      vec3 normal = turned(placed.view_axes, grid_normal(point)) / placed.ref_inside.w;
-      sunlight += light_of_lamps(slot, point.voxel, placed, ray_from(point, placed), normal);
-    }
-    colour += surface.colour * light_at(sunlight, openness);
+  uint kind = kind_of(point);
+  bool is_lit = has(kLit);
+  if (!is_lit && kind != kSurface) {
+    bool shows_values = has(kShowOcclusion) || has(kShowNormals);
+    return shows_values || kind == kGlow ? vec3(0.0) : surface.colour;
   }
-  return colour * frame().exposure;
+  if (kind == kUnlit) return surface.colour;
+  if (!is_lit && has(kShowNormals)) {
+    return linear_from_srgb(0.5 + 0.5 * turned(placed.view_axes, grid_normal(point)) / placed.ref_inside.w);
+  }
+  vec3 light = vec3(0.0);
+  float openness = 1.0;
+  bool shows_openness = (has(kShowOcclusion) || has(kUnlitOcclusion)) && has_occlusion();
+  if (is_lit ? kind == kSurface : shows_openness) trace_light(point, placed, slot, light, openness);
+  if (!is_lit && has(kShowOcclusion)) return linear_from_srgb(vec3(openness));
+  return kind == kSurface ? colour_in_light(surface.colour, surface.emitted, light, openness)
+                          : surface.emitted * frame().exposure;
 }
 
-// Of a body of a field: where it begins, from its cell's lower corner.
-vec3 place_in_field(Body body) {
-  Placed placed = placed_at(body.voxel.w);
-  ExactRay ray = exact_ray_in(placed, exact_direction());
-  Pair way = product_of(Pair(vec3(body.lengths.w), vec3(0.0)), ray.direction);
-  return sum_of(start_from(ray, placed, body.voxel.xyz), way).high;
-}
-
+// What a body shows where it begins.
 Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
+  bool is_of_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
   uint kind = (body.what.z & kStartsInside) != 0 ? kGlow : kSurface;
-  if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
-    point.inside = vec4(place_in_field(body), body.lengths.x);
-    point.what = uvec4(body.what.xy, kIsField | kind, 0);
-    return point;
-  }
-  vec3 place = exact_place(placed_at(body.voxel.w), exact_direction(), body.voxel.xyz, body.what.y);
-  point.inside = vec4(place, body.lengths.x);
-  point.what = uvec4(body.what.xy, kind, 0);
+  point.what = uvec4(body.what.xy, kind | (is_of_field ? kIsField : 0), 0);
+  ExactRay ray = exact_ray_in(placed_at(body.voxel.w), exact_direction());
+  Pair start = start_from(ray, placed_at(body.voxel.w), body.voxel.xyz);
+  Pair t = Pair(vec3(body.lengths.w), vec3(0.0));
+  if (!is_of_field) t = distance_to_face(ray, start, body.what.y);
+  point.inside = vec4(sum_of(start, product_of(t, ray.direction)).high, body.lengths.x);
   return point;
 }
 
-vec3 light_of_body(Body body, uint slot) {
-  Point point = point_of(body);
-  if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
-  return light_of(point, slot);
-}
 vec3 seen_direction() {
   return camera_ray(picture_point()).direction;
 }
@@ -220,27 +217,31 @@ vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
 }
 
-// Lights what this round has of a pixel, and returns whether that was all.
+// Lights what this round has of a pixel, and returns whether that was all. One loop over all that shows there, for the
+// reason that rays.glsl gives.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = picture_point();
   Point opaque = Points(frame().points).at[slot];
-  bool is_last = !kHasGlass || state.weight.w == kInfinity;
-  if (kHasGlass) {
-    BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, uint(state.colour.w) - 1, kInfinity);
-    Body last;
-    // The first of a later round was entered in the one before.
-    bool has_bodies = pass_bodies(list, is_last, push.round > 0, slot, state, last);
-    if (!is_last) return false;
-    bool is_left = has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, t_of(opaque, at));
-    if (is_left) leave_into_air(last, state);
+  float opaque_t = t_of(opaque, at);
+  // The first of a later round was entered in the one before.
+  BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, uint(state.colour.w) - 1, state.weight.w);
+  Passage way = passage_through(list, push.round > 0);
+  for (;;) {
+    bool is_body = kHasGlass && enter_next(way, opaque_t, state);
+    if (kHasGlass && !is_body && !way.is_last) return false;
+    Point point = opaque;
+    vec3 weight = state.weight.xyz;
+    if (is_body) {
+      weight = pass_body(way, state);
+      point = point_of(way.body);
+    } else if (opaque.voxel.w < 0) {
+      state.colour.xyz += weight * sky_colour(sky_up(at));
+      return true;
+    }
+    if (!is_of_field(point)) point.inside.xyz = on_face(point.inside.xyz, point.what.y);
+    state.colour.xyz += weight * light_of(point, slot);
+    if (!is_body) return true;
   }
-  if (opaque.voxel.w < 0) {
-    state.colour.xyz += state.weight.xyz * sky_colour(sky_up(at));
-    return true;
-  }
-  if (!is_of_field(opaque)) opaque.inside.xyz = on_face(opaque.inside.xyz, opaque.what.y);
-  state.colour.xyz += state.weight.xyz * light_of(opaque, slot);
-  return true;
 }
 
 void main() {

@@ -98,13 +98,13 @@ Point first_hit(vec2 at) {
     nearest = kInfinity;
   }
   start_visit(ray);
-  float reach = (depth - frame().view_depth) * scale + nearest;
-  for (int i = next_instance(reach); i >= 0;
-       i = next_instance((depth - frame().view_depth) * scale + nearest)) {
+  for (;;) {
+    int i = next_instance((depth - frame().view_depth) * scale + nearest);
+    if (i < 0) break;
     if (visited_is_far) continue;
     Placed placed = placed_at(i);
     // Its voxels, then its field.
-    for (int content = 0; content < (kHasFields ? 2 : 1); ++content) {
+    for (int content = 0; content < kContents; ++content) {
       bool is_field = kHasFields && content == 1;
       Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
       if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
@@ -118,9 +118,10 @@ Point first_hit(vec2 at) {
       float rounding = 1e-6 * max(abs(limit), nearest);
       float room = limit + rounding - moved_t;
       if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved)) continue;
+      float walked_t;
       FieldHit hit;
-      if (is_field ? !find_surface(room, hit) : !find_voxel(room)) continue;
-      float found_t = moved_t + (is_field ? hit.t : walk_t);
+      if (!find_content(is_field, room, walked_t, hit)) continue;
+      float found_t = moved_t + walked_t;
       // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
       bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
       if (is_equal ? i + content > point.voxel.w : found_t > limit) continue;

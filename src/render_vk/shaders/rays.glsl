@@ -1,5 +1,8 @@
 // What light reaches a point: rays among all instances. Those that include this say whether there is glass
 // (`kHasGlass`).
+//
+// Compilers copy a function to each place that calls it, and a walk is long: each is called in one place of a shader, in
+// a loop over all that needs it. See docs/decisions/088.
 
 uint rays_taken;
 
@@ -17,11 +20,14 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
       ray = grid_from_view(placed, in_view);
     }
     is_first = false;
-    Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    if (start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1) && find_voxel(max_t)) return true;
-    if (kHasFields) {
-      Tree field = Grids(frame().grids).at[placed.ref_base.w].field;
-      if (meets_field(field, ray.base, ray.origin, ray.direction, max_t)) return true;
+    for (int content = 0; content < kContents; ++content) {
+      bool is_field = kHasFields && content == 1;
+      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
+      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
+      if (!start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1)) continue;
+      float t;
+      FieldHit hit;
+      if (find_content(is_field, max_t, t, hit)) return true;
     }
     if (frame().placed_count == 1) return false;
   }
@@ -33,7 +39,9 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
 void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max_t, float from_t, inout BodyList list,
                  inout vec3 passed) {
   start_visit(in_view);
-  for (int i = next_instance(max_t); i >= 0; i = next_instance(max_t)) {
+  for (;;) {
+    int i = next_instance(max_t);
+    if (i < 0) break;
     Placed placed = placed_at(i);
     GridRay in_grid = ray;
     if (i != home) in_grid = grid_from_view(placed, in_view);
@@ -76,23 +84,9 @@ vec3 light_of_lamp(uint number, vec3 in_view, vec3 normal, Placed placed, inout 
   return light;
 }
 
-// What lamps add at a point: `voxel` of an instance's tree, w: which instance. `from`: where rays start, as in a
-// GridRay; `normal`: in view, unit.
-vec3 light_of_lamps(uint slot, ivec4 voxel, Placed placed, GridRay from, vec3 normal) {
-  uvec2 list = lamps_around(voxel, placed);
-  vec3 in_view = view_from_grid(placed, from).origin;
-  vec3 sum = vec3(0.0);
-  for (uint i = 0; i < list.y; ++i) {
-    GridRay ray = from;
-    float max_t;
-    vec3 light = light_of_lamp(list.x + i, in_view, normal, placed, ray, max_t);
-    if (light == vec3(0.0)) continue;
-    if (has(kShadows) && max_t > 0.0) {
-      ++rays_taken;
-      if (is_blocked(voxel.w, placed, ray, max_t)) continue;
-      if (kHasGlass) light *= sunlight_passed(slot, voxel.w, placed, ray, max_t);
-    }
-    sum += light;
-  }
-  return sum;
+// What of each channel of light passes on a ray's way. `slot`: whose lists of bodies it may use.
+vec3 passed_on_way(uint slot, int home, Placed own, GridRay ray, float max_t) {
+  ++rays_taken;
+  if (is_blocked(home, own, ray, max_t)) return vec3(0.0);
+  return kHasGlass ? sunlight_passed(slot, home, own, ray, max_t) : vec3(1.0);
 }

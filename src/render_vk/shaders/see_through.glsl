@@ -1,7 +1,6 @@
 // What one sees through bodies of glass, as light/glass.h says on the processor's side. Those that include this define
-// these: the light of the face through which a body is entered, which way one looks, in the world, and the upright of
-// the surface that is met at `t`, in the face of an instance's voxel; unit, in the world.
-vec3 light_of_body(Body body, uint slot);
+// these: which way one looks, in the world, and the upright of the surface that is met at `t`, in the face of an
+// instance's voxel; unit, in the world.
 vec3 seen_direction();
 vec3 normal_met(int instance, uint face, float t);
 
@@ -15,17 +14,14 @@ vec3 field_normal(int instance, vec3 in_grid) {
   Placed placed = placed_at(instance);
   return turned(placed.view_axes, in_grid) / placed.ref_inside.w;
 }
-// The uprights of the surfaces through which a ray enters a body, and leaves it; unit, in the world.
-vec3 normal_entered(Body body) {
-  bool is_of_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
-  if (is_of_field) return field_normal(body.voxel.w, normal_of(body.what.y));
-  return normal_met(body.voxel.w, body.what.y, body.lengths.x);
-}
-vec3 normal_left(Body body) {
-  int instance = int(body.what.w >> 3);
-  bool is_of_field = kHasFieldGlass && (body.what.z & kEndsInField) != 0;
-  if (is_of_field) return field_normal(instance, normal_from_28(body.what.z >> kExitNormal));
-  return normal_met(instance, body.what.w & 7, body.lengths.y);
+// The upright of the surface through which a ray enters a body, or leaves it; unit, in the world.
+vec3 normal_of_side(Body body, bool is_entered) {
+  int instance = is_entered ? body.voxel.w : int(body.what.w >> 3);
+  uint in_field = is_entered ? kBeginsInField : kEndsInField;
+  if (kHasFieldGlass && (body.what.z & in_field) != 0) {
+    return field_normal(instance, is_entered ? normal_of(body.what.y) : normal_from_28(body.what.z >> kExitNormal));
+  }
+  return normal_met(instance, is_entered ? body.what.y : body.what.w & 7, is_entered ? body.lengths.x : body.lengths.y);
 }
 
 // A surface that mirrors the sky. `normal`: unit, in the world; `tint`: of what is mirrored.
@@ -34,23 +30,26 @@ void meet_surface(vec3 normal, float before, float behind, vec3 tint, inout Stat
   state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
   state.weight.xyz *= 1.0 - mirror.x;
 }
-// Where a ray leaves a body into air, or into another that touches it: what is mirrored passes it once more.
-void leave_body(Body from, vec3 normal, float behind, inout State state) {
-  Surface surface = surface_of(from.what.x);
-  vec3 tint = passed_by(surface, from.lengths.z, has_own_length(from));
-  meet_surface(normal, surface.ior, behind, tint, state);
-}
-void leave_into_air(Body from, inout State state) {
-  leave_body(from, normal_left(from), 1.0, state);
-}
-void enter_body(Body from, bool has_from, Body to, inout State state) {
-  float ior = surface_of(to.what.x).ior;
-  if (has_from && reaches(from, to.lengths.x)) {
-    leave_body(from, normal_entered(to), ior, state);
-    return;
+// Where a ray leaves one body for the next, or for air, and where it enters that: what is mirrored in a body's end
+// passes it once more.
+void meet_surfaces(Body from, bool has_from, Body to, bool has_to, inout State state) {
+  bool touches = has_from && has_to && reaches(from, to.lengths.x);
+  for (int side = 0; side < 2; ++side) {
+    bool is_left = side == 0;
+    bool is_met = is_left ? has_from : has_to && !touches && (to.what.z & kStartsInside) == 0;
+    if (!is_met) continue;
+    bool is_entered = !is_left || touches;
+    vec3 normal = normal_of_side(is_entered ? to : from, is_entered);
+    float behind = is_entered ? surface_of(to.what.x).ior : 1.0;
+    float before = 1.0;
+    vec3 tint = vec3(1.0);
+    if (is_left) {
+      Surface surface = surface_of(from.what.x);
+      before = surface.ior;
+      tint = passed_by(surface, from.lengths.z, has_own_length(from));
+    }
+    meet_surface(normal, before, behind, tint, state);
   }
-  if (has_from) leave_into_air(from, state);
-  if ((to.what.z & kStartsInside) == 0) meet_surface(normal_entered(to), 1.0, ior, vec3(1.0), state);
 }
 
 // Whether something opaque leaves no air behind a body. `opaque_t`: how far that is; kInfinity where there is nothing.
@@ -59,31 +58,57 @@ bool lies_on_opaque(Body body, float opaque_t) {
   return opaque_t <= body.lengths.y + frame().lift * voxel_size;
 }
 
-// Lets a ray through the bodies of a list, nearest first, with what they show. Where there was no room for all
-// (`is_last` is false) it stops before the last one, which may go on among the others: state.weight.w says from where.
-// `is_entered`: the first was entered before. Returns whether there was any; `last` is the last that was passed.
-bool pass_bodies(BodyList list, bool is_last, bool is_entered, uint slot, inout State state, out Body last) {
-  bool has_surfaces = has(kGlassSurfaces);
-  bool is_first = true;
-  uint i = 0;
+// A ray's way through the bodies of a list, nearest first.
+struct Passage {
+  BodyList list;
+  uint next;
+  Body body;      // the last one that it came to
+  bool has_body;
+  bool is_entered;  // the first was entered before
+  bool is_last;     // there was room for all; else it stops before the last one, which may go on among the others
+};
+
+Passage passage_through(BodyList list, bool is_entered) {
+  Passage way;
+  way.list = list;
+  way.next = 0;
+  way.has_body = false;
+  way.is_entered = is_entered;
+  way.is_last = list.dropped_t == kInfinity;
+  return way;
+}
+
+// Goes on into the next body, with what its surfaces show; false when there is none left. Then the ray has come out,
+// unless what is opaque, `opaque_t` away, follows at once; or where not all had room, state.weight.w says from where to
+// go on.
+bool enter_next(inout Passage way, float opaque_t, inout State state) {
   Body body;
-  while (next_body(list, i, body)) {
-    if (!is_last && !is_first && i == list.count) {
-      if (has_surfaces) enter_body(last, true, body, state);
-      state.weight.w = body.lengths.x;
-      break;
-    }
-    if (has_surfaces && !(is_first && is_entered)) enter_body(last, !is_first, body, state);
-    last = body;
-    is_first = false;
-    bool starts_inside = (body.what.z & kStartsInside) != 0;
-    // Where values are shown, glass is as good as stone, but for what one looks from.
-    bool shows_values = has(kShowOcclusion) || has(kShowNormals);
-    if (shows_values && starts_inside) continue;
-    Surface surface = surface_of(body.what.x);
-    vec3 weight = state.weight.xyz * (shows_values ? 1.0 : own_share(surface, body.lengths.z, has_own_length(body)));
-    state.weight.xyz *= shows_values ? vec3(0.0) : passed_by(surface, body.lengths.z, has_own_length(body));
-    state.colour.xyz += weight * light_of_body(body, slot);
+  bool has_next = next_body(way.list, way.next, body);
+  bool is_met = has_next ? way.has_body || !way.is_entered
+                         : way.is_last && way.has_body && !lies_on_opaque(way.body, opaque_t);
+  if (has(kGlassSurfaces) && is_met) meet_surfaces(way.body, way.has_body, body, has_next, state);
+  if (!has_next) return false;
+  if (!way.is_last && way.has_body && way.next == way.list.count) {
+    state.weight.w = body.lengths.x;
+    return false;
   }
-  return !is_first;
+  way.body = body;
+  way.has_body = true;
+  return true;
+}
+
+// Goes through the body, and returns with what weight its own light is seen.
+vec3 pass_body(Passage way, inout State state) {
+  Body body = way.body;
+  Surface surface = surface_of(body.what.x);
+  // Where values are shown, glass is as good as stone, but for what one looks from.
+  if (has(kShowOcclusion) || has(kShowNormals)) {
+    if ((body.what.z & kStartsInside) != 0) return vec3(0.0);
+    vec3 weight = state.weight.xyz;
+    state.weight.xyz = vec3(0.0);
+    return weight;
+  }
+  vec3 weight = state.weight.xyz * own_share(surface, body.lengths.z, has_own_length(body));
+  state.weight.xyz *= passed_by(surface, body.lengths.z, has_own_length(body));
+  return weight;
 }

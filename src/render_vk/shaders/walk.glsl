@@ -377,19 +377,17 @@ bool meet_cell(float max_t, out FieldHit hit) {
   return true;
 }
 
-// As find_voxel, to the first point at which the field of a walk's tree is negative.
-bool find_surface(float max_t, out FieldHit hit) {
+// As find_voxel; in the tree of a field to the first point at which it is negative. `t`: how far along.
+bool find_content(bool is_field, float max_t, out float t, out FieldHit hit) {
   while (find_voxel(max_t)) {
-    if (meet_cell(max_t, hit)) return true;
+    t = walk_t;
+    if (!is_field) return true;
+    bool is_met = meet_cell(max_t, hit);
+    t = hit.t;
+    if (is_met) return true;
     if (!leave_block(0, max_t)) return false;
   }
   return false;
-}
-
-// Whether a ray, in a grid's tree, meets the solid of its field.
-bool meets_field(Tree field, ivec3 base, vec3 origin, vec3 direction, float max_t) {
-  FieldHit hit;
-  return start_walk(field, base, origin, direction, max_t, -1) && find_surface(max_t, hit);
 }
 
 float field_in_block(Numbers block, vec3 at) {
@@ -421,11 +419,12 @@ vec3 normal_in(Numbers block, ivec3 first, vec3 inside) {
   vec3 own = gradient_of(low, high, inside);
   float own_size = length(own);
   own = own_size > 0.0 ? own / own_size : vec3(0.0);
-  vec3 gradient;
-  for (int axis = 0; axis < 3; ++axis) {
+  vec3 gradient = vec3(0.0);
+  for (int side = 0; side < 6; ++side) {
+    float forward = (side & 1) == 0 ? 1.0 : -1.0;
     vec3 step = vec3(0.0);
-    step[axis] = 1.0;
-    gradient[axis] = field_in_block(block, at + step) - field_in_block(block, at - step);
+    step[side >> 1] = forward;
+    gradient[side >> 1] += forward * field_in_block(block, at + step);
   }
   float size = length(gradient);
   return dot(gradient, own) > 0.5 * size ? gradient / size : own;

@@ -9,8 +9,7 @@
 // The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
 // `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
 //
-// One loop over them all: compilers copy the walk to each place that asks for it, and that of lavapipe takes seconds
-// for each.
+// One loop over them all, for the reason that rays.glsl gives.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);
@@ -32,10 +31,7 @@ vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse
       is_shadowed = is_shadowed && max_t > 0.0;
     }
     if (light == vec3(0.0)) continue;
-    if (is_shadowed) {
-      if (is_blocked(voxel.w, placed, ray, max_t)) continue;
-      if (kHasGlass) light *= sunlight_passed(0, voxel.w, placed, ray, max_t);
-    }
+    if (is_shadowed) light *= passed_on_way(0, voxel.w, placed, ray, max_t);
     sum += light;
   }
   return sum;

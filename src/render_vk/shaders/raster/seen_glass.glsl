@@ -19,20 +19,21 @@ GridRay seen_ray_in(int instance, Placed placed) {
 float opaque_behind() {
   float nearest = kInfinity;
   start_visit(seen_in_view);
-  for (int i = next_instance(nearest); i >= 0; i = next_instance(nearest)) {
+  for (;;) {
+    int i = next_instance(nearest);
+    if (i < 0) return nearest;
     Placed placed = placed_at(i);
     GridRay ray = seen_ray_in(i, placed);
-    Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    if (start_walk(opaque, ray.base, ray.origin, ray.direction, nearest, -1) && find_voxel(nearest)) nearest = walk_t;
-    if (kHasFields) {
-      Tree field = Grids(frame().grids).at[placed.ref_base.w].field;
+    for (int content = 0; content < kContents; ++content) {
+      bool is_field = kHasFields && content == 1;
+      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
+      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
+      if (!start_walk(tree, ray.base, ray.origin, ray.direction, nearest, -1)) continue;
+      float t;
       FieldHit hit;
-      if (start_walk(field, ray.base, ray.origin, ray.direction, nearest, -1) && find_surface(nearest, hit)) {
-        nearest = min(nearest, hit.t);
-      }
+      if (find_content(is_field, nearest, t, hit)) nearest = min(nearest, t);
     }
   }
-  return nearest;
 }
 
 // The face through which a body is entered, with the occlusion that a blocky mesh would carry there. `normal`: unit, in
@@ -67,11 +68,6 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
 // Those that include this say how bodies are lit.
 LitPoint point_of_body(Body body);
 
-vec3 light_of_body(Body body, uint slot) {
-  if (kGlassStep == kGlassPassed) return vec3(0.0);
-  return colour_of(point_of_body(body));
-}
-
 // Those that include this define what begins in the fragment: the first body of a list.
 void enter_first(inout BodyList list);
 
@@ -87,16 +83,17 @@ vec4 seen_from(int home, ivec3 base, vec3 from) {
   float opaque_t = opaque_behind();
   State state = State(vec4(1.0, 1.0, 1.0, -kNever), vec4(0.0));
   vec3 unused = vec3(1.0);
-  Body last;
-  for (bool is_last = false, is_first = true; !is_last; is_first = false) {
+  for (bool is_first = true, is_last = false; !is_last; is_first = false) {
     BodyList list = BodyList(uvec2(0), 0, kHeldBodies, 0, kInfinity);
     find_bodies(home, seen_ray, seen_in_view, 1.0, opaque_t, state.weight.w, list, unused);
     if (is_first) enter_first(list);
-    is_last = list.dropped_t == kInfinity;
     state.weight.w = list.dropped_t;
-    bool has_bodies = pass_bodies(list, is_last, !is_first, 0, state, last);
-    bool is_left = is_last && has(kGlassSurfaces) && has_bodies && !lies_on_opaque(last, opaque_t);
-    if (is_left) leave_into_air(last, state);
+    Passage way = passage_through(list, !is_first);
+    while (enter_next(way, opaque_t, state)) {
+      vec3 weight = pass_body(way, state);
+      if (kGlassStep != kGlassPassed) state.colour.xyz += weight * colour_of(point_of_body(way.body));
+    }
+    is_last = way.is_last;
   }
   return kGlassStep == kGlassPassed ? vec4(state.weight.xyz, 1.0) : vec4(shown(state.colour.xyz), 0.0);
 }

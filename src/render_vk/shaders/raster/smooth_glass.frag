@@ -28,7 +28,13 @@ vec3 blurred_normal(GridTrees trees, ivec3 base, vec3 point) {
   for (int i = 0; i < 27; ++i) {
     ivec3 at = ivec3(i % 3, i / 3 % 3, i / 9);
     ivec3 voxel = base + ivec3(whole) + at - 1;
-    if (!holds(trees.transparent, voxel) && !holds(trees.opaque, voxel)) continue;
+    bool is_held = false;
+    for (int k = 0; k < 2 && !is_held; ++k) {
+      Tree tree = trees.transparent;
+      if (k == 1) tree = trees.opaque;
+      is_held = holds(tree, voxel);
+    }
+    if (!is_held) continue;
     vec3 w = vec3(weights[at.x].x, weights[at.y].y, weights[at.z].z);
     inwards += vec3(slopes[at.x].x * w.y * w.z, w.x * slopes[at.y].y * w.z, w.x * w.y * slopes[at.z].z);
   }
@@ -49,7 +55,7 @@ vec3 normal_met(int instance, uint face, float t) {
 LitPoint point_of_body(Body body) {
   if (body.lengths.x <= 0.0) return own_point();
   vec4 sun = mesh_frame().sun;
-  vec3 met = normal_entered(body);
+  vec3 met = normal_of_side(body, true);
   return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
 }
 
