@@ -59,7 +59,6 @@ class Document {
   std::int64_t drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit);
   /// The whole stroke is one step to undo.
   void end_stroke();
-  [[nodiscard]] bool is_in_stroke() const { return stroke_.has_value(); }
   [[nodiscard]] const Brush* stroke_brush() const { return stroke_ ? &stroke_->brush : nullptr; }
 
   [[nodiscard]] const EditHistory& history() const { return history_; }

@@ -35,7 +35,6 @@ class EditHistory {
   void end(const Scene& scene);
   /// Shows or hides it: a step of its own. Requires: no step is under way, it is there.
   void show(Scene& scene, const SceneNode& node, bool is_visible);
-  [[nodiscard]] bool is_under_way() const { return open_.has_value(); }
 
   [[nodiscard]] bool can_undo() const { return done_ > 0; }
   [[nodiscard]] bool can_redo() const { return done_ < steps_.size(); }

@@ -264,12 +264,16 @@ Result<FileBackup> FileBackup::of(const std::filesystem::path& path, Older older
   if (!is_there(file)) return backup;
   const std::filesystem::path name = name_for(path, older);
   if (name.empty()) return cannot_write("no name is left for a backup: NAME~ to NAME.~99~ are there", file);
-  const std::filesystem::path second_name = temporary_name(file, 0);
-  if (::link(file.c_str(), second_name.c_str()) != 0) {
-    if (Status copied = copy_whole(file, second_name); !copied) return copied.error();
-  }
-  backup.second_name_ = second_name;
   backup.backup_ = name;
+  const std::filesystem::path second_name = temporary_name(file, 0);
+  if (::link(file.c_str(), second_name.c_str()) == 0) {
+    backup.second_name_ = second_name;
+    return backup;
+  }
+  // No copy is made over what is there; a part of one is removed with `backup`.
+  const bool was_there = is_there(second_name);
+  if (!was_there) backup.second_name_ = second_name;
+  if (Status copied = copy_whole(file, second_name); !copied) return copied.error();
   return backup;
 }
 

@@ -89,7 +89,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
                                const LoadOptions& options, const Progress& progress) {
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
-  if (format == FileFormat::Scene) return read_scene_file(bytes);
+  if (format == FileFormat::Scene) return read_scene_file(bytes, options, progress);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include <quoin/io/scene_file.h>
+
 #include "io/gltf/glb_for_tests.h"
 
 namespace quoin {
@@ -26,6 +28,23 @@ TEST(Formats, ContentDecidesWhatAFileIs) {
   EXPECT_EQ(detect_format(bytes_of("VOX")), std::nullopt);
   EXPECT_EQ(detect_format(bytes_of("glTF")), std::nullopt) << "written, not read";
   EXPECT_EQ(detect_format(std::span<const std::byte>()), std::nullopt);
+}
+
+TEST(Formats, BytesOfSceneFilesAreReadAsTheirFilesAre) {
+  SceneFile file;
+  file.grids.emplace_back();
+  file.grids[0].grid.set({1, 2, 3}, *file.types.add({}));
+  file.placements.push_back({});
+  file.placements[0].grid = 0;
+  file.placements[0].visible = false;
+  const auto bytes = write_scene_file(file);
+  ASSERT_TRUE(bytes);
+  for (const bool shows : {false, true}) {
+    const auto loaded = load_scene(std::span<const std::byte>(*bytes), {.show_hidden = shows});
+    ASSERT_TRUE(loaded) << loaded.error().message;
+    const Scene& scene = loaded->scene;
+    EXPECT_EQ(scene.instances()[scene.instances().handles()[0]].visible, shows);
+  }
 }
 
 TEST(Formats, NamesDecideWhatIsWritten) {

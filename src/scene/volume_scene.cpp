@@ -51,8 +51,13 @@ struct Between {
   float share = 0.0F;
 };
 
+double station_count(int size, double spacing, double step) {
+  return std::floor((size - 1) * spacing / step + kUneven) + 1.0;
+}
+
+// Requires: station_count fits.
 std::vector<Between> stations(int size, double spacing, double step) {
-  std::vector<Between> all(static_cast<std::size_t>(std::floor((size - 1) * spacing / step + kUneven)) + 1);
+  std::vector<Between> all(static_cast<std::size_t>(station_count(size, spacing, step)));
   for (std::size_t i = 0; i < all.size(); ++i) {
     const double at = std::min(static_cast<double>(i) * step / spacing, size - 1.0);
     all[i].low = static_cast<std::size_t>(at);
@@ -68,13 +73,15 @@ float mix(float a, float b, float share) {
 }
 
 Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, double step, Threads threads) {
+  double samples = 1.0;
+  for (int axis = 0; axis < 3; ++axis) samples *= station_count(volume.size[axis], lattice.spacing[axis], step);
+  constexpr double kMostSamples = 0x1p31;
+  if (!(samples <= kMostSamples)) {
+    return make_error(ErrorCode::LimitExceeded, "with even spacing the volume has more than 2^31 samples");
+  }
   const std::vector<Between> x = stations(volume.size.x, lattice.spacing.x, step);
   const std::vector<Between> y = stations(volume.size.y, lattice.spacing.y, step);
   const std::vector<Between> z = stations(volume.size.z, lattice.spacing.z, step);
-  constexpr double kMostSamples = 0x1p31;
-  if (static_cast<double>(x.size()) * static_cast<double>(y.size()) * static_cast<double>(z.size()) > kMostSamples) {
-    return make_error(ErrorCode::LimitExceeded, "with even spacing the volume has more than 2^31 samples");
-  }
   Volume even;
   even.size = {static_cast<int>(x.size()), static_cast<int>(y.size()), static_cast<int>(z.size())};
   even.min = volume.min;

@@ -42,6 +42,14 @@ glm::dmat4 placed(const glm::dmat3& axes, DVec3 spacing, IVec3 size) {
   return matrix;
 }
 
+TEST(VolumeScene, SpacingsThatWouldNeedTooManySamplesAreRefusedBeforeAnyIsMade) {
+  for (const double spacing : {1e-9, 1e-25, 1e-300}) {
+    const auto scene = scene_from_volume(ball({2, 2, 2}, placed(glm::dmat3(1.0), {spacing, 1, 1}, {2, 2, 2})), {64.0F});
+    ASSERT_FALSE(scene);
+    EXPECT_EQ(scene.error().code, ErrorCode::LimitExceeded) << scene.error().message;
+  }
+}
+
 TEST(VolumeScene, StandsWhereTheVolumeSays) {
   const glm::dmat3 turned(glm::rotate(glm::dmat4(1.0), 0.6, DVec3{1, 2, -1}));
   glm::dmat3 mirrored = turned;

@@ -92,8 +92,8 @@ struct ManyOptions {
 /// By input, what it and all that is read beside it were when it was converted.
 using Converted = std::map<std::filesystem::path, Stamps>;
 
-/// Converts each of the inputs, several at once; those that fail are named last. `done`: for `options.watch`, those that
-/// are in it are left out until they change; gets what is converted now.
+/// Converts each of the inputs, several at once; those that fail are named last. `done`: for `options.watch`, those
+/// that are in it are left out until they change; gets what is converted now.
 [[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
 
 /// Writes what has been meshed, filling in `outcome`.

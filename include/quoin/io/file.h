@@ -11,7 +11,8 @@
 
 namespace quoin {
 
-/// The whole of a regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not there).
+/// The whole of a regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not there);
+/// LimitExceeded beyond 8 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> read_file(const std::filesystem::path& path);
 
 /// The first `most` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.

@@ -100,7 +100,8 @@ struct SceneFile {
 [[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {},
                                                   const Progress& progress = {});
 /// The same of bytes. Errors: Unsupported where they name files, which only a path finds.
-[[nodiscard]] Result<LoadedScene> read_scene_file(std::span<const std::byte> text);
+[[nodiscard]] Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options = {},
+                                                  const Progress& progress = {});
 
 /// Whether bytes look like a scene file: an object that names its version near the beginning.
 [[nodiscard]] bool is_scene_file(std::span<const std::byte> beginning);

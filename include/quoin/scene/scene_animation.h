@@ -14,10 +14,13 @@ namespace quoin {
 /// meshes. Each frame is shown until the next one; nothing is interpolated.
 ///
 ///   quoin::SceneAnimation animation;
-///   for (const quoin::Scene& frame : frames) animation.add(frame);
+///   for (const quoin::Scene& frame : frames) {
+///     if (quoin::Status added = animation.add(frame); !added) return added.error();
+///   }
 ///   auto meshes = quoin::mesh_scene(animation.scene());
+///   if (!meshes) return meshes.error();
 ///   animation.animate(*meshes, 12.0);               // frames a second
-///   quoin::write_mesh(*meshes, "walk.glb");
+///   return quoin::write_mesh(*meshes, "walk.glb");
 class SceneAnimation {
  public:
   /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of

@@ -56,7 +56,7 @@ struct FloorOptions {
 struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
-  int max_contacts = 5;  ///< after which what is left of the displacement is dropped
+  int max_contacts = 5;  ///< at least 1; after which what is left of the displacement is dropped
   /// A box that starts inside is moved out first. Without, it stays where it is: `is_blocked`, with the displacement as
   /// it was.
   bool pushes_out = true;

@@ -11,7 +11,7 @@
 namespace quoin {
 
 /// A ray in the space of whatever is asked: of a grid (voxels) for an OccupancyTree, of the world for a scene.
-/// `direction` is not zero and finite; distances are in multiples of its length.
+/// Both are finite and `direction` is not zero, or nothing is met; distances are in multiples of its length.
 struct Ray {
   DVec3 origin{0.0};
   DVec3 direction{0.0, 0.0, 1.0};

@@ -118,6 +118,10 @@ TEST(SceneFields, DamagedOnesAreRefusedWithTheirPlace) {
             at + "byte 18 of the voxel data: a density beyond the band");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
             at + "byte 18 of the voxel data: a density beyond the band");
+  for (const std::uint16_t none : {0x8000, 0x0001, 0x83FF}) {
+    EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
+              at + "byte 18 of the voxel data: a density that is -0, or nearer to 0 than 2^-14");
+  }
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
             at + "byte 18 of the voxel data: a density beyond the band");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),

@@ -245,19 +245,25 @@ class Placer {
   std::vector<GroupHandle> groups_;
 };
 
+/// `folder`: which the sources' names start from.
+Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& folder, const LoadOptions& options,
+                                 const Progress& progress) {
+  std::vector<GridHandle> grids;
+  LoadedScene loaded = begin_scene(file, grids);
+  const auto bodies = read_sources(file.sources, folder, options, loaded, progress);
+  if (!bodies) return bodies.error();
+  Placer(file, grids, *bodies, loaded.scene).place();
+  if (options.show_hidden) show_all(loaded.scene);
+  return loaded;
+}
+
 }  // namespace
 
 Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options,
                                     const Progress& progress) {
   auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
   if (!file) return file.error();
-  std::vector<GridHandle> grids;
-  LoadedScene loaded = begin_scene(*file, grids);
-  const auto bodies = with_path(read_sources(file->sources, path.parent_path(), options, loaded, progress), path);
-  if (!bodies) return bodies.error();
-  Placer(*file, grids, *bodies, loaded.scene).place();
-  if (options.show_hidden) show_all(loaded.scene);
-  return loaded;
+  return with_path(put_together(*file, path.parent_path(), options, progress), path);
 }
 
 std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {
@@ -268,17 +274,14 @@ std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::p
   return named;
 }
 
-Result<LoadedScene> read_scene_file(std::span<const std::byte> text) {
+Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options,
+                                    const Progress& progress) {
   auto file = parse_scene_file(text);
   if (!file) return file.error();
   if (!file->sources.empty()) {
     return make_error(ErrorCode::Unsupported, "a scene file that names others, which only a path finds");
   }
-  std::vector<GridHandle> grids;
-  LoadedScene loaded = begin_scene(*file, grids);
-  const Bodies none;
-  Placer(*file, grids, none, loaded.scene).place();
-  return loaded;
+  return put_together(*file, {}, options, progress);
 }
 
 }  // namespace quoin

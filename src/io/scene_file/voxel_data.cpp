@@ -222,7 +222,7 @@ class PieceReader {
     if (!has(sizeof(std::uint32_t))) return cut_off();
     const auto uniform = take<std::uint32_t>();
     if (uniform != kMixedSlab) {
-      if (!is_density(uniform)) return wrong_density(at_ - sizeof(uniform));
+      if (!is_density(uniform)) return wrong_density(uniform, at_ - sizeof(uniform));
       chunk.samples = DensityChunk(static_cast<Half>(uniform));
       chunk.samples.materials() = std::move(materials->voxels);
       return chunk;
@@ -295,18 +295,23 @@ class PieceReader {
     });
     return status;
   }
-  // Infinities and NaN are beyond any band.
+  // What `stored_density` makes: infinities and NaN are beyond any band, and neither -0 nor subnormal numbers occur.
   [[nodiscard]] bool is_density(std::uint32_t half) const {
-    return half <= 0xFFFF && std::abs(float_from_half(static_cast<Half>(half))) <= band_;
+    constexpr std::uint32_t kExponent = 0x7C00;
+    if (half > 0xFFFF || (half != 0 && (half & kExponent) == 0)) return false;
+    return std::abs(float_from_half(static_cast<Half>(half))) <= band_;
   }
-  [[nodiscard]] Error wrong_density(std::size_t at) const { return fault("a density beyond the band", at); }
+  [[nodiscard]] Error wrong_density(std::uint32_t half, std::size_t at) const {
+    const bool is_near_0 = half <= 0xFFFF && std::abs(float_from_half(static_cast<Half>(half))) <= band_;
+    return fault(is_near_0 ? "a density that is -0, or nearer to 0 than 2^-14" : "a density beyond the band", at);
+  }
 
   Status read_slab_of_densities(int slab) {
     if (!has(sizeof(std::uint32_t))) return cut_off();
     const auto uniform = take<std::uint32_t>();
     const std::span<Half> halves(halves_);
     if (uniform != kMixedSlab) {
-      if (!is_density(uniform)) return wrong_density(at_ - sizeof(uniform));
+      if (!is_density(uniform)) return wrong_density(uniform, at_ - sizeof(uniform));
       for_each_run(halves, slab, [&](std::span<Half> run) { std::ranges::fill(run, static_cast<Half>(uniform)); });
       return {};
     }
@@ -319,7 +324,7 @@ class PieceReader {
         const auto low = std::to_integer<std::uint32_t>(bytes_[at_]);
         const auto high = std::to_integer<std::uint32_t>(bytes_[at_ + kSlabVoxels]);
         before = (before + low + (high << 8)) & 0xFFFF;
-        if (!is_density(before) && status) status = wrong_density(at_);
+        if (!is_density(before) && status) status = wrong_density(before, at_);
         run[i] = static_cast<Half>(before);
       }
     });

@@ -136,7 +136,7 @@ std::string normalised(std::string_view text) {
 
 /// A finite number, "nan" or an infinity, in any case; nothing when `text` is neither.
 std::optional<double> parse_number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
@@ -257,6 +257,7 @@ Status read_spacings(const Field& field, std::size_t dimensions, Volume& volume)
     return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
   }
   bool is_amiss = false;
+  bool is_turned = false;
   for (int axis = 0; axis < 3; ++axis) {
     const auto number = parse_number(words[static_cast<std::size_t>(axis)]);
     if (!number) return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
@@ -264,7 +265,9 @@ Status read_spacings(const Field& field, std::size_t dimensions, Volume& volume)
     const bool is_good = is_distance(spacing);
     volume.spacing[axis] = is_good ? spacing : 1.0;
     is_amiss |= !is_good;
+    is_turned |= is_good && *number < 0.0;
   }
+  if (is_turned) volume.warnings.emplace_back("a spacing is negative; its size is taken");
   if (is_amiss) volume.warnings.emplace_back("a spacing is no distance; 1 is taken");
   return {};
 }

@@ -89,6 +89,9 @@ TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
   EXPECT_EQ(volume.spacing, DVec3(2, 0.5, 4));
   EXPECT_EQ(at(volume, {1, 1, 1}), DVec3(2, 4, -0.5));
   EXPECT_EQ(volume_of(tiny("spacings: 2 nan 4\n")).spacing, DVec3(2, 1, 4));
+  const Volume turned = volume_of(tiny("spacings: 2 -3 4\n"));
+  EXPECT_EQ(turned.spacing, DVec3(2, 3, 4));
+  EXPECT_EQ(turned.warnings, std::vector<std::string>{"a spacing is negative; its size is taken"});
 }
 
 TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
@@ -164,6 +167,7 @@ TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
             "byte 73: a space direction is no vector of 3 finite numbers");
   EXPECT_EQ(field("space origin: (1,2\n"), "byte 73: the space origin is no vector of 3 finite numbers");
   EXPECT_EQ(field("spacings: 1 2 x\n"), "byte 73: the spacings are not 3 numbers");
+  EXPECT_EQ(field("spacings: 1 2 +-3\n"), "byte 73: the spacings are not 3 numbers");
   EXPECT_EQ(field("space: scanner-xyz-time\n"),
             "byte 73: the space is \"scanner-xyz-time\", which is none of three dimensions");
   EXPECT_EQ(field("byte skip: -2\n"), "byte 73: the byteskip is \"-2\"");

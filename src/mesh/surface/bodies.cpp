@@ -56,6 +56,19 @@ std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vect
   return bodies;
 }
 
+std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const DensityGrid& field) {
+  std::vector<std::uint32_t> bodies{0};
+  if (!types.has_transparent()) return bodies;
+  for (const IVec3 place : field.chunks()) {
+    for (const VoxelType material : field.find_chunk(place)->materials().types()) {
+      if (types.is_transparent(material)) bodies.push_back(body_of(types, material));
+    }
+  }
+  std::sort(bodies.begin(), bodies.end());
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  return bodies;
+}
+
 DensityChunk chunk_of_body(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body) {
   return holds_others(whole, types, body) ? without_others(whole, types, body) : whole;
 }

@@ -18,6 +18,10 @@ namespace quoin::smooth {
 /// The bodies of some materials, sorted, each once.
 [[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials);
 
+/// The bodies of a field, sorted. What is solid without a material is opaque. Cost: O(chunks), unless nothing is
+/// transparent.
+[[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const DensityGrid& field);
+
 /// Whether any material of a chunk is of another body.
 [[nodiscard]] bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
 

@@ -191,6 +191,7 @@ ShaderMeshInstance shader_instance(const Space& space, const View& view, const L
     out.diffuse[static_cast<std::size_t>(i / 4)][i % 4] = static_cast<float>(std::max(cosine, 0.0) * brightness);
   }
   out.home = IVec4(IVec3(space.base) - instance.origin, instance.placed);
+  if (instance.mesh.content == SurfaceContent::Field) out.first_sample = 0.0F;
   out.eye = to_vec4(space.eye, view.rays.is_perspective() ? 1.0 : 0.0);
   const double depth_per_w = view.rays.is_perspective() ? view.nearest : 1.0;
   const double pixel = glm::length(view.rays.right());

@@ -18,7 +18,7 @@ struct ShaderMeshInstance {
   float room = 0.0F;
   float far_half = 0.0F;
   float unseen_half = 0.0F;
-  float pad = 0.0F;
+  float first_sample = 0.5F;
 };
 
 struct ShaderGlassDraw {

@@ -116,6 +116,37 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   }
 }
 
+// Sample (i, j, k) of a field is the point (i, j, k) of its grid, as in marched pictures.
+TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, {200, 60, 40});
+  SceneGrid grid;
+  grid.field.add_sphere({64, 64, 64}, 20, stone);  // over eight chunks
+  grid.pivot = {64, 64, 64};
+  Instance instance{"", scene.add_grid(std::move(grid)), {5, 6, 7}};
+  instance.voxel_size = 0.75;
+  scene.add_instance(instance);
+  put(scene, live_surfaces(scene, SurfaceStyle::Smooth));
+  MeshPictureOptions options = mesh_options(sized(160, 160));
+  options.light.shading = Shading::Normals;
+  const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
+  const Image image = drawn(camera, options);
+  int inside = 0;
+  DVec3 sum{0.0};
+  for (int y = 0; y < 160; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      const auto normal = normal_at(camera, x, y, {5, 6, 7}, 15.0);
+      if (!normal) continue;
+      ++inside;
+      sum += DVec3(byte_at(image, x, y)) - 255.0 * (0.5 + 0.5 * *normal);
+    }
+  }
+  EXPECT_GT(inside, 4000);
+  const DVec3 mean = sum / static_cast<double>(inside);
+  // Half a sample aside would be 3.2.
+  EXPECT_LT(glm::length(mean), 1.0) << mean.x << ' ' << mean.y << ' ' << mean.z;
+}
+
 TEST_F(VulkanMeshShape, SmoothSurfacesAreClosed) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});

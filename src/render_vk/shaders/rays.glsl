@@ -1,8 +1,8 @@
 // What light reaches a point: rays among all instances. Those that include this say whether there is glass
 // (`kHasGlass`).
 //
-// Compilers copy a function to each place that calls it, and a walk is long: each is called in one place of a shader, in
-// a loop over all that needs it. See docs/decisions/088.
+// Compilers copy a function to each place that calls it, and a walk is long: each is called in one place of a shader,
+// in a loop over all that needs it. See docs/decisions/088.
 
 uint rays_taken;
 

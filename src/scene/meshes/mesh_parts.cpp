@@ -1,8 +1,10 @@
 #include "scene/meshes/mesh_parts.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
+#include "mesh/surface/bodies.h"
 #include "mesh/surface/simplify_tagged.h"
 #include "scene/instance_axes.h"
 
@@ -88,6 +90,54 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
   return mesh;
 }
 
+void append(SmoothMesh& all, const SmoothMesh& more) {
+  const auto first = static_cast<std::uint32_t>(all.positions.size());
+  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  add(all.positions, more.positions);
+  add(all.normals, more.normals);
+  add(all.occlusion, more.occlusion);
+  add(all.albedo, more.albedo);
+  add(all.types, more.types);
+  for (const std::uint32_t index : more.indices) all.indices.push_back(first + index);
+}
+
+MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivot) {
+  const auto owner = std::make_shared<const SmoothBodies>(std::move(bodies));
+  MeshPart part{std::move(name), {}, pivot, owner};
+  for (const SmoothMesh& mesh : *owner) {
+    if (mesh.indices.empty()) continue;
+    part.surfaces.push_back(view_of(mesh));
+    part.surfaces.back().surface = &mesh == owner->data() ? SurfaceClass::Opaque : SurfaceClass::Transparent;
+  }
+  return part;
+}
+
+namespace {
+
+/// The surfaces of a field.
+Result<SmoothBodies> bodies_of_field(const DensityGrid& field, const VoxelRegistry& types, const SurfaceOptions& wanted,
+                                     MeshStats& stats, Threads threads, const Progress& progress) {
+  const std::vector<std::uint32_t> bodies = smooth::bodies_of(types, field);
+  SmoothBodies made;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const auto share = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(bodies.size()); };
+    const bool is_alone = bodies.size() == 1;
+    const DensityGrid own = is_alone ? DensityGrid() : smooth::field_of_body(field, types, bodies[i], threads);
+    auto mesh =
+        surface_of(is_alone ? field : own, types, wanted, stats, threads, part_of(progress, share(i), share(i + 1)));
+    if (!mesh) return mesh.error();
+    SmoothMesh& out = made[bodies[i] == 0 ? 0 : 1];
+    if (out.indices.empty()) {
+      out = std::move(*mesh);
+    } else {
+      append(out, *mesh);
+    }
+  }
+  return made;
+}
+
+}  // namespace
+
 Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
                   const SurfaceOptions& wanted, MeshHierarchy& hierarchy, SceneMeshes& meshes, Threads threads,
                   const Progress& progress) {
@@ -96,16 +146,17 @@ Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, Inst
     const GridHandle handle = grids[i];
     const SceneGrid& grid = scene.grids()[handle];
     if (grid.field.chunk_count() == 0) continue;
-    auto mesh =
-        surface_of(grid.field, scene.types, wanted, meshes.stats, threads, part_of(progress, share(i), share(i + 1)));
-    if (!mesh) return mesh.error();
-    if (mesh->indices.empty()) continue;
+    auto bodies = bodies_of_field(grid.field, scene.types, wanted, meshes.stats, threads,
+                                  part_of(progress, share(i), share(i + 1)));
+    if (!bodies) return bodies.error();
+    MeshPart part = part_of_bodies(grid.name, std::move(*bodies), grid.pivot);
+    if (part.surfaces.empty()) continue;
     for (const InstanceHandle placed : scene.instances().handles()) {
       const Instance& instance = scene.instances()[placed];
       if (instance.grid != handle || !is_drawn(scene, instance, filter)) continue;
       meshes.placements.push_back(hierarchy.place(placed, meshes.parts.size()));
     }
-    meshes.parts.push_back(mesh_part(grid.name, std::move(*mesh), grid.pivot));
+    meshes.parts.push_back(std::move(part));
   }
   return {};
 }

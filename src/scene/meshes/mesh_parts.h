@@ -2,6 +2,7 @@
 
 // What blocky and smooth meshes of scenes are put together from.
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -35,6 +36,15 @@ class MeshHierarchy {
   std::map<GroupHandle, std::size_t> groups_;
 };
 
+/// Surfaces of one grid: what is opaque, then all that is transparent.
+using SmoothBodies = std::array<SmoothMesh, 2>;
+
+/// Adds the vertices and triangles of a mesh to another.
+void append(SmoothMesh& all, const SmoothMesh& more);
+
+/// A part of what there is of a grid's surfaces.
+[[nodiscard]] MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivot);
+
 struct SurfaceOptions {
   const SmoothMeshOptions& mesh;
   std::optional<float> simplify_error;
@@ -50,7 +60,8 @@ struct SurfaceOptions {
                                         MeshStats& stats);
 
 /// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
-/// instances, in their order.
+/// instances, in their order. Each transparent material is a closed body of its own; bodies meet where pictures see
+/// them meet.
 [[nodiscard]] Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
                                 const SurfaceOptions& wanted, MeshHierarchy& hierarchy, SceneMeshes& meshes,
                                 Threads threads, const Progress& progress);

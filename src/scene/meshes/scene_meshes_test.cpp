@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
 #include <utility>
@@ -32,6 +33,72 @@ void place(Scene& scene, GridHandle grid, bool visible = true) {
   instance.grid = grid;
   instance.visible = visible;
   scene.add_instance(instance);
+}
+
+// Each edge is as often gone along one way as the other.
+bool is_closed(const MeshView& view) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = view.indices[i + k];
+      const std::uint32_t b = view.indices[i + (k + 1) % 3];
+      edges[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  }
+  return std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge.second == 0; });
+}
+
+double volume_of(const MeshView& view) {
+  double six_fold = 0.0;
+  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
+    const auto corner = [&](std::size_t k) { return DVec3(view.positions[view.indices[i + k]]); };
+    six_fold += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+  }
+  return six_fold / 6.0;
+}
+
+VoxelType add_type(Scene& scene, const char* name, Visibility visibility) {
+  VoxelProperties look;
+  look.name = name;
+  look.visibility = visibility;
+  return *scene.types.add(look);
+}
+
+TEST(SceneMeshes, TransparentMaterialsOfFieldsAreClosedBodies) {
+  Scene scene;
+  const VoxelType stone = add_type(scene, "stone", Visibility::Opaque);
+  const VoxelType water = add_type(scene, "water", Visibility::Transparent);
+  const VoxelType glass = add_type(scene, "glass", Visibility::Transparent);
+  SceneGrid content;
+  content.name = "domes";
+  content.field.add_box({-40, -30, -40}, {40, 0, 40}, stone);
+  content.field.add_sphere({0, 0, 0}, 20, water);
+  content.field.add_sphere({70, 0, 0}, 10, glass);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(content));
+  scene.add_instance(instance);
+  const double ball = 4.0 / 3.0 * 3.14159265358979 * 10 * 10 * 10;
+  const double dome = 2.0 / 3.0 * 3.14159265358979 * 20 * 20 * 20;
+  for (const bool is_smooth : {false, true}) {
+    const auto meshes = is_smooth ? mesh_scene_smoothly(scene) : mesh_scene(scene);
+    ASSERT_TRUE(meshes);
+    const auto part = std::find_if(meshes->parts.begin(), meshes->parts.end(),
+                                   [](const MeshPart& each) { return !each.surfaces.empty(); });
+    ASSERT_NE(part, meshes->parts.end());
+    ASSERT_EQ(part->surfaces.size(), 2U);
+    EXPECT_EQ(part->surfaces[0].surface, SurfaceClass::Opaque);
+    EXPECT_EQ(part->surfaces[1].surface, SurfaceClass::Transparent);
+    for (const MeshView& view : part->surfaces) EXPECT_TRUE(is_closed(view));
+    // What is added leaves stone what it is.
+    EXPECT_NEAR(volume_of(part->surfaces[0]), 80.0 * 30 * 80, 0.02 * 80 * 30 * 80);
+    EXPECT_NEAR(volume_of(part->surfaces[1]), ball + dome, 0.04 * (ball + dome));
+    const auto has_only = [](const MeshView& view, std::vector<VoxelType> types) {
+      return std::all_of(view.types.begin(), view.types.end(),
+                         [&](VoxelType type) { return std::find(types.begin(), types.end(), type) != types.end(); });
+    };
+    EXPECT_TRUE(has_only(part->surfaces[0], {stone}));
+    EXPECT_TRUE(has_only(part->surfaces[1], {water, glass}));
+  }
 }
 
 TEST(SceneMeshes, OnlyGridsOfDrawnInstancesAreMeshedAndEachOnce) {

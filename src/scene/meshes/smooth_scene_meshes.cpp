@@ -131,17 +131,6 @@ std::vector<std::uint32_t> owners_of(UnitedGrid& united, const std::vector<Trian
   return owners;
 }
 
-void append(SmoothMesh& all, const SmoothMesh& more) {
-  const auto first = static_cast<std::uint32_t>(all.positions.size());
-  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
-  add(all.positions, more.positions);
-  add(all.normals, more.normals);
-  add(all.occlusion, more.occlusion);
-  add(all.albedo, more.albedo);
-  add(all.types, more.types);
-  for (const std::uint32_t index : more.indices) all.indices.push_back(first + index);
-}
-
 /// Meshes what is united or stands for itself.
 class Mesher {
  public:
@@ -198,16 +187,9 @@ class Mesher {
   MeshStats& stats_;
 };
 
-/// A part of a grid; field samples are the voxels' centres.
-MeshPart part_of_bodies(const SceneGrid& grid, std::array<SmoothMesh, 2> bodies) {
-  const auto owner = std::make_shared<const std::array<SmoothMesh, 2>>(std::move(bodies));
-  MeshPart part{grid.name, {}, grid.pivot - 0.5, owner};
-  for (const SmoothMesh& mesh : *owner) {
-    if (mesh.indices.empty()) continue;
-    part.surfaces.push_back(view_of(mesh));
-    part.surfaces.back().surface = &mesh == owner->data() ? SurfaceClass::Opaque : SurfaceClass::Transparent;
-  }
-  return part;
+/// Field samples are the voxels' centres.
+MeshPart part_of_voxels(const SceneGrid& grid, SmoothBodies bodies) {
+  return part_of_bodies(grid.name, std::move(bodies), grid.pivot - 0.5);
 }
 
 /// What of a body is each member's, in its own grid's samples.
@@ -292,7 +274,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
     const SceneGrid& grid = grid_of(unit.members[0]);
     auto bodies = mesher.mesh(grid.grid, nullptr, progress);
     if (!bodies) return bodies.error();
-    MeshPart part = part_of_bodies(grid, {std::move((*bodies)[0].mesh), std::move((*bodies)[1].mesh)});
+    MeshPart part = part_of_voxels(grid, {std::move((*bodies)[0].mesh), std::move((*bodies)[1].mesh)});
     add_part(std::move(part), unit.members, hierarchy, meshes);
     return {};
   }
@@ -303,7 +285,7 @@ Status add_unit(const Scene& scene, Unit unit, const Mesher& mesher, const Progr
   std::vector<SmoothMesh> transparent = divide((*bodies)[1], united);
   for (std::size_t i = 0; i < united.members().size(); ++i) {
     const LatticeMember& member = united.members()[i];
-    MeshPart part = part_of_bodies(grid_of(member), {std::move(opaque[i]), std::move(transparent[i])});
+    MeshPart part = part_of_voxels(grid_of(member), {std::move(opaque[i]), std::move(transparent[i])});
     add_part(std::move(part), {&member, 1}, hierarchy, meshes);
   }
   return {};

@@ -24,7 +24,7 @@ struct MeshInstance {
   float room;       // voxels per clip w by which faces are widened
   float far_half;   // of an impostor: from the middle of a face to its edges, and of one that no view saw
   float unseen_half;
-  float pad;
+  float first_sample;  // where in voxel 0 sample 0 of a smooth mesh lies: 0.5, the voxel's middle; of fields 0
 };
 
 struct MeshDraw {

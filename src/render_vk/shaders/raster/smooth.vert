@@ -14,7 +14,7 @@ void main() {
   Numbers words = Numbers(push.data);
   uint first = 7 * uint(gl_VertexIndex);
   place = vec3(uintBitsToFloat(words.at[first]), uintBitsToFloat(words.at[first + 1]),
-               uintBitsToFloat(words.at[first + 2])) + 0.5;
+               uintBitsToFloat(words.at[first + 2])) + mesh_frame().instances[push.instance].first_sample;
   precise vec3 point = place + push.offset;
   gl_Position = clip_from(push.clip, point);
   normal = unit_vector(words.at[first + 3]);
