@@ -126,7 +126,7 @@ TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
   Instance instance{"", scene.add_grid(std::move(grid)), {5, 6, 7}};
   instance.voxel_size = 0.75;
   scene.add_instance(instance);
-  put(scene, live_surfaces(scene, SurfaceStyle::Smooth));
+  put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
   MeshPictureOptions options = mesh_options(sized(160, 160));
   options.light.shading = Shading::Normals;
   const Camera camera = towards({40, 30, 50}, {5, 6, 7}, 0.6);
