@@ -7,7 +7,6 @@
 
 #include "grid/chunk_order.h"
 #include "grid/long_box.h"
-#include "mesh/surface/bodies.h"
 
 namespace quoin {
 namespace {
@@ -50,13 +49,6 @@ ChangeReach density_difference(const DensityChunk* before, const DensityChunk* a
 
 const Chunk* materials_of(const DensityChunk* chunk) {
   return chunk == nullptr ? nullptr : &chunk->materials();
-}
-
-std::vector<VoxelType> transparent_of(const DensityChunk* chunk, const VoxelRegistry& types) {
-  if (chunk == nullptr || !types.has_transparent()) return {};
-  std::vector<VoxelType> found = chunk->materials().types();
-  std::erase_if(found, [&](VoxelType type) { return !types.is_transparent(type); });
-  return found;
 }
 
 }  // namespace
@@ -110,23 +102,6 @@ void LiveDensity::make_locked() {
   voxels_.reset();
   base_.reset();
   types_.reset();
-}
-
-std::shared_ptr<const DensityChunk> LiveDensity::of_body(const VoxelRegistry& types, std::uint32_t body) {
-  if (densities_ == nullptr) return nullptr;
-  const std::lock_guard lock(mutex_);
-  std::vector<VoxelType> transparent = transparent_of(densities_.get(), types);
-  if (transparent != transparent_) {
-    bodies_.clear();
-    transparent_ = std::move(transparent);
-  }
-  std::shared_ptr<const DensityChunk>& known = bodies_[body];
-  if (known == nullptr) {
-    known = smooth::holds_others(*densities_, types, body)
-                ? std::make_shared<const DensityChunk>(smooth::without_others(*densities_, types, body))
-                : std::shared_ptr<const DensityChunk>(std::shared_ptr<void>(), densities_.get());
-  }
-  return known;
 }
 
 bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {

@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -16,6 +15,7 @@
 
 #include "grid/chunk/chunk_difference.h"
 #include "grid/coordinate_hash.h"
+#include "live/body_chunks.h"
 
 namespace quoin {
 
@@ -42,9 +42,8 @@ class LiveDensity {
 
   /// Null where all is far air. Requires: is_made().
   [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
-  /// Those of one body alone (smooth::without_others), made by the first who needs them and kept. Null where all is far
-  /// air. The result must not outlive this. Requires: is_made().
-  [[nodiscard]] std::shared_ptr<const DensityChunk> of_body(const VoxelRegistry& types, std::uint32_t body);
+  /// Those of single bodies. Requires: is_made(), before they are asked for.
+  [[nodiscard]] BodyChunks& bodies() { return bodies_; }
   /// Whether these are, for the chunk at an offset from this one that looks `reach` samples beyond its own, those of
   /// `stamp`; false when that is not known. Requires: is_made().
   [[nodiscard]] bool reads_as(std::uint64_t stamp, int reach, IVec3 offset) const;
@@ -65,8 +64,7 @@ class LiveDensity {
   ChangeReach changed_types_;
   bool may_change_bodies_ = false;              // with `changed_types_`
   std::shared_ptr<const VoxelRegistry> types_;  // until made
-  std::vector<VoxelType> transparent_;          // those that are, of what `bodies_` was made of
-  std::map<std::uint32_t, std::shared_ptr<const DensityChunk>> bodies_;
+  BodyChunks bodies_;
   std::atomic<bool> is_made_{false};
 };
 

@@ -36,7 +36,7 @@ std::uint64_t signs_of(const DensityChunk* samples, int row) {
 
 // Surfaces are owned by where their lattice edges start: these end in the chunk, or in the first layer of the next one
 // along an axis.
-bool may_have_surface(const DensityGrid& field, IVec3 chunk) {
+bool has_changes_of_sign(const DensityGrid& field, IVec3 chunk) {
   const DensityChunk* const own = field.find_chunk(chunk);
   const std::uint64_t sign = signs_of(own, 0);
   if (sign != 0 && ~sign != 0) return true;
@@ -54,6 +54,23 @@ bool may_have_surface(const DensityGrid& field, IVec3 chunk) {
     if (signs_of(after_y, i * kChunkEdge) != sign || signs_of(after_z, i) != sign) return true;
   }
   return false;
+}
+
+// Bodies that touch have surfaces where no sign changes.
+bool may_have_surface(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
+  if (has_changes_of_sign(field, chunk)) return true;
+  if (!types.has_transparent()) return false;
+  std::vector<VoxelType> materials;
+  for (int i = 0; i < 8; ++i) {
+    const DensityChunk* const samples = field.find_chunk(corner_chunk(chunk, i));
+    if (samples == nullptr) continue;
+    const std::vector<VoxelType> some = samples->materials().types();
+    materials.insert(materials.end(), some.begin(), some.end());
+  }
+  const auto is_opaque = [&](VoxelType type) { return !types.is_transparent(type); };
+  const bool is_all_opaque = std::all_of(materials.begin(), materials.end(), is_opaque);
+  return !is_all_opaque &&
+         std::any_of(materials.begin(), materials.end(), [&](VoxelType type) { return type != materials.front(); });
 }
 
 // `present`: the level it has; -1: none.
@@ -90,6 +107,7 @@ void LiveField::follow(const SceneGrid& content, LiveClock::time_point now) {
 // What was made so far, or is being made, is of another field.
 void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) {
   abandon_groups();
+  bodies_.clear();
   const bool replaces =
       std::any_of(chunks_.begin(), chunks_.end(), [](const auto& each) { return each.second.was_given; });
   Members all;
@@ -106,6 +124,7 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
 
 void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
   for (const DensityChange& change : changes.items) {
+    bodies_.erase(change.chunk);
     for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), true, now);
   }
   for (const DensityChange& change : changes.items) {
@@ -204,15 +223,20 @@ int LiveField::reach_at(IVec3 chunk) const {
   return reach_of(options_.occlusion, *std::max_element(levels.begin(), levels.end()));
 }
 
+// Types that become transparent, or no longer are, make other surfaces, which chunks have in common.
 void LiveField::mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) {
-  if (changed.colour.empty()) return;
+  if (changed.colour.empty() && changed.visibility.empty()) return;
   for (const IVec3 chunk : content.field.chunks()) {
     const std::vector<VoxelType> types = content.field.find_chunk(chunk)->materials().types();
-    const auto has_changed = [&](VoxelType type) { return type < changed.colour.size() && changed.colour[type]; };
-    if (std::none_of(types.begin(), types.end(), has_changed)) continue;
+    const auto has_any = [&](const std::vector<bool>& set) {
+      return std::any_of(types.begin(), types.end(), [&](VoxelType type) { return type < set.size() && set[type]; });
+    };
+    const bool is_other_surface = has_any(changed.visibility);
+    if (!is_other_surface && !has_any(changed.colour)) continue;
     for (int i = 0; i < 27; ++i) {
-      const IVec3 beside = chunk + Neighbourhood::offset(i);
-      if (chunks_.contains(beside)) mark(beside, false, now);
+      const auto beside = chunks_.find(chunk + Neighbourhood::offset(i));
+      if (beside == chunks_.end()) continue;
+      mark(beside->first, is_other_surface && !beside->second.is_new(), now);
     }
   }
 }
@@ -236,7 +260,7 @@ bool LiveField::may_begin(const Members& members) const {
   return std::none_of(members.begin(), members.end(), [&](IVec3 chunk) { return chunks_.at(chunk).group != nullptr; });
 }
 
-void LiveField::prepare(const SceneGrid& content) {
+void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
   if (is_prepared_) return;
   is_blocked_ = false;
   ChunkSet seen;
@@ -250,7 +274,7 @@ void LiveField::prepare(const SceneGrid& content) {
     for (const IVec3 each : members) {
       FieldChunk& state = chunks_.at(each);
       if (state.group != nullptr) continue;  // what it waits for is in its present group
-      state.is_empty = !may_have_surface(content.field, each);
+      state.is_empty = !may_have_surface(content.field, types, each);
       is_empty &= state.is_empty;
       if (begins && !state.is_empty) {
         waiting_.insert(each);
@@ -259,14 +283,13 @@ void LiveField::prepare(const SceneGrid& content) {
       }
     }
     is_blocked_ |= !begins;
-    if (begins && is_empty) begin_group(members, {});
+    if (begins && is_empty) begin_group(members);
   }
   is_prepared_ = true;
 }
 
-void LiveField::begin_group(const Members& members, FieldSnapshot field) {
+std::shared_ptr<LiveField::Group> LiveField::begin_group(const Members& members) {
   const auto group = std::make_shared<Group>();
-  group->field = std::move(field);
   group->chunks = members;
   group->unfinished = members.size();
   for (const IVec3 chunk : members) {
@@ -285,6 +308,21 @@ void LiveField::begin_group(const Members& members, FieldSnapshot field) {
     if (state.is_empty) finish_chunk(state, nullptr);
   }
   if (group->unfinished == 0) give(members);
+  return group;
+}
+
+std::shared_ptr<const FieldBodies> LiveField::bodies_around(const Members& members, const DensityGrid& field) {
+  const auto around = std::make_shared<FieldBodies>();
+  for (const IVec3 chunk : members) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 at = chunk + Neighbourhood::offset(i);
+      if (field.find_chunk(at) == nullptr) continue;
+      std::shared_ptr<BodyChunks>& bodies = bodies_[at];
+      if (bodies == nullptr) bodies = std::make_shared<BodyChunks>();
+      around->emplace(at, bodies);
+    }
+  }
+  return around;
 }
 
 void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface) {
@@ -336,6 +374,7 @@ void LiveField::abandon_groups() {
 
 void LiveField::leave() {
   abandon_groups();
+  bodies_.clear();
   stale_.clear();
   Members all;
   for (auto& [chunk, state] : chunks_) {
@@ -359,7 +398,13 @@ void LiveField::make_ready(IVec3 chunk, FieldChunk& state) {
 }
 
 std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
-  if (chunks_.at(chunk).group == nullptr) begin_group(members_with(chunk), inputs.field());
+  if (chunks_.at(chunk).group == nullptr) {
+    const Members members = members_with(chunk);
+    const std::shared_ptr<Group> group = begin_group(members);
+    group->field = inputs.field();
+    group->types = inputs.types->registry;
+    if (group->types->has_transparent()) group->bodies = bodies_around(members, *group->field);
+  }
   const FieldChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<LiveJob>();
   job->source = {handle_, SurfaceContent::Field};
@@ -367,7 +412,9 @@ std::unique_ptr<LiveJob> LiveField::make_job(LiveInputs& inputs, IVec3 chunk) {
   job->serial = ++totals_.serial;
   job->seen = state.seen;
   job->field = state.group->field;
+  job->bodies = state.group->bodies;
   job->levels = state.levels;
+  job->types = state.group->types;
   job->materials = inputs.types->materials;
   return job;
 }

@@ -29,7 +29,7 @@ class LiveField final : public LiveSource {
   [[nodiscard]] bool wants_levels() const override { return wants_levels_; }
   /// Chunks that nobody has seen have their levels at once; of others some are changed at a time, the nearest first.
   void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) override;
-  void prepare(const SceneGrid& content) override;
+  void prepare(const SceneGrid& content, const VoxelRegistry& types) override;
   [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
   [[nodiscard]] const IBox& box() const override { return box_; }
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
@@ -43,6 +43,8 @@ class LiveField final : public LiveSource {
  private:
   struct Group {
     FieldSnapshot field;
+    std::shared_ptr<const VoxelRegistry> types;
+    std::shared_ptr<const FieldBodies> bodies;  // of the chunks that jobs read
     std::vector<IVec3> chunks;
     std::size_t unfinished = 0;  // of these
   };
@@ -83,7 +85,8 @@ class LiveField final : public LiveSource {
   [[nodiscard]] int reach_at(IVec3 chunk) const;
   [[nodiscard]] Members members_with(IVec3 chunk) const;
   [[nodiscard]] bool may_begin(const Members& members) const;
-  void begin_group(const Members& members, FieldSnapshot field);
+  std::shared_ptr<Group> begin_group(const Members& members);
+  [[nodiscard]] std::shared_ptr<const FieldBodies> bodies_around(const Members& members, const DensityGrid& field);
   void finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurface> surface);
   void give(const Members& members);
   void abandon_groups();
@@ -95,8 +98,9 @@ class LiveField final : public LiveSource {
   LiveTotals& totals_;
   ChangeCursor followed_;
   Chunks chunks_;
-  ChunkSet stale_;    // chunks that are
-  ChunkSet waiting_;  // in a group that has begun, or one that may begin
+  FieldBodies bodies_;  // of the field as it is
+  ChunkSet stale_;      // chunks that are
+  ChunkSet waiting_;    // in a group that has begun, or one that may begin
   bool is_prepared_ = true;
   bool is_blocked_ = false;  // some group waits for another
   bool wants_levels_ = false;

@@ -67,13 +67,19 @@ void expect_levels(const ShownSurfaces& shown, const std::vector<DVec3>& eyes, d
 void expect_field(const ShownSurfaces& shown, const Scene& scene, GridHandle handle, const LiveMeshOptions& options) {
   SmoothMeshOptions wanted;
   wanted.occlusion = options.occlusion;
-  const auto whole = build_smooth_mesh(scene.grids()[handle].field, scene.types, wanted);
-  ASSERT_TRUE(whole.has_value());
-  SmoothTriangles expected = triangles_of(*whole);
+  const DensityGrid& field = scene.grids()[handle].field;
+  SmoothTriangles expected;
+  for (const std::uint32_t body : smooth::bodies_of(scene.types, field)) {
+    const auto mesh = build_smooth_mesh(smooth::field_of_body(field, scene.types, body, {}), scene.types, wanted);
+    ASSERT_TRUE(mesh.has_value());
+    const SmoothTriangles part = triangles_of(*mesh);
+    expected.insert(expected.end(), part.begin(), part.end());
+  }
   SmoothTriangles found;
   for (const SurfaceUpdate& each : shown.all()) {
     if (each.grid != handle || each.content != SurfaceContent::Field) continue;
     ASSERT_EQ(each.surface->style, SurfaceStyle::Smooth);
+    expect_glass_last(*each.surface, scene.types);
     const SmoothTriangles part = triangles_of(*each.surface, each.chunk);
     found.insert(found.end(), part.begin(), part.end());
   }
@@ -260,6 +266,71 @@ TEST(LiveField, ColoursOfTypesAreFollowed) {
   EXPECT_FALSE(updates.empty());
   shown.apply(updates);
   ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(1)));
+}
+
+// A lake with a ball of glass in it, over chunk borders; `bed`: what lies around it.
+DensityGrid lake(VoxelType water, VoxelType glass, VoxelType bed) {
+  DensityGrid field;
+  field.add_box({2.0, 2.0, 2.0}, {126.0, 70.0, 126.0}, bed);
+  field.add_sphere({64.0, 74.0, 64.0}, 9.0, glass);
+  field.edit({{30, 50, 30}, {100, 70, 100}}, [&](IVec3, DensitySample now) {
+    if (now.density < 0.0F && now.material == bed) now.material = water;
+    return now;
+  });
+  return field;
+}
+
+void expect_shown(LiveMeshes& meshes, OneGrid& one, ShownSurfaces& shown) {
+  meshes.finish(one.scene, DVec3(0.0));
+  shown.apply(meshes.take());
+  ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(2)));
+  EXPECT_EQ(open_edges(shown, one.handle), 0U);
+}
+
+std::size_t glass_indices(const ShownSurfaces& shown) {
+  std::size_t all = 0;
+  for (const SurfaceUpdate& each : shown.all()) all += each.surface->glass_indices;
+  return all;
+}
+
+TEST(LiveField, TransparentMaterialsAreClosedBodies) {
+  OneGrid one;
+  VoxelProperties glass = one.scene.types[2];
+  glass.colour = {220, 240, 250, 30};
+  const VoxelType clear = one.scene.types.add(glass).value();
+  one.field() = lake(2, clear, 1);
+  LiveMeshes meshes(options_of(2));
+  ShownSurfaces shown;
+  ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
+  const std::size_t before = glass_indices(shown);
+  EXPECT_GT(before, 0U);
+  // Deep in the bed: no sign changes.
+  one.field().edit({{60, 20, 60}, {70, 30, 70}}, [](IVec3, DensitySample now) {
+    now.material = 2;
+    return now;
+  });
+  ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
+  EXPECT_GT(glass_indices(shown), before);
+  one.field().remove_sphere({64.0, 60.0, 40.0}, 14.0);
+  ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
+}
+
+TEST(LiveField, TypesThatBecomeTransparentAreFollowed) {
+  OneGrid one;
+  one.field() = lake(3, 3, 1);
+  LiveMeshes meshes(options_of(2));
+  ShownSurfaces shown;
+  ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
+  EXPECT_EQ(glass_indices(shown), 0U);
+  VoxelProperties properties = one.scene.types[3];
+  for (const Visibility visibility : {Visibility::Transparent, Visibility::Opaque, Visibility::Transparent}) {
+    properties.visibility = visibility;
+    one.scene.types.replace(3, properties);
+    // An edit at the same time, so that jobs are of both.
+    one.field().remove_sphere({64.0, 70.0, 64.0}, visibility == Visibility::Opaque ? 4.0 : 7.0);
+    ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
+    EXPECT_EQ(glass_indices(shown) > 0, visibility == Visibility::Transparent);
+  }
 }
 
 TEST(LiveField, AnotherFieldTakesThePlaceAtOnce) {

@@ -47,7 +47,7 @@ class LiveGrid final : public LiveSource {
   void forget() override { followed_ = {}; }
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
 
-  void prepare(const SceneGrid&) override {}
+  void prepare(const SceneGrid&, const VoxelRegistry&) override {}
   [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
   [[nodiscard]] const IBox& box() const override { return box_; }
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }

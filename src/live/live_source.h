@@ -111,7 +111,7 @@ class LiveSource {
     (void)now;
   }
   /// Sees which chunks may be given to workers. Requires: `content` is as `follow` saw it last.
-  virtual void prepare(const SceneGrid& content) = 0;
+  virtual void prepare(const SceneGrid& content, const VoxelRegistry& types) = 0;
   /// Those chunks.
   [[nodiscard]] virtual const ChunkSet& waiting() const = 0;
   /// Holds all chunks that wait or are being meshed.

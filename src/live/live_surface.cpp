@@ -142,7 +142,8 @@ struct BodiesAround {
   bool are_several = false;
 };
 
-BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegistry& types) {
+BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegistry& types, SurfaceContent content) {
+  if (!types.has_transparent()) return {{0}, false};
   std::vector<VoxelType> own;
   std::vector<VoxelType> all;
   for (int i = 0; i < 27; ++i) {
@@ -153,20 +154,31 @@ BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegist
     const IVec3 offset = Neighbourhood::offset(i);
     if (offset.x >= 0 && offset.y >= 0 && offset.z >= 0) own.insert(own.end(), materials.begin(), materials.end());
   }
-  return {smooth::bodies_of(types, own), smooth::bodies_of(types, all).size() > 1};
+  BodiesAround bodies{smooth::bodies_of(types, own), false};
+  std::vector<std::uint32_t> all_bodies = smooth::bodies_of(types, all);
+  // What is solid of a field without a material is opaque.
+  if (content == SurfaceContent::Field) {
+    for (std::vector<std::uint32_t>* each : {&bodies.own, &all_bodies}) {
+      if (each->empty() || each->front() != 0) each->insert(each->begin(), 0);
+    }
+  }
+  bodies.are_several = all_bodies.size() > 1;
+  return bodies;
 }
 
+// `chunk_of(i, body)`: what the body has of the i-th chunk around.
+template <class ChunkOf>
 void make_bodies(const LiveMeshOptions& options, const DensityNeighbourhood& whole, LiveJob& job,
-                 LiveWorkspace& workspace) {
+                 LiveWorkspace& workspace, const ChunkOf& chunk_of) {
   auto surface = std::make_shared<ChunkSurface>();
-  const BodiesAround bodies = bodies_around(whole, *job.types);
+  const BodiesAround bodies = bodies_around(whole, *job.types, job.source.content);
   for (const std::uint32_t body : bodies.own) {
     const std::size_t before = surface->smooth.indices.size();
     if (bodies.are_several) {
       DensityNeighbourhood chunks = whole;
       std::array<std::shared_ptr<const DensityChunk>, 27> held;
       for (std::size_t i = 0; i < 27; ++i) {
-        if (job.densities[i] != nullptr) held[i] = job.densities[i]->of_body(*job.types, body);
+        if (whole.chunks[i] != nullptr) held[i] = chunk_of(i, body);
         chunks.chunks[i] = held[i].get();
       }
       mesh_body(options, chunks, &whole, job, workspace, *surface);
@@ -184,14 +196,18 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
     job.outcome = LiveJob::Outcome::AsBefore;
     return;
   }
-  make_bodies(options, chunks, job, workspace);
+  make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {
+    return job.densities[i]->bodies().of(chunks.chunks[i], *job.types, body);
+  });
 }
 
 // Fields have no `last_stamps`: what reads as before is not meshed.
 void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
-  auto surface = std::make_shared<ChunkSurface>();
-  mesh_body(options, job.field->neighbourhood(job.chunk), nullptr, job, workspace, *surface);
-  finish(std::move(surface), job);
+  const DensityNeighbourhood chunks = job.field->neighbourhood(job.chunk);
+  make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {
+    const IVec3 at = job.chunk + Neighbourhood::offset(static_cast<int>(i));
+    return job.bodies->at(at)->of(chunks.chunks[i], *job.types, body);
+  });
 }
 
 }  // namespace

@@ -9,12 +9,15 @@
 #include <mutex>
 #include <optional>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 
+#include "grid/coordinate_hash.h"
+#include "live/body_chunks.h"
 #include "live/live_densities.h"
 #include "mesh/surface/material.h"
 
@@ -24,6 +27,9 @@ using LiveClock = std::chrono::steady_clock;
 
 /// A field as it was at one moment.
 using FieldSnapshot = std::shared_ptr<const DensityGrid>;
+
+/// What bodies have of the chunks of a field; none are where there is nothing transparent.
+using FieldBodies = std::unordered_map<IVec3, std::shared_ptr<BodyChunks>, CoordinateHash>;
 
 /// Whose surfaces: the voxels or the field of a grid.
 struct LiveKey {
@@ -44,16 +50,17 @@ struct LiveJob {
   double distance = 0.0;       ///< from the eye; the least comes first
   LiveClock::time_point seen;  ///< when the edit was
 
-  GridSnapshot voxels;                                ///< blocky
-  std::shared_ptr<const VoxelRegistry> types;         ///< of voxels
+  GridSnapshot voxels;  ///< blocky
+  std::shared_ptr<const VoxelRegistry> types;
   LiveDensities densities;                            ///< smooth
   std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth, and of fields
   /// Smooth: the stamps of the densities of which the last surface is; meshing what they say again is spared.
   std::optional<DensityStamps> last_stamps;
-  std::uint64_t last_collected = 0;       ///< the job whose surface that was
-  std::uint64_t type_generation = 0;      ///< of `types` and `materials`
-  FieldSnapshot field;                    ///< of fields, which take `materials` too
-  std::array<std::uint8_t, 27> levels{};  ///< of fields: of detail, as a neighbourhood has them
+  std::uint64_t last_collected = 0;           ///< the job whose surface that was
+  std::uint64_t type_generation = 0;          ///< of `types` and `materials`
+  FieldSnapshot field;                        ///< of fields, which take `materials` too
+  std::shared_ptr<const FieldBodies> bodies;  ///< of that
+  std::array<std::uint8_t, 27> levels{};      ///< of fields: of detail, as a neighbourhood has them
 
   enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
   Outcome outcome = Outcome::Meshed;

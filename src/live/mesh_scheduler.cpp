@@ -70,7 +70,7 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
     const SceneGrid* const grid = scene.grids().find(key.grid);
     if (grid == nullptr) continue;
     if (std::binary_search(drawn_.begin(), drawn_.end(), key.grid)) live->mark_types(*grid, changed_types, now);
-    live->prepare(*grid);
+    live->prepare(*grid, scene.types);
   }
   withdraw([&](const LiveJob& job) {
     const LiveSource* live = find(job.source);

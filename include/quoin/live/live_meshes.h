@@ -32,9 +32,8 @@ struct ChunkSurface {
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
   /// Smooth: point p of the mesh is point p + 64 * chunk of the grid, of voxels p + 0.5 + 64 * chunk (samples are their
-  /// middles); a colour (linear) and a type a vertex. Of voxels thin things are kept (SmoothMeshOptions::keep_thin),
-  /// and each transparent type is a closed body of its own, as mesh_scene_smoothly has it; instances are not united.
-  /// Fields are one surface, whatever their types.
+  /// middles); a colour (linear) and a type a vertex. Each transparent type is a closed body of its own, and of voxels
+  /// thin things are kept (SmoothMeshOptions::keep_thin), as mesh_scene_smoothly has it; instances are not united.
   SmoothChunkMesh smooth;
   std::size_t glass_indices = 0;  ///< of its indices: those of transparent bodies, which come last
   std::vector<LinearRgba16> albedo;

@@ -59,22 +59,25 @@ LitPoint point_of_body(Body body) {
   return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
 }
 
-// The surface lies up to about a voxel before the voxels of its body, or within them. Where there are none, there is no
-// more than what counts as one voxel.
+// The surface lies up to about a voxel before the voxels of its body, or within them; that of a field up to some samples
+// before it where it has less detail. Where there are none, there is no more than what counts as one voxel, and of a
+// field nothing but the surface.
 void enter_first(inout BodyList list) {
-  const float kNear = 2.0;
-  float voxel_size = placed_at(seen_home).ref_inside.w;
+  bool is_of_field = kHasFieldGlass && mesh_frame().instances[push.instance].first_sample == 0.0;
+  float near = (is_of_field ? 8.0 : 2.0) * placed_at(seen_home).ref_inside.w;
+  vec3 in_grid = own_normal_in_grid();
   if (list.count > 0) {
     Body first = listed_body(list, 0);
-    bool is_of_voxels = (first.what.z & kBeginsInField) == 0;
-    if (is_of_voxels && first.voxel.w == seen_home && first.lengths.x < kNear * voxel_size) {
-      first.what.z &= ~kHowItBegins;
+    bool is_of_kind = ((first.what.z & kBeginsInField) != 0) == is_of_field;
+    bool is_of_type = !is_of_field || first.what.x == uint(base.w);
+    if (is_of_kind && is_of_type && first.voxel.w == seen_home && first.lengths.x < near) {
+      first.what.z &= ~kStartsInside;
+      if (is_of_field) first.what.y = packed_normal(in_grid);
       first.lengths.x = 0.0;
       list_body(list, 0, first);
       return;
     }
   }
-  vec3 in_grid = own_normal_in_grid();
   vec3 size = abs(in_grid);
   int axis = size.y > size.x ? 1 : 0;
   if (size.z > size[axis]) axis = 2;
@@ -83,6 +86,10 @@ void enter_first(inout BodyList list) {
   thin.voxel = ivec4(base.xyz + ivec3(floor(place)), seen_home);
   thin.lengths = vec4(0.0);
   thin.what = uvec4(uint(base.w), face, 0, 8 * uint(seen_home) + face);
+  if (is_of_field) {
+    thin.what.y = packed_normal(in_grid);
+    thin.what.z = kBeginsInField;
+  }
   Body dropped;
   if (insert_body(list, thin, dropped)) list.dropped_t = min(list.dropped_t, dropped.lengths.x);
 }
