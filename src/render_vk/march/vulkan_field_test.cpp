@@ -10,31 +10,13 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "render_vk/device/vulkan_for_tests.h"
+#include "render_vk/lakeside_for_tests.h"
 
 namespace quoin {
 namespace {
 
 using namespace render_test;
 using namespace vulkan_test;
-
-struct FieldTypes {
-  VoxelType ground, stone, glow, glass;
-};
-
-FieldTypes add_types(Scene& scene) {
-  FieldTypes types{};
-  types.ground = add_type(scene, {90, 160, 70, 255});
-  types.stone = add_type(scene, {150, 140, 130, 255});
-  VoxelProperties glow;
-  glow.colour = {255, 200, 120, 255};
-  glow.emission = 3.0F;
-  types.glow = scene.types.add(glow).value();
-  VoxelProperties glass;
-  glass.colour = {120, 170, 220, 90};
-  glass.visibility = Visibility::Transparent;
-  types.glass = scene.types.add(glass).value();
-  return types;
-}
 
 // Hills over several chunks, some of them with solid chunks below.
 DensityGrid hills(const FieldTypes& types, int edge) {
@@ -71,7 +53,7 @@ class VulkanField : public VulkanTest {
 
 TEST_F(VulkanField, HillsWithAHouseAndGlass) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   place_grid(scene, village(types));
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
   RenderOptions options = sized(160, 120);
@@ -88,7 +70,7 @@ TEST_F(VulkanField, HillsWithAHouseAndGlass) {
 
 TEST_F(VulkanField, FromWithinAndFromAbove) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   place_grid(scene, village(types));
   compare(scene, towards({20.0, 4.0, 10.0}, {60.0, 8.0, 30.0}), sized(96, 72), "field_pit");
   compare(scene, towards({0.3, -40.0, 0.2}, {30.0, -40.0, 10.0}), sized(32, 24), "field_in_stone");
@@ -102,7 +84,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
 // Glowing balls over hills, a house and a lantern; near, halved and from an impostor.
 TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   SceneGrid grid = village(types);
   grid.field.add_sphere({25.0, 20.0, 60.0}, 4.0, types.glow);
   grid.field.remove_box({22.0, 22.0, 50.0}, {60.0, 30.0, 70.0});
@@ -126,7 +108,7 @@ TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
 
 TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   const DVec3 far{3e6, -2e5, 7e5};
   SceneGrid ground;
   ground.field = hills(types, 60);
@@ -160,7 +142,7 @@ TEST_F(VulkanField, TurnedAndScaledAmongOthersFarAway) {
 
 TEST_F(VulkanField, EditsAreTakenOver) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   const InstanceHandle placed = place_grid(scene, village(types));
   const GridHandle handle = scene.instances()[placed].grid;
   const Camera camera = towards({80, 70, 90}, {0, 0, 0});
@@ -192,37 +174,9 @@ TEST_F(VulkanField, EditsAreTakenOver) {
   compare(scene, camera, options, "field_again");
 }
 
-// Hills with a lake, a ball of glass half in it, another beside a house, which has a window; in one field.
-SceneGrid lakeside(const FieldTypes& types, VoxelType water) {
-  SceneGrid grid;
-  grid.field.edit({{-90, -60, -90}, {90, 40, 90}}, [&](IVec3 p, DensitySample) {
-    const double hill = 12.0 * std::sin(0.05 * p.x) * std::cos(0.06 * p.z);
-    const double ground = 0.8 * (p.y - hill);
-    const double level = p.y + 2.3;
-    const double ball = glm::distance(DVec3(p), DVec3{-32, 0, 20}) - 9.0;
-    const double depth = std::min({std::abs(ground), std::abs(level), std::abs(ball)});
-    if (ground < 0.0) return DensitySample{static_cast<float>(level < 0.0 ? -depth : ground), types.ground};
-    if (ball < 0.0) return DensitySample{static_cast<float>(-depth), types.glass};
-    return DensitySample{static_cast<float>(level < 0.0 ? -depth : std::min({ground, level, ball})), water};
-  });
-  grid.field.add_sphere({40, 14, 50}, 7.0, types.glass);
-  grid.grid.fill_box({{30, -2, 30}, {44, 22, 44}}, types.stone);
-  grid.grid.fill_box({{33, 4, 44}, {41, 14, 45}}, types.glass);
-  grid.grid.fill_box({{-40, -8, -40}, {-36, 10, -20}}, types.stone);
-  return grid;
-}
-
-VoxelType add_water(Scene& scene) {
-  VoxelProperties water;
-  water.colour = {60, 120, 160, 40};
-  water.visibility = Visibility::Transparent;
-  water.ior = 1.33F;
-  return scene.types.add(water).value();
-}
-
 TEST_F(VulkanField, ALakeAndBallsOfGlass) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   place_grid(scene, lakeside(types, add_water(scene)));
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
   RenderOptions options = sized(160, 120);
@@ -255,7 +209,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
 // Of several transparent materials in every cell, and opaque ones.
 TEST_F(VulkanField, MixedGlassInEveryCell) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   const VoxelType water = add_water(scene);
   VoxelProperties amber;
   amber.colour = {230, 150, 20, 60};
@@ -280,7 +234,7 @@ TEST_F(VulkanField, MixedGlassInEveryCell) {
 
 TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   const DVec3 far{3e6, -2e5, 7e5};
   SceneGrid ground;
   ground.field = hills(types, 60);
@@ -311,7 +265,7 @@ TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
 
 TEST_F(VulkanField, EditsOfGlassAreTakenOver) {
   Scene scene;
-  const FieldTypes types = add_types(scene);
+  const FieldTypes types = add_field_types(scene);
   const VoxelType water = add_water(scene);
   const InstanceHandle placed = place_grid(scene, village(types));
   const GridHandle handle = scene.instances()[placed].grid;

@@ -2,6 +2,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "render_vk/lakeside_for_tests.h"
 #include "render_vk/raster/glass_yard_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 
@@ -219,6 +220,33 @@ TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
     meshes.glass_by_rays = false;
     EXPECT_GT(different_walls(views(meshes), marched) * 2, all) << name << " without depth";
   }
+}
+
+// Pixels at shores and silhouettes differ: a mesh's normals are those of its vertices.
+TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
+  Scene scene;
+  const vulkan_test::FieldTypes types = vulkan_test::add_field_types(scene);
+  const VoxelType water = vulkan_test::add_water(scene);
+  scene.add_instance({"", scene.add_grid(vulkan_test::lakeside(types, water)), DVec3(0.0)});
+  RenderOptions options = glass_yard_options(120, 90);
+  options.light.occlusion = OcclusionMode::Off;
+  put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
+  const Camera camera = towards({110, 70, 130}, {10, 0, 10});
+  const Picture marched = render_test::taken(scene, camera, options);
+  const auto differing = [&](int by) {
+    Picture shown;
+    shown.colour = drawn(camera, mesh_options(options));
+    return render_test::count_different(shown, marched, by);
+  };
+  const int all = 120 * 90;
+  EXPECT_LT(differing(4) * 100, 10 * all);
+  EXPECT_LT(differing(16) * 100, 4 * all);
+  // As it was before: one opaque surface.
+  VoxelProperties opaque = scene.types[water];
+  opaque.visibility = Visibility::Opaque;
+  scene.types.replace(water, opaque);
+  put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
+  EXPECT_GT(differing(16) * 100, 7 * all);
 }
 
 }  // namespace
