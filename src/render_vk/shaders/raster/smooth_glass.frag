@@ -59,9 +59,9 @@ LitPoint point_of_body(Body body) {
   return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
 }
 
-// The surface lies up to about a voxel before the voxels of its body, or within them; that of a field up to some samples
-// before it where it has less detail. Where there are none, there is no more than what counts as one voxel, and of a
-// field nothing but the surface.
+// The surface lies up to about a voxel before the voxels of its body, or within them; that of a field up to some
+// samples before it where it has less detail. Where there are none, there is no more than what counts as one voxel, and
+// of a field nothing but the surface.
 void enter_first(inout BodyList list) {
   bool is_of_field = kHasFieldGlass && mesh_frame().instances[push.instance].first_sample == 0.0;
   float near = (is_of_field ? 8.0 : 2.0) * placed_at(seen_home).ref_inside.w;
