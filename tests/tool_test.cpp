@@ -160,6 +160,18 @@ TEST_F(Tool, FramesBecomeAnAnimation) {
   }
 }
 
+// Nothing is seen of such a file, and it should say why.
+TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
+  vox_test::FileBuilder file;
+  file.model(2, 2, 2, {{0, 0, 0, 1}});
+  file.transform(0, 1, {{}}, {}, -1).group(1, {2});
+  file.transform(2, 3, {{}}, {}, 0).shape(3, {{0, {}}});
+  file.layer(0, {{"_hidden", "1"}}).layer(1, {{"_name", "people"}});
+  ASSERT_TRUE(write_file(folder_.file("hidden.vox"), file.file()));
+  const ToolRun text = run("info hidden.vox");
+  EXPECT_NE(text.out.find("Layers: 2: \"people\", 1 without a name hidden\n"), std::string::npos) << text.out;
+}
+
 // What an artist's file holds beside voxels goes along from .vox to .vox, and is told where it cannot.
 TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   vox_test::FileBuilder file;

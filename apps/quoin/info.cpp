@@ -208,16 +208,21 @@ std::string grid_text(const Scene& scene, const GridReport& report) {
   return text;
 }
 
-/// Names that say something; how many there are, where none does.
+/// Names that say something, and what is hidden without one; how many there are, where neither is.
 template <class T>
 std::string names_text(const char* what, const SlotMap<T>& all) {
   if (all.empty()) return {};
   std::string names;
+  std::size_t hidden = 0;
   for (const Handle<T> handle : all.handles()) {
     const T& each = all[handle];
-    if (!each.name.empty())
+    if (!each.name.empty()) {
       names += (names.empty() ? ": " : ", ") + quoted(each.name) + (each.visible ? "" : " (hidden)");
+    } else if (!each.visible) {
+      ++hidden;
+    }
   }
+  if (hidden > 0) names += (names.empty() ? ": " : ", ") + std::to_string(hidden) + " without a name hidden";
   return std::string(what) + ": " + std::to_string(all.size()) + names + "\n";
 }
 

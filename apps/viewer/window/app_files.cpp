@@ -126,6 +126,11 @@ void App::adopt(OpenDocument opened) {
     show_from(View::Iso);
   }
   const bool has_fault = state_.message && state_.message->is_error;
+  const std::size_t instances = state_.scene().instances().size();
+  if (!has_fault && options_.instances() == InstanceFilter::Visible && instances > 0 &&
+      hidden_parts(state_.scene()).instances == instances) {
+    return state_.tell("all of it is hidden: the panel (F2) has switches under Scene");
+  }
   if (!loaded.warnings.empty() && !has_fault) {
     const std::size_t more = loaded.warnings.size() - 1;
     state_.tell(loaded.warnings.front() + (more > 0 ? " (and " + std::to_string(more) + " more warnings)" : ""));

@@ -23,18 +23,21 @@ class SceneList {
 
   void draw_layers() {
     if (scene_.layers().empty()) return;
-    if (!ImGui::TreeNode("layers", "Layers (%d)", static_cast<int>(scene_.layers().size()))) return;
+    const HiddenParts& hidden = tree_.hidden();
+    // What is not seen is looked for here.
+    if (hidden.layers > 0) ImGui::SetNextItemOpen(true, ImGuiCond_Once);
+    const auto all = static_cast<int>(scene_.layers().size());
+    const bool is_open = hidden.layers > 0
+                             ? ImGui::TreeNode("layers", "Layers (%d, %d hidden)", all, static_cast<int>(hidden.layers))
+                             : ImGui::TreeNode("layers", "Layers (%d)", all);
+    if (!is_open) return;
     int number = 0;
     for (const LayerHandle handle : scene_.layers().handles()) {
       const SceneLayer& layer = scene_.layers()[handle];
       ImGui::PushID(number);
       draw_switch(handle, layer.visible, true);
       ImGui::SameLine();
-      if (layer.name.empty()) {
-        ImGui::TextDisabled("layer %d", number);
-      } else {
-        ImGui::TextUnformatted(layer.name.c_str());
-      }
+      draw_name(layer.name, "layer " + std::to_string(number));
       ImGui::PopID();
       ++number;
     }
@@ -67,15 +70,41 @@ class SceneList {
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", is_reached ? "shown" : "hidden by what it belongs to");
   }
 
+  /// The name, or in grey what stands for it: whole in a tooltip where there is no room for it.
+  static void draw_name(const std::string& name, const std::string& stands_for_it) {
+    if (name.empty()) {
+      ImGui::TextDisabled("%s", stands_for_it.c_str());
+    } else {
+      ImGui::TextUnformatted(name.c_str());
+    }
+    tell_if_cut(name);
+  }
+
+  static void tell_if_cut(const std::string& name) {
+    const ImVec2 size = ImGui::CalcTextSize(name.c_str());
+    const float end = ImGui::GetItemRectMax().x;
+    const float room = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
+    if (size.x > 0.0F && end > room && ImGui::IsItemHovered()) ImGui::SetTooltip("%s", name.c_str());
+  }
+
   void draw_group(GroupHandle handle) {
     const SceneGroup& group = scene_.groups()[handle];
     ImGui::PushID(static_cast<int>(handle.index));
-    draw_switch(handle, group.visible, is_shown(scene_, group) == group.visible);
-    ImGui::SameLine();
-    const char* name = group.name.empty() ? "group" : group.name.c_str();
-    if (ImGui::TreeNode("group", "%s", name)) {
-      draw_below(handle);
-      ImGui::TreePop();
+    // There may be thousands: those that are folded and out of sight only take their room.
+    const ImVec2 row{1.0F, ImGui::GetFrameHeight()};
+    const bool is_folded = ImGui::GetStateStorage()->GetInt(ImGui::GetID("group")) == 0;
+    if (is_folded && !ImGui::IsRectVisible(row)) {
+      ImGui::Dummy(row);
+    } else {
+      draw_switch(handle, group.visible, is_shown(scene_, group) == group.visible);
+      ImGui::SameLine();
+      const char* name = group.name.empty() ? "group" : group.name.c_str();
+      const bool is_open = ImGui::TreeNode("group", "%s", name);
+      tell_if_cut(group.name);
+      if (is_open) {
+        draw_below(handle);
+        ImGui::TreePop();
+      }
     }
     ImGui::PopID();
   }
@@ -88,11 +117,7 @@ class SceneList {
     ImGui::SameLine();
     const SceneGrid* grid = scene_.grids().find(instance.grid);
     const std::string& name = instance.name.empty() && grid != nullptr ? grid->name : instance.name;
-    if (name.empty()) {
-      ImGui::TextDisabled("object %u", handle.index);
-    } else {
-      ImGui::TextUnformatted(name.c_str());
-    }
+    draw_name(name, "object " + std::to_string(handle.index));
     ImGui::PopID();
     ImGui::PopID();
   }
@@ -107,12 +132,17 @@ class SceneList {
 void draw_scene_part(ViewState& state) {
   const Scene& scene = state.scene();
   const bool says_something = scene.instances().size() > 1 || !scene.groups().empty() || !scene.layers().empty();
-  if (!says_something || !heading("Scene", !scene.groups().empty())) return;
+  if (!says_something) return;
   state.scene_tree.update(scene);
+  const HiddenParts& hidden = state.scene_tree.hidden();
+  if (!heading("Scene", !scene.groups().empty() || hidden.layers > 0 || hidden.instances > 0)) return;
   SceneList list(scene, state.scene_tree);
-  const std::size_t entries = scene.instances().size() + scene.groups().size() + (scene.layers().empty() ? 1 : 2);
+  const std::size_t layers = scene.layers().empty() ? 1 : 2 + (hidden.layers > 0 ? scene.layers().size() : 0);
+  const std::size_t entries = scene.instances().size() + scene.groups().size() + layers;
   const auto rows = static_cast<float>(std::clamp<std::size_t>(entries, 4, 10));
-  ImGui::BeginChild("scene", {0.0F, rows * ImGui::GetFrameHeightWithSpacing()}, true);
+  // Names may be long, and groups deep.
+  ImGui::BeginChild("scene", {0.0F, rows * ImGui::GetFrameHeightWithSpacing()}, true,
+                    ImGuiWindowFlags_HorizontalScrollbar);
   list.draw_layers();
   list.draw_below({});
   ImGui::EndChild();

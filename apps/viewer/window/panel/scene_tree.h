@@ -7,6 +7,14 @@
 
 namespace quoin::viewer {
 
+/// How much of a scene is not seen.
+struct HiddenParts {
+  std::size_t layers = 0;     ///< that are switched off
+  std::size_t instances = 0;  ///< whatever hides them
+};
+
+[[nodiscard]] HiddenParts hidden_parts(const Scene& scene);
+
 /// A scene's groups and instances by what they belong to; the default handle stands for the top.
 class SceneTree {
  public:
@@ -18,6 +26,7 @@ class SceneTree {
   /// Follows the scene. Cost: O(instances + groups * depth) when any of them has changed or another scene is given;
   /// else what asking costs.
   void update(const Scene& scene);
+  [[nodiscard]] const HiddenParts& hidden() const { return hidden_; }
   /// Null where nothing is below.
   [[nodiscard]] const Below* find(GroupHandle group) const {
     const auto found = below_.find(group);
@@ -26,6 +35,7 @@ class SceneTree {
 
  private:
   std::map<GroupHandle, Below> below_;
+  HiddenParts hidden_;
   ChangeCursor cursor_;
 };
 
