@@ -178,6 +178,8 @@ Result<std::optional<ViewFrame>> DeviceBackend::Impl::draw_apart(std::unique_loc
   if (Status read = drawer->read_scene(); !read) return read.error();
   lock.lock();
   told = tell();
+  // Whoever ends does not wait for shaders to be compiled and a picture that nobody sees.
+  if (is_stopped) return std::optional<ViewFrame>();
   is_reading = drawer->draws_from_scene();
   idle.notify_all();
   lock.unlock();

@@ -146,6 +146,13 @@ void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choic
   }
 }
 
+// Pictures that lack something say so. Before the device has drawn nothing is known of it.
+void tell_of_plain_light(const ViewState& state) {
+  if (!state.open.backend || state.open.backend->stats().empty()) return;
+  if (state.open.backend->traces_light(state.settings.mode)) return;
+  ImGui::TextWrapped("Without a graphics card meshes have no shadows, lamps and depth of glass. F5 has them.");
+}
+
 }  // namespace
 
 bool heading(const char* name, bool is_open) {
@@ -228,6 +235,7 @@ void draw_picture_part(ViewState& state) {
   ImGui::EndDisabled();
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", kDetailLegend);
   if (has_meshes(settings.mode)) {
+    tell_of_plain_light(state);
     int edges = static_cast<int>(settings.wireframe);
     if (ImGui::Combo("edges", &edges, "none\0over surfaces\0alone\0")) {
       settings.wireframe = static_cast<Wireframe>(edges);
