@@ -94,75 +94,105 @@ GridRay ray_from(Point point, Placed placed) {
   return ray;
 }
 
+// The rays of a surface point, by numbers: -1 is that to the sun, then come those of occlusion, then those to lamps.
+struct LightRays {
+  vec3 normal;  // in the grid
+  uint face;    // directions about a field's surface are those of an upper face, turned with it
+  bool is_field;
+  float cosine;  // of the sun
+  int first;
+  int open_count;
+  uvec2 lamps;  // where they are listed, and how many
+  vec3 in_view;
+  vec3 normal_in_view;
+  uint hash;  // of the pixel
+};
+
+bool traces_occlusion(Point point) {
+  // A field has no faces with corners.
+  return has(kOcclusionRays) || (is_of_field(point) && has(kOcclusionVertex));
+}
+
+LightRays rays_of(Point point, Placed placed, GridRay from) {
+  const uint kUp = 2;
+  LightRays rays;
+  rays.is_field = is_of_field(point);
+  rays.face = rays.is_field ? kUp : point.what.y;
+  rays.normal = grid_normal(point);
+  rays.cosine = rays.face < 4 ? placed.diffuse[0][rays.face] : placed.diffuse[1][rays.face - 4];
+  if (rays.is_field) rays.cosine = max(dot(rays.normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
+  bool is_far = (point.what.z & kIsFar) != 0;
+  rays.open_count = traces_occlusion(point) && !is_far ? frame().occlusion_count : 0;
+  rays.lamps = uvec2(0);
+  if (has(kLit) && has(kLamps)) rays.lamps = lamps_around(point.voxel, placed);
+  rays.first = has(kLit) && has(kShadows) && rays.cosine > 0.0 ? -1 : 0;
+  rays.in_view = view_from_grid(placed, from).origin;
+  rays.normal_in_view = turned(placed.view_axes, rays.normal) / placed.ref_inside.w;
+  ivec2 pixel = push.corner + tile_pixel();
+  rays.hash = hash_of(uint(pixel.x), uint(pixel.y)) ^ push.seed;
+  return rays;
+}
+
+// Turns a ray to where its number says. `brought`: what a lamp adds if nothing is in between; false where that need not
+// be asked.
+bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float max_t, out vec3 brought) {
+  brought = vec3(0.0);
+  max_t = (number < 0 ? frame().shadow_distance : frame().occlusion_distance) / placed.ref_view.w;
+  if (number < 0) {
+    ray.direction = placed.to_sun.xyz;
+  } else if (number < rays.open_count) {
+    ray.direction = occlusion_direction(rays.face, number, rays.hash);
+    if (rays.is_field) ray.direction = turned_from_up(ray.direction, rays.normal);
+  } else {
+    uint lamp = rays.lamps.x + uint(number - rays.open_count);
+    brought = light_of_lamp(lamp, rays.in_view, rays.normal_in_view, placed, ray, max_t);
+    return brought != vec3(0.0) && has(kShadows) && max_t > 0.0;
+  }
+  return true;
+}
+
+// How open a surface point is, of whose rays of occlusion so many met nothing.
+float openness_of(Point point, Placed placed, int open) {
+  if ((point.what.z & kIsFar) != 0) return openness_of_far(point);
+  if (has(kOcclusionVertex) && !is_of_field(point)) {
+    Tree opaque = opaque_tree(placed, 0);
+    uint face = point.what.y;
+    return 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
+  }
+  return traces_occlusion(point) ? float(open) / float(frame().occlusion_count) : 0.0;
+}
+
 // What reaches a surface point: the sun's light and that of lamps, and its openness. One loop over all rays, for the
 // reason that rays.glsl gives.
 void trace_light(Point point, Placed placed, uint slot, out vec3 light, out float openness) {
-  const uint kUp = 2;
-  bool is_field = is_of_field(point);
-  // Directions about a field's surface are those of an upper face, turned with it.
-  uint face = is_field ? kUp : point.what.y;
-  vec3 normal = grid_normal(point);
-  float cells = placed.ref_view.w;
-  float cosine = face < 4 ? placed.diffuse[0][face] : placed.diffuse[1][face - 4];
-  if (is_field) cosine = max(dot(normal, placed.to_sun.xyz), 0.0) * placed.to_sun.w;
-  vec3 sunlight = sunlight_of(cosine);
   GridRay ray = ray_from(point, placed);
-  GridRay from = ray;
-  bool is_far = (point.what.z & kIsFar) != 0;
-  // A field has no faces with corners.
-  bool traces_occlusion = has(kOcclusionRays) || (is_field && has(kOcclusionVertex));
-  int open_count = traces_occlusion && !is_far ? frame().occlusion_count : 0;
-  uvec2 lamps = uvec2(0);
-  if (has(kLit) && has(kLamps)) lamps = lamps_around(point.voxel, placed);
-  vec3 in_view = view_from_grid(placed, from).origin;
-  vec3 normal_in_view = turned(placed.view_axes, normal) / placed.ref_inside.w;
-  ivec2 pixel = push.corner + tile_pixel();
-  uint hash = hash_of(uint(pixel.x), uint(pixel.y)) ^ push.seed;
+  LightRays rays = rays_of(point, placed, ray);
+  vec3 sunlight = sunlight_of(rays.cosine);
   vec3 of_lamps = vec3(0.0);
   int open = 0;
-  int first = has(kLit) && has(kShadows) && cosine > 0.0 ? -1 : 0;
-  for (int i = first; i < open_count + int(lamps.y); ++i) {
-    bool is_sun = i < 0;
-    bool is_lamp = i >= open_count;
-    vec3 brought = vec3(0.0);
-    float max_t = (is_sun ? frame().shadow_distance : frame().occlusion_distance) / cells;
-    if (is_sun) {
-      ray.direction = placed.to_sun.xyz;
-    } else if (!is_lamp) {
-      ray.direction = occlusion_direction(face, i, hash);
-      if (is_field) ray.direction = turned_from_up(ray.direction, normal);
-    } else {
-      brought = light_of_lamp(lamps.x + uint(i - open_count), in_view, normal_in_view, placed, ray, max_t);
-      if (brought == vec3(0.0)) continue;
-      if (!(has(kShadows) && max_t > 0.0)) {
-        of_lamps += brought;
-        continue;
-      }
+  for (int i = rays.first; i < rays.open_count + int(rays.lamps.y); ++i) {
+    float max_t;
+    vec3 brought;
+    if (!aim(i, rays, placed, ray, max_t, brought)) {
+      of_lamps += brought;
+      continue;
     }
     ++rays_taken;
     bool is_open = !is_blocked(point.voxel.w, placed, ray, max_t);
-    if (is_sun || is_lamp) {
-      vec3 passed = vec3(is_open ? 1.0 : 0.0);
-      if (kHasGlass && is_open) passed = sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
-      if (is_sun) {
-        sunlight *= passed;
-      } else {
-        of_lamps += brought * passed;
-      }
-    } else if (is_open) {
-      ++open;
+    if (i >= 0 && i < rays.open_count) {
+      if (is_open) ++open;
+      continue;
+    }
+    vec3 passed = vec3(is_open ? 1.0 : 0.0);
+    if (kHasGlass && is_open) passed = sunlight_passed(slot, point.voxel.w, placed, ray, max_t);
+    if (i < 0) {
+      sunlight *= passed;
+    } else {
+      of_lamps += brought * passed;
     }
   }
   light = sunlight + of_lamps;
-  openness = 0.0;
-  if (is_far) {
-    openness = openness_of_far(point);
-  } else if (has(kOcclusionVertex) && !is_field) {
-    Tree opaque = Grids(frame().grids).at[placed.ref_base.w].opaque;
-    openness = 1.0 - occlusion_at(corner_occlusion(opaque, point.voxel.xyz, face), face, point.inside.xyz) / 3.0;
-  } else if (traces_occlusion) {
-    openness = float(open) / float(frame().occlusion_count);
-  }
+  openness = openness_of(point, placed, open);
 }
 
 vec3 light_of(Point point, uint slot) {

@@ -34,11 +34,8 @@ vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 
   return near + rest * d;
 }
 
-// Puts what is drawn of impostors at the pixel into `point`; answers the start of the instance's ray, and how far
-// behind it the face lies.
-bool find_far(Pair direction, float scale, inout Point point, out float depth, out float nearest) {
-  uint number = FarPixels(frame().far_numbers).at[slot_of_pixel()];
-  if (number == kNoFace) return false;
+// The impostor that a face is of, by the face's number among those of all.
+Far far_with(uint number) {
   Fars fars = Fars(frame().fars);
   uint low = 0;
   uint high = frame().far_count;
@@ -50,7 +47,15 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
       high = middle;
     }
   }
-  Far far = fars.at[low];
+  return fars.at[low];
+}
+
+// Puts what is drawn of impostors at the pixel into `point`; answers the start of the instance's ray, and how far
+// behind it the face lies.
+bool find_far(Pair direction, float scale, inout Point point, out float depth, out float nearest) {
+  uint number = FarPixels(frame().far_numbers).at[slot_of_pixel()];
+  if (number == kNoFace) return false;
+  Far far = far_with(number);
   uint index = number - far.faces.z;
   bool is_surfel = index >= far.faces.w;
   if (is_surfel) index = 3 * index - 2 * far.faces.w;
@@ -81,6 +86,49 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   return true;
 }
 
+// Every instance has a start of its own; that of the nearest hit so far lies at this depth, and the hit `t` behind it.
+// Differences of depths are exact.
+struct Nearest {
+  float depth;
+  float t;
+};
+
+// Takes over what the pixel's ray meets of what a grid holds if that is nearer than all before. `scale`: the length of a
+// depth.
+void meet_content(int content, int i, Placed placed, Pair direction, float scale, inout Nearest nearest,
+                  inout Point point) {
+  bool is_field = is_field_content(content);
+  Tree tree = opaque_tree(placed, content);
+  if ((tree.root.x | tree.root.y) == 0) return;
+  ExactRay exact = exact_ray_in(placed, direction);
+  float moved_t;
+  int moved;
+  if (!move_to_bounds(tree, placed, exact, moved_t, moved)) return;
+  GridRay in_grid = rounded(placed, exact, placed.start.w * scale);
+  float limit = (nearest.depth - placed.start.w) * scale + nearest.t;
+  float rounding = 1e-6 * max(abs(limit), nearest.t);
+  float room = limit + rounding - moved_t;
+  if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved)) return;
+  float walked_t;
+  FieldHit hit;
+  if (!find_content(is_field, room, walked_t, hit)) return;
+  float found_t = moved_t + walked_t;
+  // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
+  bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
+  if (is_equal ? i + content > point.voxel.w : found_t > limit) return;
+  nearest = Nearest(placed.start.w, found_t);
+  point.voxel = ivec4(walk_voxel, i);
+  point.inside.w = in_grid.t + found_t;
+  if (is_field) {
+    bool is_inside = hit.starts_inside && moved < 0;
+    point.inside.xyz = hit.inside;
+    point.what = uvec4(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
+                       kIsField | (is_inside ? kUnlit : kSurface), floatBitsToUint(found_t));
+  } else {
+    point.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kUnlit : kSurface, floatBitsToUint(found_t));
+  }
+}
+
 Point first_hit(vec2 at) {
   Point point;
   point.voxel = ivec4(0, 0, 0, -1);
@@ -88,58 +136,19 @@ Point first_hit(vec2 at) {
   point.what = uvec4(0);
   ViewRay ray = camera_ray(at);
   Pair direction = exact_direction();
-  // Every instance has a start of its own; that of the nearest so far lies at this depth, and the hit `nearest` behind.
-  // Differences of depths are exact.
   float scale = length_a_depth(at);
-  float depth = 0.0;
-  float nearest = kInfinity;
-  if (push.far_count > 0 && !find_far(direction, scale, point, depth, nearest)) {
-    depth = 0.0;
-    nearest = kInfinity;
+  Nearest nearest = Nearest(0.0, kInfinity);
+  if (push.far_count > 0 && !find_far(direction, scale, point, nearest.depth, nearest.t)) {
+    nearest = Nearest(0.0, kInfinity);
   }
   start_visit(ray);
   for (;;) {
-    int i = next_instance((depth - frame().view_depth) * scale + nearest);
+    int i = next_instance((nearest.depth - frame().view_depth) * scale + nearest.t);
     if (i < 0) break;
     if (visited_is_far) continue;
     Placed placed = placed_at(i);
-    // Its voxels, then its field.
     for (int content = 0; content < kContents; ++content) {
-      bool is_field = kHasFields && content == 1;
-      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
-      if ((tree.root.x | tree.root.y) == 0) continue;
-      ExactRay exact = exact_ray_in(placed, direction);
-      float moved_t;
-      int moved;
-      if (!move_to_bounds(tree, placed, exact, moved_t, moved)) continue;
-      GridRay in_grid = rounded(placed, exact, placed.start.w * scale);
-      float limit = (depth - placed.start.w) * scale + nearest;
-      float rounding = 1e-6 * max(abs(limit), nearest);
-      float room = limit + rounding - moved_t;
-      if (!start_walk(tree, in_grid.base, in_grid.origin, in_grid.direction, room, moved)) continue;
-      float walked_t;
-      FieldHit hit;
-      if (!find_content(is_field, room, walked_t, hit)) continue;
-      float found_t = moved_t + walked_t;
-      // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
-      bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
-      if (is_equal ? i + content > point.voxel.w : found_t > limit) continue;
-      depth = placed.start.w;
-      nearest = found_t;
-      float t = in_grid.t + found_t;
-      point.voxel = ivec4(walk_voxel, i);
-      point.inside.w = t;
-      if (is_field) {
-        bool is_inside = hit.starts_inside && moved < 0;
-        point.inside.xyz = hit.inside;
-        point.what = uvec4(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
-                           kIsField | (is_inside ? kUnlit : kSurface), floatBitsToUint(found_t));
-      } else {
-        bool is_inside = walk_axis < 0;
-        point.what =
-            uvec4(type_found(), face_found(), is_inside ? kUnlit : kSurface, floatBitsToUint(found_t));
-      }
+      meet_content(content, i, placed, direction, scale, nearest, point);
     }
   }
   // Inside a voxel the place does not count.

@@ -21,13 +21,8 @@ bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
     }
     is_first = false;
     for (int content = 0; content < kContents; ++content) {
-      bool is_field = kHasFields && content == 1;
-      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
-      if (!start_walk(tree, ray.base, ray.origin, ray.direction, max_t, -1)) continue;
       float t;
-      FieldHit hit;
-      if (find_content(is_field, max_t, t, hit)) return true;
+      if (find_opaque(placed, content, ray, max_t, t)) return true;
     }
     if (frame().placed_count == 1) return false;
   }

@@ -80,11 +80,8 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   return clamp(ivec3(at), low, high);
 }
 
-// Puts a ray at its start, or where it enters the tree's bounds; false when it misses them.
-//
-// `moved`: the axis of the bounds' plane to which it was moved before; -1 for a ray that starts where it is.
-bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t, int moved) {
-  if (any(greaterThanEqual(tree.low.xyz, tree.high.xyz))) return false;
+// What the walk keeps of its ray, from the 64 voxels about the ray's origin.
+void set_ray(ivec3 base, vec3 origin, vec3 direction) {
   ivec3 whole = ivec3(clamp(floor(origin), vec3(-1e9), vec3(1e9)));
   ivec3 shift = whole & ~63;
   ray_base = base + shift;
@@ -94,6 +91,14 @@ bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t,
   ray_inverse = 1.0 / mix(direction, vec3(1.0), ray_still);
   ray_forward = greaterThan(ray_direction, vec3(0.0));
   ray_sign = mix(vec3(-1.0), vec3(1.0), ray_forward);
+}
+
+// Puts a ray at its start, or where it enters the tree's bounds; false when it misses them.
+//
+// `moved`: the axis of the bounds' plane to which it was moved before; -1 for a ray that starts where it is.
+bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t, int moved) {
+  if (any(greaterThanEqual(tree.low.xyz, tree.high.xyz))) return false;
+  set_ray(base, origin, direction);
   walk_low = tree.low.xyz;
   walk_high = tree.high.xyz;
   vec3 low = vec3(walk_low - ray_base);

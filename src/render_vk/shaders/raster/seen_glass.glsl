@@ -25,13 +25,8 @@ float opaque_behind() {
     Placed placed = placed_at(i);
     GridRay ray = seen_ray_in(i, placed);
     for (int content = 0; content < kContents; ++content) {
-      bool is_field = kHasFields && content == 1;
-      Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
-      if (is_field) tree = Grids(frame().grids).at[placed.ref_base.w].field;
-      if (!start_walk(tree, ray.base, ray.origin, ray.direction, nearest, -1)) continue;
       float t;
-      FieldHit hit;
-      if (find_content(is_field, nearest, t, hit)) nearest = min(nearest, t);
+      if (find_opaque(placed, content, ray, nearest, t)) nearest = min(nearest, t);
     }
   }
 }
