@@ -119,35 +119,38 @@ void add_castle(Grid& grid, const Palette& p) {
   add_keep(grid, p);
 }
 
+struct PaletteEntry {
+  VoxelType Palette::*slot;
+  const char* name;
+  Rgba8 colour;
+};
+
+constexpr PaletteEntry kEntries[] = {{&Palette::grass, "grass", {106, 153, 66, 255}},
+                                     {&Palette::meadow, "meadow", {132, 172, 78, 255}},
+                                     {&Palette::soil, "soil", {121, 88, 58, 255}},
+                                     {&Palette::rock, "rock", {128, 124, 120, 255}},
+                                     {&Palette::sand, "sand", {222, 204, 150, 255}},
+                                     {&Palette::path, "path", {178, 152, 112, 255}},
+                                     {&Palette::wall, "wall", {201, 190, 170, 255}},
+                                     {&Palette::wall_dark, "old wall", {180, 168, 148, 255}},
+                                     {&Palette::trim, "trim", {226, 217, 198, 255}},
+                                     {&Palette::roof, "roof", {166, 62, 48, 255}},
+                                     {&Palette::roof_dark, "roof shade", {140, 48, 40, 255}},
+                                     {&Palette::wood, "wood", {98, 68, 44, 255}},
+                                     {&Palette::plank, "plank", {142, 102, 64, 255}},
+                                     {&Palette::leaf, "leaf", {64, 116, 56, 255}},
+                                     {&Palette::leaf_light, "young leaf", {92, 142, 62, 255}},
+                                     {&Palette::water, "water", {52, 140, 186, 84}},
+                                     {&Palette::glass, "glass", {190, 226, 236, 110}},
+                                     {&Palette::lamp, "lamp", {255, 204, 110, 255}},
+                                     {&Palette::flag, "flag", {40, 74, 150, 255}},
+                                     {&Palette::sail, "sail", {240, 234, 220, 255}}};
+
 }  // namespace
 
 quoin::Result<Palette> add_palette(quoin::VoxelRegistry& types) {
   Palette p{};
-  const struct {
-    VoxelType Palette::*slot;
-    const char* name;
-    Rgba8 colour;
-  } entries[] = {{&Palette::grass, "grass", {106, 153, 66, 255}},
-                 {&Palette::meadow, "meadow", {132, 172, 78, 255}},
-                 {&Palette::soil, "soil", {121, 88, 58, 255}},
-                 {&Palette::rock, "rock", {128, 124, 120, 255}},
-                 {&Palette::sand, "sand", {222, 204, 150, 255}},
-                 {&Palette::path, "path", {178, 152, 112, 255}},
-                 {&Palette::wall, "wall", {201, 190, 170, 255}},
-                 {&Palette::wall_dark, "old wall", {180, 168, 148, 255}},
-                 {&Palette::trim, "trim", {226, 217, 198, 255}},
-                 {&Palette::roof, "roof", {166, 62, 48, 255}},
-                 {&Palette::roof_dark, "roof shade", {140, 48, 40, 255}},
-                 {&Palette::wood, "wood", {98, 68, 44, 255}},
-                 {&Palette::plank, "plank", {142, 102, 64, 255}},
-                 {&Palette::leaf, "leaf", {64, 116, 56, 255}},
-                 {&Palette::leaf_light, "young leaf", {92, 142, 62, 255}},
-                 {&Palette::water, "water", {52, 140, 186, 84}},
-                 {&Palette::glass, "glass", {190, 226, 236, 110}},
-                 {&Palette::lamp, "lamp", {255, 204, 110, 255}},
-                 {&Palette::flag, "flag", {40, 74, 150, 255}},
-                 {&Palette::sail, "sail", {240, 234, 220, 255}}};
-  for (const auto& entry : entries) {
+  for (const PaletteEntry& entry : kEntries) {
     quoin::VoxelProperties properties;
     properties.name = entry.name;
     properties.colour = entry.colour;

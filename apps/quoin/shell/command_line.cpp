@@ -91,13 +91,20 @@ CommandOfTool describe(const CLI::App& app, const std::string& above) {
   return command;
 }
 
-std::string bash_completion(const CommandOfTool& tool) {
+namespace {
+
+/// The lines of the script's three case statements.
+struct BashCases {
   std::string walk;    // which command the words before lead to
   std::string values;  // what follows an option
   std::string words;   // what a command takes
+};
+
+BashCases bash_cases(const CommandOfTool& tool) {
+  BashCases cases;
   for_each_command(tool, [&](const CommandOfTool& command) {
     for (const CommandOfTool& inner : command.commands) {
-      walk += "      '" + command.path + " " + inner.name + "') command='" + inner.path + "' ;;\n";
+      cases.walk += "      '" + command.path + " " + inner.name + "') command='" + inner.path + "' ;;\n";
     }
     for (const OptionOfCommand& option : command.options) {
       if (option.value.empty()) continue;
@@ -107,24 +114,31 @@ std::string bash_completion(const CommandOfTool& tool) {
       const std::string reply = option.choices.empty()
                                     ? ""
                                     : "COMPREPLY=($(compgen -W '" + joined(option.choices, " ") + "' -- \"$word\")); ";
-      values += "    " + joined(patterns, "|") + ") " + reply + "return ;;\n";
+      cases.values += "    " + joined(patterns, "|") + ") " + reply + "return ;;\n";
     }
-    words += "    '" + command.path + "') options='" + joined(names_of_options(command), " ") + "'; commands='" +
-             joined(names_of_commands(command), " ") + "' ;;\n";
+    cases.words += "    '" + command.path + "') options='" + joined(names_of_options(command), " ") + "'; commands='" +
+                   joined(names_of_commands(command), " ") + "' ;;\n";
   });
+  return cases;
+}
+
+}  // namespace
+
+std::string bash_completion(const CommandOfTool& tool) {
+  const BashCases cases = bash_cases(tool);
   return "# Completes quoin in bash: source <(quoin completions bash)\n"
          "_quoin() {\n"
          "  local word=${COMP_WORDS[COMP_CWORD]} command=quoin options= commands= i\n"
          "  for ((i = 1; i < COMP_CWORD; ++i)); do\n"
          "    case \"$command ${COMP_WORDS[i]}\" in\n" +
-         walk +
+         cases.walk +
          "    esac\n"
          "  done\n"
          "  case \"$command ${COMP_WORDS[COMP_CWORD - 1]}\" in\n" +
-         values +
+         cases.values +
          "  esac\n"
          "  case $command in\n" +
-         words +
+         cases.words +
          "  esac\n"
          "  if [[ $word == -* ]]; then\n"
          "    COMPREPLY=($(compgen -W \"$options\" -- \"$word\"))\n"

@@ -234,6 +234,17 @@ QUOIN_INLINE void store_lanes(std::uint64_t* p, unsigned lanes, Words v) {
 
 inline constexpr unsigned kAllLanes = (1U << kLanes) - 1;
 
+// Three of the six steps of a transposition, for words that lie kFar / 4 apart.
+template <int kFar>
+QUOIN_INLINE void exchange_eight(Words (&v)[8]) {
+  for (int j = 0; j < 4; ++j) exchange<kFar>(v[j], v[j + 4]);
+  for (int j = 0; j < 8; j += 4) {
+    exchange<kFar / 2>(v[j], v[j + 2]);
+    exchange<kFar / 2>(v[j + 1], v[j + 3]);
+  }
+  for (int j = 0; j < 8; j += 2) exchange<kFar / 4>(v[j], v[j + 1]);
+}
+
 // Bits x of 64 rows z become bits z of 64 planes x, for as many rows y side by side as there are lanes.
 template <unsigned kStored>
 void transpose_bits(const std::uint64_t* from, std::uint64_t* to) {
@@ -259,23 +270,13 @@ void transpose_bits(const std::uint64_t* from, std::uint64_t* to) {
   for (int i = 0; i < 8; ++i) {
     Words v[8];
     for (int j = 0; j < 8; ++j) v[j] = half[i + 8 * j];
-    for (int j = 0; j < 4; ++j) exchange<32>(v[j], v[j + 4]);
-    for (int j = 0; j < 8; j += 4) {
-      exchange<16>(v[j], v[j + 2]);
-      exchange<16>(v[j + 1], v[j + 3]);
-    }
-    for (int j = 0; j < 8; j += 2) exchange<8>(v[j], v[j + 1]);
+    exchange_eight<32>(v);
     for (int j = 0; j < 8; ++j) half[i + 8 * j] = v[j];
   }
   for (int i = 0; i < 64; i += 8) {
     Words v[8];
     for (int j = 0; j < 8; ++j) v[j] = half[i + j];
-    for (int j = 0; j < 4; ++j) exchange<4>(v[j], v[j + 4]);
-    for (int j = 0; j < 8; j += 4) {
-      exchange<2>(v[j], v[j + 2]);
-      exchange<2>(v[j + 1], v[j + 3]);
-    }
-    for (int j = 0; j < 8; j += 2) exchange<1>(v[j], v[j + 1]);
+    exchange_eight<4>(v);
     for (int j = 0; j < 8; ++j) put(i + j, v[j]);
   }
 }
