@@ -35,7 +35,7 @@ inline Camera over_the_terrain() {
   camera.forward = glm::normalize(DVec3{128, 40, 128} - camera.position);
   camera.right = glm::normalize(glm::cross(camera.forward, DVec3{0, 1, 0}));
   camera.up = glm::cross(camera.right, camera.forward);
-  camera.vertical_fov = 70.0 * std::numbers::pi / 180.0;
+  camera.vertical_fov_radians = 70.0 * std::numbers::pi / 180.0;
   return camera;
 }
 

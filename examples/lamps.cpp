@@ -61,8 +61,8 @@ void hang_lamps(quoin::Scene& scene) {
   spot.direction = {-0.25, -1.0, -0.1};
   spot.colour = {0.75F, 0.8F, 1.0F};
   spot.intensity = 500.0;
-  spot.inner_angle = 0.15;
-  spot.outer_angle = 0.4;
+  spot.inner_angle_radians = 0.15;
+  spot.outer_angle_radians = 0.4;
   scene.lamps.push_back(spot);
 }
 

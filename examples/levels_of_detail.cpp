@@ -68,12 +68,12 @@ int main(int argc, char** argv) {
   options.width = 640;
   options.height = 240;
   options.samples = 4;
-  options.detail.emplace().far_pixels = 24;  // for so small models; 128 where impostors are to be had early
-  options.selector = &view;
+  options.detail.policy.emplace().far_pixels = 24;  // for so small models; 128 where impostors are to be had early
+  options.detail.selector = &view;
   const quoin::CpuRenderer renderer(scene);
   quoin::Image both{options.width, 2 * options.height, {}};
   for (const bool in_colours : {false, true}) {
-    options.detail_colours = in_colours;
+    options.detail.colours = in_colours;
     const auto picture = renderer.render(*camera, options);
     if (!picture) return 1;
     both.rgb.insert(both.rgb.end(), picture->colour.rgb.begin(), picture->colour.rgb.end());
@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
   if (!size) std::fprintf(stderr, "levels_of_detail: %s\n", quoin::to_string(size.error()).c_str());
 
   std::vector<quoin::SelectedInstance> selected;
-  view.select(scene, *camera, options.width, options.height, *options.detail, selected);
+  view.select(scene, *camera, options.width, options.height, *options.detail.policy, selected);
   std::array<int, 3> count{};
   for (const quoin::SelectedInstance& each : selected) ++count[static_cast<std::size_t>(each.detail)];
   std::printf("of %zu houses in sight %d near, %d in coarser cells, %d from impostors\n", selected.size(), count[0],

@@ -62,7 +62,7 @@ quoin::Status draw(const quoin::Scene& scene, quoin::Shading shading, const std:
   options.height = 360;
   options.samples = 4;
   options.light.shading = shading;
-  options.light.occlusion = quoin::OcclusionMode::Vertex;
+  options.light.occlusion_mode = quoin::OcclusionMode::Vertex;
   const auto camera = quoin::look_at({44.0, 34.0, 50.0}, {9.0, 4.5, 10.5}, 0.42);
   if (!camera) return camera.error();
   const auto picture = quoin::CpuRenderer(scene).render(*camera, options);

@@ -18,7 +18,7 @@ int count_hits(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
   for (int lane = 0; lane < quoin::RayPacket::kSize; ++lane) {
     const int column = 158 + lane % 4;
     const int row = 118 + lane / 4;
-    rays.set(lane, quoin::ray_through(camera, column + 0.5, row + 0.5, 320, 240), kEndless);
+    rays.set(lane, quoin::ray_through(camera, {column + 0.5, row + 0.5, 320, 240}), kEndless);
   }
   quoin::PacketHits hits;
   quoin::first_hits(tree, rays, hits);
@@ -29,7 +29,7 @@ int count_hits(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
 
 // What the middle of a picture of 320x240 pixels shows.
 std::optional<quoin::RayHit> look(const quoin::OccupancyTree& tree, const quoin::Camera& camera) {
-  const quoin::Ray ray = quoin::ray_through(camera, 160.5, 120.5, 320, 240);
+  const quoin::Ray ray = quoin::ray_through(camera, {160.5, 120.5, 320, 240});
   const auto hit = quoin::first_hit(tree, ray);
   if (hit) std::printf("voxel %d %d %d, %.2f away\n", hit->voxel.x, hit->voxel.y, hit->voxel.z, hit->t);
   return hit;

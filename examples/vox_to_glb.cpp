@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <string>
-#include <vector>
 
 #include <quoin/quoin.h>
 
@@ -21,9 +20,8 @@ quoin::Status write_sample(const std::string& path) {
   quoin::Instance placed;
   placed.grid = scene.add_grid(std::move(stairs));
   scene.add_instance(placed);
-  std::vector<std::string> warnings;
-  const auto bytes = quoin::write_vox(scene, path, warnings);
-  if (!bytes) return bytes.error();
+  const auto saved = quoin::save_scene(scene, path);
+  if (!saved) return saved.error();
   return {};
 }
 

@@ -46,7 +46,7 @@ int main() {
   quoin::SlideResult moved;
   for (int frame = 0; frame < 960; ++frame) {
     falling -= 9.81 * kFrame;
-    moved = move_and_slide(tracer, scene.types, box, quoin::DVec3(4.5, falling, 0.0) * kFrame, options);
+    moved = move_and_slide(tracer, box, quoin::DVec3(4.5, falling, 0.0) * kFrame, options);
     box.centre = moved.centre;
     falling = moved.displacement.y / kFrame;
     if (frame % 60 != 59) continue;

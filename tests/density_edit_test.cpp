@@ -86,7 +86,8 @@ TEST(DensityEdits, NoMeshChangesUntold) {
   for (const float spread : {0.0F, 1.0F, 2.0F, 5.5F}) {
     SCOPED_TRACE(spread);
     SmoothOptions options;
-    options.occlusion.form = spread == 0.0F ? SmoothOcclusion::None : SmoothOcclusion::Weighted;
+    options.split_sheets = false;
+    options.occlusion.method = spread == 0.0F ? SmoothOcclusion::None : SmoothOcclusion::Weighted;
     if (spread > 0.0F) options.occlusion.spread = spread;
     Meshes meshes(options);
     DensityGrid grid;

@@ -19,11 +19,10 @@ TEST(Fleet, ItsPictureFromTheWrittenFileIsTheOriginals) {
   const auto fleet = demo::make_fleet();
   ASSERT_TRUE(fleet);
   const TestFolder folder("fleet");
-  std::vector<std::string> warnings;
-  const auto written = save_scene(*fleet, folder.file("fleet.json"), warnings);
+  const auto written = save_scene(*fleet, folder.file("fleet.json"));
   ASSERT_TRUE(written) << to_string(written.error());
-  EXPECT_EQ(warnings, std::vector<std::string>());
-  EXPECT_FALSE(save_scene(*fleet, folder.file("fleet.vox"), warnings));
+  EXPECT_EQ(written->warnings, std::vector<std::string>());
+  EXPECT_FALSE(save_scene(*fleet, folder.file("fleet.vox")));
   const auto read = load_scene(folder.file("fleet.json"));
   ASSERT_TRUE(read) << to_string(read.error());
   EXPECT_EQ(count_faces(read->scene), count_faces(fleet->scene));

@@ -35,8 +35,8 @@ Scene scene_without_neighbours() {
   return scene_of(std::move(types), std::move(grid));
 }
 
-Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& options) {
-  return CpuRenderer(scene).render(camera_for(view), options).value();
+Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& options, Threads threads = {}) {
+  return CpuRenderer(scene).render(camera_for(view), options, threads).value();
 }
 
 GoldenFolders golden_folders() {
@@ -68,11 +68,10 @@ TEST_P(Golden, PictureIsTheGoldenOne) {
 TEST_P(Golden, PictureIsTheSameWithPlainInstructionsAndOneThread) {
   const GoldenView& view = GetParam();
   const Scene scene = terrain_scene();
-  RenderOptions options = options_for(view);
+  const RenderOptions options = options_for(view);
   const Picture usual = render(scene, view, options);
   const InstructionSetOverride over(InstructionSet::Plain);
-  options.threads = {1};
-  const Picture plain = render(scene, view, options);
+  const Picture plain = render(scene, view, options, {1});
   EXPECT_EQ(difference_of(plain.colour, usual.colour).pixels, 0);
   EXPECT_TRUE(plain.depth.values == usual.depth.values);
 }
@@ -91,7 +90,7 @@ TEST(GoldenTwin, ShadowViewFailsWithoutShadows) {
 TEST(GoldenTwin, AoViewFailsWithoutOcclusion) {
   const GoldenView& view = view_called("ao");
   RenderOptions options = options_for(view);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   const std::int64_t wrong = wrong_pixels(render(terrain_scene(), view, options), view);
   EXPECT_GT(wrong, kPixels / 2) << "of " << kPixels;
 }

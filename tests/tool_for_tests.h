@@ -68,8 +68,7 @@ inline std::string vox_with_hidden(int hidden) {
   for (const InstanceHandle handle : scene.instances().handles()) {
     if (hidden-- > 0) scene.edit(handle).visible = false;
   }
-  std::vector<std::string> warnings;
-  const auto bytes = write_vox(scene, warnings).value();
+  const std::vector<std::byte> bytes = write_vox(scene).value().bytes;
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 

@@ -2,7 +2,6 @@
 // one picture in its own colours and one in those of its levels of detail. The files are named on the command line.
 
 #include <cstdio>
-#include <string>
 #include <vector>
 
 #include <quoin/io/formats.h>
@@ -16,9 +15,8 @@ namespace {
 quoin::Result<quoin::LoadedScene> written_and_read(const char* file) {
   const auto fleet = demo::make_fleet();
   if (!fleet) return fleet.error();
-  std::vector<std::string> warnings;
-  const auto written = quoin::save_scene(*fleet, file, warnings);
-  if (!written) return written.error();
+  const auto saved = quoin::save_scene(*fleet, file);
+  if (!saved) return saved.error();
   return quoin::load_scene(file);
 }
 
@@ -32,7 +30,7 @@ quoin::Status draw(const char* scene_file, const std::vector<const char*>& pictu
     if (!picture) return picture.error();
     const auto written = quoin::write_png(picture->colour, file);
     if (!written) return written.error();
-    options.detail_colours = true;
+    options.detail.colours = true;
   }
   return {};
 }

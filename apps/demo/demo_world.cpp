@@ -4,9 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string>
-#include <vector>
 
-#include <quoin/io/file.h>
 #include <quoin/io/vox.h>
 #include <quoin/scene/scene.h>
 
@@ -73,9 +71,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const auto scene = make_scene();
-  std::vector<std::string> warnings;
-  const auto bytes = scene ? quoin::write_vox(*scene, warnings) : scene.error();
-  const auto written = bytes ? quoin::write_file(argv[1], *bytes) : bytes.error();
+  const auto written = scene ? quoin::write_vox(*scene, argv[1]) : scene.error();
   if (!written) {
     std::fprintf(stderr, "quoin_demo_world: %s\n", quoin::to_string(written.error()).c_str());
     return 1;

@@ -92,7 +92,7 @@ quoin::Result<quoin::LoadedScene> make_fleet() {
 quoin::RenderOptions fleet_options(const quoin::LoadedScene& fleet) {
   quoin::RenderOptions options;
   options.samples = 4;
-  options.detail.emplace();
+  options.detail.policy.emplace();
   options.light.sun = *fleet.sun;
   options.light.exposure = 1.15;
   return options;

@@ -78,15 +78,15 @@ const char* given_field_occlusion(const CLI::App& command) {
 }
 
 std::string read_field_occlusion(const CLI::App& command, SmoothOcclusionOptions& options) {
-  if (std::string fault = read_form(command, options.form); !fault.empty()) return fault;
+  if (std::string fault = read_form(command, options.method); !fault.empty()) return fault;
   for (const NumberOption& option : kNumbers) {
     if (std::string fault = read_number(command, option, options); !fault.empty()) return fault;
   }
-  if (options.form == SmoothOcclusion::None && command.count("--ao-spread") > 0) {
+  if (options.method == SmoothOcclusion::None && command.count("--ao-spread") > 0) {
     return "--ao-spread: the form none has no samples";
   }
   const bool is_weighted =
-      options.form == SmoothOcclusion::Weighted || options.form == SmoothOcclusion::WeightedPublished;
+      options.method == SmoothOcclusion::Weighted || options.method == SmoothOcclusion::WeightedPublished;
   for (const char* name : {"--ao-offset", "--ao-power"}) {
     if (command.count(name) > 0 && !is_weighted) return std::string(name) + " needs --ao-form weighted";
   }

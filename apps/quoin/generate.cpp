@@ -90,8 +90,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
   ProgressBar bar;
-  LoadedScene made;
-  Scene& scene = made.scene;
+  Scene scene;
   const auto materials = add_terrain_types(scene.types);
   if (!materials) return materials.error();
   SceneGrid content;
@@ -106,11 +105,12 @@ Result<Outcome> generate(const GenerateOptions& options) {
   instance.name = content.name;
   instance.grid = scene.add_grid(std::move(content));
   scene.add_instance(std::move(instance));
-  outcome.faces = count_faces(made.scene, InstanceFilter::All, options.threads);
+  outcome.faces = count_faces(scene, InstanceFilter::All, options.threads);
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
-  const auto bytes = save_scene(made, options.output, outcome.warnings, options.threads, bar.listener("writing"));
-  if (!bytes) return bytes.error();
-  outcome.bytes = *bytes;
+  auto saved = save_scene(scene, options.output, options.threads, bar.listener("writing"));
+  if (!saved) return saved.error();
+  outcome.bytes = saved->bytes;
+  outcome.warnings = std::move(saved->warnings);
   outcome.seconds_write = watch.lap();
   return outcome;
 }

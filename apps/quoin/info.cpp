@@ -258,7 +258,7 @@ Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
   if (holds_volume(options.input)) return run_volume_info(options, streams);
   const auto loaded = [&] {
     ProgressBar bar;
-    return load_scene(options.input, options.load, bar.listener("reading"));
+    return load_scene(options.input, options.load, options.threads, bar.listener("reading"));
   }();
   if (!loaded) return loaded.error();
   const FaceCounts faces = count_faces(loaded->scene, options.instances(), options.threads);

@@ -47,11 +47,6 @@ Status make_folder_of(const std::filesystem::path& file) {
   return make_error(ErrorCode::CannotWrite, code.message(), file.parent_path().string());
 }
 
-bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code missing;
-  return std::filesystem::equivalent(a, b, missing);
-}
-
 Status check_replaced(const std::filesystem::path& output, const FileSet& inputs, bool force) {
   if (inputs.contains(output)) {
     return make_error(ErrorCode::InvalidArgument, "an input is never replaced; write to another name", output.string());

@@ -29,9 +29,6 @@ class FileSet {
 /// Makes the folder that a file is to lie in. Errors: CannotWrite.
 [[nodiscard]] Status make_folder_of(const std::filesystem::path& file);
 
-/// Whether both are one file.
-[[nodiscard]] bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
-
 /// Refuses to lose what a person made: to replace one of `inputs`, and, unless `force`, a file that can be read as a
 /// model, a world or a volume. Meshes, pictures and what is no format of ours are replaced.
 [[nodiscard]] Status check_replaced(const std::filesystem::path& output, const FileSet& inputs, bool force);

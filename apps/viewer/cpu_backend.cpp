@@ -52,7 +52,7 @@ struct Stage {
 LightOptions draft_of(LightOptions light) {
   if (light.shading != Shading::Lit) return light;
   light.lamps = std::min(light.lamps, kDraftLamps);
-  if (light.occlusion == OcclusionMode::Rays) light.occlusion = OcclusionMode::Vertex;
+  if (light.occlusion_mode == OcclusionMode::Rays) light.occlusion_mode = OcclusionMode::Vertex;
   return light;
 }
 
@@ -60,17 +60,16 @@ bool has_drafts(const ViewRequest& request) {
   return request.mode == DrawMode::Rays && draft_of(request.light) != request.light;
 }
 
-RenderOptions options_for(const ViewRequest& request, const Stage& stage, Threads threads) {
+RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
   RenderOptions options;
   options.width = stage.width(request);
   options.height = stage.height(request);
   options.samples = stage.samples;
   options.light = stage.is_draft ? draft_of(request.light) : request.light;
-  options.threads = threads;
   // What is shown for a moment does not wait for impostors.
-  if (stage.divisor > 1) options.impostor_seconds = 0.0;
-  options.detail_colours = request.detail_colours;
-  if (request.detail_by_pixels) options.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
+  if (stage.divisor > 1) options.detail.impostor_seconds = 0.0;
+  options.detail.colours = request.detail_colours;
+  if (request.detail_by_pixels) options.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   return options;
 }
 
@@ -83,8 +82,7 @@ Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, c
   slice.axis = request.slice.axis;
   slice.at = request.slice.at;
   slice.instances = options.instances;
-  slice.threads = options.threads;
-  auto drawn = draw_density_slice(scene, slice);
+  auto drawn = draw_density_slice(scene, slice, options.threads);
   if (!drawn) return drawn.error();
   Picture picture;
   picture.colour = std::move(drawn->colour);
@@ -212,11 +210,11 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t number = request_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
-  RenderOptions render = options_for(wanted, now, options.threads);
-  render.selector = &selectors[now.divisor];
+  RenderOptions render = options_for(wanted, now);
+  render.detail.selector = &selectors[now.divisor];
   const auto goes_on = [&](double) { return !halt && (is_first || request_number == number); };
-  auto picture =
-      is_density ? draw_densities(scene, wanted, now, options) : renderer.render(wanted.camera, render, goes_on);
+  auto picture = is_density ? draw_densities(scene, wanted, now, options)
+                            : renderer.render(wanted.camera, render, options.threads, goes_on);
   const double seconds = seconds_since(start);
   lock.lock();
   if (!picture && picture.error().code == ErrorCode::Cancelled) return;
@@ -316,12 +314,12 @@ std::optional<SceneHit> CpuBackend::pick(const Camera& camera, double x, double 
     const std::lock_guard lock(impl_->mutex);
     if (impl_->request && impl_->request->mode == DrawMode::Density) return std::nullopt;
   }
-  return quoin::pick(impl_->renderer.tracer(), camera, x, y, width, height);
+  return quoin::pick(impl_->renderer.tracer(), camera, {x, y, width, height});
 }
 
 std::optional<SlideResult> CpuBackend::slide(const OrientedBox& box, DVec3 displacement, const SlideOptions& options) {
   if (!is_up_to_date()) return std::nullopt;
-  return move_and_slide(impl_->renderer.tracer(), impl_->scene.types, box, displacement, options);
+  return move_and_slide(impl_->renderer.tracer(), box, displacement, options);
 }
 
 bool CpuBackend::is_up_to_date() {

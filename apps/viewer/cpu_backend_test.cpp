@@ -167,7 +167,7 @@ TEST(CpuBackend, WhereThereIsNoTimeMovingPicturesAreDraftsInLessLight) {
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso);
   request.light = natural_light();
-  ASSERT_EQ(request.light.occlusion, OcclusionMode::Rays);
+  ASSERT_EQ(request.light.occlusion_mode, OcclusionMode::Rays);
   for (const Shading shading : {Shading::Lit, Shading::Normals}) {
     request.light.shading = shading;
     watched.backend.show(request);
@@ -178,7 +178,7 @@ TEST(CpuBackend, WhereThereIsNoTimeMovingPicturesAreDraftsInLessLight) {
     first.height = (request.height + 3) / 4;
     first.samples = 1;
     if (shading == Shading::Lit) {
-      first.light.occlusion = OcclusionMode::Vertex;
+      first.light.occlusion_mode = OcclusionMode::Vertex;
       first.light.lamps = std::min(first.light.lamps, 2);
     }
     // A frame that nobody took in time is replaced by the next.
@@ -289,7 +289,7 @@ TEST(CpuBackend, PicksWhatIsSeen) {
   Watched watched(loaded.scene);
   const ViewRequest request = request_for(loaded.scene, View::Top);
   const auto hit = watched.backend.pick(request.camera, 45.0, 30.5, request.width, request.height);
-  const auto same = pick(SceneTracer(loaded.scene), request.camera, 45.0, 30.5, request.width, request.height);
+  const auto same = pick(SceneTracer(loaded.scene), request.camera, {45.0, 30.5, request.width, request.height});
   ASSERT_EQ(hit.has_value(), same.has_value());
   if (hit) {
     EXPECT_EQ(hit->voxel, same->voxel);

@@ -40,7 +40,7 @@ struct DeviceBackend::Impl {
     if (!request || request->mode == DrawMode::Density) return false;
     if (has_meshes(request->mode)) return true;
     // Smooth occlusion of fields is the processor's.
-    return options.rays_on_device && !is_device_gone && request->light.occlusion != OcclusionMode::Smooth;
+    return options.rays_on_device && !is_device_gone && request->light.occlusion_mode != OcclusionMode::Smooth;
   }
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;

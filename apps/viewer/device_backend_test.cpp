@@ -83,8 +83,8 @@ Image by_processor(const Document& document, const ViewRequest& request) {
   options.height = request.height;
   options.samples = request.samples;
   options.light = request.light;
-  options.detail_colours = request.detail_colours;
-  if (request.detail_by_pixels) options.detail.emplace();
+  options.detail.colours = request.detail_colours;
+  if (request.detail_by_pixels) options.detail.policy.emplace();
   return CpuRenderer(document.scene()).render(request.camera, options).value().colour;
 }
 
@@ -147,7 +147,7 @@ TEST_F(DeviceBackendTest, MeshesShowTheScenePromptlyAndFollowEditsAndUndo) {
   const auto backend = backend_of(document);
   ViewRequest request = request_for(document, DrawMode::Blocks);
   request.samples = 1;
-  request.light.occlusion = OcclusionMode::Vertex;
+  request.light.occlusion_mode = OcclusionMode::Vertex;
   request.light.shadows = false;
   backend->show(request);
   auto pictures = settle(*backend);
@@ -200,7 +200,7 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   ViewRequest request = request_for(document, DrawMode::Smooth);
   request.light.shading = Shading::Occlusion;
   const auto shown = [&](const SmoothOcclusionOptions& smooth) {
-    request.light.smooth = smooth;
+    request.light.smooth_occlusion = smooth;
     backend->show(request);
     const auto pictures = settle(*backend);
     return pictures.empty() ? Image{} : pictures.back();
@@ -211,11 +211,11 @@ TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   EXPECT_GT(differing(plain, weighted, 6), 0.005);
   EXPECT_EQ(shown({}).rgb, plain.rgb);
   // Several changes in a row, and an edit among them: the last counts.
-  request.light.smooth.spread = 1.0F;
+  request.light.smooth_occlusion.spread = 1.0F;
   backend->show(request);
   (void)backend->take();
   edit(document, *backend, {30, 12, 20});
-  request.light.smooth.spread = 4.0F;
+  request.light.smooth_occlusion.spread = 4.0F;
   backend->show(request);
   (void)backend->take();
   const Image edited = shown({SmoothOcclusion::Weighted, 3.0F, 0.4F, 2.0F});
@@ -232,7 +232,7 @@ TEST_F(DeviceBackendTest, TheProcessorMarchesRaysWithSmoothOcclusion) {
   ViewRequest request = request_for(document, DrawMode::Rays);
   backend->show(request);
   ASSERT_FALSE(settle(*backend).empty());
-  request.light.occlusion = OcclusionMode::Smooth;
+  request.light.occlusion_mode = OcclusionMode::Smooth;
   backend->show(request);
   const auto pictures = settle(*backend);
   ASSERT_FALSE(pictures.empty());
@@ -273,7 +273,7 @@ TEST_F(DeviceBackendTest, MeshesHaveLevelsOfDetail) {
   ViewRequest request = request_for(document, DrawMode::Blocks);
   request.samples = 1;
   request.detail_by_pixels = true;
-  request.light.occlusion = OcclusionMode::Vertex;
+  request.light.occlusion_mode = OcclusionMode::Vertex;
   request.light.shadows = false;
   backend->show(request);
   ASSERT_FALSE(settle(*backend).empty());

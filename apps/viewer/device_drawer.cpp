@@ -125,7 +125,7 @@ Status DeviceDrawer::prepare_meshes(SurfaceStyle style) {
   meshes_.reset();
   auto drawer = VulkanMeshRenderer::create(*renderer_);
   if (!drawer) return drawer.error();
-  const SmoothOcclusionOptions occlusion = request_->light.smooth;
+  const SmoothOcclusionOptions occlusion = request_->light.smooth_occlusion;
   meshes_.reset(new Meshes{style, occlusion, live_meshes(style, occlusion), std::move(*drawer)});
   is_request_new_ = true;
   return {};
@@ -136,7 +136,7 @@ std::unique_ptr<LiveMeshes> DeviceDrawer::live_meshes(SurfaceStyle style,
   LiveMeshOptions live;
   live.style = style;
   live.instances = options_.cpu.instances;
-  live.threads = options_.cpu.threads;
+  live.workers = options_.cpu.threads;
   live.on_ready = on_surfaces_;
   live.detail_distance = kDetailDistance;
   live.occlusion = occlusion;
@@ -146,10 +146,10 @@ std::unique_ptr<LiveMeshes> DeviceDrawer::live_meshes(SurfaceStyle style,
 // Has all chunks meshed with another occlusion, once those that are under way are done: surfaces stay until the new
 // ones come, and none is left of a chunk that an edit emptied.
 void DeviceDrawer::renew_occlusion() {
-  if (meshes_->occlusion == request_->light.smooth || meshes_->is_scene_new) return;
+  if (meshes_->occlusion == request_->light.smooth_occlusion || meshes_->is_scene_new) return;
   meshes_->live->update(*scene_, request_->camera.position);
   if (meshes_->live->pending() > 0) return;
-  meshes_->occlusion = request_->light.smooth;
+  meshes_->occlusion = request_->light.smooth_occlusion;
   meshes_->live = live_meshes(meshes_->style, meshes_->occlusion);
   is_request_new_ = true;
 }
@@ -200,10 +200,9 @@ MeshPictureOptions DeviceDrawer::mesh_picture() const {
   wanted.samples = samples_;
   wanted.light = request_->light;
   wanted.wireframe = request_->wireframe;
-  wanted.detail_colours = request_->detail_colours;
-  wanted.threads = options_.cpu.threads;
-  if (request_->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
-  if (!waits_) wanted.impostor_seconds = 0.0;
+  wanted.detail.colours = request_->detail_colours;
+  if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
+  if (!waits_) wanted.detail.impostor_seconds = 0.0;
   // Without a graphics card meshes have no light that takes rays, nor glass: such a picture would take seconds.
   if (is_processor()) {
     wanted.light.shadows = false;
@@ -253,14 +252,15 @@ Result<bool> DeviceDrawer::draw_meshes() {
   // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
   waits_ = !is_moving;
   MeshPictureOptions wanted = mesh_picture();
-  wanted.selector = &selectors_[divisor_];
+  wanted.detail.selector = &selectors_[divisor_];
   const Clock::time_point start = Clock::now();
-  if (Status drawn = meshes_->renderer.draw(*picture_, request_->camera, wanted); !drawn) return drawn.error();
+  if (Status drawn = meshes_->renderer.draw(*picture_, request_->camera, wanted, options_.cpu.threads); !drawn)
+    return drawn.error();
   note_mesh_seconds(seconds_since(start), is_moving);
   const bool is_best =
       divisor_ == 1 && samples_ == std::min(request_->samples, kMeshSamples) && (waits_ || !request_->detail_by_pixels);
   // Otherwise the next picture is a better one.
-  is_settled_ = is_best && meshes_->live->pending() == 0 && meshes_->occlusion == request_->light.smooth;
+  is_settled_ = is_best && meshes_->live->pending() == 0 && meshes_->occlusion == request_->light.smooth_occlusion;
   return true;
 }
 
@@ -291,11 +291,11 @@ Status DeviceDrawer::draw_stage() {
   wanted.height = (request_->height + divisor_ - 1) / divisor_;
   wanted.samples = is_new ? 1 : samples_now();
   wanted.light = request_->light;
-  wanted.detail_colours = request_->detail_colours;
-  if (request_->detail_by_pixels) wanted.detail.emplace().rule = DetailPolicy::Rule::ByPixels;
-  wanted.selector = &selectors_[divisor_];
+  wanted.detail.colours = request_->detail_colours;
+  if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
+  wanted.detail.selector = &selectors_[divisor_];
   // What is shown for a moment does not wait for impostors.
-  if (divisor_ > 1) wanted.impostor_seconds = 0.0;
+  if (divisor_ > 1) wanted.detail.impostor_seconds = 0.0;
   const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
   const Clock::time_point start = Clock::now();
   if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, accumulation); !drawn) return drawn;

@@ -66,7 +66,7 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   as_saved.show_hidden = false;
   // Before it is read: what is written meanwhile is not what was read.
   const auto stamp = FileStamp::of(path);
-  auto loaded = load_scene(path, as_saved, progress);
+  auto loaded = load_scene(path, as_saved, {}, progress);
   if (!loaded) return loaded.error();
   auto document = std::make_unique<Document>(std::move(*loaded), path);
   document->stamp_ = stamp;
@@ -211,7 +211,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   if (!of_format) return of_format.error();
   all = std::move(*of_format);
   std::error_code ignored;
-  const bool is_own = path == path_ || std::filesystem::equivalent(path, path_, ignored);
+  const bool is_own = is_same_file(path, path_);
   if (is_own && FileStamp::of(path) != stamp_ && std::filesystem::exists(path, ignored)) {
     all.emplace_back("what another program put into the file since it was opened (kept as " +
                      kept_as(path).filename().string() + ")");
@@ -232,8 +232,9 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
     if (!before) return before.error();
     backup = std::move(*before);
   }
-  const auto written = save_scene(loaded_, path, warnings, {}, progress);
-  if (!written) return written.error();
+  const auto saved = save_scene(loaded_, path, {}, progress);
+  if (!saved) return saved.error();
+  warnings.insert(warnings.end(), saved->warnings.begin(), saved->warnings.end());
   // The file is what it should be; that the one before has another name than it should is not a failure.
   if (Status kept = backup ? backup->keep() : Status(); !kept) warnings.push_back(to_string(kept.error()));
   return {};

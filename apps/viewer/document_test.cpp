@@ -24,8 +24,7 @@ namespace quoin::viewer {
 namespace {
 
 std::vector<std::byte> vox_bytes(const Scene& scene) {
-  std::vector<std::string> warnings;
-  return write_vox(scene, warnings).value();
+  return write_vox(scene).value().bytes;
 }
 
 const Grid& only_grid(const Document& document) {

@@ -85,7 +85,7 @@ std::int64_t sculpt(const Brush& brush, DVec3 centre, const SurfacePlace& first,
     case BrushAction::Smooth:
       return field.smooth(centre, 2.0 * radius, kStrength);
     case BrushAction::Flatten:
-      return field.flatten(centre, 2.0 * radius, first.point, first.normal, kStrength, brush.type);
+      return field.flatten(centre, 2.0 * radius, {first.point, first.normal, kStrength, brush.type});
   }
   return 0;
 }

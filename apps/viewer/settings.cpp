@@ -76,7 +76,7 @@ void read_smooth_occlusion(const Json& object, SmoothOcclusionOptions& options) 
     read_number(object, key, least, most, number);
     value = static_cast<float>(number);
   };
-  read_name(object, "form", kForms, options.form);
+  read_name(object, "form", kForms, options.method);
   read("spread", 0.0625, 4.0, options.spread);
   read("offset", 0.0, 0.99, options.offset);
   read("power", 0.0625, 64.0, options.power);
@@ -98,13 +98,13 @@ void read_light(const Json& object, LightOptions& light) {
   read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
   read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
-  if (!has_occlusion) light.occlusion = OcclusionMode::Off;
-  read_name(object, "occlusion", kOcclusionModes, light.occlusion);
+  if (!has_occlusion) light.occlusion_mode = OcclusionMode::Off;
+  read_name(object, "occlusion", kOcclusionModes, light.occlusion_mode);
   if (const Json* smooth = find(object, "smooth_occlusion"); smooth != nullptr && smooth->is_object()) {
-    read_smooth_occlusion(*smooth, light.smooth);
+    read_smooth_occlusion(*smooth, light.smooth_occlusion);
   }
-  read_number(object, "occlusion_distance", 0.0, 4096.0, light.occlusion_distance);
-  read_number(object, "shadow_distance", 0.0, 4096.0, light.shadow_distance);
+  read_number(object, "occlusion_distance", 0.0, 4096.0, light.occlusion_distance_voxels);
+  read_number(object, "shadow_distance", 0.0, 4096.0, light.shadow_distance_voxels);
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   read_flag(object, "occlusion_darkens_all", is_all);
   light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
@@ -181,13 +181,13 @@ std::string to_json(const Settings& settings) {
                   {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
                    {"shading", kShadings[static_cast<std::size_t>(light.shading)]},
                    {"shadows", light.shadows},
-                   {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion)]},
+                   {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion_mode)]},
                    {"smooth_occlusion",
-                    {{"form", kForms[static_cast<std::size_t>(light.smooth.form)]},
-                     {"spread", light.smooth.spread},
-                     {"offset", light.smooth.offset},
-                     {"power", light.smooth.power}}},
-                   {"occlusion_distance", light.occlusion_distance},
+                    {{"form", kForms[static_cast<std::size_t>(light.smooth_occlusion.method)]},
+                     {"spread", light.smooth_occlusion.spread},
+                     {"offset", light.smooth_occlusion.offset},
+                     {"power", light.smooth_occlusion.power}}},
+                   {"occlusion_distance", light.occlusion_distance_voxels},
                    {"occlusion_darkens_all", light.occlusion_affects == OcclusionAffects::All},
                    {"sun_brightness", light.sun_brightness},
                    {"sky_brightness", light.sky_brightness},
@@ -197,7 +197,7 @@ std::string to_json(const Settings& settings) {
                    {"lamp_brightness", light.lamp_brightness},
                    {"exposure", light.exposure}}},
                  {"recent", settings.recent}};
-  if (std::isfinite(light.shadow_distance)) object["light"]["shadow_distance"] = light.shadow_distance;
+  if (std::isfinite(light.shadow_distance_voxels)) object["light"]["shadow_distance"] = light.shadow_distance_voxels;
   if (settings.ui_scale > 0.0) object["ui_scale"] = settings.ui_scale;
   return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -23,13 +23,13 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.detail_by_pixels = true;
   settings.light.sun = {0.1, 0.2, -0.3};
   settings.light.shadows = false;
-  settings.light.occlusion = OcclusionMode::Off;
+  settings.light.occlusion_mode = OcclusionMode::Off;
   settings.light.occlusion_affects = OcclusionAffects::All;
-  settings.light.smooth = {SmoothOcclusion::WeightedPublished, 0.4F, 0.25F, 3.5F};
+  settings.light.smooth_occlusion = {SmoothOcclusion::WeightedPublished, 0.4F, 0.25F, 3.5F};
   settings.light.exposure = 1.25;
   settings.light.shading = Shading::UnlitWithOcclusion;
-  settings.light.occlusion_distance = 12.5;
-  settings.light.shadow_distance = 64.0;
+  settings.light.occlusion_distance_voxels = 12.5;
+  settings.light.shadow_distance_voxels = 64.0;
   settings.light.sun_brightness = 0.25;
   settings.light.sky_brightness = 0.0;
   settings.light.sky_follows_sun = false;
@@ -60,7 +60,7 @@ TEST(Settings, ComeBackAsTheyWere) {
 TEST(Settings, WhatEarlierVersionsWroteIsRead) {
   const LightOptions light = parse_settings(R"({"light": {"lit": false, "shadows": true, "occlusion": false}})").light;
   EXPECT_EQ(light.shading, Shading::Unlit);
-  EXPECT_EQ(light.occlusion, OcclusionMode::Off);
+  EXPECT_EQ(light.occlusion_mode, OcclusionMode::Off);
   EXPECT_EQ(parse_settings(R"({"light": {"lit": true, "occlusion": true}})").light, Settings{}.light);
 }
 

@@ -47,11 +47,10 @@ std::vector<Counted> file_work() {
   const auto scene = std::make_shared<Scene>(small_terrain());
   const std::filesystem::path folder = std::filesystem::temp_directory_path();
   const std::string stem = "quoin_counts_" + std::to_string(::getpid());
-  std::vector<std::string> warnings;
-  const auto bytes = write_vox(*scene, warnings);
+  const auto written = write_vox(*scene);
   const auto meshes = mesh_scene(*scene, {}, {1});
-  if (!bytes || !meshes) give_up("preparing files");
-  const auto file = std::make_shared<std::vector<std::byte>>(*bytes);
+  if (!written || !meshes) give_up("preparing files");
+  const auto file = std::make_shared<std::vector<std::byte>>(written->bytes);
   const auto meshed = std::make_shared<SceneMeshes>(*meshes);
   const auto picture = std::make_shared<Image>(gradient());
   return {{"files/terrain", [] { (void)small_terrain(); }},
@@ -61,8 +60,7 @@ std::vector<Counted> file_work() {
            }},
           {"files/write_vox",
            [=] {
-             std::vector<std::string> ignored;
-             if (!write_vox(*scene, ignored)) give_up("writing .vox");
+             if (!write_vox(*scene)) give_up("writing .vox");
            }},
           {"files/mesh_scene",
            [=] {

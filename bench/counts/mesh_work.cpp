@@ -6,7 +6,7 @@
 
 #include "bench/smooth_workload.h"
 #include "bench/workloads.h"
-#include "core/instruction_set.h"
+#include "core/made_with_for_tests.h"
 #include "counted.h"
 
 namespace quoin::counts {
@@ -22,7 +22,7 @@ Counted blocky(const std::string& name, workloads::Blocky which, bool occlusion,
   const auto state = std::make_shared<State>(
       State{workloads::blocky_chunk(which), workloads::three_types(), made_with<BlockyMesher>(instructions), {}});
   QuadOptions options;
-  options.occlusion = occlusion;
+  options.bake_occlusion = occlusion;
   options.region = workloads::kInterior;
   return {name, [=] { state->mesher.mesh(isolated(state->chunk), state->types, options, state->quads); }};
 }
@@ -37,7 +37,8 @@ Counted smooth(const std::string& name, workloads::Smooth which, SmoothOcclusion
       State{workloads::density_chunk(workloads::smooth_field(which)), made_with<SmoothMesher>(instructions), {}});
   SmoothOptions options;
   options.border = SmoothBorder::Open;
-  options.occlusion.form = form;
+  options.split_sheets = false;
+  options.occlusion.method = form;
   return {name, [=] {
             DensityNeighbourhood alone;
             alone.chunks[13] = &state->chunk;

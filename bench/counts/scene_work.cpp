@@ -22,12 +22,11 @@ RenderOptions small_picture(bool lit) {
   options.width = 128;
   options.height = 72;
   options.light.shading = lit ? Shading::Lit : Shading::Unlit;
-  options.threads = {1};
   return options;
 }
 
 void take(const World& world, bool lit) {
-  if (world.renderer.render(workloads::over_the_terrain(), small_picture(lit))) return;
+  if (world.renderer.render(workloads::over_the_terrain(), small_picture(lit), {1})) return;
   std::fprintf(stderr, "counts: a picture failed\n");
   std::exit(1);
 }

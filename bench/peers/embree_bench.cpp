@@ -41,7 +41,7 @@ struct Triangles {
 
 Triangles triangles_of(const Grid& grid) {
   BlockyMeshOptions options;
-  options.occlusion = false;
+  options.bake_occlusion = false;
   auto mesh = build_blocky_mesh(grid, workloads::three_types(), options, {1}).value();
   auto& opaque = mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Opaque)];
   return {std::move(opaque.positions), std::move(opaque.indices)};

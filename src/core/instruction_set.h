@@ -51,11 +51,4 @@ class InstructionSetOverride {
   InstructionSet before_;
 };
 
-/// An object whose kernels are those of `set`.
-template <class T>
-[[nodiscard]] T made_with(InstructionSet set) {
-  const InstructionSetOverride over(set);
-  return T();
-}
-
 }  // namespace quoin

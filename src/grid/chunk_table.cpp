@@ -41,7 +41,7 @@ ChunkWindow::ChunkWindow() : air_(&all_air()) {}
 void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch) {
   entries_[cell] = entry;
   epochs_[cell] = epoch;
-  voxels_[cell] = entry == nullptr ? air_ : entry->chunk.storage();
+  voxels_[cell] = entry == nullptr ? air_ : ChunkStorage::of(entry->chunk);
 }
 
 void ChunkWindow::move_to(const Box& box) {

@@ -130,7 +130,7 @@ class ChunkTable {
   }
   /// To be called after every change of a chunk's voxels.
   void voxels_changed(const Slot& slot) {
-    if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != slot.entry->chunk.storage()) {
+    if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != ChunkStorage::of(slot.entry->chunk)) {
       window_.put(slot.cell, slot.entry, epoch());
     }
   }

@@ -24,7 +24,7 @@ VoxelType GridReader::get_elsewhere(int x, int y, int z) {
 VoxelType GridReader::get_in_other_chunk(int x, int y, int z) {
   unknown_ = 0;
   chunk_ = grid_->find_chunk(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift);
-  voxels_ = chunk_ == nullptr ? nullptr : chunk_->storage();
+  voxels_ = chunk_ == nullptr ? nullptr : ChunkStorage::of(*chunk_);
   uniform_ = chunk_ == nullptr ? kAir : chunk_->uniform().value_or(kAir);
   last_x_ = x;
   if (goes_on(x)) return get_in_new_row(x, y, z);

@@ -12,6 +12,8 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
+#include "grid/chunk/chunk_storage.h"
+
 namespace quoin {
 namespace {
 
@@ -112,9 +114,9 @@ TEST(Snapshot, AChunkThatNobodySharesAnyMoreIsEditedInPlace) {
   Grid grid;
   grid.fill_sphere({32, 32, 32}, 20.0, 1);
   { const Grid copy = grid.snapshot(); }
-  const ChunkStorage* const before = grid.find_chunk({0, 0, 0})->storage();
+  const ChunkStorage* const before = ChunkStorage::of(*grid.find_chunk({0, 0, 0}));
   grid.set({32, 32, 32}, 2);
-  EXPECT_EQ(grid.find_chunk({0, 0, 0})->storage(), before);
+  EXPECT_EQ(ChunkStorage::of(*grid.find_chunk({0, 0, 0})), before);
 }
 
 TEST(Snapshot, OfDensitiesStaysAsItWas) {

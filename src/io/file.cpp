@@ -43,19 +43,6 @@ struct DescriptorGuard {
   ~DescriptorGuard() { ::close(descriptor); }
 };
 
-/// The file at the end of a chain of symbolic links, which need not exist.
-std::filesystem::path behind_links(std::filesystem::path path) {
-  constexpr int kMaxLinks = 40;
-  std::error_code error;
-  for (int i = 0; i < kMaxLinks; ++i) {
-    if (!std::filesystem::is_symlink(path, error) || error) break;
-    const std::filesystem::path target = std::filesystem::read_symlink(path, error);
-    if (error) break;
-    path = target.is_absolute() ? target : path.parent_path() / target;
-  }
-  return path;
-}
-
 /// Why there is no folder in which `path` could lie, or nothing when there is one.
 Status check_folder(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.parent_path();
@@ -129,6 +116,24 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
 
 }  // namespace
 
+std::filesystem::path follow_links(std::filesystem::path path) {
+  constexpr int kMaxLinks = 40;
+  std::error_code error;
+  for (int i = 0; i < kMaxLinks && std::filesystem::is_symlink(path, error); ++i) {
+    const std::filesystem::path target = std::filesystem::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / target;
+  }
+  return path;
+}
+
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code missing;
+  if (std::filesystem::equivalent(a, b, missing)) return true;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(follow_links(a), missing);
+  return !missing && whole == std::filesystem::weakly_canonical(follow_links(b), missing) && !missing;
+}
+
 Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
   return read_regular_file(path, std::nullopt);
 }
@@ -139,7 +144,7 @@ Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& 
 
 Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
   AtomicFile file;
-  file.path_ = behind_links(path);
+  file.path_ = follow_links(path);
   std::optional<mode_t> mode;
   Status status = check_folder(file.path_);
   if (status) status = check_replaceable(file.path_, mode);
@@ -242,7 +247,7 @@ Status copy_whole(const std::filesystem::path& from, const std::filesystem::path
 }  // namespace
 
 std::filesystem::path FileBackup::name_for(const std::filesystem::path& path, Older older) {
-  const std::filesystem::path file = behind_links(path);
+  const std::filesystem::path file = follow_links(path);
   if (!is_there(file)) return {};
   std::filesystem::path beside = file;
   beside += "~";
@@ -260,7 +265,7 @@ std::filesystem::path FileBackup::name_for(const std::filesystem::path& path, Ol
 
 Result<FileBackup> FileBackup::of(const std::filesystem::path& path, Older older) {
   FileBackup backup;
-  const std::filesystem::path file = behind_links(path);
+  const std::filesystem::path file = follow_links(path);
   if (!is_there(file)) return backup;
   const std::filesystem::path name = name_for(path, older);
   if (name.empty()) return cannot_write("no name is left for a backup: NAME~ to NAME.~99~ are there", file);

@@ -71,12 +71,13 @@ bool is_volume(const std::optional<FileFormat>& format) {
 
 /// `source`: a path, or bytes.
 template <class Source>
-Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, const Progress& progress) {
+Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, Threads threads,
+                                         const Progress& progress) {
   const auto volume = read_volume(source, {}, part_of(progress, 0.0, 0.5));
   if (!volume) return volume.error();
   VolumeSceneOptions wanted;
   wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
-  auto scene = scene_from_volume(*volume, wanted, options.threads, part_of(progress, 0.5, 1.0));
+  auto scene = scene_from_volume(*volume, wanted, threads, part_of(progress, 0.5, 1.0));
   if (!scene) return scene.error();
   LoadedScene loaded;
   loaded.scene = std::move(*scene);
@@ -86,11 +87,11 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
 }
 
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
-                               const LoadOptions& options, const Progress& progress) {
+                               const LoadOptions& options, Threads threads, const Progress& progress) {
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
-  if (format == FileFormat::Scene) return read_scene_file(bytes, options, progress);
-  if (is_volume(format)) return read_volume_as_scene(bytes, options, progress);
+  if (format == FileFormat::Scene) return read_scene_file(bytes, options, threads, progress);
+  if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
@@ -98,12 +99,50 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   return error;
 }
 
+/// A scene to be saved, and what was read with it, if it was read.
+struct Saved {
+  const Scene& scene;
+  const LoadedScene* loaded = nullptr;
+};
+
 /// What only another .vox file would keep.
-std::vector<std::string> lost_with_source(const LoadedScene& loaded) {
-  if (loaded.source == nullptr) return {};
-  std::vector<std::string> lines = only_in_source(*loaded.source);
+std::vector<std::string> lost_with_source(const Saved& saved) {
+  if (saved.loaded == nullptr || saved.loaded->source == nullptr) return {};
+  std::vector<std::string> lines = only_in_source(*saved.loaded->source);
   for (std::string& line : lines) line.insert(0, "left out, which only .vox keeps: ");
   return lines;
+}
+
+Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
+  const auto format = format_for_writing(path);
+  if (!format) return format.error();
+  if (format->is_mesh) return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
+  return format->format;
+}
+
+Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, Threads threads,
+                        const Progress& progress) {
+  const auto format = format_for_saving(path);
+  if (!format) return format.error();
+  if (*format == FileFormat::Vox) {
+    return saved.loaded != nullptr ? write_vox(*saved.loaded, path) : write_vox(saved.scene, path);
+  }
+  auto file = with_path(scene_file_of(saved.scene), path);
+  if (!file) return file.error();
+  if (saved.loaded != nullptr) {
+    file->sun = saved.loaded->sun;
+    file->camera = saved.loaded->camera;
+  }
+  const auto bytes = write_scene_file(*file, path, threads, progress);
+  if (!bytes) return bytes.error();
+  return SavedScene{*bytes, lost_with_source(saved)};
+}
+
+Result<std::vector<std::string>> losses(const Saved& saved, const std::filesystem::path& path) {
+  const auto format = format_for_saving(path);
+  if (!format) return format.error();
+  if (*format != FileFormat::Vox) return lost_with_source(saved);
+  return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
 }
 
 }  // namespace
@@ -149,33 +188,27 @@ Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
   return make_error(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
 }
 
-Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
-                                 std::vector<std::string>& warnings, Threads threads, const Progress& progress) {
-  const auto format = format_for_writing(path);
-  if (!format) return format.error();
-  if (format->format == FileFormat::Vox) return write_vox(loaded, path, warnings);
-  if (format->format != FileFormat::Scene) {
-    return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
-  }
-  auto file = with_path(scene_file_of(loaded.scene), path);
-  if (!file) return file.error();
-  file->sun = loaded.sun;
-  file->camera = loaded.camera;
-  const std::vector<std::string> lost = lost_with_source(loaded);
-  warnings.insert(warnings.end(), lost.begin(), lost.end());
-  return write_scene_file(*file, path, threads, progress);
+Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads,
+                              const Progress& progress) {
+  return save({scene}, path, threads, progress);
+}
+
+Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path, Threads threads,
+                              const Progress& progress) {
+  return save({loaded.scene, &loaded}, path, threads, progress);
+}
+
+Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path) {
+  return losses({scene}, path);
 }
 
 Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, const std::filesystem::path& path) {
-  const auto format = format_for_writing(path);
-  if (!format) return format.error();
-  if (format->format == FileFormat::Vox) return with_path(losses_of_vox(loaded), path);
-  if (format->is_mesh) return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
-  return lost_with_source(loaded);
+  return losses({loaded.scene, &loaded}, path);
 }
 
-Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, const Progress& progress) {
-  return read_bytes({}, bytes, options, progress);
+Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
+  return read_bytes({}, bytes, options, threads, progress);
 }
 
 std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path) {
@@ -185,16 +218,16 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
   return **format == FileFormat::Nifti ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }
 
-Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options,
+Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   // A volume's reader is given the path, which may lead to what lies beside it.
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, progress), path);
+  if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
-  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, progress);
-  return with_path(read_bytes(path, *bytes, options, progress), path);
+  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
+  return with_path(read_bytes(path, *bytes, options, threads, progress), path);
 }
 
 }  // namespace quoin

@@ -106,7 +106,7 @@ Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& o
 
 /// As the options want them.
 Result<SceneMeshes> as_written(const SceneMeshes& meshes, const MeshFileOptions& options) {
-  return in_axes_of_file(options.occlusion ? meshes : without_occlusion(meshes), options);
+  return in_axes_of_file(options.write_occlusion ? meshes : without_occlusion(meshes), options);
 }
 
 const Progress kNobody;

@@ -164,7 +164,7 @@ TEST_F(SmoothMeshFiles, ColoursAreAlbedoDarkenedByOcclusion) {
   const SmoothMesh& mesh = parts_[0].mesh;
   for (const Format& format : kFormats) {
     for (const bool occlusion : {true, false}) {
-      const WorldMesh world = write(format, {.occlusion = occlusion});
+      const WorldMesh world = write(format, {.write_occlusion = occlusion});
       ASSERT_EQ(world.colours.size(), mesh.positions.size());
       for (std::size_t i = 0; i < world.colours.size(); ++i) {
         for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -413,7 +413,7 @@ TEST(MeshFiles, OcclusionIsAnAttributeOfItsOwnWhereThatIsWanted) {
   EXPECT_EQ(obj.error().code, ErrorCode::Unsupported);
 
   // Without occlusion there is none to write; PLY has one kind of vertex for all.
-  options.occlusion = false;
+  options.write_occlusion = false;
   const ParsedGlb plain = parse_glb(*write_mesh(*meshes, FileFormat::Glb, options));
   EXPECT_FALSE(plain.document["meshes"][1]["primitives"][0]["attributes"].contains("_AO"));
   EXPECT_EQ(ply_occlusion(*write_mesh(*meshes, FileFormat::Ply, options), both.size()),

@@ -61,8 +61,8 @@ bool shines(const Lamp& lamp) {
       is_finite(lamp.position) && std::isfinite(lamp.intensity) && is_finite(DVec3(lamp.colour));
   if (!is_finite_lamp || !(lamp.intensity > 0.0) || !(lamp.range > 0.0)) return false;
   if (lamp.kind == Lamp::Kind::Point) return true;
-  return is_finite(lamp.direction) && lamp.direction != DVec3(0.0) && std::isfinite(lamp.inner_angle) &&
-         std::isfinite(lamp.outer_angle);
+  return is_finite(lamp.direction) && lamp.direction != DVec3(0.0) && std::isfinite(lamp.inner_angle_radians) &&
+         std::isfinite(lamp.outer_angle_radians);
 }
 
 PlacedLamp placed_lamp(const Lamp& from, double brightness) {
@@ -74,8 +74,9 @@ PlacedLamp placed_lamp(const Lamp& from, double brightness) {
   if (from.kind == Lamp::Kind::Point) return lamp;
   const DVec3 size = glm::abs(from.direction);
   lamp.direction = glm::normalize(from.direction / std::max({size.x, size.y, size.z}));
-  lamp.cos_inner = std::cos(std::clamp(from.inner_angle, 0.0, std::numbers::pi));
-  lamp.cos_outer = std::min(std::cos(std::clamp(from.outer_angle, 0.0, std::numbers::pi)), lamp.cos_inner - 1e-6);
+  lamp.cos_inner = std::cos(std::clamp(from.inner_angle_radians, 0.0, std::numbers::pi));
+  lamp.cos_outer =
+      std::min(std::cos(std::clamp(from.outer_angle_radians, 0.0, std::numbers::pi)), lamp.cos_inner - 1e-6);
   return lamp;
 }
 

@@ -22,10 +22,10 @@ Status check(const LightOptions& options) {
   if (options.occlusion_rays < 1 || options.occlusion_rays > 4096) {
     return refuse("occlusion rays: must be 1 to 4096");
   }
-  if (!std::isfinite(options.occlusion_distance) || options.occlusion_distance < 0.0) {
+  if (!std::isfinite(options.occlusion_distance_voxels) || options.occlusion_distance_voxels < 0.0) {
     return refuse("occlusion distance: must be finite and not negative");
   }
-  if (!(options.shadow_distance >= 0.0)) return refuse("shadow distance: must not be negative");
+  if (!(options.shadow_distance_voxels >= 0.0)) return refuse("shadow distance: must not be negative");
   if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
     return refuse("exposure: must be finite and not negative");
   }

@@ -18,7 +18,7 @@ TEST(LightOptions, DefaultsAndLimitsAreAccepted) {
   LightOptions options;
   options.sun = {0, -1e-300, 0};
   options.occlusion_rays = 4096;
-  options.occlusion_distance = options.shadow_distance = options.exposure = 0.0;
+  options.occlusion_distance_voxels = options.shadow_distance_voxels = options.exposure = 0.0;
   EXPECT_TRUE(check(options).has_value());
 }
 
@@ -46,10 +46,10 @@ TEST(LightOptions, ImpossibleOnesAreRefusedByName) {
   expect_refused("sun", [](LightOptions& o) { o.sun.z = kInfinity; });
   expect_refused("occlusion rays", [](LightOptions& o) { o.occlusion_rays = 0; });
   expect_refused("occlusion rays", [](LightOptions& o) { o.occlusion_rays = 4097; });
-  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance = -1; });
-  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance = kInfinity; });
-  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance = kNan; });
-  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance = -1; });
+  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance_voxels = -1; });
+  expect_refused("occlusion distance", [](LightOptions& o) { o.occlusion_distance_voxels = kInfinity; });
+  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance_voxels = kNan; });
+  expect_refused("shadow distance", [](LightOptions& o) { o.shadow_distance_voxels = -1; });
   expect_refused("exposure", [](LightOptions& o) { o.exposure = -0.5; });
   expect_refused("exposure", [](LightOptions& o) { o.exposure = kNan; });
 }

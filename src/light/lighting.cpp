@@ -118,7 +118,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
 }
 
 bool Lighting::needs_openness() const {
-  return options_.occlusion != OcclusionMode::Off && options_.shading != Shading::Unlit &&
+  return options_.occlusion_mode != OcclusionMode::Off && options_.shading != Shading::Unlit &&
          options_.shading != Shading::Normals;
 }
 
@@ -189,7 +189,7 @@ std::int64_t Lighting::find_sunlight(const Group& group, std::span<Vec3> sunligh
   rays.direction_x.fill(frame.to_sun.x);
   rays.direction_y.fill(frame.to_sun.y);
   rays.direction_z.fill(frame.to_sun.z);
-  rays.max_t.fill(options_.shadow_distance / voxels_per_cell(group.placed));
+  rays.max_t.fill(options_.shadow_distance_voxels / voxels_per_cell(group.placed));
   return shadow(group, rays, sunlight);
 }
 
@@ -278,11 +278,11 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   for (std::size_t i = 0; i < group.size; ++i) openness[i] = std::max(group.points[i]->openness, 0.0F);
   if (group.unknown == 0) return 0;
   // A field has no faces with corners.
-  std::uint32_t traced = options_.occlusion == OcclusionMode::Rays ? group.unknown : 0;
+  std::uint32_t traced = options_.occlusion_mode == OcclusionMode::Rays ? group.unknown : 0;
   std::uint32_t found = 0;
   for (std::size_t i = 0; i < group.size; ++i) {
     if ((group.unknown >> i & 1U) == 0 || !group.points[i]->in_field) continue;
-    if (options_.occlusion == OcclusionMode::Smooth) {
+    if (options_.occlusion_mode == OcclusionMode::Smooth) {
       openness[i] = smooth_openness(*group.points[i]);
       found |= 1U << i;
     } else {
@@ -310,7 +310,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
 float Lighting::smooth_openness(const SurfacePoint& point) const {
   const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
   if (placed.opaque_field == nullptr) return 1.0F;  // glass darkens nothing
-  SmoothOcclusionOptions options = options_.smooth;
+  SmoothOcclusionOptions options = options_.smooth_occlusion;
   options.spread /= static_cast<float>(placed.voxels_per_cell());  // as far as in the full field
   return 1.0F - smooth_occlusion(placed.opaque_field->field(), point.position, point.normal, options);
 }
@@ -319,7 +319,7 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
   rays.active = lanes;
-  rays.max_t.fill(options_.occlusion_distance / voxels_per_cell(group.placed));
+  rays.max_t.fill(options_.occlusion_distance_voxels / voxels_per_cell(group.placed));
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);
@@ -393,7 +393,7 @@ Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness)
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {
     Vec3 light(0.0F);
-    if (options_.occlusion == OcclusionMode::Off) {
+    if (options_.occlusion_mode == OcclusionMode::Off) {
       light = sky_ * kAmbientWithoutOcclusion * daylight_.ambient + direct;
     } else if (options_.occlusion_affects == OcclusionAffects::Ambient) {
       light = sky_ * kAmbient * openness * daylight_.ambient + direct;

@@ -181,8 +181,8 @@ void follow_live(benchmark::State& state, SurfaceStyle style) {
   World world(static_cast<int>(state.range(0)));
   LiveMeshOptions options;
   options.style = style;
-  options.occlusion.form = SmoothOcclusion::None;
-  options.threads = {1};
+  options.occlusion.method = SmoothOcclusion::None;
+  options.workers = {1};
   LiveMeshes meshes(options);
   meshes.finish(world.scene, {});
   (void)meshes.take();

@@ -128,7 +128,7 @@ void dig(DensityGrid& field, std::mt19937& random, int chunks) {
 
 LiveMeshOptions options_of(unsigned threads) {
   LiveMeshOptions options;
-  options.threads = {threads};
+  options.workers = {threads};
   return options;
 }
 

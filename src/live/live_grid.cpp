@@ -12,7 +12,7 @@ namespace {
 bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   if (chunk == nullptr) return false;
   if (const auto uniform = chunk->uniform()) return *uniform != kAir;
-  return chunk->storage()->layer_counts[axis][0] != 0;
+  return ChunkStorage::of(*chunk)->layer_counts[axis][0] != 0;
 }
 
 // Quads belong to the chunk in which their lattice edge starts: it, or the next one along the edge, has a solid sample.

@@ -109,7 +109,7 @@ void dig(benchmark::State& state, bool corner) {
   DensityGrid& field = scene.edit(instance.grid).field;
   const DVec3 at = corner ? DVec3(128.0) : DVec3(96.0);
   LiveMeshOptions options;
-  options.threads = {1};
+  options.workers = {1};
   LiveMeshes meshes(options);
   meshes.finish(scene, at);
   fail_unless(!meshes.take().empty(), "nothing was meshed");

@@ -16,7 +16,7 @@ class LiveMeshesOf : public testing::TestWithParam<SurfaceStyle> {
   LiveMeshOptions options(unsigned threads = 2) const {
     LiveMeshOptions options;
     options.style = GetParam();
-    options.threads = {threads};
+    options.workers = {threads};
     return options;
   }
 };
@@ -33,7 +33,7 @@ TEST_P(LiveMeshesOf, RandomEditsEndAsAFreshStart) {
     LiveMeshOptions wanted = options(1 + seed % 3);
     wanted.merge = seed % 2 == 0;
     wanted.instances = seed % 5 == 0 ? InstanceFilter::All : InstanceFilter::Visible;
-    if (seed % 4 == 1) wanted.occlusion.form = SmoothOcclusion::None;
+    if (seed % 4 == 1) wanted.occlusion.method = SmoothOcclusion::None;
     SceneEditor editor(seed);
     LiveMeshes meshes(wanted);
     ShownSurfaces shown;

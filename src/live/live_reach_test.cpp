@@ -25,7 +25,7 @@ class FollowedGrid {
   static LiveMeshOptions options_of(SurfaceStyle style) {
     LiveMeshOptions options;
     options.style = style;
-    options.threads = {2};
+    options.workers = {2};
     return options;
   }
   // How many chunks were meshed since the last call, and which were given.

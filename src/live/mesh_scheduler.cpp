@@ -37,7 +37,7 @@ struct MeshScheduler::Candidate {
 
 MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work)
     : options_(options),
-      workers_(worker_count(options.threads)),
+      workers_(worker_count(options.workers)),
       max_ahead_(jobs_ahead(options.style, workers_)),
       queue_(workers_, std::move(work), options.on_ready) {}
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "grid/chunk/chunk_storage.h"
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -63,7 +64,7 @@ class GatedWork {
 LiveMeshOptions blocky(unsigned threads) {
   LiveMeshOptions options;
   options.merge = false;
-  options.threads = {threads};
+  options.workers = {threads};
   return options;
 }
 
@@ -119,7 +120,7 @@ TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   }
   GatedWork gated(blocky(1));
   MeshScheduler scheduler(blocky(1), gated.work());
-  const auto storage = [&](int chunk) { return one.grid().find_chunk({chunk, 0, 0})->storage(); };
+  const auto storage = [&](int chunk) { return ChunkStorage::of(*one.grid().find_chunk({chunk, 0, 0})); };
   scheduler.update(one.scene, {});
   gated.wait_for_started(1);
   const ChunkStorage* before = storage(90);
@@ -279,7 +280,7 @@ TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
   int calls = 0;
   LiveMeshOptions options;
   options.style = SurfaceStyle::Smooth;
-  options.threads = {1};
+  options.workers = {1};
   options.on_ready = [&] {
     const std::lock_guard lock(mutex);
     ++calls;

@@ -26,7 +26,8 @@ CameraRays::CameraRays(const Camera& camera, int width, int height)
       height_(height),
       is_perspective_(camera.projection == Camera::Projection::Perspective),
       forward_(camera.forward) {
-  const double picture_height = is_perspective_ ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height;
+  const double picture_height =
+      is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
   const double pixel = picture_height / height;
   right_ = camera.right * pixel;
   down_ = camera.up * -pixel;

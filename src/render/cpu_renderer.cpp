@@ -72,8 +72,8 @@ struct CpuRenderer::Impl {
   DetailChooser detail;
   LampCache lamps;
 
-  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const RenderOptions& render) {
-    return lamps.table(*scene, render.light, render.threads, [this] { return lamp_places(); });
+  [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const LightOptions& light, Threads threads) {
+    return lamps.table(*scene, light, threads, [this] { return lamp_places(); });
   }
   [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
@@ -118,7 +118,7 @@ void CpuRenderer::update(Threads threads) {
   impl_->lamps.update();
 }
 
-Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options,
+Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return status.error();
   QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
@@ -128,21 +128,21 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->instances, camera, options);
   keep_whole(detail.far.instances, detail.selected);
   Subject subject;
-  if (options.detail) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, options.threads));
+  if (options.detail.policy) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, threads));
   subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position);
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
-  const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options);
+  const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options.light, threads);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, lamps.get(),
-                          options.detail_colours);
+                          options.detail.colours);
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
   const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;
   const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
   ProgressOfTiles done(progress, tiles * static_cast<std::size_t>(options.samples));
-  parallel_for(tiles, options.threads, [&](std::size_t i) {
+  parallel_for(tiles, threads, [&](std::size_t i) {
     if (done.is_cancelled()) return;
     const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * Tile::kEdge;
     const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * Tile::kEdge;

@@ -16,10 +16,9 @@ void picture(benchmark::State& state, const LightOptions& light, Threads threads
   fail_unless(scene.voxel_count() == workloads::kPictureVoxels, "the number of voxels", scene.voxel_count());
   const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   RenderOptions options;
-  options.threads = threads;
   options.light = light;
   workloads::time_pictures(state, options, [&](const Camera& camera, const RenderOptions& wanted) {
-    return renderer.render(camera, wanted);
+    return renderer.render(camera, wanted, threads);
   });
 }
 
@@ -37,7 +36,7 @@ void unlit(benchmark::State& state) {
 }
 void vertex(benchmark::State& state) {
   LightOptions light;
-  light.occlusion = OcclusionMode::Vertex;
+  light.occlusion_mode = OcclusionMode::Vertex;
   picture(state, light);
 }
 BENCHMARK(full)->Name("render/terrain/1280x720")->Unit(benchmark::kMillisecond)->Iterations(5);

@@ -49,14 +49,12 @@ TEST(CpuRenderer, GivesTheSameBytesForAnyThreadsAndInstructions) {
     RenderOptions options = sized(101, 67);
     options.samples = 2;
     options.light.occlusion_rays = occlusion_rays;
-    options.threads = {1};
-    const auto reference = renderer.render(camera, options);
+    const auto reference = renderer.render(camera, options, {1});
     ASSERT_TRUE(reference.has_value());
     for (const unsigned threads : {2U, 0U}) {
       for (const InstructionSet set : sets_of_this_machine()) {
         const InstructionSetOverride over(set);
-        options.threads = {threads};
-        const auto picture = renderer.render(camera, options);
+        const auto picture = renderer.render(camera, options, {threads});
         ASSERT_TRUE(picture.has_value());
         EXPECT_EQ(picture->colour.rgb, reference->colour.rgb);
         EXPECT_EQ(picture->depth.values, reference->depth.values);
@@ -72,12 +70,13 @@ TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
   double last = 0.0;
   std::atomic<int> inside{0};
   bool is_fine = true;
-  const auto picture = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(200, 100), [&](double done) {
-    is_fine &= ++inside == 1 && done >= last;
-    last = done;
-    --inside;
-    return true;
-  });
+  const auto picture =
+      CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(200, 100), {}, [&](double done) {
+        is_fine &= ++inside == 1 && done >= last;
+        last = done;
+        --inside;
+        return true;
+      });
   ASSERT_TRUE(picture.has_value());
   EXPECT_TRUE(is_fine);
   EXPECT_EQ(last, 1.0);
@@ -86,8 +85,8 @@ TEST(CpuRenderer, ProgressNeverFallsAndReachesOne) {
 TEST(CpuRenderer, StopsWhenTold) {
   const Scene scene = lively_scene();
   int calls = 0;
-  const auto picture =
-      CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), [&](double) { return ++calls < 3; });
+  const auto picture = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), sized(300, 300), {},
+                                                 [&](double) { return ++calls < 3; });
   ASSERT_FALSE(picture.has_value());
   EXPECT_EQ(picture.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(calls, 3);
@@ -99,11 +98,11 @@ TEST(CpuRenderer, TellsOfEverySampleAndStopsAmongThem) {
   options.samples = 50;
   int calls = 0;
   const auto count = [&](double) { return ++calls != 7; };
-  const auto stopped = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, count);
+  const auto stopped = CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, {}, count);
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(calls, 7);
-  ASSERT_TRUE(CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, count).has_value());
+  ASSERT_TRUE(CpuRenderer(scene).render(towards({25, 18, 30}, {0, 2, 0}), options, {}, count).has_value());
   EXPECT_EQ(calls, 57);
 }
 
@@ -130,7 +129,7 @@ TEST(CpuRenderer, RefusesWhatCannotBe) {
   expect_refused("camera", [](Camera& c, RenderOptions&) { c.forward = DVec3(0.0); });
   expect_refused("camera", [](Camera& c, RenderOptions&) { c.up.x = kNan; });
   for (const double angle : {0.0, -1.0, std::numbers::pi, 4.0, kNan, kInfinity}) {
-    expect_refused("camera", [&](Camera& c, RenderOptions&) { c.vertical_fov = angle; });
+    expect_refused("camera", [&](Camera& c, RenderOptions&) { c.vertical_fov_radians = angle; });
     expect_refused("camera", [&](Camera& c, RenderOptions&) {
       c.projection = Camera::Projection::Orthographic;
       c.view_height = angle > 0.0 && angle < 10.0 ? 0.0 : angle;
@@ -239,7 +238,7 @@ TEST(CameraRays, AreThoseThatPickThePixel) {
     RayPacket rays;
     CameraRays(camera, 37, 21).block(12, 8, {0.25, 0.75}, rays);
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
-      const Ray expected = ray_through(camera, 12 + lane % 4 + 0.25, 8 + lane / 4 + 0.75, 37, 21);
+      const Ray expected = ray_through(camera, {12 + lane % 4 + 0.25, 8 + lane / 4 + 0.75, 37, 21});
       const Ray in_view = rays.ray(lane);
       EXPECT_NEAR(glm::distance(in_view.origin + camera.position, expected.origin), 0.0, 1e-12);
       EXPECT_NEAR(glm::distance(in_view.direction, expected.direction), 0.0, 1e-12);
@@ -258,9 +257,9 @@ class UpdatedRenderer {
     RenderOptions options = sized(90, 60);
     renderer_.update();
     for (const bool detail : {true, false}) {
-      options.detail.reset();
+      options.detail.policy.reset();
       // Far all of them: drawn from impostors.
-      if (detail) options.detail.emplace().far_pixels = 1000;
+      if (detail) options.detail.policy.emplace().far_pixels = 1000;
       const auto updated = renderer_.render(camera, options);
       const Picture fresh = taken(scene_, camera, options);
       ASSERT_TRUE(updated.has_value());

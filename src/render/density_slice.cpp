@@ -129,7 +129,7 @@ Status check(const DensitySliceOptions& options) {
 
 }  // namespace
 
-Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOptions& options) {
+Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOptions& options, Threads threads) {
   if (Status right = check(options); !right) return right.error();
   const std::vector<PlacedField> fields = fields_of(scene, options.instances);
   const DBox box = bounds_of(fields);
@@ -143,7 +143,7 @@ Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOp
   slice.colour = {options.width, options.height, {}};
   slice.colour.rgb.resize(3 * width * static_cast<std::size_t>(options.height));
   std::vector<std::int64_t> solid(static_cast<std::size_t>(options.height));
-  parallel_for(solid.size(), options.threads, [&](std::size_t y) {
+  parallel_for(solid.size(), threads, [&](std::size_t y) {
     // With one row and one column more, for the lines.
     const auto value = [&](std::size_t x, std::size_t row) {
       return value_at(fields, plane, plane.at(static_cast<int>(x), static_cast<int>(row)));

@@ -70,10 +70,8 @@ TEST(DensitySlice, MovesAlongItsAxisAndIsTheSameWithAnyThreads) {
   const Scene scene = ball();
   DensitySliceOptions options;
   options.at = 0.9;
-  options.threads = {1};
-  const auto top = draw_density_slice(scene, options);
-  options.threads = {3};
-  const auto again = draw_density_slice(scene, options);
+  const auto top = draw_density_slice(scene, options, {1});
+  const auto again = draw_density_slice(scene, options, {3});
   options.at = 0.5;
   const auto middle = draw_density_slice(scene, options);
   ASSERT_TRUE(top && again && middle);

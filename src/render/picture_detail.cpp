@@ -9,11 +9,11 @@ namespace {
 
 std::vector<SelectedInstance> select(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options) {
-  DetailPolicy policy = *options.detail;
+  DetailPolicy policy = *options.detail.policy;
   policy.instances = filter;
   std::vector<SelectedInstance> selected;
   DetailSelector without_memory;
-  DetailSelector& selector = options.selector != nullptr ? *options.selector : without_memory;
+  DetailSelector& selector = options.detail.selector != nullptr ? *options.detail.selector : without_memory;
   selector.select(scene, camera, options.width, options.height, policy, selected);
   return selected;
 }
@@ -33,7 +33,7 @@ void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> se
 PictureDetail DetailChooser::choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                     const RenderOptions& options) {
   PictureDetail detail;
-  if (!options.detail) return detail;
+  if (!options.detail.policy) return detail;
   detail.selected = select(scene, filter, camera, options);
   detail.far = take_far(scene, detail.selected, options);
   return detail;
@@ -45,8 +45,8 @@ FarImpostors DetailChooser::take_far(const Scene& scene, const std::vector<Selec
   if (std::none_of(selected.begin(), selected.end(), is_far)) return {};
   // Pictures that wait do so one after another: none ends a round in which another's impostors must not be dropped.
   std::unique_lock lock(waiting_, std::defer_lock);
-  if (options.impostor_seconds == std::numeric_limits<double>::infinity()) lock.lock();
-  return take_impostors(impostors_, scene, selected, options.impostor_seconds, {options.impostor_edge});
+  if (options.detail.impostor_seconds == std::numeric_limits<double>::infinity()) lock.lock();
+  return take_impostors(impostors_, scene, selected, options.detail.impostor_seconds, {options.detail.impostor_edge});
 }
 
 }  // namespace quoin

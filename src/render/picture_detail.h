@@ -27,10 +27,10 @@ void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> se
 /// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
 class DetailChooser {
  public:
-  /// `threads`: those that build impostors; as ImpostorCacheOptions.
+  /// `threads`: those that build impostors; as ImpostorCacheOptions::workers.
   explicit DetailChooser(Threads threads = {}) : impostors_({FarImpostors::kMaxBytes, threads}) {}
 
-  /// Nothing without RenderOptions::detail. Requires: nobody edits the scene meanwhile; it is always the same one.
+  /// Nothing without DetailOptions::policy. Requires: nobody edits the scene meanwhile; it is always the same one.
   [[nodiscard]] PictureDetail choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options);
 

@@ -17,7 +17,7 @@ Status check_camera(const Camera& camera) {
     if (!(std::abs(glm::dot(axis, axis) - 1.0) < 1e-3)) return refuse("camera: directions must be unit vectors");
   }
   if (camera.projection == Camera::Projection::Perspective) {
-    if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
+    if (!(camera.vertical_fov_radians > 0.0 && camera.vertical_fov_radians < std::numbers::pi)) {
       return refuse("camera: field of view must be more than 0 and less than pi radians (180 degrees)");
     }
   } else if (!(camera.view_height > 0.0) || !std::isfinite(camera.view_height)) {
@@ -34,8 +34,9 @@ Status check(const Camera& camera, const RenderOptions& options) {
   if (std::int64_t{options.width} * options.height > kMaxPixels) {
     return refuse("size: more than 268,435,456 pixels");
   }
-  if (std::isnan(options.impostor_seconds)) return refuse("impostor_seconds: must be a number");
-  if (options.impostor_edge < 16 || options.impostor_edge > 1024) return refuse("impostor_edge: must be 16 to 1024");
+  if (std::isnan(options.detail.impostor_seconds)) return refuse("impostor_seconds: must be a number");
+  if (options.detail.impostor_edge < 16 || options.detail.impostor_edge > 1024)
+    return refuse("impostor_edge: must be 16 to 1024");
   if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
   if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
   return check(options.light);

@@ -168,7 +168,7 @@ Closeness closeness_at(const Model& model, const Camera& camera, const DetailPol
   options.samples = 64;
   const CpuRenderer renderer(model.scene);
   const Picture near = renderer.render(camera, options).value();
-  options.detail = policy;
+  options.detail.policy = policy;
   return closeness(near, renderer.render(camera, options).value());
 }
 
@@ -263,9 +263,9 @@ Model blobs(VoxelType* glass = nullptr) {
 
 RenderOptions always_mid() {
   RenderOptions options = sized(64, 64);
-  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
-  options.detail->near_radii = 0.0;
-  options.detail->mid_radii = 1e9;
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = 0.0;
+  options.detail.policy->mid_radii = 1e9;
   return options;
 }
 
@@ -279,18 +279,18 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
   const Instance& full = model.scene.instances()[model.instance];
   const SceneGrid& full_grid = model.scene.grids()[full.grid];
   SceneGrid grid;
-  grid.grid = halved(full_grid.grid, coarse.types);
+  grid.grid = downsample(full_grid.grid, coarse.types);
   grid.pivot = full_grid.pivot / 2.0;
   Instance instance = full;
   instance.grid = coarse.add_grid(std::move(grid));
   instance.voxel_size = 2.0;
   coarse.add_instance(instance);
   RenderOptions options = always_mid();
-  options.light.shadow_distance = 8.0;
+  options.light.shadow_distance_voxels = 8.0;
   const Picture mid = taken(model.scene, camera, options);
   RenderOptions expected = sized(64, 64);
-  expected.light.occlusion_distance /= 2.0;
-  expected.light.shadow_distance = 4.0;
+  expected.light.occlusion_distance_voxels /= 2.0;
+  expected.light.shadow_distance_voxels = 4.0;
   const Picture other = taken(coarse, camera, expected);
   EXPECT_EQ(mid.depth.values, other.depth.values);
   EXPECT_GT(mid.pixels_hit, 300);
@@ -308,19 +308,19 @@ TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
   Instance instance = model.scene.instances()[model.instance];
   const SceneGrid& full = model.scene.grids()[instance.grid];
   SceneGrid grid;
-  grid.grid = halved(full.grid, coarse.types);
-  grid.field = halved(full.field);
+  grid.grid = downsample(full.grid, coarse.types);
+  grid.field = downsample(full.field);
   grid.pivot = full.pivot / 2.0;
   instance.grid = coarse.add_grid(std::move(grid));
   instance.voxel_size = 2.0;
   coarse.add_instance(instance);
   for (const OcclusionMode mode : {OcclusionMode::Rays, OcclusionMode::Smooth}) {
     RenderOptions options = always_mid();
-    options.light.occlusion = mode;
+    options.light.occlusion_mode = mode;
     RenderOptions expected = sized(64, 64);
     expected.light = options.light;
-    expected.light.occlusion_distance /= 2.0;
-    expected.light.smooth.spread /= 2.0F;
+    expected.light.occlusion_distance_voxels /= 2.0;
+    expected.light.smooth_occlusion.spread /= 2.0F;
     const Picture mid = taken(model.scene, camera, options);
     const Picture other = taken(coarse, camera, expected);
     EXPECT_EQ(mid.depth.values, other.depth.values);
@@ -363,12 +363,12 @@ TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
   Instance instance = model.scene.instances()[model.instance];
   SceneGrid grid;
   grid.pivot = model.scene.grids()[instance.grid].pivot / 2.0;
-  grid.grid = halved(voxels, coarse.types);
+  grid.grid = downsample(voxels, coarse.types);
   instance.grid = coarse.add_grid(std::move(grid));
   instance.voxel_size = 2.0;
   coarse.add_instance(instance);
   RenderOptions expected = sized(64, 64);
-  expected.light.occlusion_distance /= 2.0;
+  expected.light.occlusion_distance_voxels /= 2.0;
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   EXPECT_LE(count_different(taken(model.scene, camera, always_mid()), taken(coarse, camera, expected), 2), 8);
 }
@@ -378,7 +378,7 @@ TEST(RenderDetail, NearIsThePictureWithoutDetailToTheByte) {
   const Camera camera = towards({30, 25, 40}, {0, 0, 0}, 0.9);
   RenderOptions options = sized(64, 64);
   const Picture plain = taken(model.scene, camera, options);
-  options.detail.emplace().far_pixels = 0;
+  options.detail.policy.emplace().far_pixels = 0;
   const Picture detailed = taken(model.scene, camera, options);
   EXPECT_EQ(plain.colour.rgb, detailed.colour.rgb);
   EXPECT_EQ(plain.depth.values, detailed.depth.values);
@@ -389,11 +389,9 @@ TEST(RenderDetail, TheSameBytesAtAnyNumberOfThreadsAndAgain) {
   const CpuRenderer renderer(model.scene);
   const Camera camera = towards({300, 250, 400}, {0, 0, 0}, 0.2);
   RenderOptions options = sized(64, 64);
-  options.detail.emplace();
-  options.threads = {1};
-  const Picture one = renderer.render(camera, options).value();
-  options.threads = {4};
-  EXPECT_EQ(renderer.render(camera, options).value().colour.rgb, one.colour.rgb);
+  options.detail.policy.emplace();
+  const Picture one = renderer.render(camera, options, {1}).value();
+  EXPECT_EQ(renderer.render(camera, options, {4}).value().colour.rgb, one.colour.rgb);
   EXPECT_EQ(CpuRenderer(model.scene).render(camera, options).value().colour.rgb, one.colour.rgb);
 }
 
@@ -408,7 +406,7 @@ TEST(RenderDetail, WhatIsOutOfThePictureStillCastsItsShadow) {
   const InstanceHandle handle = place(scene, std::move(roof), {0, 90, 0});
   RenderOptions options = sized(4, 4);
   options.light.sun = {0, 1, 0};
-  options.detail.emplace().far_pixels = 0;
+  options.detail.policy.emplace().far_pixels = 0;
   const Camera camera = from_above(0, 30, 0, 4);
   const Pixel shadowed = pixel_at(taken(scene, camera, options), 1, 1);
   scene.remove_instance(handle);
@@ -422,10 +420,10 @@ TEST(RenderDetail, ColoursTellTheDetail) {
   slab.fill_box({{-208, -16, -208}, {208, 0, 208}}, type);
   place(scene, std::move(slab));
   RenderOptions options = sized(4, 4);
-  options.detail_colours = true;
+  options.detail.colours = true;
   options.light.shading = Shading::Unlit;
   const auto colour_with = [&](const DetailPolicy& policy, double view_height) {
-    options.detail = policy;
+    options.detail.policy = policy;
     return pixel_at(taken(scene, from_above(0.5, 10, 0.5, view_height), options), 1, 1);
   };
   DetailPolicy policy;
@@ -459,12 +457,12 @@ TEST(RenderDetail, NoViewTremblesAtAnyThreshold) {
   const Model model = blobs();
   const CpuRenderer renderer(model.scene);
   RenderOptions options = sized(64, 64);
-  options.detail_colours = true;
+  options.detail.colours = true;
   options.light.shading = Shading::Unlit;
   for (const auto rule : {DetailPolicy::Rule::ByPixels, DetailPolicy::Rule::ByRadius}) {
-    options.detail.emplace().rule = rule;
-    options.detail->far_pixels = 12;
-    const std::vector<double> thresholds = thresholds_of(model, *options.detail);
+    options.detail.policy.emplace().rule = rule;
+    options.detail.policy->far_pixels = 12;
+    const std::vector<double> thresholds = thresholds_of(model, *options.detail.policy);
     EXPECT_GE(thresholds.size(), 3U);
     int changes_without = 0;
     for (const double threshold : thresholds) {
@@ -473,9 +471,9 @@ TEST(RenderDetail, NoViewTremblesAtAnyThreshold) {
       std::set<Pixel> without;
       for (int frame = 0; frame < 12; ++frame) {
         const Camera camera = towards({0, 0, threshold * (1.0 + (frame % 2 == 0 ? 0.005 : -0.005))}, {0, 0, 0}, kFov);
-        options.selector = &view;
+        options.detail.selector = &view;
         with_memory.insert(pixel_at(renderer.render(camera, options).value(), 32, 32));
-        options.selector = nullptr;
+        options.detail.selector = nullptr;
         without.insert(pixel_at(renderer.render(camera, options).value(), 32, 32));
       }
       EXPECT_EQ(with_memory.size(), 1U) << threshold;

@@ -109,7 +109,7 @@ TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
   place_field(s.scene, std::move(lake));
   RenderOptions options = sized(4, 4);
   options.light.sun = {0, 1, 0};
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
   // The sun comes through the water, and is seen through it; of the surface itself nothing is in the way.
   const Vec3 behind = linear(kRed) * (0.1F + through(6.74F));
@@ -128,11 +128,11 @@ TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
   options.light.sun = {0, 1, 0};
   const auto floor_below = [&] { return pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1); };
   expect_near(floor_below(), encoded(linear(kWhite) * (0.15F + through(2.0F))), 1);
-  options.light.shadow_distance = 4.49;
+  options.light.shadow_distance_voxels = 4.49;
   expect_near(floor_below(), encoded(linear(kWhite) * (0.15F + through(1.5F))), 1);
-  options.light.shadow_distance = 2.5;
+  options.light.shadow_distance_voxels = 2.5;
   expect_near(floor_below(), encoded(linear(kWhite) * 1.15F), 1);
-  options.light.shadow_distance = 100.0;
+  options.light.shadow_distance_voxels = 100.0;
   // Painted with stone it takes the light, and glass again it gives it back.
   const GridHandle handle = s.scene.instances()[roof].grid;
   const auto paint = [&](VoxelType type) {
@@ -259,10 +259,8 @@ TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
   RenderOptions options = sized(80, 60);
   options.light.glass_surfaces = true;
   const Camera camera = towards({70, 40, 80}, {0, 0, 0});
-  options.threads = Threads{1};
-  const Picture one = taken(s.scene, camera, options);
-  options.threads = Threads{3};
-  EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, one.colour.rgb);
+  const Picture one = taken(s.scene, camera, options, {1});
+  EXPECT_EQ(taken(s.scene, camera, options, {3}).colour.rgb, one.colour.rgb);
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
     EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, one.colour.rgb) << name_of(set);
@@ -340,10 +338,10 @@ TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
   RenderOptions options = sized(96, 72);
   const Camera camera = towards({170, 120, 190}, {0, 0, 0});
   const Picture whole = taken(s.scene, camera, options);
-  options.detail.emplace().far_pixels = 0;
-  options.detail->cell_pixels = 3.0;
+  options.detail.policy.emplace().far_pixels = 0;
+  options.detail.policy->cell_pixels = 3.0;
   EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb);
-  options.detail->far_pixels = 1000;
+  options.detail.policy->far_pixels = 1000;
   const Picture far = taken(s.scene, camera, options);
   EXPECT_NE(far.colour.rgb, whole.colour.rgb);
   EXPECT_LT(count_different(whole, far, 24), 250) << "edges";
@@ -353,7 +351,7 @@ TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
     s.scene.types.replace(type, opaque);
   }
   EXPECT_GT(count_different(far, taken(s.scene, camera, options), 6), 60);
-  options.detail->far_pixels = 0;
+  options.detail.policy->far_pixels = 0;
   EXPECT_NE(taken(s.scene, camera, options).colour.rgb, whole.colour.rgb) << "without glass it is halved";
 }
 

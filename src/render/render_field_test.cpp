@@ -20,7 +20,7 @@ constexpr DVec3 kSun{0.48, 0.6, 0.64};  // unit
 RenderOptions lit_by_the_sun(int edge) {
   RenderOptions options = sized(edge, edge);
   options.light.sun = kSun;
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   return options;
 }
 
@@ -140,8 +140,8 @@ TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
   place_field(scene, std::move(field));
   RenderOptions options = sized(40, 40);
   options.light.shading = Shading::Occlusion;
-  options.light.occlusion = OcclusionMode::Smooth;
-  options.light.smooth.form = SmoothOcclusion::Weighted;
+  options.light.occlusion_mode = OcclusionMode::Smooth;
+  options.light.smooth_occlusion.method = SmoothOcclusion::Weighted;
   options.depth = true;
   const Camera camera = from_above(20, 60, 20, 40);
   const Picture picture = taken(scene, camera, options);
@@ -151,7 +151,7 @@ TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
       const float depth = picture.depth.values[static_cast<std::size_t>(40 * y + x)];
       const DVec3 point(x + 0.5, 60.0 - static_cast<double>(depth), y + 0.5);
       const DVec3 up = glm::normalize(same.gradient_at(point));
-      const float open = 1.0F - smooth_occlusion(same, point, Vec3(up), options.light.smooth);
+      const float open = 1.0F - smooth_occlusion(same, point, Vec3(up), options.light.smooth_occlusion);
       darker += open < 0.9F ? 1 : 0;
       // The picture's normals are those of light, smoother than the exact ones.
       EXPECT_NEAR(pixel_at(picture, x, y)[0], 255.0 * open, 30.0) << x << ' ' << y;

@@ -130,9 +130,9 @@ TEST(RenderGlass, TintsTheSunAndDoesNotOcclude) {
   const Picture picture = taken(s.scene, from_above(0, 2, 0, 4), options);
   expect_near(pixel_at(picture, 1, 1), encoded(linear(kWhite) * (0.15F + power(through_one(), 2.0F))), 1);
   // Floor at 0, glass from 3 to 5.
-  options.light.shadow_distance = 2.5;
+  options.light.shadow_distance_voxels = 2.5;
   expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1), encoded(linear(kWhite) * 1.15F), 1);
-  options.light.shadow_distance = 4.49;
+  options.light.shadow_distance_voxels = 4.49;
   expect_near(pixel_at(taken(s.scene, from_above(0, 2, 0, 4), options), 1, 1),
               encoded(linear(kWhite) * (0.15F + power(through_one(), 1.5F))), 1);
   options.light.shadows = false;
@@ -211,7 +211,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     RenderOptions options = sized(4, 4);
     options.light.sun = {0, 1, 0};
     options.light.shadows = false;
-    options.light.occlusion = OcclusionMode::Off;
+    options.light.occlusion_mode = OcclusionMode::Off;
     options.light.glass_surfaces = true;
     const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
     const Vec3 light(1.0F + 0.1F);

@@ -18,7 +18,7 @@ constexpr Rgba8 kWhite{255, 255, 255, 255};
 
 RenderOptions by_night(int width, int height) {
   RenderOptions options = sized(width, height);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.0;
   options.light.lamps = 64;
@@ -76,8 +76,8 @@ TEST(RenderLamps, ASpotLightsItsCone) {
   lamp.position = {0.0, 10.0, 0.0};
   lamp.direction = {0.0, -7.0, 0.0};
   lamp.intensity = 50.0;
-  lamp.inner_angle = 0.2;
-  lamp.outer_angle = 0.5;
+  lamp.inner_angle_radians = 0.2;
+  lamp.outer_angle_radians = 0.5;
   scene.lamps.push_back(lamp);
   const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(80, 80));
   for (int x = 0; x < 80; ++x) {
@@ -262,8 +262,7 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
     for (int x = 0; x < 32; ++x) different += pixel_at(part, x, y) != pixel_at(whole, x + 48, y + 16);
   }
   EXPECT_EQ(different, 0);
-  options.threads = {1};
-  EXPECT_EQ(taken(scene, from_above(8, 50, -8, 16), options).colour.rgb, part.colour.rgb);
+  EXPECT_EQ(taken(scene, from_above(8, 50, -8, 16), options, {1}).colour.rgb, part.colour.rgb);
   options.light.lamps = 200;
   EXPECT_GT(count_different(taken(scene, from_above(8, 50, -8, 16), options), part, 1), 500) << "more add more";
 }
@@ -296,8 +295,8 @@ TEST(RenderLamps, BadOnesLightNothing) {
     if (i == 3) lamp.range = nan;
     if (i == 4) lamp.direction = DVec3(0.0);
     if (i == 5) lamp.colour.x = std::numeric_limits<float>::quiet_NaN();
-    if (i == 6) lamp.inner_angle = nan;
-    if (i == 7) lamp.outer_angle = nan;
+    if (i == 6) lamp.inner_angle_radians = nan;
+    if (i == 7) lamp.outer_angle_radians = nan;
     scene.lamps.push_back(lamp);
   }
   const Picture picture = taken(scene, from_above(0, 20, 0, 40), by_night(16, 16));

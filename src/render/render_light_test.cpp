@@ -47,7 +47,7 @@ TEST(RenderLight, WithoutOcclusionTheAmbientTermIsATenth) {
   Scene scene;
   place(scene, floor_of(add_type(scene, kGrey)));
   RenderOptions options = sized(4, 4);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   options.light.sun = {0, 2, 0};
   options.light.exposure = 0.5;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 30, 0, 20), options), 1, 1), encoded(linear(kGrey) * 0.55F));
@@ -82,7 +82,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
   grid.fill_box({{1, 6, -2}, {4, 8, 1}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(160, 160);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   const DVec3 sun = options.light.sun;
   const Picture picture = taken(scene, from_above(0, 30, 0, 32), options);
   const Pixel lit = encoded(linear(kGrey) * (0.1F + cosines(sun).y));
@@ -113,13 +113,13 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   const InstanceHandle instance = place(scene, std::move(grid));
   scene.edit(instance).voxel_size = 0.25;
   RenderOptions options = sized(1, 1);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   options.light.sun = {0, 0.001, 0};  // of any length
   Camera camera = from_above(0, 1, 0, 0.1);
   const Pixel dark = encoded(linear(kGrey) * 0.1F);
-  options.light.shadow_distance = 9.98;
+  options.light.shadow_distance_voxels = 9.98;
   EXPECT_NE(pixel_at(taken(scene, camera, options), 0, 0), dark);
-  options.light.shadow_distance = 10.0;
+  options.light.shadow_distance_voxels = 10.0;
   EXPECT_EQ(pixel_at(taken(scene, camera, options), 0, 0), dark);
   options.light.shadows = false;
   EXPECT_NE(pixel_at(taken(scene, camera, options), 0, 0), dark);
@@ -137,7 +137,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   // Only the ray along the normal reaches the ceiling.
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0),
             encoded(linear(kGrey) * 0.15F * (8.0F / 9.0F)));
-  options.light.occlusion_distance = 5.98;
+  options.light.occlusion_distance_voxels = 5.98;
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0), encoded(linear(kGrey) * 0.15F));
 }
 
@@ -192,7 +192,7 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   grid.fill_box({{4, 0, -40}, {5, 6, 40}}, type);
   place(scene, std::move(grid));
   RenderOptions options = sized(40, 1);
-  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.shadows = false;
   options.light.sun = {-1, 1, 0};
   const float sun = cosines(options.light.sun).y;
@@ -259,7 +259,7 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
   const Scene scene = with_step(colour);
   const Camera camera = from_above(5, 30, 5, 10);
   RenderOptions options = sized(200, 200);
-  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.exposure = 3.0;  // light has no say
   options.light.shading = Shading::Occlusion;
   const Picture grey = taken(scene, camera, options);
@@ -277,7 +277,7 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
     const Pixel expected = encoded(linear(colour) * (0.25F + 0.75F * open));
     for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixel_at(classic, x, 95)[c], expected[c], 1) << x;
   }
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   options.light.shading = Shading::UnlitWithOcclusion;
   EXPECT_EQ(taken(scene, camera, options).colour.rgb, unlit.colour.rgb);
   options.light.shading = Shading::Occlusion;
@@ -295,7 +295,7 @@ TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
     EXPECT_LT(std::abs(std::remainder(level * 9.0 / 255.0, 1.0)), 0.02) << level;
   }
   EXPECT_GT(levels.size(), 1U);
-  options.light.occlusion_distance = 0.0;
+  options.light.occlusion_distance_voxels = 0.0;
   const Picture open = taken(scene, from_above(6, 30, 5, 0.04), options);
   EXPECT_EQ(pixel_at(open, 45, 0)[0], 255) << "rays of no length";
 }

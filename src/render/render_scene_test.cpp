@@ -75,7 +75,7 @@ TEST(RenderScene, TurnedAndMirroredInstancesLookLikeTurnedAndMirroredVoxels) {
     place(moved.scene, std::move(turned));
     RenderOptions options = sized(48, 48);
     for (const auto mode : {OcclusionMode::Rays, OcclusionMode::Vertex}) {
-      options.light.occlusion = mode;
+      options.light.occlusion_mode = mode;
       const Picture a = taken(placed.scene, kCamera, options);
       const Picture b = taken(moved.scene, kCamera, options);
       // The triangles of a face do not turn with it where all four levels count.
@@ -230,7 +230,7 @@ TEST(RenderScene, LooksStraightUpAndDownAndFromFarAway) {
   up.up = {0, 0, 1};
   EXPECT_EQ(depth_at(taken(world.scene, up, sized(4, 4)), 2, 2), 5.0F);
   up.projection = Camera::Projection::Perspective;
-  up.vertical_fov = 3.1;
+  up.vertical_fov_radians = 3.1;
   EXPECT_GT(taken(world.scene, up, sized(64, 64)).pixels_hit, 0);
   EXPECT_EQ(depth_at(taken(world.scene, from_above(0, 1e7, 0, 4), sized(4, 4)), 2, 2), 1e7F - 6.0F);
   Camera lost = from_above(1e308, -1e308, 1e308, 1e300);

@@ -49,13 +49,13 @@ inline Camera from_above(double x, double height, double z, double view_height) 
   return camera;
 }
 
-inline Camera towards(DVec3 eye, DVec3 target, double vertical_fov = 0.8) {
+inline Camera towards(DVec3 eye, DVec3 target, double vertical_fov_radians = 0.8) {
   Camera camera;
   camera.position = eye;
   camera.forward = glm::normalize(target - eye);
   camera.right = glm::normalize(glm::cross(camera.forward, DVec3(0, 1, 0)));
   camera.up = glm::cross(camera.right, camera.forward);
-  camera.vertical_fov = vertical_fov;
+  camera.vertical_fov_radians = vertical_fov_radians;
   return camera;
 }
 
@@ -67,8 +67,8 @@ inline RenderOptions sized(int width, int height) {
   return options;
 }
 
-inline Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options) {
-  auto picture = CpuRenderer(scene).render(camera, options);
+inline Picture taken(const Scene& scene, const Camera& camera, const RenderOptions& options, Threads threads = {}) {
+  auto picture = CpuRenderer(scene).render(camera, options, threads);
   EXPECT_TRUE(picture.has_value());
   return picture ? std::move(*picture) : Picture{};
 }

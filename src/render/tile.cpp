@@ -111,7 +111,7 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   if ((far_faces_.found >> lane & 1U) == 0) return;
   if (point.in_field) point.position += double{ImpostorFaces::kSurfelLift} * DVec3(point.normal);
   point.type = far_faces_.face[i]->type;
-  point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion, point.position);
+  point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
 }
 
 Tile::Sight Tile::add_glass(const Ray& ray, double max_t, std::size_t pixel) {

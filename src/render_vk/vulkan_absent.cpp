@@ -47,10 +47,11 @@ Status VulkanRenderer::update(const Scene&, InstanceFilter, Threads) {
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return 0;
 }
-Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, const Progress&) {
+Result<Picture> VulkanRenderer::render(const Camera&, const RenderOptions&, Threads, const Progress&) {
   return refusal();
 }
-Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, Accumulation, const Progress&) {
+Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&, Accumulation, Threads,
+                            const Progress&) {
   return refusal();
 }
 
@@ -107,7 +108,7 @@ Status VulkanMeshRenderer::put(std::span<const SurfaceUpdate>) {
   return refusal();
 }
 void VulkanMeshRenderer::clear() {}
-Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPictureOptions&) {
+Status VulkanMeshRenderer::draw(VulkanPicture&, const Camera&, const MeshPictureOptions&, Threads) {
   return refusal();
 }
 VulkanMeshRenderer::Stats VulkanMeshRenderer::stats() const {

@@ -65,10 +65,10 @@ Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
 
 }  // namespace
 
-Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
+Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians) {
   if (!is_finite(position)) return make_error(ErrorCode::InvalidArgument, "the camera's position is not finite");
   if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "the point to look at is not finite");
-  if (!(vertical_fov > 0.0 && vertical_fov < std::numbers::pi)) {
+  if (!(vertical_fov_radians > 0.0 && vertical_fov_radians < std::numbers::pi)) {
     return make_error(ErrorCode::InvalidArgument,
                       "the field of view is not more than 0 and less than pi radians (180 degrees)");
   }
@@ -78,7 +78,7 @@ Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov) {
   if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
   Camera camera;
   camera.position = position;
-  camera.vertical_fov = vertical_fov;
+  camera.vertical_fov_radians = vertical_fov_radians;
   turn(camera, glm::normalize(half / largest));
   return camera;
 }
@@ -90,10 +90,11 @@ glm::dmat4 camera_from_world(const Camera& camera) {
   return matrix;
 }
 
-Ray ray_through(const Camera& camera, double x, double y, int width, int height) {
+Ray ray_through(const Camera& camera, const PicturePoint& point) {
+  const auto [x, y, width, height] = point;
   QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height;
+  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
   const double pixel = picture_height / height;
   const DVec3 across = camera.right * ((x - 0.5 * width) * pixel) + camera.up * ((0.5 * height - y) * pixel);
   if (!is_perspective) return {camera.position + across, camera.forward};
@@ -138,7 +139,7 @@ std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
 Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect) {
   QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
   Camera camera;
-  camera.vertical_fov = kFramingFov;
+  camera.vertical_fov_radians = kFramingFov;
   turn(camera, forward);
   const double slope = std::tan(0.5 * kFramingFov) * (1.0 - 2.0 * kMargin);
   const Stand level = stand_for(reach, camera.right, camera.forward, slope * aspect);

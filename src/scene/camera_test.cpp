@@ -36,8 +36,9 @@ struct InPicture {
 InPicture project(const Camera& camera, double aspect, DVec3 point) {
   const DVec3 offset = point - camera.position;
   const double depth = glm::dot(offset, camera.forward);
-  const double half = camera.projection == Camera::Projection::Perspective ? depth * std::tan(0.5 * camera.vertical_fov)
-                                                                           : 0.5 * camera.view_height;
+  const double half = camera.projection == Camera::Projection::Perspective
+                          ? depth * std::tan(0.5 * camera.vertical_fov_radians)
+                          : 0.5 * camera.view_height;
   return {glm::dot(offset, camera.right) / (half * aspect), glm::dot(offset, camera.up) / half, depth};
 }
 
@@ -67,7 +68,7 @@ TEST(Camera, LooksAtItsTargetUpright) {
   expect_orthonormal(*camera);
   EXPECT_EQ(camera->right.y, 0.0);
   EXPECT_GT(camera->up.y, 0.0);
-  EXPECT_EQ(camera->vertical_fov, 1.0);
+  EXPECT_EQ(camera->vertical_fov_radians, 1.0);
   const InPicture target = project(*camera, 1.5, {-1, 2, 0.5});
   EXPECT_NEAR(target.x, 0.0, 1e-12);
   EXPECT_NEAR(target.y, 0.0, 1e-12);
@@ -82,9 +83,9 @@ TEST(Camera, TheViewMatrixAgreesWithItsRays) {
   expect_near(DVec3(view * glm::dvec4(camera.position, 1.0)), DVec3(0.0));
   const int width = 640;
   const int height = 360;
-  const glm::dmat4 clip = glm::perspective(camera.vertical_fov, double{width} / height, 0.1, 1e3) * view;
+  const glm::dmat4 clip = glm::perspective(camera.vertical_fov_radians, double{width} / height, 0.1, 1e3) * view;
   for (const DVec3 at : {DVec3(0, 0, 1), DVec3(640, 0, 9), DVec3(100, 333, 50)}) {
-    const Ray ray = ray_through(camera, at.x, at.y, width, height);
+    const Ray ray = ray_through(camera, {at.x, at.y, width, height});
     const glm::dvec4 point = clip * glm::dvec4(ray.origin + ray.direction * at.z, 1.0);
     EXPECT_NEAR(point.x / point.w, at.x / width * 2.0 - 1.0, 1e-12);
     EXPECT_NEAR(point.y / point.w, 1.0 - at.y / height * 2.0, 1e-12);

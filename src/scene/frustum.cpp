@@ -8,7 +8,7 @@ namespace quoin {
 
 Frustum::Frustum(const Camera& camera, int width, int height) {
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-  const double up = is_perspective ? std::tan(camera.vertical_fov / 2.0) : 0.5 * camera.view_height;
+  const double up = is_perspective ? std::tan(camera.vertical_fov_radians / 2.0) : 0.5 * camera.view_height;
   const double across = up * width / height;
   const std::array<DVec3, 4> edges = {across * camera.right, -across * camera.right, up * camera.up, -up * camera.up};
   for (std::size_t i = 0; i < edges.size(); ++i) {

@@ -29,7 +29,8 @@ class PixelScale {
  public:
   PixelScale(const Camera& camera, int height)
       : is_perspective_(camera.projection == Camera::Projection::Perspective),
-        scale_(is_perspective_ ? 0.5 * height / std::tan(camera.vertical_fov / 2.0) : height / camera.view_height) {}
+        scale_(is_perspective_ ? 0.5 * height / std::tan(camera.vertical_fov_radians / 2.0)
+                               : height / camera.view_height) {}
 
   [[nodiscard]] ScreenSize of(double distance, double radius, double voxel_size) const {
     if (!is_perspective_) return {voxel_size * scale_, 2.0 * radius * scale_};

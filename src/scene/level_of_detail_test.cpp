@@ -186,7 +186,7 @@ TEST(LevelOfDetail, NothingVisibleIsCulled) {
     bool is_seen = false;
     for (int y = 0; y <= 2 * kHeight && !is_seen; ++y) {
       for (int x = 0; x <= 2 * kWidth && !is_seen; ++x) {
-        is_seen = meets_sphere(ray_through(camera, 0.5 * x, 0.5 * y, kWidth, kHeight), centre, radius);
+        is_seen = meets_sphere(ray_through(camera, {0.5 * x, 0.5 * y, kWidth, kHeight}), centre, radius);
       }
     }
     const bool is_kept = frustum.meets(centre - camera.position, radius);

@@ -24,7 +24,7 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
 }
 
 TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {
-  QUOIN_EXPECT_MISTAKE((void)ray_through({}, 0.0, 0.0, 0, 5), "a picture of positive size");
+  QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a picture of positive size");
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
   QUOIN_EXPECT_MISTAKE(selector.select(Scene(), {}, 5, -1, {}, selected), "a picture of positive size");

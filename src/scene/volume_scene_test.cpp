@@ -66,7 +66,7 @@ TEST(VolumeScene, StandsWhereTheVolumeSays) {
         const auto hit = first_hit(tracer, {DVec3{20, 30, -10} + away * 60.0, -away});
         ASSERT_TRUE(hit);
         // Coarse along one axis: interpolation between its samples cuts corners.
-        EXPECT_NEAR(hit->distance, 60.0 - 12.0, spacing.z > 2.0 ? 0.15 : 0.03);
+        EXPECT_NEAR(hit->t, 60.0 - 12.0, spacing.z > 2.0 ? 0.15 : 0.03);
         EXPECT_GT(glm::dot(hit->normal, away), 0.97);
       }
     }

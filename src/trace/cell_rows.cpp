@@ -9,7 +9,7 @@ CellRows::CellRows(const DensityGrid& field, IVec3 chunk) {
     const DensityChunk* const found = field.find_chunk(chunk + IVec3{i & 1, i >> 1 & 1, i >> 2});
     if (found == nullptr) continue;
     Signs& signs = signs_[static_cast<std::size_t>(i)];
-    if (const DensityStorage* const storage = found->storage()) {
+    if (const DensityStorage* const storage = DensityStorage::of(*found)) {
       signs.rows = storage->solid.data();
       is_air_ = false;
     } else if (DensityChunk::is_solid(*found->uniform())) {

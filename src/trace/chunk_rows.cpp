@@ -38,7 +38,7 @@ void ChunkRows::sort_types() {
   for (const VoxelType type : chunk.types()) (belongs(type) ? in_ : out_).push_back(type);
   const bool by_absence = out_.size() < in_.size();
   inverted_ = by_absence ? kAll : 0;
-  if (const ChunkStorage* mixed = chunk.storage()) {
+  if (const ChunkStorage* mixed = ChunkStorage::of(chunk)) {
     for (const VoxelType type : by_absence ? out_ : in_) asked_.push_back(index_of(*mixed, type));
   }
 }
@@ -48,7 +48,7 @@ bool ChunkRows::belongs(VoxelType type) const {
 }
 
 Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
-  const ChunkStorage* mixed = chunk_->storage();
+  const ChunkStorage* mixed = ChunkStorage::of(*chunk_);
   if (mixed == nullptr) return in_.empty() ? Slab::Empty : Slab::Full;
   const std::uint32_t slab = mixed->slabs[ChunkStorage::slab_index(y, z)];
   if ((slab & ChunkStorage::kUniformSlab) != 0) {

@@ -47,6 +47,10 @@ struct FlatChunk {
 
 /// What the kernels read of a tree with flat tables.
 struct TreeView {
+  /// Of a tree; null where the world is so sparse (islands far apart) that its tables would be larger than all the
+  /// rest.
+  [[nodiscard]] static const TreeView* of(const OccupancyTree& tree) { return tree.view_; }
+
   // `origin`, `box` and the strides of chunks, as registers read them.
   alignas(32) double corner[4];
   alignas(16) float low[4];

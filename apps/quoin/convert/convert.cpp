@@ -78,14 +78,37 @@ Status read_frames(const LoadedScene& first, const ConvertOptions& options, Scen
   return {};
 }
 
+/// What its animation shows of a file, with warnings of what that is not.
+Status animate(const LoadedScene& loaded, const ConvertOptions& options, SceneAnimation& animation, Outcome& outcome) {
+  if (loaded.last_frame == 0) {
+    outcome.warnings.emplace_back(loaded.named_files.empty()
+                                      ? "nothing moves in it: a single frame"
+                                      : "only a .vox file itself is animated, not what a scene names");
+  }
+  // The animation has no instance that is never shown.
+  warn_of_left_out(loaded.scene, options.common.instances(), outcome.warnings);
+  if (auto read = read_frames(loaded, options, animation); !read) return read;
+  std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
+  return {};
+}
+
+Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& options, Stopwatch& watch, Outcome& outcome) {
+  SceneAnimation animation;
+  if (options.animate) {
+    if (auto done = animate(loaded, options, animation, outcome); !done) return done;
+    outcome.seconds.read += watch.lap();
+  }
+  const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
+  return convert(options.animate ? animation.scene() : loaded.scene, animation, options, outcome);
+}
+
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
-  load.threads = options.common.threads;
   load.keep_source = !format.is_mesh || options.animate;
   auto loaded = [&] {
     ProgressBar bar(!options.is_one_of_many);
-    return load_scene(options.common.input, load, bar.listener("reading"));
+    return load_scene(options.common.input, load, options.common.threads, bar.listener("reading"));
   }();
   if (!loaded) return loaded.error();
   Outcome outcome;
@@ -94,32 +117,17 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   if (format.is_mesh) {
-    SceneAnimation animation;
-    if (options.animate) {
-      if (loaded->last_frame == 0) {
-        outcome.warnings.emplace_back(loaded->named_files.empty()
-                                          ? "nothing moves in it: a single frame"
-                                          : "only a .vox file itself is animated, not what a scene names");
-      }
-      // The animation has no instance that is never shown.
-      warn_of_left_out(loaded->scene, options.common.instances(), outcome.warnings);
-      if (auto read = read_frames(*loaded, options, animation); !read) return read.error();
-      std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
-      outcome.seconds.read += watch.lap();
-    }
-    const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
-    const Scene& scene = options.animate ? animation.scene() : loaded->scene;
-    if (auto done = convert(scene, animation, options, outcome); !done) return done.error();
+    if (auto done = convert_to_meshes(*loaded, options, watch, outcome); !done) return done.error();
     return outcome;
   }
   keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
-  const auto bytes =
-      save_scene(*loaded, options.output, outcome.warnings, options.common.threads, bar.listener("writing"));
-  if (!bytes) return bytes.error();
-  outcome.bytes = *bytes;
+  const auto saved = save_scene(*loaded, options.output, options.common.threads, bar.listener("writing"));
+  if (!saved) return saved.error();
+  outcome.bytes = saved->bytes;
+  outcome.warnings.insert(outcome.warnings.end(), saved->warnings.begin(), saved->warnings.end());
   outcome.seconds.write = watch.lap();
   return outcome;
 }
@@ -288,7 +296,8 @@ int run(ConvertOptions& options, const ManyOptions& many) {
   return watch(many.inputs.empty() ? files_read(options.common.input) : many.inputs, work);
 }
 
-void add_mesh_options(CLI::App& command, ConvertOptions& options) {
+/// How meshes are made.
+void add_meshing_options(CLI::App& command, ConvertOptions& options) {
   command
       .add_option("--mesher", options.mesher,
                   "How to mesh: culled or greedy for blocks, smooth for rounded surfaces (default greedy; of volumes "
@@ -319,6 +328,10 @@ void add_mesh_options(CLI::App& command, ConvertOptions& options) {
       ->check(CLI::IsMember({"palette", "atlas"}));
   command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
+}
+
+/// How they are written.
+void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
   command.add_flag(
       "--animate", options.animate,
       "All frames of a .vox file, as an animation of glTF (.glb, .gltf); smooth models are meshed each by itself");
@@ -361,7 +374,7 @@ std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
     if (given != nullptr) return std::string(given) + ": --no-ao leaves occlusion out";
   }
   std::string fault = read_field_occlusion(command, options.field_occlusion);
-  const bool has_none = options.has_field_occlusion && options.field_occlusion.form == SmoothOcclusion::None;
+  const bool has_none = options.has_field_occlusion && options.field_occlusion.method == SmoothOcclusion::None;
   if (fault.empty() && has_none && options.occlusion_apart)
     fault = "--ao-attribute: --ao-form none leaves occlusion out";
   return fault;
@@ -512,63 +525,84 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   return {};
 }
 
+namespace {
+
+void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& many,
+                      std::vector<std::filesystem::path>& rest) {
+  command.add_option("OUT", rest, "File to write: " + writable_extensions() + "; with --to: more files to read")
+      ->check(file_name());
+  command
+      .add_option("--to", many.to,
+                  "Convert every file that is named to this format: glb, vox, ...; of OUT where that is -")
+      ->check(file_name());
+  command.add_option("--out-dir", many.folder, "With --to: where the files go (default: beside those they are of)")
+      ->check(file_name());
+  command.add_flag("--recursive", many.recursive,
+                   "With --to: of folders, all files in them and below that can be read");
+  command.add_option("--from", options.from, "Refuse what is not of this format: " + readable_names())
+      ->check(file_name());
+  command.add_flag("--force", options.force, kForceHelp);
+  command.add_flag("--watch", options.watch, "Convert again whenever what is read changes, until Ctrl-C");
+}
+
+std::string footer() {
+  return "Reads " + readable_extensions() + "; writes " + writable_extensions() +
+         ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
+         "NAME_emissive.png, and NAME_atlas.png with an atlas, but for smooth meshes, whose colours are in the "
+         "vertices. "
+         "They replace files of these\n"
+         "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
+         "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel "
+         "can.\n"
+         "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"
+         "IN and OUT may be -: standard input and output.\n"
+         "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
+         "Example: quoin convert castle.vox castle.glb\n"
+         "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
+         "Example: quoin convert fleet.json whole_fleet.json\n"
+         "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
+         "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
+         "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute";
+}
+
+/// Reads what CLI11 left as text, and what only all options together say; returns what is wrong, or "".
+std::string read_options(const CLI::App& command, const VolumeTexts& texts,
+                         const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
+  std::size_t given = 0;
+  for (const char* name :
+       {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite", "--iso",
+        "--simplify", "--scale", "--up", "--texture", "--compress", "--quantize", "--animate", "--fps"}) {
+    given += command.count(name);
+  }
+  options.has_field_occlusion = given_field_occlusion(command) != nullptr;
+  options.mesh_only = given > 0 || options.has_field_occlusion;
+  std::string fault = read_texts(command, texts, options);
+  if (fault.empty()) fault = read_occlusion(command, options);
+  if (fault.empty()) fault = fault_of_atlas(options);
+  if (fault.empty() && command.count("--fps") > 0 && !options.animate) fault = "--fps needs --animate";
+  if (fault.empty() && options.animate && options.common.takes_frame)
+    fault = "--frame and --animate exclude each other";
+  if (fault.empty()) fault = read_files(rest, options, many);
+  if (fault.empty()) fault = fault_of_watching(options, many);
+  return fault;
+}
+
+}  // namespace
+
 void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Turn a file into another format, by OUT's ending");
   const auto options = std::make_shared<ConvertOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
-  add_common_options(*command, options->common);
   const auto many = std::make_shared<ManyOptions>();
   const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
-  command->add_option("OUT", *rest, "File to write: " + writable_extensions() + "; with --to: more files to read")
-      ->check(file_name());
-  command
-      ->add_option("--to", many->to,
-                   "Convert every file that is named to this format: glb, vox, ...; of OUT where that is -")
-      ->check(file_name());
-  command->add_option("--out-dir", many->folder, "With --to: where the files go (default: beside those they are of)")
-      ->check(file_name());
-  command->add_flag("--recursive", many->recursive,
-                    "With --to: of folders, all files in them and below that can be read");
-  command->add_option("--from", options->from, "Refuse what is not of this format: " + readable_names())
-      ->check(file_name());
-  command->add_flag("--force", options->force, kForceHelp);
-  command->add_flag("--watch", options->watch, "Convert again whenever what is read changes, until Ctrl-C");
-  add_mesh_options(*command, *options);
+  add_common_options(*command, options->common);
+  add_file_options(*command, *options, *many, *rest);
+  add_meshing_options(*command, *options);
+  add_mesh_file_options(*command, *options);
   add_volume_options(*command, *texts);
-  command->footer(
-      "Reads " + readable_extensions() + "; writes " + writable_extensions() +
-      ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
-      "NAME_emissive.png, and NAME_atlas.png with an atlas, but for smooth meshes, whose colours are in the vertices. "
-      "They replace files of these\n"
-      "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
-      "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel can.\n"
-      "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"
-      "IN and OUT may be -: standard input and output.\n"
-      "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
-      "Example: quoin convert castle.vox castle.glb\n"
-      "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
-      "Example: quoin convert fleet.json whole_fleet.json\n"
-      "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
-      "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
-      "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute");
+  command->footer(footer());
   command->callback([command, options, texts, many, rest, &status] {
-    std::size_t given = 0;
-    for (const char* name :
-         {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite", "--iso",
-          "--simplify", "--scale", "--up", "--texture", "--compress", "--quantize", "--animate", "--fps"}) {
-      given += command->count(name);
-    }
-    options->has_field_occlusion = given_field_occlusion(*command) != nullptr;
-    options->mesh_only = given > 0 || options->has_field_occlusion;
-    std::string fault = read_texts(*command, *texts, *options);
-    if (fault.empty()) fault = read_occlusion(*command, *options);
-    if (fault.empty()) fault = fault_of_atlas(*options);
-    if (fault.empty() && command->count("--fps") > 0 && !options->animate) fault = "--fps needs --animate";
-    if (fault.empty() && options->animate && options->common.takes_frame)
-      fault = "--frame and --animate exclude each other";
-    if (fault.empty()) fault = read_files(*rest, *options, *many);
-    if (fault.empty()) fault = fault_of_watching(*options, *many);
-    if (!fault.empty()) {
+    if (const std::string fault = read_options(*command, *texts, *rest, *options, *many); !fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;

@@ -4,6 +4,7 @@
 #include <new>
 
 #include <quoin/core/parallel.h>
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
 #include "convert/convert.h"
@@ -227,6 +228,24 @@ int print_text(const std::vector<Task>& tasks, const std::vector<Error>& errors,
   return printed;
 }
 
+FileSet inputs_of(const std::vector<Task>& tasks) {
+  std::vector<fs::path> inputs;
+  inputs.reserve(tasks.size());
+  for (const Task& task : tasks) inputs.push_back(task.input);
+  return FileSet(inputs);
+}
+
+Totals totals_of(const std::vector<Task>& tasks, double seconds) {
+  Totals totals;
+  for (const Task& task : tasks) {
+    if (!task.outcome) continue;
+    ++totals.converted;
+    totals.bytes += task.outcome->bytes;
+  }
+  totals.seconds = seconds;
+  return totals;
+}
+
 }  // namespace
 
 WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done) {
@@ -249,25 +268,15 @@ WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Con
   std::vector<Error> errors;
   std::vector<Task> tasks = plan(many, extension, errors);
   if (const std::string fault = fault_of_plan(tasks); !fault.empty()) return misused(fault);
-  std::vector<fs::path> inputs;
-  inputs.reserve(tasks.size());
-  for (const Task& task : tasks) inputs.push_back(task.input);
   ConvertOptions wanted = options;
-  wanted.inputs = FileSet(inputs);
+  wanted.inputs = inputs_of(tasks);
   const bool is_again = !done.empty();
   if (options.watch) leave_out(done, tasks, work);
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
   if (options.watch) note(tasks, done, work);
   if (is_again && tasks.empty() && errors.empty()) return ended(kDone);
-
-  Totals totals;
-  for (const Task& task : tasks) {
-    if (!task.outcome) continue;
-    ++totals.converted;
-    totals.bytes += task.outcome->bytes;
-  }
-  totals.seconds = watch.lap();
+  const Totals totals = totals_of(tasks, watch.lap());
   const bool is_whole = totals.converted == tasks.size() && errors.empty();
   const int printed =
       options.common.json ? print_json(json_of(tasks, errors, totals)) : print_text(tasks, errors, totals);

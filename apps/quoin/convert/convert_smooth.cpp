@@ -17,7 +17,7 @@ namespace {
 SmoothMeshOptions mesh_options(const ConvertOptions& options) {
   SmoothMeshOptions mesh;
   mesh.occlusion = options.field_occlusion;
-  if (options.occlusion_off) mesh.occlusion.form = SmoothOcclusion::None;
+  if (options.occlusion_off) mesh.occlusion.method = SmoothOcclusion::None;
   return mesh;
 }
 

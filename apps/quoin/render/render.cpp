@@ -125,10 +125,9 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   LoadOptions options = arguments.common.load;
   options.frame = frame;
   options.keep_source = false;
-  options.threads = arguments.common.threads;
   if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
   ProgressBar bar;
-  auto loaded = load_scene(arguments.common.input, options, bar.listener("reading"));
+  auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
   if (loaded && arguments.iso && !is_volume) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
   }
@@ -146,8 +145,8 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
       return (static_cast<double>(i) + fraction) / static_cast<double>(shots.size());
     };
     const Progress listener = bar.listener("tracing");
-    auto picture =
-        renderer.render(shots[i].camera, options, [&](double fraction) { return listener(share(fraction)); });
+    auto picture = renderer.render(shots[i].camera, options, arguments.common.threads,
+                                   [&](double fraction) { return listener(share(fraction)); });
     if (!picture) return picture.error();
     outcome.camera = shots[i].camera;
     outcome.picture = std::move(*picture);
@@ -232,7 +231,7 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
 }
 
 Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatch& watch, Outcome& outcome) {
-  auto slice = draw_density_slice(scene, arguments.slice);
+  auto slice = draw_density_slice(scene, arguments.slice, arguments.common.threads);
   if (!slice) return slice.error();
   outcome.slice = slice->place;
   outcome.picture.colour = std::move(slice->colour);
@@ -281,7 +280,7 @@ Json camera_json(const Camera& camera) {
   Json json = {{"position", triple(camera.position)},
                {"forward", triple(camera.forward)},
                {"up", triple(camera.up)},
-               {"fov", std::round(camera.vertical_fov * 180e9 / std::numbers::pi) / 1e9}};
+               {"fov", std::round(camera.vertical_fov_radians * 180e9 / std::numbers::pi) / 1e9}};
   if (camera.projection == Camera::Projection::Orthographic) json["view_height"] = camera.view_height;
   return json;
 }

@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include <quoin/io/file.h>
+
 #include "field_occlusion.h"
 #include "parse.h"
 #include "standard_streams.h"
@@ -132,7 +134,7 @@ void add_detail_options(CLI::App& command, RenderArguments& arguments) {
           "Draw far models in coarser cells: near (never), radius (by distance in radii of the model) or pixels "
           "(where a voxel spans less than one) (default near)")
       ->check(CLI::IsMember({"near", "radius", "pixels"}));
-  command.add_flag("--lod-colours", arguments.render.detail_colours,
+  command.add_flag("--lod-colours", arguments.render.detail.colours,
                    "Colour models by their detail: near green, mid yellow to orange, far blue; alone, as with --detail "
                    "pixels");
 }
@@ -159,22 +161,6 @@ std::string fault_of_backend(const CLI::App& command, const RenderArguments& arg
 
 bool has_ending(const std::filesystem::path& path, const std::string& ending) {
   return CLI::detail::to_lower(path.extension().string()) == ending;
-}
-
-/// Where a name leads: behind symbolic links, also behind one that leads to no file yet.
-std::filesystem::path destination(std::filesystem::path path) {
-  constexpr int kMaxLinks = 40;
-  std::error_code error;
-  for (int i = 0; i < kMaxLinks && std::filesystem::is_symlink(path, error); ++i) {
-    path = path.parent_path() / std::filesystem::read_symlink(path, error);
-  }
-  return std::filesystem::weakly_canonical(path, error);
-}
-
-/// Whether both name one file, which need not be there yet.
-bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code missing;
-  return std::filesystem::equivalent(a, b, missing) || destination(a) == destination(b);
 }
 
 std::string fault_of_files(const RenderArguments& arguments) {
@@ -348,14 +334,14 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
                                         "three numbers that are not all 0, as in 1,2,-0.5, or off", light.sun),
       read_option(command, "--sky-brightness", read_not_negative, at_least_0, light.sky_brightness),
       read_option(command, "--lamp-brightness", read_not_negative, at_least_0, light.lamp_brightness),
-      read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance),
-      read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance),
+      read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance_voxels),
+      read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance_voxels),
       read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
       read_option(command, "--azimuth", parse_number, "a number", arguments.azimuth),
       read_option(command, "--elevation", read_elevation, "from -90 to 90", arguments.elevation),
       read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
-      read_field_occlusion(command, light.smooth),
+      read_field_occlusion(command, light.smooth_occlusion),
       read_option(command, "--iso", read_float, "a number", arguments.iso)};
   arguments.position = camera.position;
   arguments.file_camera = camera.number;
@@ -404,9 +390,9 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
         fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
     if (!fault.empty()) return fault;
   }
-  if (command.count("--detail") == 0 && arguments.render.detail_colours) arguments.detail = "pixels";
+  if (command.count("--detail") == 0 && arguments.render.detail.colours) arguments.detail = "pixels";
   if (arguments.detail != "near") {
-    arguments.render.detail.emplace().rule =
+    arguments.render.detail.policy.emplace().rule =
         arguments.detail == "radius" ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
   arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
@@ -416,21 +402,19 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   if (is_sun_off(command)) light.sun_brightness = 0.0;
   if (arguments.has_fixed_sky) light.sky_follows_sun = false;
   if (arguments.has_plain_glass) light.glass_surfaces = false;
-  if (arguments.occlusion == "vertex") light.occlusion = OcclusionMode::Vertex;
-  if (arguments.occlusion == "smooth") light.occlusion = OcclusionMode::Smooth;
+  if (arguments.occlusion == "vertex") light.occlusion_mode = OcclusionMode::Vertex;
+  if (arguments.occlusion == "smooth") light.occlusion_mode = OcclusionMode::Smooth;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;
-  if (arguments.preset == "no-ao") light.occlusion = OcclusionMode::Off;
+  if (arguments.preset == "no-ao") light.occlusion_mode = OcclusionMode::Off;
   if (arguments.preset == "no-shadows") light.shadows = false;
   if (arguments.preset == "ao") light.shading = Shading::Occlusion;
   if (arguments.preset == "unlit") {
     light.shading = command.count("--ao") > 0 ? Shading::UnlitWithOcclusion : Shading::Unlit;
   }
   arguments.render.depth = !arguments.depth.empty();
-  arguments.render.threads = arguments.common.threads;
   arguments.slice.width = arguments.render.width;
   arguments.slice.height = arguments.render.height;
   arguments.slice.instances = arguments.common.instances();
-  arguments.slice.threads = arguments.common.threads;
   return "";
 }
 

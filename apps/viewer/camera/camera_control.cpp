@@ -25,7 +25,7 @@ bool are_finite(double a, double b) {
 }  // namespace
 
 CameraControl::CameraControl() {
-  camera_.vertical_fov = std::numbers::pi / 6.0;
+  camera_.vertical_fov_radians = std::numbers::pi / 6.0;
 }
 
 void CameraControl::set(const Camera& camera, const DBox& bounds) {
@@ -50,15 +50,15 @@ void CameraControl::set_pivot(DVec3 pivot) {
   if (is_finite(pivot)) pivot_ = pivot;
 }
 
-void CameraControl::look_level(double vertical_fov) {
+void CameraControl::look_level(double vertical_fov_radians) {
   pitch_ = 0.0;
   camera_.projection = Camera::Projection::Perspective;
-  set_vertical_fov(vertical_fov);
+  set_vertical_fov(vertical_fov_radians);
   apply_angles();
 }
 
 void CameraControl::set_vertical_fov(double radians) {
-  if (radians > 0.0 && radians < std::numbers::pi) camera_.vertical_fov = radians;
+  if (radians > 0.0 && radians < std::numbers::pi) camera_.vertical_fov_radians = radians;
 }
 
 void CameraControl::move_to(DVec3 position) {
@@ -102,7 +102,8 @@ void CameraControl::turn(double dx, double dy, int picture_height) {
 
 double CameraControl::units_per_pixel(double distance, int picture_height) const {
   const bool is_perspective = camera_.projection == Camera::Projection::Perspective;
-  const double height = is_perspective ? 2.0 * distance * std::tan(camera_.vertical_fov / 2.0) : camera_.view_height;
+  const double height =
+      is_perspective ? 2.0 * distance * std::tan(camera_.vertical_fov_radians / 2.0) : camera_.view_height;
   return height / picture_height;
 }
 

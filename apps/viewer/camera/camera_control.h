@@ -44,7 +44,7 @@ class CameraControl {
   void set_pivot(DVec3 pivot);
 
   /// Looks to the horizon, in perspective, through an angle of view (radians).
-  void look_level(double vertical_fov);
+  void look_level(double vertical_fov_radians);
   void set_vertical_fov(double radians);
   /// Moves the camera, and the pivot as far. It glides no further.
   void move_to(DVec3 position);

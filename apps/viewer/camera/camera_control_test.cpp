@@ -186,7 +186,7 @@ TEST(CameraControl, PanningKeepsThePivotUnderTheMouse) {
   control.pan(60.0, -25.0, height);
   const DVec3 offset = pivot - control.camera().position;
   const double ahead = glm::dot(offset, control.camera().forward);
-  const double pixels = height / (2.0 * ahead * std::tan(control.camera().vertical_fov / 2.0));
+  const double pixels = height / (2.0 * ahead * std::tan(control.camera().vertical_fov_radians / 2.0));
   EXPECT_NEAR(glm::dot(offset, control.camera().right) * pixels, 60.0, 1e-6);
   EXPECT_NEAR(glm::dot(offset, control.camera().up) * pixels, 25.0, 1e-6);
 }

@@ -39,7 +39,7 @@ class Walking : public ::testing::Test {
   void walk(double seconds, const CameraPush& push, double frame = 1.0 / 60.0) {
     for (double t = 0.0; t < seconds - 1e-9; t += frame) {
       walker_.advance(frame, push, 1.0, control_, [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
-        return std::optional(move_and_slide(tracer_, scene_.types, box, way, options));
+        return std::optional(move_and_slide(tracer_, box, way, options));
       });
     }
   }

@@ -109,7 +109,7 @@ void Editing::go_on(ViewState& state) {
     const double share = static_cast<double>(touch) / touches;
     hits.push_back(pick_at(state, from_.x + share * (to_.x - from_.x), from_.y + share * (to_.y - from_.y)));
   }
-  const Ray ray = ray_through(state.camera.camera(), to_.x, to_.y, state.picture_place.w, state.picture_place.h);
+  const Ray ray = ray_through(state.camera.camera(), {to_.x, to_.y, state.picture_place.w, state.picture_place.h});
   edit_paused(state, [&](Document& document) {
     std::int64_t changed = 0;
     if (!is_painting) return document.drag_to(ray, std::nullopt) > 0;

@@ -38,7 +38,7 @@ void ViewState::set_camera_mode(CameraMode mode) {
     }
     if (hover) feet = hover->position;
     walker.stand(feet, bounds);
-    fov_before_walk = camera.camera().vertical_fov;
+    fov_before_walk = camera.camera().vertical_fov_radians;
     camera.look_level(kWalkersFov);
   }
   if (mode != CameraMode::Walk && camera.mode == CameraMode::Walk) camera.set_vertical_fov(fov_before_walk);

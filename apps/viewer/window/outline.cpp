@@ -34,7 +34,8 @@ class WorldLines {
     const double ahead = glm::dot(offset, camera.forward);
     const bool is_perspective = camera.projection == Camera::Projection::Perspective;
     if (is_perspective && ahead < 1e-3) return std::nullopt;
-    const double height = is_perspective ? 2.0 * ahead * std::tan(camera.vertical_fov / 2.0) : camera.view_height;
+    const double height =
+        is_perspective ? 2.0 * ahead * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
     const double pixels = place.h / height;
     const double x = place.x + 0.5 * place.w + glm::dot(offset, camera.right) * pixels;
     const double y = place.y + 0.5 * place.h - glm::dot(offset, camera.up) * pixels;

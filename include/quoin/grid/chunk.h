@@ -112,10 +112,8 @@ class Chunk {
   /// Gives back what edits left behind: unused palette entries, bits, slabs that became uniform.
   void compact();
 
-  /// The storage, laid out as is best for the library's own kernels; null when the chunk is uniform.
-  [[nodiscard]] const ChunkStorage* storage() const { return storage_.get(); }
-
  private:
+  friend struct ChunkStorage;
   inline ChunkStorage& own();
   void copy_storage();
   void make_mixed();

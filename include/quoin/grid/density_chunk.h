@@ -83,10 +83,8 @@ class DensityChunk {
   /// Whether a stored density is below 0.
   [[nodiscard]] static constexpr bool is_solid(Half density) { return (density & 0x8000U) != 0; }
 
-  /// The storage, laid out as is best for the library's own kernels; null when the chunk is uniform.
-  [[nodiscard]] const DensityStorage* storage() const { return storage_.get(); }
-
  private:
+  friend struct DensityStorage;
   void make_mixed();
   std::uint32_t slot_for_writing(std::size_t slab);
 

@@ -18,6 +18,14 @@ struct DensitySample {
   VoxelType material = kAir;
 };
 
+/// What DensityGrid::flatten moves a surface towards.
+struct FlattenOptions {
+  DVec3 point{0.0};             ///< of the plane, in samples
+  DVec3 normal{0.0, 1.0, 0.0};  ///< into the air; any length but 0
+  double strength = 1.0;        ///< as in `smooth`: how far of the way
+  VoxelType material = 1;       ///< of samples that become solid
+};
+
 /// A sparse, unbounded field of densities in chunks of 64^3 samples: negative is solid, 0 and above is air. What was
 /// never set is air, `band` from the surface.
 ///
@@ -78,10 +86,9 @@ class DensityGrid {
   /// infinite or NaN change nothing. Cost: O(samples of the sphere's box in chunks that exist, or are beside one), and
   /// 4 bytes of memory for each meanwhile.
   std::int64_t smooth(DVec3 centre, double radius, double strength);
-  /// Moves the surface within a sphere towards the plane through `point` with `normal` (pointing into the air; any
-  /// length but 0), `strength` as in `smooth`. Samples that become solid take `material`.
-  /// Cost: as adding a sphere.
-  std::int64_t flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength, VoxelType material);
+  /// Moves the surface within a sphere towards a plane. A strength, place or normal that is not as FlattenOptions says
+  /// changes nothing. Cost: as adding a sphere.
+  std::int64_t flatten(DVec3 centre, double radius, const FlattenOptions& options);
   /// Asks `pick(IVec3 sample, DensitySample current)` for the new value of every sample of the box (half open: `max`
   /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many samples
   /// changed.

@@ -22,13 +22,13 @@ namespace quoin {
 ///          more for every face that meets air (tuned on pictures of terrains); of equal ones the lower.
 /// Threads: the same result at any number.
 /// Cost:    1.3 to 3 milliseconds a chunk of the result, of caves and several types.
-[[nodiscard]] Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
+[[nodiscard]] Grid downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-/// One chunk of `halved(grid, types)`, by its place among that grid's chunks.
+/// One chunk of `downsample(grid, types)`, by its place among that grid's chunks.
 ///
 /// Reads the voxels that its cells stand for and two past them on each side, and no others: an edit elsewhere leaves it
 /// as it was.
-[[nodiscard]] Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
+[[nodiscard]] Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
 /// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was
 /// edited.
@@ -45,7 +45,7 @@ class GridPyramid {
   /// update can have changed are made again; all of another grid.
   ///
   /// Requires: the visibility of the types is that of the last update.
-  /// Cost:     `halved_chunk` for each chunk that an edit can have changed.
+  /// Cost:     `downsample_chunk` for each chunk that an edit can have changed.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});
 
   /// How many there are; none before the first update.
@@ -69,30 +69,30 @@ class GridPyramid {
 ///           solid sample its own.
 /// Threads:  the same result at any number.
 /// Cost:     some 5 milliseconds a chunk of the result, of caves and several materials.
-[[nodiscard]] DensityGrid halved(const DensityGrid& field, Threads threads = {});
+[[nodiscard]] DensityGrid downsample(const DensityGrid& field, Threads threads = {});
 
 /// What a halved field has kept of the finer one, in samples.
-struct HalvedDensityCounts {
+struct DownsampledDensityCounts {
   std::int64_t finer_solid = 0;  ///< of the field that was halved
   std::int64_t solid = 0;        ///< of the result
   std::int64_t surface = 0;      ///< of these, those with air beside them along some axis
   std::int64_t thin = 0;         ///< of these, those with air on both sides along some axis
 
-  HalvedDensityCounts& operator+=(const HalvedDensityCounts& other) {
+  DownsampledDensityCounts& operator+=(const DownsampledDensityCounts& other) {
     finer_solid += other.finer_solid;
     solid += other.solid;
     surface += other.surface;
     thin += other.thin;
     return *this;
   }
-  HalvedDensityCounts& operator-=(const HalvedDensityCounts& other) {
+  DownsampledDensityCounts& operator-=(const DownsampledDensityCounts& other) {
     finer_solid -= other.finer_solid;
     solid -= other.solid;
     surface -= other.surface;
     thin -= other.thin;
     return *this;
   }
-  bool operator==(const HalvedDensityCounts&) const = default;
+  bool operator==(const DownsampledDensityCounts&) const = default;
 };
 
 /// The coarser levels of a field, as GridPyramid has those of a grid.
@@ -114,7 +114,7 @@ class DensityPyramid {
   /// Requires: 1 <= level <= levels().
   [[nodiscard]] const DensityGrid& level(int level) const;
   /// What halving to `level` has kept. Lifetime: as `level`. Requires: 1 <= level <= levels().
-  [[nodiscard]] const HalvedDensityCounts& counts(int level) const;
+  [[nodiscard]] const DownsampledDensityCounts& counts(int level) const;
 
  private:
   struct Impl;

@@ -86,7 +86,7 @@ struct VolumeFieldOptions {
 /// Errors:    InvalidArgument when `iso` is NaN, a size is not positive or there are not as many values as the size
 ///            says; Cancelled. A volume that never crosses `iso` gives an empty or a solid field.
 /// Memory:    2 bytes a sample near the surface or where the volume is within the band, none where it is far from it.
-[[nodiscard]] Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOptions& options,
+[[nodiscard]] Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOptions& options = {},
                                                     Threads threads = {}, const Progress& progress = {});
 
 }  // namespace quoin

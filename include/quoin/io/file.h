@@ -18,6 +18,11 @@ namespace quoin {
 /// The first `most` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.
 [[nodiscard]] Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t most);
 
+/// The file at the end of a chain of symbolic links; it need not be there. A path that is no link is itself.
+[[nodiscard]] std::filesystem::path follow_links(std::filesystem::path path);
+/// Whether both names lead to one file, by links of any kind or none; it need not be there yet.
+[[nodiscard]] bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+
 /// A file that appears whole or not at all: bytes go to a temporary file beside `path`, `commit` syncs and renames it.
 /// Destroyed without a commit, it leaves nothing behind and the old file as it was.
 class AtomicFile {

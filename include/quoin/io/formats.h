@@ -50,6 +50,10 @@ struct FormatInfo {
 /// Errors: Unsupported, naming the extensions there are.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
+// What reads and what writes has a twin for bytes and one for a path. Warnings are part of what is returned: of what was
+// read, and of what was written where its format may not hold all. Options, Threads (where several are used) and
+// Progress (of what may take long) come last, in this order, and may be left out.
+
 /// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it.
 ///
 /// The content decides; the name only helps to say what is wrong with a file that is of no known format.
@@ -57,28 +61,30 @@ struct FormatInfo {
 ///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
 ///         set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
-                                             const Progress& progress = {});
+                                             Threads threads = {}, const Progress& progress = {});
+/// The same of bytes. Errors: Unsupported also for scene files that name others, which only a path finds.
+[[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {});
 
 /// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, and the
 /// values of a NIfTI pair. Nothing where the file cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
 
-/// The same of bytes. Errors: Unsupported also for scene files that name others, which only a path finds.
-[[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
-                                             const Progress& progress = {});
-
-/// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss, with
-/// sun and camera) or .vox (write_vox, which keeps what `source` holds). It appears whole or not at all; returns its
-/// size.
+/// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss) or
+/// .vox (write_vox). It appears whole or not at all.
 ///
-/// Warnings: one line each of what the format does not hold, added to `warnings`.
+/// Warnings: one line each of what the format does not hold.
 /// Errors:   Unsupported for other endings; those of the format's writer; `path` is set in all.
-[[nodiscard]] Result<std::uint64_t> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
-                                               std::vector<std::string>& warnings, Threads threads = {},
-                                               const Progress& progress = {});
+[[nodiscard]] Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads = {},
+                                            const Progress& progress = {});
+/// The same of a scene that was read, with what its file had beside it: in .json its sun and camera, in .vox what
+/// `source` holds.
+[[nodiscard]] Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
+                                            Threads threads = {}, const Progress& progress = {});
 
 /// What `save_scene` would warn of, for who wants to ask before: nothing when all is kept. Cost: little beside saving.
 /// Errors: those of `save_scene` that are known before anything is written.
+[[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded,
                                                                 const std::filesystem::path& path);
 

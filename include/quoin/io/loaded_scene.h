@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
@@ -44,7 +43,12 @@ struct LoadOptions {
   bool keep_source = true;
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
   std::optional<float> iso = std::nullopt;
-  Threads threads = {};  ///< for the field of a volume
+};
+
+/// What saving a scene gave.
+struct SavedScene {
+  std::uint64_t bytes = 0;            ///< of the file
+  std::vector<std::string> warnings;  ///< one line each: what the format does not hold
 };
 
 }  // namespace quoin

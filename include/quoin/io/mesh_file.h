@@ -25,7 +25,7 @@ enum class UpAxis : std::uint8_t { Y, Z };
 
 struct MeshFileOptions {
   std::optional<FileFormat> format{};  ///< of the mesh formats; without, that of the path's extension
-  bool occlusion = true;               ///< without, the meshes' occlusion is left out
+  bool write_occlusion = true;         ///< without, the meshes' occlusion is left out
   OcclusionIn occlusion_in = OcclusionIn::Colour;
   double scale = 1.0;     ///< units of the file a world unit; positive
   UpAxis up = UpAxis::Y;  ///< Z: what is at (x, y, z) is written at (x, -z, y)
@@ -54,7 +54,7 @@ struct MeshFileOptions {
 ///            what pictures show through the type's bodies of typical thickness (MeshPart::thickness).
 ///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
 ///            and one rough, opaque material.
-///            OcclusionIn::Attribute: a scalar _AO (blocks have 1 - occlusion / 4: 1, 0.75, 0.5 or 0.25) of every
+///            OcclusionIn::Attribute: a scalar _AO of every
 ///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
 ///            Of meshes with an atlas, opaque blocks that emit nothing have that as their colours, with a linear filter
 ///            and without mipmaps, in TEXCOORD_0, no COLOR_0 and no occlusion of their own, and the palette's roughness
@@ -78,6 +78,9 @@ struct MeshFileOptions {
 /// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
 ///            emission are lost. OcclusionIn::Attribute: a float ao after these, 1 where a mesh has no occlusion.
+/// Occlusion: in meshes 0 is open, and 3 (of blocks) or 1 is dark. Files have what it leaves, 1 open to 0 dark, as a
+///            factor of colours or as the attribute: 1 - occlusion / 4 of blocks (1, 0.75, 0.5, 0.25), 1 - occlusion of
+///            smooth meshes.
 /// Left out:  parts without a triangle (their placements are glTF nodes without a mesh) or a placement.
 /// Order:     the same bytes on every run.
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a

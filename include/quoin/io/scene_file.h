@@ -68,7 +68,7 @@ struct SceneFile {
 ///         instances or lamps, and for voxels that would take more than 64 MiB and 64 times the file's size of memory,
 ///         which what `write_scene_file` writes does not. What is wrong within voxels is told with its place in them
 ///         ("grids[0].voxels[2]: byte 37 of the voxel data: ...").
-[[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text);
+[[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads threads = {});
 
 /// A scene as a file that holds it all: every type, every grid with its voxels and its field (snapshots, which cost
 /// pointers), its groups, layers and lamps, and an instance each. Handles become places in the lists, in their order.
@@ -98,10 +98,10 @@ struct SceneFile {
 /// Errors: those of `parse_scene_file` and of reading the files (with their paths); Unsupported when one of them is a
 ///         scene file itself or a volume; LimitExceeded when all files together have more types than a registry holds.
 [[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {},
-                                                  const Progress& progress = {});
+                                                  Threads threads = {}, const Progress& progress = {});
 /// The same of bytes. Errors: Unsupported where they name files, which only a path finds.
 [[nodiscard]] Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options = {},
-                                                  const Progress& progress = {});
+                                                  Threads threads = {}, const Progress& progress = {});
 
 /// Whether bytes look like a scene file: an object that names its version near the beginning.
 [[nodiscard]] bool is_scene_file(std::span<const std::byte> beginning);

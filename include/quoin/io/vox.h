@@ -54,6 +54,12 @@ namespace quoin {
 /// file written by write_vox keeps it; any other format loses it.
 [[nodiscard]] std::vector<std::string> only_in_source(const VoxSource& source);
 
+/// A scene as the bytes of a .vox file.
+struct VoxBytes {
+  std::vector<std::byte> bytes;
+  std::vector<std::string> warnings;  ///< one line each: what the format does not hold
+};
+
 /// The scene as a .vox file of version 150; the same scene gives the same bytes.
 ///
 /// Reading it again gives the same scene when every canvas is a box of at most 256 voxels a side from the origin, as
@@ -65,11 +71,9 @@ namespace quoin {
 /// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or
 ///           a grid holds a field of densities;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
-[[nodiscard]] Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings);
-/// The same as a file, which appears whole or not at all; returns its size. Errors: also CannotWrite; they name the
-/// file.
-[[nodiscard]] Result<std::uint64_t> write_vox(const Scene& scene, const std::filesystem::path& path,
-                                              std::vector<std::string>& warnings);
+[[nodiscard]] Result<VoxBytes> write_vox(const Scene& scene);
+/// The same as a file, which appears whole or not at all. Errors: also CannotWrite; they name the file.
+[[nodiscard]] Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path);
 
 /// A scene that was read from a .vox file, with what was changed since, as a .vox file that keeps all else of the first
 /// one: chunks that no change concerns are the same bytes in the same order, so that a scene without a change is the
@@ -84,10 +88,11 @@ namespace quoin {
 /// Lost:     also, with a warning each: colours of the palette that no voxel uses, when new ones need their entries;
 ///           animation, attributes of nodes that Quoin does not know and nodes apart from the graph, where nodes of
 ///           the scene graph have several parents and one of them has to change.
-[[nodiscard]] Result<std::vector<std::byte>> write_vox(const LoadedScene& loaded, std::vector<std::string>& warnings);
-[[nodiscard]] Result<std::uint64_t> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
-                                              std::vector<std::string>& warnings);
+[[nodiscard]] Result<VoxBytes> write_vox(const LoadedScene& loaded);
+[[nodiscard]] Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path);
+
 /// What write_vox would warn of. Errors: those of write_vox, but for files of more than 4 GiB.
+[[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);
 [[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
 
 }  // namespace quoin

@@ -41,12 +41,12 @@ struct LightOptions {
   DVec3 sun{0.371, 0.743, 0.223};  ///< from the surface towards the sun; any length but 0
   Shading shading = Shading::Lit;
   bool shadows = true;
-  OcclusionMode occlusion = OcclusionMode::Rays;
+  OcclusionMode occlusion_mode = OcclusionMode::Rays;
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
-  int occlusion_rays = 9;           ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
-  double occlusion_distance = 6.0;  ///< voxels
-  SmoothOcclusionOptions smooth;    ///< of OcclusionMode::Smooth
-  double shadow_distance = std::numeric_limits<double>::infinity();  ///< voxels; beyond it nothing casts a shadow
+  int occlusion_rays = 9;  ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
+  double occlusion_distance_voxels = 6.0;
+  SmoothOcclusionOptions smooth_occlusion;                                  ///< of OcclusionMode::Smooth
+  double shadow_distance_voxels = std::numeric_limits<double>::infinity();  ///< beyond it nothing casts a shadow
   double exposure = 1.0;        ///< times all light of a surface, before it is clamped to 0..1
   double sun_brightness = 1.0;  ///< times the sun's light; 0: night
   double sky_brightness = 1.0;  ///< times the ambient light, and the sky behind everything
@@ -71,8 +71,8 @@ struct LightOptions {
 /// reference model, whose pictures stay what they are.
 [[nodiscard]] LightOptions natural_light();
 
-/// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance) or out of
-///         range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,
+/// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance_voxels) or out
+///         of range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,
 ///         brightness of less than 0 or more than 1e9, fewer than 0 or more than 1,024 lamps.
 [[nodiscard]] Status check(const LightOptions& options);
 

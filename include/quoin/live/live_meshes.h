@@ -62,7 +62,7 @@ struct LiveMeshOptions {
   /// less count as 1, NaN as infinity: level 0 everywhere.
   double detail_distance = std::numeric_limits<double>::infinity();
   InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
-  Threads threads;  ///< the workers. Unlike elsewhere 0 means one less than the machine has, at least 1
+  Threads workers;  ///< unlike elsewhere 0 means one less than the machine has, at least 1
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
   /// room for more chunks. May be empty. It must not throw or call the meshes.
   std::function<void()> on_ready;
@@ -80,7 +80,7 @@ struct LiveMeshOptions {
 class LiveMeshes {
  public:
   /// Errors: std::system_error where the workers cannot be started.
-  explicit LiveMeshes(const LiveMeshOptions& options);
+  explicit LiveMeshes(const LiveMeshOptions& options = {});
   /// Waits for the chunks that are being meshed; others are given up.
   ~LiveMeshes();
   LiveMeshes(const LiveMeshes&) = delete;

@@ -29,7 +29,7 @@ struct ArraySurfaceOptions {
   ArrayBorder border = ArrayBorder::Closed;
   /// Gives a cell that several sheets of the surface pass through a vertex for each, so that the mesh is manifold; but
   /// for cells at an open border. Without, some edges have four triangles.
-  bool split_sheets = false;
+  bool split_sheets = true;
 };
 
 /// A welded surface. The vertex arrays have one entry a vertex; every vertex has a triangle.
@@ -66,7 +66,7 @@ struct ArraySurface {
 ///     ArrayView view{values.data(), ScalarType::Float32, {256, 256, 256}};
 ///     view.strides = strides_of_last_fastest(view.size, view.type);
 ///     const Result<ArraySurface> surface = surface_from_array(view, {.iso = 0.5});
-[[nodiscard]] Result<ArraySurface> surface_from_array(const ArrayView& array, const ArraySurfaceOptions& options,
+[[nodiscard]] Result<ArraySurface> surface_from_array(const ArrayView& array, const ArraySurfaceOptions& options = {},
                                                       Threads threads = {}, const Progress& progress = {});
 
 }  // namespace quoin

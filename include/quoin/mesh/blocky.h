@@ -16,9 +16,9 @@
 namespace quoin {
 
 struct QuadOptions {
-  bool merge = true;          ///< false: one quad a visible unit face
-  bool occlusion = true;      ///< false: 0 everywhere, and faces merge whatever stands in front of them
-  IBox region = kWholeChunk;  ///< of the voxels whose faces are wanted: chunk coordinates, clipped to the chunk
+  bool merge = true;           ///< false: one quad a visible unit face
+  bool bake_occlusion = true;  ///< false: 0 everywhere, and faces merge whatever stands in front of them
+  IBox region = kWholeChunk;   ///< of the voxels whose faces are wanted: chunk coordinates, clipped to the chunk
 };
 
 /// Turns chunks into quads; holds the scratch memory that this takes (about 1.5 MiB), so keep one a thread.

@@ -42,9 +42,9 @@ struct BlockyMesh {
 };
 
 struct BlockyMeshOptions {
-  bool merge = true;        ///< as QuadOptions::merge
-  bool occlusion = true;    ///< as QuadOptions::occlusion
-  bool watertight = false;  ///< subdivide outlines so that no vertex lies inside another triangle's edge
+  bool merge = true;           ///< as QuadOptions::merge
+  bool bake_occlusion = true;  ///< as QuadOptions::bake_occlusion
+  bool watertight = false;     ///< subdivide outlines so that no vertex lies inside another triangle's edge
 };
 
 /// Meshes a whole grid, chunk by chunk.
@@ -56,7 +56,7 @@ struct BlockyMeshOptions {
 /// Types:    those that are not registered count as opaque.
 /// Errors:   Cancelled; LimitExceeded when a surface class needs more than about 2^32 vertices.
 [[nodiscard]] Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& types,
-                                                   const BlockyMeshOptions& options, Threads threads = {},
+                                                   const BlockyMeshOptions& options = {}, Threads threads = {},
                                                    const Progress& progress = {});
 
 }  // namespace quoin

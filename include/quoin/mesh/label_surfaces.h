@@ -59,8 +59,9 @@ struct LabelSurfaces {
 ///           array's type cannot hold, and for relaxation steps out of their range.
 /// Cost:     each sample is read three times, from neighbouring places.
 /// Source:   S. Gibson, "Constrained Elastic Surface Nets" (1998), for several materials at once.
-[[nodiscard]] Result<LabelSurfaces> surfaces_from_labels(const ArrayView& labels, const LabelSurfaceOptions& options,
-                                                         Threads threads = {}, const Progress& progress = {});
+[[nodiscard]] Result<LabelSurfaces> surfaces_from_labels(const ArrayView& labels,
+                                                         const LabelSurfaceOptions& options = {}, Threads threads = {},
+                                                         const Progress& progress = {});
 
 /// The labels that have a surface, but for the background; in the order of the interfaces.
 [[nodiscard]] std::vector<std::int64_t> labels_of(const LabelSurfaces& surfaces);

@@ -29,7 +29,7 @@ enum class SmoothOcclusion : std::uint8_t {
 /// 1 - clamp(1 - (ratio + offset)^power, 0, 1). Numbers out of their range count as its nearest end, NaN as the
 /// default.
 struct SmoothOcclusionOptions {
-  SmoothOcclusion form = SmoothOcclusion::SolidShare;
+  SmoothOcclusion method = SmoothOcclusion::SolidShare;
   float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2, rounded to 1/65,536; 1 and 2 are several times
                         ///< faster than others
   float offset = 0.4F;  ///< of the weighted forms: 0 to 0.99
@@ -57,7 +57,7 @@ struct SmoothOptions {
   SmoothBorder border = SmoothBorder::Shared;
   /// Gives a cell that two sheets of the surface cross a vertex for each, so that the mesh is manifold everywhere.
   /// Without, some edges have four triangles. Cells beside a chunk of another level keep one vertex.
-  bool split_sheets = false;
+  bool split_sheets = true;
   /// Where solid samples touch by an edge only, the sheets are those of one solid instead of two: what is one sample
   /// thick and runs at a slant holds together. Of use with `split_sheets` alone.
   bool join_diagonals = false;

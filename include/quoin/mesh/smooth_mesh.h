@@ -37,7 +37,7 @@ enum class SurfaceColours : std::uint8_t {
 
 struct SmoothMeshOptions {
   SmoothOcclusionOptions occlusion{};
-  bool split_sheets = true;  ///< as in SmoothOptions, where it is off
+  bool split_sheets = true;  ///< as in SmoothOptions
   SurfaceColours colours = SurfaceColours::Blended;
   /// 1: the surface of the field. Less draws each vertex to the middle of its cell, and each normal to that of its
   /// face, until at 0 the surface is that of blocks around the solid samples (which are 1/256 apart, or as much
@@ -61,7 +61,7 @@ struct SmoothMeshOptions {
 /// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices; InvalidArgument for a level out of
 ///          range.
 [[nodiscard]] Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
-                                                   const SmoothMeshOptions& options, Threads threads = {},
+                                                   const SmoothMeshOptions& options = {}, Threads threads = {},
                                                    const Progress& progress = {});
 
 }  // namespace quoin

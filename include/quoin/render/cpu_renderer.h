@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <memory>
-#include <optional>
 
 #include <quoin/core/image.h>
 #include <quoin/core/parallel.h>
@@ -23,23 +21,7 @@ struct RenderOptions {
   int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
   bool depth = false;  ///< whether Picture::depth is filled
   LightOptions light;
-  /// How instances are drawn; without, all are Near. Whether hidden instances are drawn is for the renderer to say, not
-  /// the policy.
-  std::optional<DetailPolicy> detail;
-  /// Of the view that the picture is of: remembers what was chosen in the one before, so that models do not tremble
-  /// between two details. Null: a picture knows nothing of any other, and there is no hysteresis. Pictures that share
-  /// one are taken one after another, of one scene; it must outlive the call.
-  DetailSelector* selector = nullptr;
-  /// For how long a picture waits for impostors that are missing or older than their grid. Threads of the renderer's
-  /// own build them, whatever is drawn meanwhile; grids whose are not ready are traced, or shown as they were. Only
-  /// without a limit is a picture the same whenever it is taken; 0 is for frames. Their occlusion by rays is that of
-  /// nine rays of 6 voxels within the grid.
-  double impostor_seconds = std::numeric_limits<double>::infinity();
-  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots: ImpostorOptions::edge
-  /// Instances in colours that tell their detail instead of their own: Near green, Mid yellow to orange the more often
-  /// halved, Far blue.
-  bool detail_colours = false;
-  Threads threads;
+  DetailOptions detail;
 };
 
 struct Picture {
@@ -90,7 +72,7 @@ class CpuRenderer {
   ///           the camera's position is not finite, its axes are not of unit length, its angle or height is
   ///           impossible, or `check` refuses the light; Cancelled when `progress` returns false, which is asked after
   ///           every sample of a tile.
-  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
                                        const Progress& progress = {}) const;
 
   /// What its rays go through, for queries (first_hit, pick) that shall see what pictures show. Out of date after an

@@ -16,7 +16,6 @@ struct DensitySliceOptions {
   int axis = 1;     ///< of the world, that the plane is square to: 0 x, 1 y, 2 z
   double at = 0.5;  ///< where on it: 0 to 1 from the least to the greatest of the drawn fields' bounds
   InstanceFilter instances = InstanceFilter::Visible;
-  Threads threads;
 };
 
 struct DensitySlice {
@@ -35,6 +34,7 @@ struct DensitySlice {
 /// Errors:  InvalidArgument for a size that is not positive or more than 2^28 pixels, an axis that is none of the
 ///          three, a place beyond 0 to 1, and for a scene whose drawn instances have no field with a solid.
 /// Cost:    O(pixels * instances with fields). The same bytes at any thread count.
-[[nodiscard]] Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOptions& options = {});
+[[nodiscard]] Result<DensitySlice> draw_density_slice(const Scene& scene, const DensitySliceOptions& options = {},
+                                                      Threads threads = {});
 
 }  // namespace quoin

@@ -94,10 +94,9 @@ class Impostor {
   /// quarter of whose surface is of what is at most three samples thick, which tangent planes do not show well.
   [[nodiscard]] bool is_left_to_rays() const { return is_left_to_rays_; }
   [[nodiscard]] std::size_t bytes() const;
-  /// What it holds, laid out as is best for the library's own kernels.
-  [[nodiscard]] const ImpostorFaces& faces() const { return *faces_; }
 
  private:
+  friend struct ImpostorFaces;
   static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
                         const DensityTree* field, const IBox& whole, const ImpostorOptions& options);
 
@@ -145,7 +144,7 @@ struct FarInstance {
 ///
 /// Requires: the camera and options are such that CpuRenderer accepts them; `picture` has their size, and depth.
 ///           One sample a pixel is taken, at its centre.
-void draw_impostors(const SceneTracer& scene, const VoxelRegistry& types, std::span<const FarInstance> far,
-                    const Camera& camera, const RenderOptions& options, Picture& picture);
+void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
+                    const RenderOptions& options, Picture& picture, Threads threads = {});
 
 }  // namespace quoin

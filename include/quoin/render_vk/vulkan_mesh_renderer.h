@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <memory>
-#include <optional>
 #include <span>
 
 #include <quoin/core/parallel.h>
@@ -30,19 +28,14 @@ struct MeshPictureOptions {
   int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
   /// `occlusion_rays` means nothing here: any occlusion but Off is that of the meshes' vertices.
   LightOptions light;
-  /// As RenderOptions has them. Mid: meshes of halved grids, made on `threads` when a picture first shows them, blocky
+  /// Mid: meshes of halved grids, made when a picture first shows them, blocky
   /// or smooth as those of the full grid that were put, else blocky; Far: the faces of an impostor.
-  std::optional<DetailPolicy> detail;
-  DetailSelector* selector = nullptr;
-  double impostor_seconds = std::numeric_limits<double>::infinity();
-  int impostor_edge = 128;
-  bool detail_colours = false;
+  DetailOptions detail;
   /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays
   /// through the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface,
   /// drawn from back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface:
   /// cheap, and without need of voxels.
   bool glass_by_rays = true;
-  Threads threads;
   Wireframe wireframe = Wireframe::Off;
 };
 
@@ -85,7 +78,7 @@ class VulkanMeshRenderer {
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
   void clear();
 
-  /// Draws all there is.
+  /// Draws all there is; `threads` are for what detail needs.
   ///
   /// Requires: with levels of detail or lamps the scene was not edited since the last update of this and of the
   ///           VulkanRenderer.
@@ -93,7 +86,8 @@ class VulkanMeshRenderer {
   /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, levels of detail or glass
   /// by rays, if there is any, when the VulkanRenderer was not last updated with the same scene and filter; Unsupported
   /// for wireframes where the device has no lines. After an error in drawing the picture has no samples.
-  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options);
+  [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
+                            Threads threads = {});
 
   struct Stats {
     std::size_t chunks = 0;            ///< with a surface, those of halved grids too

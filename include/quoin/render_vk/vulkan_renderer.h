@@ -42,7 +42,7 @@ enum class Accumulation : std::uint8_t {
 ///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
 ///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little.
 /// Detail:  grids are halved and impostors built on the processor, when a picture first asks for them, from the scene
-///          of the last update: pictures with `RenderOptions::detail`, and the first with lamps, require that it is
+///          of the last update: pictures with `DetailOptions::policy`, and the first with lamps, require that it is
 ///          still there, unedited.
 /// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
@@ -80,8 +80,8 @@ class VulkanRenderer {
   /// Bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
-  /// One picture, as CpuRenderer::render; `options.threads` are for what detail needs.
-  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options,
+  /// One picture, as CpuRenderer::render; `threads` are for what detail needs.
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
                                        const Progress& progress = {});
 
   /// Draws into a picture that stays on the device: adds `options.samples` samples a pixel to those that it has, or
@@ -93,7 +93,7 @@ class VulkanRenderer {
   /// Errors:   those of `render`, LimitExceeded for more than 4,096 samples, and InvalidArgument for a picture of
   ///           another renderer; `options.depth` means nothing.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
-                            Accumulation accumulation, const Progress& progress = {});
+                            Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
 
  private:
   friend struct vulkan::Access;

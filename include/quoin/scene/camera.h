@@ -24,8 +24,8 @@ struct Camera {
   DVec3 up{0.0, 1.0, 0.0};
   DVec3 forward{0.0, 0.0, -1.0};
   Projection projection = Projection::Perspective;
-  double vertical_fov = 1.0;  ///< perspective: radians, more than 0 and less than pi
-  double view_height = 1.0;   ///< orthographic: world units from the picture's lower to its upper edge
+  double vertical_fov_radians = 1.0;  ///< perspective: more than 0 and less than pi
+  double view_height = 1.0;           ///< orthographic: world units from the picture's lower to its upper edge
 
   bool operator==(const Camera&) const = default;
 };
@@ -33,20 +33,26 @@ struct Camera {
 /// A perspective camera at `position` that looks at `target`, upright (+Y up; where it looks straight up or down, the
 /// picture's top is towards -Z when looking down and +Z when looking up).
 ///
-/// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view (vertical,
-///         radians) is not more than 0 and less than pi.
-[[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov);
+/// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view is not more
+///         than 0 and less than pi.
+[[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians);
 
-/// The view matrix: x to the right, y up, and -z forward, as glm::perspective(camera.vertical_fov, aspect, near, far)
-/// and glTF's cameras expect.
+/// The view matrix: x to the right, y up, and -z forward, as glm::perspective(camera.vertical_fov_radians, aspect, near,
+/// far) and glTF's cameras expect.
 [[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);
+
+/// A point of a picture of `width` by `height` pixels.
+struct PicturePoint {
+  double x = 0.0;  ///< pixels from the picture's upper left corner; a pixel's centre is at + 0.5
+  double y = 0.0;
+  int width = 1;
+  int height = 1;
+};
 
 /// The ray of a point of the picture, in world space: from the camera for a perspective one, from the picture's plane
 /// for an orthographic one. `direction` is unit, so distances along it are world units.
-///
-/// `x` and `y` are in pixels from the picture's upper left corner; a pixel's centre is at + 0.5.
 /// Requires: width and height are positive.
-[[nodiscard]] Ray ray_through(const Camera& camera, double x, double y, int width, int height);
+[[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
 
 /// The views that frame a whole scene by themselves. Front looks along -Z: what faces +Z is seen.
 enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };

@@ -25,8 +25,8 @@ struct Lamp {
   Vec3 colour{1.0F};                ///< linear
   double intensity = 1.0;           ///< the light of a white surface that faces it at a distance of 1
   double range = std::numeric_limits<double>::infinity();  ///< world units
-  double inner_angle = 0.0;          ///< radians from a spot's middle up to which it is at its brightest
-  double outer_angle = 0.785398163;  ///< and from which on it is dark; up to pi
+  double inner_angle_radians = 0.0;                        ///< from a spot's middle, up to which it is at its brightest
+  double outer_angle_radians = 0.785398163;                ///< and from which on it is dark; up to pi
 
   bool operator==(const Lamp&) const = default;
 };

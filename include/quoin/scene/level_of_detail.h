@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -76,6 +78,28 @@ struct SelectedInstance {
 
 /// The coarsest level at which grids are traced.
 inline constexpr int kMaxGridLevel = 4;
+
+class DetailSelector;
+
+/// How a picture draws instances in levels of detail.
+struct DetailOptions {
+  /// Which detail each instance is drawn in; without, all are Near. Whether hidden instances are drawn is for the
+  /// renderer to say, not the policy.
+  std::optional<DetailPolicy> policy{};
+  /// Of the view that the picture is of: remembers what was chosen in the one before, so that models do not tremble
+  /// between two details. Null: a picture knows nothing of any other, and there is no hysteresis. Pictures that share
+  /// one are taken one after another, of one scene; it must outlive the call.
+  DetailSelector* selector = nullptr;
+  /// For how long a picture waits for impostors that are missing or older than their grid. Threads of the renderer's
+  /// own build them, whatever is drawn meanwhile; grids whose are not ready are traced, or shown as they were. Only
+  /// without a limit is a picture the same whenever it is taken; 0 is for frames. Their occlusion by rays is that of
+  /// nine rays of 6 voxels within the grid.
+  double impostor_seconds = std::numeric_limits<double>::infinity();
+  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots: ImpostorOptions::edge
+  /// Whether instances have colours that tell their detail instead of their own: Near green, Mid yellow to orange the
+  /// more often halved, Far blue.
+  bool colours = false;
+};
 
 /// Chooses what is drawn, and how, in one view (a window, a split screen's half, a mirror): remembers the last choice
 /// of each instance there (hysteresis), and each grid's content.

@@ -21,7 +21,7 @@ struct SceneHit {
   IVec3 voxel{0};
   VoxelType type = kAir;             ///< of a field the material
   Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit. Of a field that nearest to its normal
-  double distance = 0.0;             ///< in lengths of the ray's direction: world units for a unit one
+  double t = 0.0;                    ///< in lengths of the ray's direction: world units for a unit one
   DVec3 position{0.0};               ///< in the world
   bool starts_inside = false;
   bool in_field = false;
@@ -36,17 +36,20 @@ struct SceneHit {
 ///            itself.
 /// Cost:      O(log instances + grids on the ray).
 [[nodiscard]] std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world,
-                                                double max_distance = std::numeric_limits<double>::infinity());
+                                                double max_t = std::numeric_limits<double>::infinity());
 
-/// What is seen at a point of a picture; `x` and `y` in pixels from its upper left corner (a pixel's centre is at
-/// + 0.5). Requires: width and height are positive.
-[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, double x, double y,
-                                           int width, int height);
+/// Whether anything meets a ray in the world from 0 up to and including `max_t`, transparent ones too: as `first_hit`,
+/// without asking what is nearest, so it is done with the first that is found. For lines of sight.
+[[nodiscard]] bool any_hit(const SceneTracer& tracer, const Ray& ray_in_world,
+                           double max_t = std::numeric_limits<double>::infinity());
+
+/// What is seen at a point of a picture. Requires: width and height are positive.
+[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point);
 
 /// The voxel that a pixel of a depth picture shows: the first one no nearer than `depth`, which is a float's rounding
 /// off at most. Nothing when there is none at that distance.
-[[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x,
-                                                     double y, int width, int height, float depth);
+[[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
+                                                     const PicturePoint& point, float depth);
 
 /// A voxel that collides (VoxelProperties::collides) and meets a shape, or a cell of a field whose solid does.
 struct SceneOverlap {
@@ -65,9 +68,7 @@ struct SceneOverlap {
 /// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
 /// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
 /// Threads: any number may ask at once, while the tracer is not updated.
-[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre,
-                                                 double radius);
-[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types,
-                                                 const OrientedBox& box);
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius);
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box);
 
 }  // namespace quoin

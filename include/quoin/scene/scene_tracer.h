@@ -79,6 +79,8 @@ class SceneTracer {
   /// Threads:  any number may call at once.
   [[nodiscard]] SceneTracer with_detail(std::span<const SelectedInstance> selected, Threads threads = {}) const;
 
+  /// What it traces; queries ask its registry what collides.
+  [[nodiscard]] const Scene& scene() const;
   /// In the order of the instances' handles.
   [[nodiscard]] const std::vector<PlacedGrid>& placed() const;
   /// Whether any of them has transparent voxels, or anything transparent in its field.

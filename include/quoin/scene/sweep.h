@@ -38,8 +38,7 @@ struct SweepHit {
 /// Source: the separating axes of two boxes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996), each with the times
 ///         at which they begin and cease to part them; in a field of the box and what lies below planes under the
 ///         trilinear field, halved until these are near enough to it.
-[[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry& types,
-                                                const OrientedBox& box, DVec3 displacement);
+[[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement);
 
 /// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {
@@ -82,7 +81,7 @@ struct SlideResult {
 ///
 /// Cost:    a sweep for each contact, `max_contacts` at most. With a floor two more, and four for an attempt to step.
 /// Threads: any number may ask at once, while the tracer is not updated.
-[[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
-                                         DVec3 displacement, const SlideOptions& options = {});
+[[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
+                                         const SlideOptions& options = {});
 
 }  // namespace quoin

@@ -71,11 +71,8 @@ class OccupancyTree {
   /// Bytes held.
   [[nodiscard]] std::size_t bytes() const;
 
-  /// For the library's own kernels; null where the world is so sparse (islands far apart) that their tables would be
-  /// larger than all the rest.
-  [[nodiscard]] const trace::TreeView* view() const { return view_; }
-
  private:
+  friend struct trace::TreeView;
   friend class trace::TreeNodes;
   struct Impl;
   void finish_build();

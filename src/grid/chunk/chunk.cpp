@@ -76,7 +76,7 @@ void for_each_row_of_slab(std::size_t slab, Visit&& visit) {
 
 // The type of all voxels of a row, where there is one and it is quick to see.
 std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
-  const ChunkStorage* m = chunk.storage();
+  const ChunkStorage* m = ChunkStorage::of(chunk);
   if (m == nullptr) return chunk.uniform();
   const std::uint32_t slab = m->slabs[ChunkStorage::slab_index(y, z)];
   std::uint32_t index = slab & ~ChunkStorage::kUniformSlab;

@@ -26,12 +26,12 @@ bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z)
 template <class Compare>
 void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, Compare&& compare) {
   if (before.shares_storage_with(after)) return;
-  const bool share = share_palette(before.storage(), after.storage());
+  const bool share = share_palette(ChunkStorage::of(before), ChunkStorage::of(after));
   std::array<VoxelType, kChunkEdge> old_row;
   std::array<VoxelType, kChunkEdge> new_row;
   for (int z = within.min.z; z < within.max.z; ++z) {
     for (int y = within.min.y; y < within.max.y; ++y) {
-      if (share && is_stored_alike(*before.storage(), *after.storage(), y, z)) continue;
+      if (share && is_stored_alike(*ChunkStorage::of(before), *ChunkStorage::of(after), y, z)) continue;
       before.read_row(y, z, old_row);
       after.read_row(y, z, new_row);
       compare(y, z, old_row, new_row);

@@ -43,6 +43,9 @@ struct ChunkStorage : RefCounted {
   std::uint32_t free_count = 0;
   std::uint32_t slot_count = 0;  ///< free ones included
 
+  /// Of a chunk; null when it is uniform.
+  [[nodiscard]] static const ChunkStorage* of(const Chunk& chunk) { return chunk.storage_.get(); }
+
   [[nodiscard]] static std::size_t slab_index(int y, int z) {
     return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));
   }
@@ -92,7 +95,8 @@ struct ChunkStorage : RefCounted {
 
 /// Chunk::non_air_count, where a call would be a good part of its cost.
 [[nodiscard]] inline int non_air_count(const Chunk& chunk) {
-  return chunk.storage() != nullptr ? chunk.storage()->non_air : chunk.non_air_count();
+  const ChunkStorage* const mixed = ChunkStorage::of(chunk);
+  return mixed != nullptr ? mixed->non_air : chunk.non_air_count();
 }
 
 // What is about to be written: of this chunk alone.

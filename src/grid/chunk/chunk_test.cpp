@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(Widths, ChunkOfTypes, testing::Values(2, 3, 4, 5, 16, 1
 TEST(Chunk, ReusesPaletteEntriesThatFellOutOfUse) {
   Chunk chunk;
   for (int i = 1; i < 60'000; ++i) chunk.set(5, 5, 5, static_cast<VoxelType>(i));
-  EXPECT_LE(chunk.storage()->bits, 2);
+  EXPECT_LE(ChunkStorage::of(chunk)->bits, 2);
 }
 
 TEST(Chunk, BoxFillsLeaveWholeSlabsWithoutData) {

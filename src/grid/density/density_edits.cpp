@@ -121,10 +121,9 @@ std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, doub
   return remove_shape(impl_->store, RoundedBox(min, max, rounding), blend);
 }
 
-std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec3 normal, double strength,
-                                  VoxelType material) {
-  const Brush brush(centre, radius, strength);
-  const Plane plane(point, normal);
+std::int64_t DensityGrid::flatten(DVec3 centre, double radius, const FlattenOptions& options) {
+  const Brush brush(centre, radius, options.strength);
+  const Plane plane(options.point, options.normal);
   if (!brush.is_sound() || !plane.is_sound()) return 0;
   const NoticeOfEdits notice(impl_->store, notice_);
   DensityStore& store = impl_->store;
@@ -143,12 +142,12 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, DVec3 point, DVec
       float& density = row.densities[static_cast<std::size_t>(x)];
       const double wanted = std::clamp(plane.distance(at), -band, band);
       const auto moved = static_cast<float>(density + weight * (wanted - density));
-      if (!(density < 0.0F) && moved < 0.0F) row.materials[static_cast<std::size_t>(x)] = material;
+      if (!(density < 0.0F) && moved < 0.0F) row.materials[static_cast<std::size_t>(x)] = options.material;
       density = moved;
     }
     return true;
   };
-  return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, material, choose, change);
+  return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, options.material, choose, change);
 }
 
 }  // namespace quoin

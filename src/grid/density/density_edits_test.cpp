@@ -99,7 +99,7 @@ class RandomEdit {
       case 4:
         return grid.smooth(centre_, radius_ + 0.1, strength_);
       default:
-        return grid.flatten(centre_, radius_ + 0.1, centre_ + 2.0, normal_, strength_, material_);
+        return grid.flatten(centre_, radius_ + 0.1, {centre_ + 2.0, normal_, strength_, material_});
     }
   }
 
@@ -249,19 +249,19 @@ TEST(DensityEdits, SizesThatAreNoneChangeNothing) {
     EXPECT_EQ(grid.add_box({0, 0, 0}, {5, 5, 5}, 2, bad), 0);
     EXPECT_EQ(grid.remove_box({0, 0, 0}, {5, bad, 5}), 0);
     EXPECT_EQ(grid.smooth({0, 0, 0}, bad, 0.5), 0);
-    EXPECT_EQ(grid.flatten({0, 0, 0}, bad, {0, 0, 0}, {0, 1, 0}, 0.5, 1), 0);
+    EXPECT_EQ(grid.flatten({0, 0, 0}, bad, {{0, 0, 0}, {0, 1, 0}, 0.5, 1}), 0);
   }
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     EXPECT_EQ(grid.add_sphere({0, bad, 0}, 3.0, 2), 0);
     EXPECT_EQ(grid.smooth({bad, 0, 0}, 3.0, 0.5), 0);
-    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, bad, 0}, {0, 1, 0}, 0.5, 1), 0);
-    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, 0, 0}, {0, bad, 0}, 0.5, 1), 0);
+    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {{0, bad, 0}, {0, 1, 0}, 0.5, 1}), 0);
+    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {{0, 0, 0}, {0, bad, 0}, 0.5, 1}), 0);
   }
   for (const double bad : {0.0, -1.0, kNan, -kInfinity}) {
     EXPECT_EQ(grid.smooth({0, 0, 0}, 5.0, bad), 0);
-    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, 1, 0}, {0, 1, 0}, bad, 1), 0);
+    EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {{0, 1, 0}, {0, 1, 0}, bad, 1}), 0);
   }
-  EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {0, 1, 0}, {0, 0, 0}, 0.5, 1), 0);
+  EXPECT_EQ(grid.flatten({0, 0, 0}, 5.0, {{0, 1, 0}, {0, 0, 0}, 0.5, 1}), 0);
   EXPECT_FALSE(follower.is_behind(grid));
   EXPECT_TRUE(follower.take(grid, 64).empty());
 }
@@ -306,7 +306,7 @@ TEST(DensityEdits, SmoothingTowardsTheMeanLowersATip) {
 TEST(DensityEdits, FlatteningAtFullStrengthPutsTheSurfaceOnThePlane) {
   DensityGrid grid;
   grid.add_box({-30, -30, -30}, {30, 0, 30}, 4);
-  grid.flatten({0, 3, 0}, 20.0, {0, 3, 0}, {0, 1e300, 0}, 1.0, 5);
+  grid.flatten({0, 3, 0}, 20.0, {{0, 3, 0}, {0, 1e300, 0}, 1.0, 5});
   EXPECT_EQ(grid.density({0, 3, 0}), 0.0F);
   EXPECT_NEAR(grid.density({4, 3, 4}), 3.0F - 3.0F * std::pow(1.0F - 32.0F / 400.0F, 2.0F), 0.01F);
   EXPECT_LT(grid.density({0, 2, 0}), 0.0F);

@@ -13,6 +13,9 @@ namespace quoin {
 
 /// The densities of a chunk of several. Shared by copies of the chunk until one of them is written.
 struct DensityStorage : RefCounted {
+  /// Of a chunk; null when it is uniform.
+  [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
+
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`
   std::vector<Half> values;                ///< [slot][z % 4][y % 4][x]
   std::vector<std::uint32_t> free_slots;

@@ -62,7 +62,7 @@ void ChunkHalver::add(VoxelType type, int half, std::uint64_t cells) {
 void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
   // Solid cells hold voxels, so there is a chunk.
   const Chunk& chunk = *masks_.octant({half, y / kHalfEdge, z / kHalfEdge});
-  const ChunkStorage* mixed = chunk.storage();
+  const ChunkStorage* mixed = ChunkStorage::of(chunk);
   if (mixed == nullptr) return add(*chunk.uniform(), half, solid);
   const int fine_y = 2 * (y % kHalfEdge);
   const int fine_z = 2 * (z % kHalfEdge);
@@ -81,7 +81,7 @@ void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
 
 // The types in the four rows of half a row of cells, whose slab has voxels of its own.
 void ChunkHalver::find_layers(const Chunk& chunk, std::uint32_t slab, int half, int y, int z) {
-  const ChunkStorage& mixed = *chunk.storage();
+  const ChunkStorage& mixed = *ChunkStorage::of(chunk);
   std::array<const std::uint64_t*, 4> rows{};
   std::array<std::uint64_t, 4> left{};
   for (std::size_t i = 0; i < rows.size(); ++i) {

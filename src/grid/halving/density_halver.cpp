@@ -178,8 +178,8 @@ VoxelType DensityHalver::outermost(const NearRows& rows, IVec3 fine) const {
   return chunk_at(best)->materials().get(p);
 }
 
-HalvedDensityCounts DensityHalver::counts() const {
-  HalvedDensityCounts counts;
+DownsampledDensityCounts DensityHalver::counts() const {
+  DownsampledDensityCounts counts;
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
       const Signs& row = signs(y, z);

@@ -13,7 +13,7 @@ namespace quoin {
 /// A chunk of a halved field, and what it has kept.
 struct HalvedDensityChunk {
   DensityChunk samples{Half{0}};
-  HalvedDensityCounts counts;
+  DownsampledDensityCounts counts;
 };
 
 /// Makes one chunk of a halved field.
@@ -62,7 +62,7 @@ class DensityHalver {
   [[nodiscard]] VoxelType outermost(const NearRows& rows, IVec3 fine) const;
   [[nodiscard]] std::uint64_t beside_air(int y, int z) const;
   [[nodiscard]] bool is_of_one_material() const;
-  [[nodiscard]] HalvedDensityCounts counts() const;
+  [[nodiscard]] DownsampledDensityCounts counts() const;
 
   Half far_;         // of the field
   Half coarse_far_;  // of the result

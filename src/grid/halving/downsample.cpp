@@ -30,7 +30,7 @@ struct VoxelHalving {
   using Made = Chunk;
   const VoxelRegistry* types;
 
-  [[nodiscard]] Chunk make(const Grid& finer, IVec3 chunk) const { return halved_chunk(finer, *types, chunk); }
+  [[nodiscard]] Chunk make(const Grid& finer, IVec3 chunk) const { return downsample_chunk(finer, *types, chunk); }
 };
 
 // A halved chunk of densities.
@@ -68,8 +68,8 @@ struct VoxelLevel {
 // A level of a field.
 struct DensityLevel {
   DensityGrid content;
-  std::map<IVec3, HalvedDensityCounts, ByZyx> chunks;  // that hold any solid
-  HalvedDensityCounts counts;                          // of all
+  std::map<IVec3, DownsampledDensityCounts, ByZyx> chunks;  // that hold any solid
+  DownsampledDensityCounts counts;                          // of all
 
   // Of another field its band may be another.
   void begin(const DensityGrid& finer) {
@@ -81,10 +81,10 @@ struct DensityLevel {
   }
   void put(IVec3 chunk, HalvedDensityChunk made) {
     content.put_chunk(chunk, std::move(made.samples));
-    HalvedDensityCounts& known = chunks[chunk];
+    DownsampledDensityCounts& known = chunks[chunk];
     counts -= known;
     counts += known = made.counts;
-    if (known == HalvedDensityCounts{}) chunks.erase(chunk);
+    if (known == DownsampledDensityCounts{}) chunks.erase(chunk);
   }
 };
 
@@ -151,17 +151,17 @@ struct Levels {
 
 }  // namespace
 
-Chunk halved_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
+Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk) {
   return ChunkHalver(grid, types, chunk).make();
 }
 
-Grid halved(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+Grid downsample(const Grid& grid, const VoxelRegistry& types, Threads threads) {
   Level<VoxelHalving, VoxelLevel> level;
   level.update(grid, {&types}, threads);
   return std::move(level.content);
 }
 
-DensityGrid halved(const DensityGrid& field, Threads threads) {
+DensityGrid downsample(const DensityGrid& field, Threads threads) {
   Level<DensityHalving, DensityLevel> level;
   level.update(field, {}, threads);
   return std::move(level.content);
@@ -205,7 +205,7 @@ const DensityGrid& DensityPyramid::level(int level) const {
   return impl_->at(level).content;
 }
 
-const HalvedDensityCounts& DensityPyramid::counts(int level) const {
+const DownsampledDensityCounts& DensityPyramid::counts(int level) const {
   return impl_->at(level).counts;
 }
 

@@ -48,7 +48,7 @@ WordCells cells_of(const CellVoxels& voxels) {
 // The rows of a chunk as masks of what is not air; looks air up in the palette once.
 class SolidRows {
  public:
-  explicit SolidRows(const Chunk& chunk) : voxels_(chunk.storage()) {
+  explicit SolidRows(const Chunk& chunk) : voxels_(ChunkStorage::of(chunk)) {
     if (voxels_ == nullptr) {
       uniform_ = chunk.uniform() == kAir ? 0 : ~std::uint64_t{0};
       return;

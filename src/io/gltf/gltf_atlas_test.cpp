@@ -83,7 +83,7 @@ TEST_F(GltfAtlas, GlassAndWhatGlowsStayInThePalette) {
 }
 
 TEST_F(GltfAtlas, WithoutOcclusionThereIsNoAtlas) {
-  const auto bytes = write_mesh(meshed(), FileFormat::Glb, {.occlusion = false});
+  const auto bytes = write_mesh(meshed(), FileFormat::Glb, {.write_occlusion = false});
   ASSERT_TRUE(bytes.has_value());
   const ParsedGlb glb = parse_glb(*bytes);
   EXPECT_EQ(glb.document["images"][0]["name"], "palette");
@@ -122,7 +122,7 @@ TEST_F(GltfAtlas, VoxelsThatFloatsDoNotTellApartAreRefused) {
 }
 
 TEST_F(GltfAtlas, WhatContradictsItIsRefused) {
-  for (const BlockyMeshOptions mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.occlusion = false},
+  for (const BlockyMeshOptions mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.bake_occlusion = false},
                                        BlockyMeshOptions{.watertight = true}}) {
     EXPECT_EQ(mesh_scene(scene_, {.mesh = mesh, .atlas = true}).error().code, ErrorCode::InvalidArgument);
   }

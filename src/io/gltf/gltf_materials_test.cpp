@@ -35,7 +35,7 @@ TEST_F(GltfMaterials, OcclusionIsLinearGreyWithFullAlphaAndCanBeLeftOut) {
     seen.insert(grey);
   }
   EXPECT_GT(seen.size(), 1U) << "the model has inner corners";
-  const ParsedGlb plain = write(BlockyMeshOptions{.merge = true, .occlusion = false, .watertight = false});
+  const ParsedGlb plain = write(BlockyMeshOptions{.merge = true, .bake_occlusion = false, .watertight = false});
   EXPECT_FALSE(plain.document["meshes"][0]["primitives"][0]["attributes"].contains("COLOR_0"));
 }
 

@@ -91,7 +91,7 @@ class Obj : public ::testing::Test {
   }
 
   ParsedObj write(bool occlusion = true) {
-    meshes_ = *mesh_scene(scene_, {.mesh = {.occlusion = occlusion}});
+    meshes_ = *mesh_scene(scene_, {.mesh = {.bake_occlusion = occlusion}});
     const auto bytes = write_mesh(meshes_, folder_.file("my model.obj"));
     EXPECT_TRUE(bytes) << to_string(bytes.error());
     return parse_obj(folder_.file("my model.obj"));

@@ -134,10 +134,10 @@ struct Decoded {
 
 /// The chunks of all pieces; nothing where they take more than `max_bytes`.
 std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, const std::vector<SceneGrid>& grids,
-                                           std::size_t type_count, std::size_t max_bytes) {
+                                           std::size_t type_count, std::size_t max_bytes, Threads threads) {
   std::vector<Decoded> decoded(pieces.size());
   std::atomic<std::size_t> bytes = 0;
-  parallel_for(pieces.size(), {}, [&](std::size_t i) {
+  parallel_for(pieces.size(), threads, [&](std::size_t i) {
     if (bytes > max_bytes) return;
     const Piece& piece = pieces[i];
     if (piece.is_field) {
@@ -167,8 +167,8 @@ void put_or_blame(Result<Chunks>& chunks, Content& content, const Place& place, 
 }
 
 void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t file_bytes,
-                 std::vector<SceneGrid>& grids, Faults& faults) {
-  auto decoded = decode(pieces, grids, type_count, max_voxel_bytes(file_bytes));
+                 std::vector<SceneGrid>& grids, Threads threads, Faults& faults) {
+  auto decoded = decode(pieces, grids, type_count, max_voxel_bytes(file_bytes), threads);
   if (!decoded) {
     faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
                ErrorCode::LimitExceeded);
@@ -200,14 +200,14 @@ VoxelRegistry read_types(const Object& file) {
   return types;
 }
 
-std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes) {
+std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes, Threads threads) {
   std::vector<SceneGrid> grids;
   if (file.find("grids") == nullptr) return grids;
   std::vector<Piece> pieces;
   read_list(file, "grids", kMaxGrids, [&](const Json& each, const Place& place) {
     grids.push_back(grid_of(each, place, grids.size(), pieces, file.faults()));
   });
-  if (!file.faults().error()) read_voxels(pieces, type_count, file_bytes, grids, file.faults());
+  if (!file.faults().error()) read_voxels(pieces, type_count, file_bytes, grids, threads, file.faults());
   return grids;
 }
 

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include <quoin/core/parallel.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>
 
@@ -14,6 +15,7 @@ namespace quoin::scene_json {
 
 /// The list "grids" of a scene file of `file_bytes`, if there is one, whose voxels are of the first `type_count` types,
 /// air included.
-[[nodiscard]] std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes);
+[[nodiscard]] std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes,
+                                                Threads threads);
 
 }  // namespace quoin::scene_json

@@ -54,8 +54,8 @@ struct Body {
   std::vector<Instance> instances;
 };
 
-/// Moves the grids of a file's scene into `into`.
-Result<Body> take_over(Scene& from, Scene& into) {
+/// Moves the types and grids of a file's scene into `into`; returns what the grids are there.
+Result<std::map<GridHandle, GridHandle>> take_over_grids(Scene& from, Scene& into) {
   std::vector<VoxelType> new_type_of = {kAir};
   for (std::size_t type = 1; type < from.types.size(); ++type) {
     const auto added = into.types.find_or_add(from.types[static_cast<VoxelType>(type)]);
@@ -68,6 +68,13 @@ Result<Body> take_over(Scene& from, Scene& into) {
     renumber(grid, new_type_of);
     new_grid_of[handle] = into.add_grid(std::move(grid));
   }
+  return new_grid_of;
+}
+
+/// Moves the grids and layers of a file's scene into `into`.
+Result<Body> take_over(Scene& from, Scene& into) {
+  auto new_grid_of = take_over_grids(from, into);
+  if (!new_grid_of) return new_grid_of.error();
   // Layers that nothing is on stay behind: MagicaVoxel's files have 8 or more.
   std::map<LayerHandle, LayerHandle> new_layer_of;
   const auto layer_of = [&](LayerHandle handle) {
@@ -87,7 +94,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   const std::vector<InstanceHandle> handles = from.instances().handles();
   for (const InstanceHandle handle : handles) {
     Instance instance = from.instances()[handle];
-    instance.grid = new_grid_of.at(instance.grid);
+    instance.grid = new_grid_of->at(instance.grid);
     // Alone it is placed without its groups, but on its layer.
     const SceneGroup* group = handles.size() == 1 ? from.groups().find(instance.group) : nullptr;
     if (group != nullptr) instance.visible = instance.visible && is_shown(from, *group);
@@ -122,7 +129,7 @@ Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool i
   return instance;
 }
 
-Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options,
+Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                 const Progress& progress) {
   const auto format = detect_format(path);
   if (!format) return format.error();
@@ -131,21 +138,22 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   }
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
-  return load_scene(path, taken_over, progress);
+  return load_scene(path, taken_over, threads, progress);
 }
 
 using Bodies = std::map<std::string, Body, std::less<>>;
 
 /// Reads the files that a scene file in `folder` names.
 Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& folder,
-                            const LoadOptions& options, LoadedScene& loaded, const Progress& progress) {
+                            const LoadOptions& options, Threads threads, LoadedScene& loaded,
+                            const Progress& progress) {
   Bodies bodies;
   for (const SceneFile::Source& source : sources) {
     const auto share = [&](std::size_t read) {
       return static_cast<double>(read) / static_cast<double>(sources.size());
     };
     const Progress of_source = part_of(progress, share(bodies.size()), share(bodies.size() + 1));
-    auto part = load_source(folder / source.file, options, of_source);
+    auto part = load_source(folder / source.file, options, threads, of_source);
     if (!part) {
       Error error = part.error();
       error.message += " (source \"" + printable(source.id) + "\" of the scene file)";
@@ -247,10 +255,10 @@ class Placer {
 
 /// `folder`: which the sources' names start from.
 Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& folder, const LoadOptions& options,
-                                 const Progress& progress) {
+                                 Threads threads, const Progress& progress) {
   std::vector<GridHandle> grids;
   LoadedScene loaded = begin_scene(file, grids);
-  const auto bodies = read_sources(file.sources, folder, options, loaded, progress);
+  const auto bodies = read_sources(file.sources, folder, options, threads, loaded, progress);
   if (!bodies) return bodies.error();
   Placer(file, grids, *bodies, loaded.scene).place();
   if (options.show_hidden) show_all(loaded.scene);
@@ -259,11 +267,11 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& f
 
 }  // namespace
 
-Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options,
+Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                     const Progress& progress) {
-  auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
+  auto file = read_whole(path, [&](std::span<const std::byte> bytes) { return parse_scene_file(bytes, threads); });
   if (!file) return file.error();
-  return with_path(put_together(*file, path.parent_path(), options, progress), path);
+  return with_path(put_together(*file, path.parent_path(), options, threads, progress), path);
 }
 
 std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {
@@ -274,14 +282,14 @@ std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::p
   return named;
 }
 
-Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options,
+Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadOptions& options, Threads threads,
                                     const Progress& progress) {
-  auto file = parse_scene_file(text);
+  auto file = parse_scene_file(text, threads);
   if (!file) return file.error();
   if (!file->sources.empty()) {
     return make_error(ErrorCode::Unsupported, "a scene file that names others, which only a path finds");
   }
-  return put_together(*file, {}, options, progress);
+  return put_together(*file, {}, options, threads, progress);
 }
 
 }  // namespace quoin

@@ -107,8 +107,8 @@ Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
   }
   object.read("intensity", lamp.intensity);
   object.read("range", lamp.range);
-  object.read("inner_angle", lamp.inner_angle);
-  object.read("outer_angle", lamp.outer_angle);
+  object.read("inner_angle", lamp.inner_angle_radians);
+  object.read("outer_angle", lamp.outer_angle_radians);
   return lamp;
 }
 
@@ -162,13 +162,13 @@ Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
   object.read("right", camera.right);
   object.read("up", camera.up);
   object.read("forward", camera.forward);
-  object.read("fov_radians", camera.vertical_fov);
+  object.read("fov_radians", camera.vertical_fov_radians);
   object.read("view_height", camera.view_height);
   const bool is_flat = object.find("view_height") != nullptr;
   if (is_flat == (object.find("fov_radians") != nullptr)) faults.add(place, "needs fov_radians or view_height");
   if (is_flat) camera.projection = Camera::Projection::Orthographic;
   if (!is_frame(camera)) faults.add(place, "right, up and forward must be unit and perpendicular");
-  if (!(camera.vertical_fov > 0.0 && camera.vertical_fov < std::numbers::pi)) {
+  if (!(camera.vertical_fov_radians > 0.0 && camera.vertical_fov_radians < std::numbers::pi)) {
     faults.add(object.place_of("fov_radians"), "must be more than 0 and less than pi");
   }
   if (!(camera.view_height > 0.0)) faults.add(object.place_of("view_height"), "must be more than 0");
@@ -238,7 +238,7 @@ class NameCheck {
   std::set<std::string_view> ids_;
 };
 
-void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene, Faults& faults) {
+void read_file_object(const Json& json, std::size_t file_bytes, Threads threads, SceneFile& scene, Faults& faults) {
   const Place root;
   const Object file(
       json, root, {"quoin_scene", "types", "grids", "files", "layers", "groups", "instances", "lamps", "sun", "camera"},
@@ -251,7 +251,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, SceneFile& scene
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
-  scene.grids = read_grids(file, scene.types.size(), file_bytes);
+  scene.grids = read_grids(file, scene.types.size(), file_bytes, threads);
   if (file.find("grids") == nullptr || file.find("files") != nullptr) {
     read_list(file, "files", kMaxFiles,
               [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });
@@ -310,7 +310,7 @@ Outside outside_strings(std::string_view text) {
 
 }  // namespace
 
-Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
+Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads threads) {
   if (text.size() > kMaxSceneFileBytes) {
     return make_error(ErrorCode::LimitExceeded, "a scene file of more than 2 GiB");
   }
@@ -325,7 +325,7 @@ Result<SceneFile> parse_scene_file(std::span<const std::byte> text) {
   SceneFile scene;
   Faults faults;
   try {
-    read_file_object(Json::parse(chars), chars.size(), scene, faults);
+    read_file_object(Json::parse(chars), chars.size(), threads, scene, faults);
   } catch (const Json::parse_error& error) {
     return make_error(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
   } catch (const Json::exception&) {

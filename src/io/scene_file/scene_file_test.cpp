@@ -102,7 +102,7 @@ TEST(SceneFile, WhatIsWrittenReadsAsItWas) {
       EXPECT_EQ(read->camera->forward, scene.camera->forward);
       EXPECT_EQ(read->camera->up, scene.camera->up);
       EXPECT_EQ(read->camera->right, scene.camera->right);
-      EXPECT_EQ(read->camera->vertical_fov, scene.camera->vertical_fov);
+      EXPECT_EQ(read->camera->vertical_fov_radians, scene.camera->vertical_fov_radians);
     }
   }
 }
@@ -122,7 +122,7 @@ TEST(SceneFile, HoldsCamerasOfEveryKind) {
       camera.projection = Camera::Projection::Orthographic;
       camera.view_height = std::exp(number(random));
     } else {
-      camera.vertical_fov = 0.1 + std::abs(std::atan(number(random)));
+      camera.vertical_fov_radians = 0.1 + std::abs(std::atan(number(random)));
     }
     scene.camera = camera;
     const auto bytes = write_scene_file(scene);
@@ -134,7 +134,7 @@ TEST(SceneFile, HoldsCamerasOfEveryKind) {
     EXPECT_EQ(read->camera->up, camera.up);
     EXPECT_EQ(read->camera->forward, camera.forward);
     EXPECT_EQ(read->camera->projection, camera.projection);
-    EXPECT_EQ(read->camera->vertical_fov, camera.vertical_fov);
+    EXPECT_EQ(read->camera->vertical_fov_radians, camera.vertical_fov_radians);
     EXPECT_EQ(read->camera->view_height, camera.view_height);
   }
 }
@@ -175,7 +175,7 @@ TEST(SceneFile, WhatTheReaderWouldRefuseIsNotWritten) {
   EXPECT_EQ(code_of([](SceneFile& s) { s.sources[0].file.clear(); }), ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) {
               s.camera = look_at({0, 0, 5}, {0, 0, 0}, 1.0).value();
-              s.camera->vertical_fov = 4.0;
+              s.camera->vertical_fov_radians = 4.0;
             }),
             ErrorCode::InvalidArgument);
   EXPECT_EQ(code_of([](SceneFile& s) {
@@ -261,10 +261,8 @@ class SceneFiles : public testing::Test {
     Instance instance;
     instance.grid = scene.add_grid(std::move(grid));
     scene.add_instance(instance);
-    std::vector<std::string> warnings;
-    const auto bytes = write_vox(scene, warnings);
-    ASSERT_TRUE(bytes) << to_string(bytes.error());
-    ASSERT_TRUE(write_file(folder_ / name, *bytes));
+    const auto written = write_vox(scene, folder_ / name);
+    ASSERT_TRUE(written) << to_string(written.error());
   }
   fs::path write_text(const std::string& text) const {
     const fs::path path = folder_ / "scene.json";

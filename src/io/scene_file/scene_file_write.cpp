@@ -157,8 +157,8 @@ class SceneText {
     };
     put("range", lamp.range, plain.range);
     if (!is_same(lamp.direction, plain.direction)) json["direction"] = triple(lamp.direction);
-    put("inner_angle", lamp.inner_angle, plain.inner_angle);
-    put("outer_angle", lamp.outer_angle, plain.outer_angle);
+    put("inner_angle", lamp.inner_angle_radians, plain.inner_angle_radians);
+    put("outer_angle", lamp.outer_angle_radians, plain.outer_angle_radians);
     return json;
   }
 
@@ -168,11 +168,11 @@ class SceneText {
     // So far that the sum's rounding turns nothing.
     const DVec3 reach = glm::abs(camera.position);
     const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
-    const double degrees = camera.vertical_fov * 180.0 / std::numbers::pi;
+    const double degrees = camera.vertical_fov_radians * 180.0 / std::numbers::pi;
     const auto again = look_at(camera.position, target, degrees * std::numbers::pi / 180.0);
     const bool is_flat = camera.projection == Camera::Projection::Orthographic;
     if (!is_flat && again && is_same(again->forward, camera.forward) && is_same(again->up, camera.up) &&
-        is_same(again->right, camera.right) && is_same(again->vertical_fov, camera.vertical_fov)) {
+        is_same(again->right, camera.right) && is_same(again->vertical_fov_radians, camera.vertical_fov_radians)) {
       return {{"position", triple(camera.position)}, {"look_at", triple(target)}, {"fov", degrees}};
     }
     is_second_ = true;
@@ -180,7 +180,7 @@ class SceneText {
                  {"right", triple(camera.right)},
                  {"up", triple(camera.up)},
                  {"forward", triple(camera.forward)}};
-    json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov;
+    json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov_radians;
     return json;
   }
 

@@ -123,8 +123,8 @@ class RandomScene {
     made.colour = {0.1F, 1.0F / 3.0F, static_cast<float>(below(9))};
     made.intensity = number();
     if (is_rare()) made.range = number();
-    if (is_rare()) made.inner_angle = number();
-    if (is_rare()) made.outer_angle = number();
+    if (is_rare()) made.inner_angle_radians = number();
+    if (is_rare()) made.outer_angle_radians = number();
     return made;
   }
   Instance instance(GridHandle grid) {
@@ -285,16 +285,15 @@ TEST(SceneModels, WhatIsRegularIsStoredWhereItWouldTakeTooMuchMemory) {
 TEST(SceneModels, StandBesideFilesOfModels) {
   const TestFolder folder("scene_models");
   const Scene ship = RandomScene(1).scene();
-  std::vector<std::string> warnings;
-  LoadedScene red;
+  Scene red;
   VoxelProperties properties;
   properties.colour = {200, 0, 0, 255};
-  ASSERT_TRUE(red.scene.types.add(properties));
+  ASSERT_TRUE(red.types.add(properties));
   SceneGrid cube;
   cube.grid.set({0, 0, 0}, 1);
-  const GridHandle handle = red.scene.add_grid(std::move(cube));
-  red.scene.add_instance({.name = "", .grid = handle});
-  ASSERT_TRUE(save_scene(red, folder.file("red.vox"), warnings));
+  const GridHandle handle = red.add_grid(std::move(cube));
+  red.add_instance({.name = "", .grid = handle});
+  ASSERT_TRUE(save_scene(red, folder.file("red.vox")));
   auto file = scene_file_of(ship).value();
   file.sources.push_back({"r", "red.vox"});
   SceneFile::Placement placement;

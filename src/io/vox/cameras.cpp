@@ -96,12 +96,12 @@ Camera camera_from(const Keys& keys, const DBox& bounds) {
   const DVec3 up = glm::cross(right, camera.forward);
   camera.right = right * std::cos(radians.z) + up * std::sin(radians.z);
   camera.up = up * std::cos(radians.z) - right * std::sin(radians.z);
-  camera.vertical_fov = keys.fov * (std::numbers::pi / 180.0);
+  camera.vertical_fov_radians = keys.fov * (std::numbers::pi / 180.0);
   const DVec3 focus(keys.focus.x, keys.focus.z, -keys.focus.y);
   double distance = keys.radius;
   if (is_orthographic(keys)) {
     camera.projection = Camera::Projection::Orthographic;
-    camera.view_height = 2.0 * keys.radius * std::tan(camera.vertical_fov / 2.0);
+    camera.view_height = 2.0 * keys.radius * std::tan(camera.vertical_fov_radians / 2.0);
     distance = std::max(distance, distance_before(bounds, focus, camera.forward));
   }
   camera.position = focus - camera.forward * distance;

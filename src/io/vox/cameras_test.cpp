@@ -52,7 +52,7 @@ TEST(VoxCameras, WithoutAnglesTheFrontIsSeen) {
   EXPECT_LT(distance_of(camera.right, {1, 0, 0}), 1e-12);
   EXPECT_LT(distance_of(camera.up, {0, 1, 0}), 1e-12);
   EXPECT_LT(distance_of(camera.position, {1, 3, 8}), 1e-12);
-  EXPECT_NEAR(camera.vertical_fov, 60 * kDegree, 1e-12);
+  EXPECT_NEAR(camera.vertical_fov_radians, 60 * kDegree, 1e-12);
 }
 
 // Turns in MagicaVoxel's own axes, one after the other, as matrices: first roll, then pitch, then yaw.
@@ -135,8 +135,7 @@ TEST(VoxCameras, ADamagedOneIsNoReasonToRefuseTheVoxels) {
   ASSERT_EQ(loaded.warnings.size(), 1U);
   EXPECT_NE(loaded.warnings[0].find("a camera skipped"), std::string::npos);
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
-  std::vector<std::string> warnings;
-  EXPECT_EQ(write_vox(loaded, warnings).value(), bytes) << "kept as it is";
+  EXPECT_EQ(write_vox(loaded).value().bytes, bytes) << "kept as it is";
 }
 
 }  // namespace

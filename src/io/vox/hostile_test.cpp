@@ -214,8 +214,7 @@ TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   const Instance& instance = loaded->scene.instances()[loaded->scene.instances().handles()[0]];
   EXPECT_EQ(instance.position, DVec3(2147483647.0 * kDepth, 0, 2147483648.0 * kDepth));
-  std::vector<std::string> warnings;
-  const auto written = write_vox(loaded->scene, warnings);
+  const auto written = write_vox(loaded->scene);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::LimitExceeded);
 }

@@ -109,8 +109,8 @@ class FileBuilder {
     whole.text("VOX ");
     whole.u32(version);
     const std::size_t main = whole.begin_chunk("MAIN");
+    whole.end_chunk(main, chunks.size());
     whole.raw(chunks);
-    whole.end_parent(main);
     return whole.take();
   }
 
@@ -181,10 +181,9 @@ inline std::string difference(const Scene& a, const Scene& b) {
 
 /// Writes the scene and reads it again: what differs, or why it could not be done; nothing when all is the same.
 inline std::string difference_after_round_trip(const Scene& scene) {
-  std::vector<std::string> warnings;
-  const Result<std::vector<std::byte>> bytes = write_vox(scene, warnings);
-  if (!bytes) return "cannot write: " + to_string(bytes.error());
-  const Result<LoadedScene> again = read_vox(*bytes);
+  const Result<VoxBytes> written = write_vox(scene);
+  if (!written) return "cannot write: " + to_string(written.error());
+  const Result<LoadedScene> again = read_vox(written->bytes);
   if (!again) return "cannot read: " + to_string(again.error());
   return difference(scene, again->scene);
 }
@@ -197,12 +196,11 @@ inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOption
     const std::string text = to_string(loaded.error());
     return text.empty() || text.find('\n') != std::string::npos ? "the error is not one line: " + text : "";
   }
-  std::vector<std::string> warnings;
-  const Result<std::vector<std::byte>> written = write_vox(loaded->scene, warnings);
+  const Result<VoxBytes> written = write_vox(loaded->scene);
   if (!written) {
     return written.error().code == ErrorCode::LimitExceeded ? "" : "cannot write: " + to_string(written.error());
   }
-  const Result<LoadedScene> again = read_vox(*written, {.show_hidden = false, .frame = 0});
+  const Result<LoadedScene> again = read_vox(written->bytes, {.show_hidden = false, .frame = 0});
   if (!again) return "cannot read what was written: " + to_string(again.error());
   return difference(loaded->scene, again->scene);
 }

@@ -86,6 +86,7 @@ void sphere(benchmark::State& state) {
   const ArrayView view = view_of_cube(values, ScalarType::Float32);
   ArraySurfaceOptions options;
   options.solid = SolidSide::Below;
+  options.split_sheets = false;
   const Threads threads{static_cast<unsigned>(state.range(0))};
   const auto made = surface_from_array(view, options, threads);
   require(made.has_value(), "the sphere");

@@ -59,11 +59,11 @@ TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
     const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);
     const TestArray<float> field = noise(size, 41);
     const std::size_t taken = most_bytes([&](const Progress& progress) {
-      const auto surface = surface_from_array(field.view(), {}, {1}, progress);
+      const auto surface = surface_from_array(field.view(), {.split_sheets = false}, {1}, progress);
       ASSERT_TRUE(surface.has_value());
       progress(1.0);
     });
-    const auto surface = surface_from_array(field.view(), {}, {1});
+    const auto surface = surface_from_array(field.view(), {.split_sheets = false}, {1});
     ASSERT_TRUE(surface.has_value());
     const std::size_t output = surface->positions.size() * 24 + surface->indices.size() * 4;
     EXPECT_GT(taken, output);

@@ -25,7 +25,10 @@ using namespace array_tests;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-ArraySurface surface_of(const ArrayView& view, const ArraySurfaceOptions& options = {}, unsigned threads = 1) {
+// Without a vertex for each sheet: what most of these tests count.
+constexpr ArraySurfaceOptions kPlain = {.split_sheets = false};
+
+ArraySurface surface_of(const ArrayView& view, const ArraySurfaceOptions& options = kPlain, unsigned threads = 1) {
   auto surface = surface_from_array(view, options, {threads});
   EXPECT_TRUE(surface.has_value()) << to_string(surface.error());
   return surface ? std::move(*surface) : ArraySurface{};
@@ -79,7 +82,7 @@ struct Ball {
   }
 };
 
-constexpr ArraySurfaceOptions kBelow = {0.0, SolidSide::Below, ArrayBorder::Closed};
+constexpr ArraySurfaceOptions kBelow = {0.0, SolidSide::Below, ArrayBorder::Closed, false};
 
 void expect_ball(const ArraySurface& surface, const Ball& ball, double tolerance, double least_cosine) {
   const oracle::SurfaceCount count = count_of(surface);
@@ -149,13 +152,13 @@ TEST_P(ArrayNoise, IsTheSameForEveryInstructionSetAndThreadCount) {
   const ArraySurface expected = surface_of(samples.view());
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
-    for (const unsigned threads : {1U, 3U}) expect_same(surface_of(samples.view(), {}, threads), expected);
+    for (const unsigned threads : {1U, 3U}) expect_same(surface_of(samples.view(), kPlain, threads), expected);
   }
 }
 
 TEST_P(ArrayNoise, WithAnOpenBorderEndsThere) {
   const TestArray<float> samples = noise(GetParam(), 14);
-  ArraySurfaceOptions options;
+  ArraySurfaceOptions options = kPlain;
   options.border = ArrayBorder::Open;
   const ArraySurface surface = surface_of(samples.view(), options);
   const oracle::SurfaceCount count = count_of(surface);
@@ -174,7 +177,7 @@ TEST_P(ArrayNoise, WithAnOpenBorderEndsThere) {
 TEST_P(ArrayNoise, WithAVertexASheetIsManifold) {
   for (const unsigned seed : {15U, 16U, 17U}) {
     const TestArray<float> samples = noise(GetParam(), seed);
-    ArraySurfaceOptions options;
+    ArraySurfaceOptions options = kPlain;
     const ArraySurface joined = surface_of(samples.view(), options);
     if (joined.indices.empty()) continue;
     options.split_sheets = true;
@@ -248,7 +251,7 @@ TYPED_TEST(ArrayTypes, AllMakeTheSameSurface) {
   const TestArray<TypeParam> others(samples.size(), [&](DVec3 p) { return static_cast<TypeParam>(whole(p)); });
   for (const double iso : {30.0, 44.25, 61.1}) {
     for (const SolidSide side : {SolidSide::Above, SolidSide::Below}) {
-      const ArraySurfaceOptions options{iso, side, ArrayBorder::Closed};
+      const ArraySurfaceOptions options{iso, side, ArrayBorder::Closed, false};
       expect_same(surface_of(others.view(), options), surface_of(doubles.view(), options));
     }
   }
@@ -259,7 +262,7 @@ TYPED_TEST(ArrayTypes, KnowLimitsOutOfTheirRange) {
     return p.z == 7 ? std::numeric_limits<TypeParam>::max() : std::numeric_limits<TypeParam>::lowest();
   });
   const auto triangles = [&](double iso, SolidSide side) {
-    return surface_of(samples.view(), {iso, side, ArrayBorder::Closed}).indices.size();
+    return surface_of(samples.view(), {iso, side, ArrayBorder::Closed, false}).indices.size();
   };
   const std::size_t full = 12 * (12 + 150 + 200);
   for (const double iso : {-kInfinity * 1.0, -1e39, -1e20}) {
@@ -283,9 +286,9 @@ TEST(ArraySurface, TellsLargeWholeNumbersApart) {
   const TestArray<std::uint64_t> larger(samples.size(),
                                         [&](DVec3 p) { return kLarger + static_cast<std::uint64_t>(whole(p)); });
   const ArraySurface expected = surface_of(small.view());
-  expect_same(surface_of(large.view(), {-static_cast<double>(kLarge), SolidSide::Above, ArrayBorder::Closed}),
+  expect_same(surface_of(large.view(), {-static_cast<double>(kLarge), SolidSide::Above, ArrayBorder::Closed, false}),
               expected);
-  expect_same(surface_of(larger.view(), {static_cast<double>(kLarger), SolidSide::Above, ArrayBorder::Closed}),
+  expect_same(surface_of(larger.view(), {static_cast<double>(kLarger), SolidSide::Above, ArrayBorder::Closed, false}),
               expected);
 }
 
@@ -305,7 +308,7 @@ TEST(ArraySurface, IsTheSameAtAnyScaleOfItsValues) {
 
 TEST(ArraySurface, TellsDoublesApartThatAreOneFloat) {
   const TestArray<double> samples({3, 3, 50}, [](DVec3 p) { return 1.0 + (p.z < 20.0 ? 1e-12 : -1e-12); });
-  const ArraySurface surface = surface_of(samples.view(), {1.0, SolidSide::Above, ArrayBorder::Closed});
+  const ArraySurface surface = surface_of(samples.view(), {1.0, SolidSide::Above, ArrayBorder::Closed, false});
   float most = 0.0F;
   for (const Vec3& p : surface.positions) most = std::max(most, p.z);
   EXPECT_NEAR(most, 19.5F, 1e-3F);
@@ -324,7 +327,7 @@ TEST(ArraySurface, StaysFiniteWhereValuesAreNot) {
                         : value;
   }
   for (const SolidSide side : {SolidSide::Above, SolidSide::Below}) {
-    const ArraySurface surface = surface_of(samples.view(), {0.0, side, ArrayBorder::Closed});
+    const ArraySurface surface = surface_of(samples.view(), {0.0, side, ArrayBorder::Closed, false});
     oracle::expect_closed(count_of(surface));
     for (std::size_t i = 0; i < surface.positions.size(); ++i) {
       for (int axis = 0; axis < 3; ++axis) {
@@ -335,7 +338,7 @@ TEST(ArraySurface, StaysFiniteWhereValuesAreNot) {
     }
     for (const InstructionSet set : sets_of_this_machine()) {
       const InstructionSetOverride over(set);
-      expect_same(surface_of(samples.view(), {0.0, side, ArrayBorder::Closed}), surface);
+      expect_same(surface_of(samples.view(), {0.0, side, ArrayBorder::Closed, false}), surface);
     }
   }
 }
@@ -352,11 +355,11 @@ TEST(ArraySurface, TakesWhatIsNoNumberAsAir) {
 
 TEST(ArraySurface, OfAFullArrayIsABoxHalfASampleLarger) {
   const TestArray<std::uint8_t> samples({30, 20, 50}, [](DVec3) { return std::uint8_t{1}; });
-  const ArraySurface surface = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Closed});
+  const ArraySurface surface = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Closed, false});
   oracle::expect_manifold(count_of(surface));
   EXPECT_NEAR(enclosed_volume(surface.positions, surface.indices), 30.0 * 20.0 * 50.0, 300.0);
-  EXPECT_EQ(surface_of(samples.view(), {1.5, SolidSide::Above, ArrayBorder::Closed}).positions.size(), 0U);
-  const ArraySurface open = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Open});
+  EXPECT_EQ(surface_of(samples.view(), {1.5, SolidSide::Above, ArrayBorder::Closed, false}).positions.size(), 0U);
+  const ArraySurface open = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Open, false});
   EXPECT_EQ(open.positions.size(), 0U);
 }
 
@@ -387,7 +390,7 @@ TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
   ASSERT_TRUE(grid.has_value());
   for (const bool splits : {false, true}) {
     SmoothMeshOptions options;
-    options.occlusion.form = SmoothOcclusion::None;
+    options.occlusion.method = SmoothOcclusion::None;
     options.split_sheets = splits;
     const SmoothMesh mesh = oracle::mesh_of(*grid, options);
     const ArraySurface surface = surface_of(view_of(volume), {0.0, SolidSide::Above, ArrayBorder::Closed, splits});
@@ -420,7 +423,7 @@ TEST(ArraySurface, RefusesWhatCannotBe) {
   const auto error = [&](auto change, double iso = 0.0) {
     ArrayView view = samples.view();
     change(view);
-    const auto surface = surface_from_array(view, {iso, SolidSide::Above, ArrayBorder::Closed}, {1});
+    const auto surface = surface_from_array(view, {iso, SolidSide::Above, ArrayBorder::Closed, false}, {1});
     EXPECT_FALSE(surface.has_value());
     return surface ? ErrorCode::BadFormat : surface.error().code;
   };

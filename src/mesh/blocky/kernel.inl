@@ -90,7 +90,7 @@ void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scrat
 
 // The type of all of a chunk's voxels besides air, when there is just one.
 bool has_one_type(const Chunk& chunk, VoxelType& type) {
-  const ChunkStorage* voxels = chunk.storage();
+  const ChunkStorage* voxels = ChunkStorage::of(chunk);
   if (voxels == nullptr) {
     type = *chunk.uniform();
     return true;
@@ -108,7 +108,7 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
 TypeSource find_types(const Chunk& centre, Scratch& s) {
   VoxelType type = kAir;
   if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType, 0};
-  const ChunkStorage& voxels = *centre.storage();
+  const ChunkStorage& voxels = *ChunkStorage::of(centre);
   for (std::size_t i = 0; i < voxels.palette.size(); ++i) {
     s.palette[i] = std::uint64_t{voxels.palette[i]} << Quad::kTypeShift;
     if (i < 16) s.narrow_palette[i] = static_cast<std::uint32_t>(s.palette[i] >> 32);

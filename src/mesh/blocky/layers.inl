@@ -258,28 +258,35 @@ void read_planes(const Job& job, const ChunkStorage& voxels, const SlabRange& ra
   }
 }
 
+// Which cells of a row hold an index.
+template <int kBits>
+QUOIN_INLINE std::uint64_t cells_of(const std::uint64_t* row, std::uint32_t index) {
+  std::uint64_t pattern[kBits];
+  for (int i = 0; i < kBits; ++i) pattern[i] = packed_row::repeat(kBits, index);
+  return equal_cells<kBits>(row, pattern);
+}
+
+// Which hold a transparent type.
+template <int kBits>
+QUOIN_INLINE std::uint64_t transparent_cells(const Job& job, const ChunkStorage& voxels, const Scratch& s,
+                                             const std::uint64_t* row) {
+  std::uint64_t mask = 0;
+  if constexpr (kBits == 8) {
+    for (std::uint32_t i = 0; i < voxels.palette.size(); ++i) {
+      if (s.index_class[i] == 2) mask |= cells_of<kBits>(row, i);
+    }
+  } else {
+    for (int x = 0; x < 64; ++x) {
+      const auto type = static_cast<VoxelType>(packed_row::read(row, kBits, x));
+      mask |= std::uint64_t{job.types->is_transparent(type)} << x;
+    }
+  }
+  return mask;
+}
+
 // As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
 template <int kBits>
 void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
-  const auto cells_of = [&](const std::uint64_t* row, std::uint32_t index) {
-    std::uint64_t pattern[kBits];
-    for (int i = 0; i < kBits; ++i) pattern[i] = packed_row::repeat(kBits, index);
-    return equal_cells<kBits>(row, pattern);
-  };
-  const auto transparent_cells = [&](const std::uint64_t* row) {
-    std::uint64_t mask = 0;
-    if constexpr (kBits == 8) {
-      for (std::uint32_t i = 0; i < voxels.palette.size(); ++i) {
-        if (s.index_class[i] == 2) mask |= cells_of(row, i);
-      }
-    } else {
-      for (int x = 0; x < 64; ++x) {
-        const auto type = static_cast<VoxelType>(packed_row::read(row, kBits, x));
-        mask |= std::uint64_t{job.types->is_transparent(type)} << x;
-      }
-    }
-    return mask;
-  };
   std::uint32_t air = 0;
   bool has_air = true;
   if constexpr (kBits == 8) {
@@ -289,12 +296,12 @@ void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& 
   for (int z = range.z.begin; z < range.z.end; ++z) {
     for (int y = range.y.begin; y < range.y.end; ++y) {
       const std::uint64_t* row = s.rows[z * 64 + y];
-      const std::uint64_t solid = has_air ? ~cells_of(row, air) : ~std::uint64_t{0};
+      const std::uint64_t solid = has_air ? ~cells_of<kBits>(row, air) : ~std::uint64_t{0};
       const int at = word_index(z, y);
       std::uint64_t opaque = solid;
       if (job.has_transparent) {
         s.solid.words[at] = solid;
-        opaque &= ~transparent_cells(row);
+        opaque &= ~transparent_cells<kBits>(job, voxels, s, row);
       }
       s.z.opaque.words[at] = opaque;
       std::uint64_t shifted[kBits];
@@ -321,7 +328,7 @@ void classify_uniform(const Job& job, const SlabRange& range, Scratch& s) {
 }
 
 void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
-  const ChunkStorage* voxels = job.chunks->centre()->storage();
+  const ChunkStorage* voxels = ChunkStorage::of(*job.chunks->centre());
   if (voxels == nullptr) {
     classify_uniform(job, range, s);
     return;
@@ -360,7 +367,7 @@ class OpaqueVoxels {
  public:
   OpaqueVoxels(const Chunk* chunk, const VoxelRegistry& types) : types_(&types) {
     if (chunk == nullptr) return;
-    voxels_ = chunk->storage();
+    voxels_ = ChunkStorage::of(*chunk);
     if (voxels_ == nullptr) {
       all_ = types.is_opaque(*chunk->uniform());
       return;
@@ -476,7 +483,7 @@ bool gather_rows(const Job& job, Scratch& s) {
 // Whether a voxel of the 18 neighbours with another x may be opaque: their palettes need not be read for that.
 bool has_row_ends(const Job& job) {
   const auto may_be_opaque = [&](const Chunk* chunk) {
-    return chunk != nullptr && (chunk->storage() != nullptr || job.types->is_opaque(*chunk->uniform()));
+    return chunk != nullptr && (ChunkStorage::of(*chunk) != nullptr || job.types->is_opaque(*chunk->uniform()));
   };
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {

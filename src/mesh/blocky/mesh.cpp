@@ -67,7 +67,7 @@ std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chu
     BlockyMesher mesher;
     QuadOptions quad_options;
     quad_options.merge = options.merge;
-    quad_options.occlusion = options.occlusion;
+    quad_options.bake_occlusion = options.bake_occlusion;
     for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
       mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
       reporter.step();

@@ -20,7 +20,7 @@ TEST_P(WatertightWorld, HasNoOpenEdgeAndNoVertexInsideAnEdge) {
   for (const int type_count : {3, 5}) {
     const Grid grid = oracle::random_world(GetParam(), {IVec3{-20}, IVec3{25}}, type_count, GetParam() % 3 * 0.04);
     for (const bool occlusion : {true, false}) {
-      options.occlusion = occlusion;
+      options.bake_occlusion = occlusion;
       const auto mesh = build_blocky_mesh(grid, types, options, {1});
       ASSERT_TRUE(mesh.has_value());
       EXPECT_EQ(oracle::watertight_fault(*mesh), "");

@@ -54,7 +54,7 @@ OcclusionTables make_occlusion_tables() {
 
 bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
   if (!types.has_transparent()) return false;
-  const ChunkStorage* voxels = chunk.storage();
+  const ChunkStorage* voxels = ChunkStorage::of(chunk);
   if (voxels == nullptr) return types.is_transparent(*chunk.uniform());
   if (voxels->direct()) return true;
   for (std::size_t i = 0; i < voxels->palette.size(); ++i) {
@@ -75,7 +75,7 @@ namespace {
 std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
   const Chunk& centre = *job.chunks->centre();
   std::uint64_t mask = 0;
-  const ChunkStorage* voxels = centre.storage();
+  const ChunkStorage* voxels = ChunkStorage::of(centre);
   if (voxels != nullptr && !voxels->direct()) {
     for (const VoxelType type : voxels->palette) {
       if (!job.types->is_transparent(type)) continue;
@@ -211,7 +211,7 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
                             .types = &types,
                             .region = region,
                             .merge = options.merge,
-                            .occlusion = options.occlusion,
+                            .occlusion = options.bake_occlusion,
                             .has_transparent = blocky::holds_transparent(*centre, types),
                             .one_type = false};
       scratch_->kernel.mesh(job, *scratch_, out);

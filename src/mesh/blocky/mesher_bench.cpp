@@ -11,7 +11,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/workloads.h"
-#include "core/instruction_set.h"
+#include "core/made_with_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -52,7 +52,7 @@ void mesh_world(benchmark::State& state, bool occlusion, InstructionSet instruct
   std::vector<Neighbourhood> chunks;
   for (const IVec3 chunk : grid.chunks()) chunks.push_back(grid.neighbourhood(chunk));
   QuadOptions options;
-  options.occlusion = occlusion;
+  options.bake_occlusion = occlusion;
   auto mesher = made_with<BlockyMesher>(instructions);
   QuadBuffer quads;
   std::size_t next = 0;
@@ -89,7 +89,7 @@ void mesh(benchmark::State& state, Blocky which, int chunk_count, bool occlusion
   for (int i = 0; i < chunk_count; ++i) chunks.push_back(workloads::blocky_chunk(which, i % 8, i / 8));
   const VoxelRegistry types = workloads::glass_types();
   QuadOptions options;
-  options.occlusion = occlusion;
+  options.bake_occlusion = occlusion;
   options.region = which == Blocky::Full ? kWholeChunk : workloads::kInterior;
   auto mesher = made_with<BlockyMesher>(instructions);
   QuadBuffer quads;

@@ -8,6 +8,7 @@
 
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
+#include "core/made_with_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
@@ -33,7 +34,7 @@ FaceSet faces_of_quads(const Grid& grid, const VoxelRegistry& types, const QuadO
 
 int quad_count(const Chunk& chunk, Direction direction, bool occlusion = true) {
   QuadOptions options;
-  options.occlusion = occlusion;
+  options.bake_occlusion = occlusion;
   QuadBuffer quads;
   BlockyMesher().mesh(isolated(chunk), oracle::mixed_types(), options, quads);
   int count = 0;
@@ -120,10 +121,10 @@ TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
     EXPECT_EQ(face_count(quads), workloads::expected_faces(which));
     if (which != Blocky::W1) continue;
     EXPECT_NEAR(static_cast<double>(quads.size()), 8'450.0, 50.0);
-    options.occlusion = false;
+    options.bake_occlusion = false;
     mesher.mesh(isolated(chunk), types, options, quads);
     EXPECT_NEAR(static_cast<double>(quads.size()), 5'750.0, 50.0);
-    options.occlusion = true;
+    options.bake_occlusion = true;
   }
 }
 
@@ -170,7 +171,7 @@ TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndOcclusion) 
     for (const bool merge : {true, false}) {
       QuadOptions options;
       options.merge = merge;
-      options.occlusion = occlusion;
+      options.bake_occlusion = occlusion;
       std::int64_t quads = 0;
       EXPECT_EQ(faces_of_quads(grid, types, options, &quads), expected);
       if (!merge) {
@@ -240,7 +241,7 @@ TEST_P(BlockySets, GiveTheBytesOfThePlainKernel) {
     for (const IVec3 chunk : grid.chunks()) {
       for (const bool occlusion : {true, false}) {
         QuadOptions options;
-        options.occlusion = occlusion;
+        options.bake_occlusion = occlusion;
         plain.mesh(grid.neighbourhood(chunk), types, options, plain_quads);
         mesher.mesh(grid.neighbourhood(chunk), types, options, quads);
         EXPECT_EQ(quads, plain_quads);

@@ -28,7 +28,7 @@ struct Baked {
 Baked bake(const Grid& grid, const VoxelRegistry& types) {
   Baked baked;
   baked.split = build_blocky_mesh(grid, types, {}).value().surfaces[kOpaque];
-  baked.merged = build_blocky_mesh(grid, types, {.occlusion = false}).value().surfaces[kOpaque];
+  baked.merged = build_blocky_mesh(grid, types, {.bake_occlusion = false}).value().surfaces[kOpaque];
   OcclusionAtlas atlas;
   const std::size_t addition = atlas.add(baked.split, baked.merged, types);
   baked.image = atlas.draw().value();

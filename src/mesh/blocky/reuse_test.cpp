@@ -6,6 +6,7 @@
 #include <quoin/mesh/blocky.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "core/made_with_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
 // One mesher serves many chunks: nothing of an earlier call may show in a later one.
@@ -123,7 +124,7 @@ QuadOptions random_options(std::mt19937& random) {
   QuadOptions options;
   if (random() % 3 != 0) options.region = {glm::min(a, b), glm::max(a, b)};
   options.merge = random() % 3 != 0;
-  options.occlusion = random() % 3 != 0;
+  options.bake_occlusion = random() % 3 != 0;
   return options;
 }
 
@@ -145,7 +146,7 @@ TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) 
     const IVec3 chunk = random() % 2 == 0 ? IVec3{0} : IVec3{near(), near(), near()};
     const QuadOptions options = random_options(random);
     const Neighbourhood n = world.grid.neighbourhood(chunk);
-    const FaceSet expected = expected_faces(options.occlusion ? world.lit : world.unlit, chunk, options.region);
+    const FaceSet expected = expected_faces(options.bake_occlusion ? world.lit : world.unlit, chunk, options.region);
     plain.mesh(n, world.types, options, plain_quads);
     ASSERT_EQ(faces_of(plain_quads, chunk), expected) << "round " << round;
     if (!options.merge) {

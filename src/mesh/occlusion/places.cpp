@@ -30,8 +30,8 @@ Vec3 unit_or_up(Vec3 normal) {
 }
 
 float open_occlusion(const SmoothOcclusionOptions& options) {
-  if (options.form == SmoothOcclusion::None) return 0.0F;
-  return options.form == SmoothOcclusion::SolidShare ? solid_share(27) : weighted_occlusion(0.0F, 0.0F, options);
+  if (options.method == SmoothOcclusion::None) return 0.0F;
+  return options.method == SmoothOcclusion::SolidShare ? solid_share(27) : weighted_occlusion(0.0F, 0.0F, options);
 }
 
 Sampling::Sampling(const SmoothOcclusionOptions& wanted, int wanted_level)

@@ -100,7 +100,7 @@ class PlacesByChunk {
 float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, const SmoothOcclusionOptions& options,
                        int level) {
   const Sampling sampling(options, level);
-  if (sampling.occlusion.form == SmoothOcclusion::None) return 0.0F;
+  if (sampling.occlusion.method == SmoothOcclusion::None) return 0.0F;
   const auto place = smooth::place_at(position, sampling.level);
   if (!place) return smooth::open_occlusion(sampling.occlusion);
   const IVec3 chunk = chunk_at(position);
@@ -112,7 +112,7 @@ void smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, cons
                       std::span<float> out, Threads threads) {
   check_places(places, out);
   const Sampling sampling(options, places.level);
-  if (sampling.occlusion.form == SmoothOcclusion::None)
+  if (sampling.occlusion.method == SmoothOcclusion::None)
     return void(std::fill_n(out.begin(), places.positions.size(), 0.0F));
   const PlacesByChunk chunks(places, sampling, out);
   Lender<PlaceKernel> kernels;
@@ -149,7 +149,7 @@ void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothPla
   check_places(places, out);
   const Sampling sampling(options, places.level);
   const std::size_t count = places.positions.size();
-  if (sampling.occlusion.form == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
+  if (sampling.occlusion.method == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
   for (std::size_t i = scratch_->numbers.size(); i < count; ++i) {
     scratch_->numbers.push_back(static_cast<std::uint32_t>(i));
   }

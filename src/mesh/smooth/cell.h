@@ -165,7 +165,7 @@ struct SampleAxis {
 /// What the weighted forms make of the sum of the depths and the deepest (both at most 0).
 [[gnu::always_inline]] inline float weighted_occlusion(float sum, float least, const SmoothOcclusionOptions& options) {
   float ratio = 0.0F;
-  if (options.form == SmoothOcclusion::Weighted) {
+  if (options.method == SmoothOcclusion::Weighted) {
     ratio = -sum / (27.0F * std::max(-least, options.spread));
   } else if (least <= -kLeastDepth) {
     ratio = sum / (27.0F * least);
@@ -174,7 +174,7 @@ struct SampleAxis {
   const bool squared = options.power == 2.0F;
   const float darkness = squared ? base * base : std::pow(base, options.power);
   // As published, what is open has the offset's darkness.
-  if (options.form == SmoothOcclusion::WeightedPublished) return std::clamp(darkness, 0.0F, 1.0F);
+  if (options.method == SmoothOcclusion::WeightedPublished) return std::clamp(darkness, 0.0F, 1.0F);
   const float open = squared ? options.offset * options.offset : std::pow(options.offset, options.power);
   return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
 }
@@ -182,7 +182,7 @@ struct SampleAxis {
 /// Occlusion from the samples' densities, which come by z, then y, then x.
 [[gnu::always_inline]] inline float occlusion_of(const std::array<float, 27>& samples,
                                                  const SmoothOcclusionOptions& options) {
-  if (options.form == SmoothOcclusion::SolidShare) {
+  if (options.method == SmoothOcclusion::SolidShare) {
     const auto open = std::count_if(samples.begin(), samples.end(), [](float v) { return v >= 0.0F; });
     return solid_share(static_cast<int>(open));
   }

@@ -41,8 +41,8 @@ std::uint64_t solid_row(const DensityChunk* chunk, Half outside, ChunkCoordinate
 
 // The signs of 64 rows of one chunk column at once, as they lie in storage.
 void copy_signs(const DensityChunk* chunk, Half outside, int z, std::uint64_t* to) {
-  if (chunk != nullptr && chunk->storage() != nullptr) {
-    std::memcpy(to, chunk->storage()->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
+  if (chunk != nullptr && DensityStorage::of(*chunk) != nullptr) {
+    std::memcpy(to, DensityStorage::of(*chunk)->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
                 kChunkEdge * sizeof(std::uint64_t));
     return;
   }
@@ -114,7 +114,7 @@ bool is_of_one_sign(const DensityNeighbourhood& chunks) {
 }  // namespace
 
 int apron_of(const SmoothOcclusionOptions& occlusion) {
-  if (occlusion.form == SmoothOcclusion::None) return 0;
+  if (occlusion.method == SmoothOcclusion::None) return 0;
   // The largest n_x (|n_x| + |n_y| + |n_z|) of a unit vector is (1 + sqrt(3)) / 2.
   const double reach = 1.3660254037844388 * double{occlusion.spread} + 0.1 + double{occlusion.spread};
   return static_cast<int>(std::floor(reach + 1e-3)) + 1;

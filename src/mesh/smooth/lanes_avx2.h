@@ -13,7 +13,7 @@
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 
-#include "core/lanes_avx2.h"
+#include "core/lanes/lanes_avx2.h"
 
 namespace quoin::smooth {
 namespace {

@@ -13,7 +13,7 @@
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 
-#include "core/lanes_avx512.h"
+#include "core/lanes/lanes_avx512.h"
 
 namespace quoin::smooth {
 namespace {

@@ -118,7 +118,7 @@ inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const 
   const IVec3 first = cell.first;
   const bool inside = cell.level == 0 && cell.chunk == IVec3{0} && std::max({first.x, first.y, first.z}) < 63;
   if (const DensityChunk* centre = chunks.centre(); inside && centre != nullptr) {
-    const DensityStorage* const storage = centre->storage();
+    const DensityStorage* const storage = DensityStorage::of(*centre);
     if (storage == nullptr) return centre->solid_row(0, 0) != 0 ? 255U : 0U;
     const std::uint64_t* const rows = storage->solid.data() + first.z * kChunkEdge + first.y;
     const auto pair = [&](int y, int z) {

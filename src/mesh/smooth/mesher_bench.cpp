@@ -14,7 +14,7 @@
 #include <quoin/terrain/smooth_terrain.h>
 
 #include "bench/smooth_workload.h"
-#include "core/instruction_set.h"
+#include "core/made_with_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -54,7 +54,8 @@ void run(benchmark::State& state, const Case& what) {
   }
   SmoothOptions options;
   options.border = SmoothBorder::Open;
-  options.occlusion.form = what.occlusion;
+  options.split_sheets = false;
+  options.occlusion.method = what.occlusion;
   auto mesher = made_with<SmoothMesher>(what.instructions);
   SmoothChunkMesh mesh;
   mesher.mesh(alone(chunks[0]), options, mesh);
@@ -76,6 +77,7 @@ void places(benchmark::State& state) {
   field.put_chunk(IVec3{0}, chunk);
   SmoothOptions options;
   options.border = SmoothBorder::Open;
+  options.split_sheets = false;
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
   mesher.mesh(field.neighbourhood(IVec3{0}), options, mesh);

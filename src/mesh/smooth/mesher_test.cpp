@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "core/made_with_for_tests.h"
 #include "mesh/smooth/test_support.h"
 
 namespace quoin {

@@ -125,7 +125,7 @@ template <int kSpread>
 void add_occlusion_of_spread(const Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   const Thirds low_lanes(kSpread, 0);
   const Thirds high_lanes(kSpread, 1);
-  const bool is_counted = work.occlusion.form == SmoothOcclusion::SolidShare;
+  const bool is_counted = work.occlusion.method == SmoothOcclusion::SolidShare;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const Centres centres = find_centres(work, slice, first);
     const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);

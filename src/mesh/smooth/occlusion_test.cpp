@@ -118,7 +118,7 @@ TEST(SmoothOcclusion, ThePublishedCurveIsAsPublished) {
   std::uniform_real_distribution<float> any(-4.0F, 4.0F);
   for (int round = 0; round < 200; ++round) {
     SmoothOcclusionOptions options;
-    options.form = SmoothOcclusion::WeightedPublished;
+    options.method = SmoothOcclusion::WeightedPublished;
     options.offset = round % 2 == 0 ? 0.4F : 0.1F;
     options.power = round % 3 == 0 ? 2.0F : 1.5F;
     std::array<float, 27> samples{};

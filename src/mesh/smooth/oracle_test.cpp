@@ -59,8 +59,9 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
     for (const SmoothBorder border : {SmoothBorder::Shared, SmoothBorder::Open}) {
       SmoothOptions options;
       options.border = border;
+      options.split_sheets = false;
       options.levels.fill(static_cast<std::uint8_t>(level));
-      options.occlusion.form = static_cast<SmoothOcclusion>((GetParam() + static_cast<unsigned>(level)) % 4);
+      options.occlusion.method = static_cast<SmoothOcclusion>((GetParam() + static_cast<unsigned>(level)) % 4);
       options.occlusion.spread = level % 2 == 0 ? 2.0F : 0.4F;
       SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", level " << level);
       oracle::smooth_mesh(chunks, options, expected);

@@ -148,7 +148,7 @@ bool find_needed(Work& work) {
     is_any = true;
     rows.unite(rows.raised());
     for (int dz = 0; dz <= 1; ++dz) work.corner_rows[static_cast<std::size_t>(z + dz + kWidestApron)].unite(rows);
-    if (work.occlusion.form == SmoothOcclusion::None) continue;
+    if (work.occlusion.method == SmoothOcclusion::None) continue;
     add_occlusion_rows(work, rows, z);
   }
   return is_any;
@@ -281,7 +281,7 @@ void quads_of_slice(Work& work, const Slice& slice, SmoothChunkMesh& out) {
 void mesh_slices(Work& work, SmoothChunkMesh& out) {
   find_active(work);
   if (!find_needed(work)) return;
-  const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
+  const bool has_occlusion = work.occlusion.method != SmoothOcclusion::None;
   Slice slice;
   if (has_occlusion) begin_occlusion(work);
   gather_slice(work, work.cells.first);

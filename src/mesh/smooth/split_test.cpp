@@ -129,7 +129,7 @@ TEST_P(SplitNoise, ScatteredSamplesGiveAManifold) {
     SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", solid share " << share);
     const DensityGrid grid = grid_of(box, oracle::scatter(GetParam(), share));
     SmoothMeshOptions options;
-    options.occlusion.form = SmoothOcclusion::None;
+    options.occlusion.method = SmoothOcclusion::None;
     oracle::expect_manifold(count_surface(mesh_of(grid, options), true));
     options.split_sheets = false;
     EXPECT_GT(count_surface(mesh_of(grid, options)).crowded_edges, 0) << "the test asks for nothing";
@@ -155,6 +155,7 @@ TEST(SmoothSheets, CellsOfOneSheetKeepTheirBits) {
   SmoothChunkMesh plain;
   SmoothChunkMesh split;
   SmoothOptions options;
+  options.split_sheets = false;
   mesher.mesh(grid.neighbourhood(IVec3{0}), options, plain);
   options.split_sheets = true;
   mesher.mesh(grid.neighbourhood(IVec3{0}), options, split);
@@ -199,7 +200,7 @@ int edits_that_matter(DensityGrid& grid, int z) {
   SmoothChunkMesh after;
   SmoothOptions options;
   options.split_sheets = true;
-  options.occlusion.form = SmoothOcclusion::None;
+  options.occlusion.method = SmoothOcclusion::None;
   mesher.mesh(grid.neighbourhood(IVec3{0}), options, before);
   int changed = 0;
   for (int i = 0; i < 20 * 20; ++i) {

@@ -62,7 +62,8 @@ inline std::function<double(IVec3)> noise(std::uint32_t seed, double amount) {
 
 inline SmoothOptions with(SmoothOcclusion form, int level = 0, float spread = 2.0F) {
   SmoothOptions options;
-  options.occlusion.form = form;
+  options.split_sheets = false;
+  options.occlusion.method = form;
   options.occlusion.spread = spread;
   options.levels.fill(static_cast<std::uint8_t>(level));
   return options;

@@ -31,7 +31,7 @@ SmoothMeshOptions options_with(const std::function<int(IVec3)>& level_of, bool s
   SmoothMeshOptions options;
   options.level_of = level_of;
   options.split_sheets = split;
-  options.occlusion.form = SmoothOcclusion::None;
+  options.occlusion.method = SmoothOcclusion::None;
   return options;
 }
 
@@ -117,7 +117,7 @@ void expect_that_chunks_agree(const DensityGrid& grid, const std::function<int(I
   SmoothChunkMesh mesh;
   SmoothOptions options;
   options.split_sheets = split;
-  options.occlusion.form = SmoothOcclusion::Weighted;
+  options.occlusion.method = SmoothOcclusion::Weighted;
   std::int64_t shared = 0;
   for (int i = 0; i < 64; ++i) {
     const IVec3 chunk = IVec3{i % 4, i / 4 % 4, i / 16} - 1;
@@ -231,6 +231,7 @@ TEST_P(MixedLevels, EveryShortestEdgeHasItsPolygonAndEveryCellTheMeanOfItsCrossi
   for (int i = 0; i < 64; ++i) {
     const IVec3 chunk = IVec3{i % 4, i / 4 % 4, i / 16} - 1;
     SmoothOptions options;
+    options.split_sheets = false;
     for (int k = 0; k < 27; ++k) {
       const IVec3 offset = IVec3{k % 3, k / 3 % 3, k / 9} - 1;
       options.levels[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(level_of(chunk + offset));
@@ -251,6 +252,7 @@ TEST(SmoothLevels, MeshesThatKnowNothingOfTheirNeighboursLevelsDoNotMeet) {
   SmoothChunkMesh fine;
   SmoothChunkMesh coarse;
   SmoothOptions options;
+  options.split_sheets = false;
   mesher.mesh(grid.neighbourhood({1, 0, 0}), options, fine);
   options.levels.fill(2);
   mesher.mesh(grid.neighbourhood(IVec3{0}), options, coarse);
@@ -281,7 +283,7 @@ TEST(SmoothLevels, AnEditBeyondTheReachChangesNothingWhateverTheLevels) {
     DensityGrid grid = grid_of({IVec3{-14}, IVec3{14}}, oracle::scatter(seed));
     SmoothOptions options;
     options.split_sheets = true;
-    options.occlusion.form = seed % 2 == 0 ? SmoothOcclusion::None : SmoothOcclusion::Weighted;
+    options.occlusion.method = seed % 2 == 0 ? SmoothOcclusion::None : SmoothOcclusion::Weighted;
     const int coarsest = static_cast<int>(seed % 3);
     for (std::size_t k = 0; k < 27; ++k) {
       const auto chunk = static_cast<int>(k);
@@ -317,6 +319,7 @@ TEST(SmoothLevels, CellsAwayFromOtherLevelsAreThoseOfTheKernel) {
   SmoothChunkMesh mixed;
   SmoothChunkMesh plain;
   SmoothOptions options;
+  options.split_sheets = false;
   options.levels.fill(1);
   mesher.mesh(grid.neighbourhood(IVec3{0}), options, plain);
   options.levels[14] = 0;  // the next chunk along x

@@ -135,7 +135,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   const F scale = all(static_cast<float>(1 << work.level));
   const Half* const low = work.row(0, slice.z) - place_of(0, 0);
   const Half* const high = work.row(0, slice.z + 1) - place_of(0, 0);
-  const bool has_occlusion = work.occlusion.form != SmoothOcclusion::None;
+  const bool has_occlusion = work.occlusion.method != SmoothOcclusion::None;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const I place = load_words(work.places + first) & all(kPlaceMask);
     const CornerLanes corners = load_corners(low, high, place);

@@ -51,7 +51,7 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
                          const LevelCell& cell, const CellVertex& vertex, std::uint32_t index, SmoothChunkMesh& out) {
   out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());
   out.normals[index] = vertex.normal;
-  if (occlusion.form == SmoothOcclusion::None) return;
+  if (occlusion.method == SmoothOcclusion::None) return;
   NearbyDensities nearby(chunks);
   const auto density = [&](int x, int y, int z) {
     return float_from_half(nearby.get(cell.first + IVec3{x, y, z} * cell.size())) * depth_unit(cell.level);
@@ -67,7 +67,7 @@ inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const Smo
   const std::size_t index = out.positions.size();
   out.positions.resize(index + 1);
   out.normals.resize(index + 1);
-  if (occlusion.form != SmoothOcclusion::None) out.occlusion.resize(index + 1);
+  if (occlusion.method != SmoothOcclusion::None) out.occlusion.resize(index + 1);
   out.cells.push_back(name);
   write_vertex(chunks, occlusion, cell, vertex, static_cast<std::uint32_t>(index), out);
   return static_cast<std::uint32_t>(index);

@@ -202,7 +202,7 @@ class Builder {
     }
     mesh.positions.resize(vertices);
     mesh.normals.resize(vertices);
-    if (options_.occlusion.form != SmoothOcclusion::None) mesh.occlusion.resize(vertices);
+    if (options_.occlusion.method != SmoothOcclusion::None) mesh.occlusion.resize(vertices);
     mesh.albedo.resize(vertices);
     mesh.types.resize(vertices);
     mesh.indices.resize(indices);

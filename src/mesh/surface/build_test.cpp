@@ -189,7 +189,7 @@ TEST(SmoothMesh, HasNoOcclusionUnlessAskedFor) {
   const DensityGrid grid = grid_of({IVec3{0}, IVec3{9}}, oracle::sphere(DVec3{4.2}, 3.0));
   SmoothMeshOptions options;
   EXPECT_EQ(mesh_of(grid, options).occlusion.size(), mesh_of(grid, options).positions.size());
-  options.occlusion.form = SmoothOcclusion::None;
+  options.occlusion.method = SmoothOcclusion::None;
   EXPECT_TRUE(mesh_of(grid, options).occlusion.empty());
 }
 

@@ -91,7 +91,7 @@ bool is_solid_at(const DensityNeighbourhood& chunks, IVec3 sample) {
   const IVec3 local = local_of(sample);
   const DensityChunk* const found = chunks.at(chunk.x, chunk.y, chunk.z);
   if (found == nullptr) return DensityChunk::is_solid(chunks.outside);
-  const DensityStorage* const storage = found->storage();
+  const DensityStorage* const storage = DensityStorage::of(*found);
   const std::uint64_t row = storage == nullptr
                                 ? found->solid_row(0, 0)
                                 : storage->solid[static_cast<std::size_t>(local.z * kChunkEdge + local.y)];

@@ -29,7 +29,7 @@ VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
 
 // The materials of the solid corners of a cell that lies within a chunk, row by row.
 std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
-  const ChunkStorage* mixed = chunk.materials().storage();
+  const ChunkStorage* mixed = ChunkStorage::of(chunk.materials());
   std::size_t found = 0;
   for (int row = 0; row < 4; ++row) {
     const int y = first.y + (row & 1);

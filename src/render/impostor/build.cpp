@@ -32,7 +32,7 @@ std::uint8_t packed(const FaceOcclusion& corners) {
   return static_cast<std::uint8_t>(all);
 }
 
-constexpr double kOcclusionReach = LightOptions{}.occlusion_distance;
+constexpr double kOcclusionReach = LightOptions{}.occlusion_distance_voxels;
 
 // A point before the middle of a surfel, in the grid.
 DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& surfel, double lift) {
@@ -42,6 +42,15 @@ DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& sur
   point[frame.u] += double{surfel.shift[0]};
   point[frame.v] += double{surfel.shift[1]};
   return point;
+}
+
+// Bit i: ray i meets a voxel or the field, if there is one.
+std::uint32_t blocked_by(const OccupancyTree& opaque, const DensityTree* field, const RayPacket& rays) {
+  const std::uint32_t blocked = any_hits(opaque, rays);
+  if (field == nullptr) return blocked;
+  RayPacket rest = rays;
+  rest.active &= ~blocked;
+  return blocked | any_hits(*field, rest);
 }
 
 // How many of the rays of OcclusionDirections reach open space from the middle of each of the faces at `wanted`; by
@@ -75,12 +84,7 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
         }
         rays.direction_x[i] = direction.x, rays.direction_y[i] = direction.y, rays.direction_z[i] = direction.z;
       }
-      std::uint32_t blocked = any_hits(opaque, rays);
-      if (field != nullptr) {
-        RayPacket rest = rays;
-        rest.active &= ~blocked;
-        blocked |= any_hits(*field, rest);
-      }
+      const std::uint32_t blocked = blocked_by(opaque, field, rays);
       for (std::size_t i = 0; i < size; ++i) open[i] += (blocked >> i & 1U) == 0;
     }
     for (std::size_t i = 0; i < size; ++i) {

@@ -132,7 +132,7 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
 
 void ImpostorCache::Impl::start_workers() {
   if (!workers.empty()) return;
-  const unsigned count = worker_count(options.threads);
+  const unsigned count = worker_count(options.workers);
   for (unsigned i = 0; i < count; ++i) workers.emplace_back([this] { work(); });
 }
 

@@ -30,7 +30,7 @@ struct World {
 };
 
 bool shows(const Impostor& impostor, VoxelType type) {
-  const std::vector<ImpostorFaces::Face>& faces = impostor.faces().faces;
+  const std::vector<ImpostorFaces::Face>& faces = ImpostorFaces::of(impostor).faces;
   return std::any_of(faces.begin(), faces.end(), [&](const ImpostorFaces::Face& face) { return face.type == type; });
 }
 
@@ -109,7 +109,7 @@ TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
 TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
   World world(3);
   const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();
-  ImpostorCache cache({.max_bytes = 2 * one, .threads = {1}});
+  ImpostorCache cache({.max_bytes = 2 * one, .workers = {1}});
   for (const std::size_t i : {0U, 1U}) {
     EXPECT_EQ(cache.find(world.scene, world.grids[i]), nullptr);
     EXPECT_EQ(cache.wait(world.scene), 0U);
@@ -127,7 +127,7 @@ TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
 
 TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
   World world(1);
-  ImpostorCache cache({.max_bytes = 1000, .threads = {1}});
+  ImpostorCache cache({.max_bytes = 1000, .workers = {1}});
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_EQ(cache.wait(world.scene), 0U);
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
@@ -148,7 +148,7 @@ TEST(ImpostorCache, ForgetsGridsThatAreGone) {
 
 TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
   World world(8);
-  ImpostorCache cache({.max_bytes = kRoom, .threads = {2}});
+  ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
   std::thread other([&] { EXPECT_EQ(cache.wait(world.scene), 0U); });
   for (std::size_t ready = 0; ready < world.grids.size();) {
     ready = 0;
@@ -160,7 +160,7 @@ TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
 
 TEST(ImpostorCache, WorkersBuildWhileNobodyWaits) {
   World world(3);
-  ImpostorCache cache({.max_bytes = kRoom, .threads = {1}});
+  ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
   while (cache.stats().waiting > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   for (const GridHandle grid : world.grids) EXPECT_NE(cache.find(world.scene, grid), nullptr);
@@ -187,9 +187,9 @@ TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
   const auto found = cache.find(world.scene, world.grids[0]);
   const Impostor fresh = Impostor::build(world.scene.grids()[world.grids[0]].grid, world.scene.types);
   ASSERT_NE(found, nullptr);
-  ASSERT_EQ(found->faces().faces.size(), fresh.faces().faces.size());
-  for (std::size_t level = 0; level < fresh.faces().levels.size(); ++level) {
-    EXPECT_EQ(found->faces().levels[level].views, fresh.faces().levels[level].views);
+  ASSERT_EQ(ImpostorFaces::of(*found).faces.size(), ImpostorFaces::of(fresh).faces.size());
+  for (std::size_t level = 0; level < ImpostorFaces::of(fresh).levels.size(); ++level) {
+    EXPECT_EQ(ImpostorFaces::of(*found).levels[level].views, ImpostorFaces::of(fresh).levels[level].views);
   }
   EXPECT_GE(cache.stats().rebuilt, 10U);
   EXPECT_EQ(cache.stats().waiting, 0U);
@@ -203,15 +203,15 @@ TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
     cache.wait(world.scene);
     return cache.find(world.scene, world.grids[0], {edge});
   };
-  EXPECT_EQ(ready(64)->faces().edge, 64);
-  EXPECT_EQ(ready(256)->faces().edge, 256);
+  EXPECT_EQ(ImpostorFaces::of(*ready(64)).edge, 64);
+  EXPECT_EQ(ImpostorFaces::of(*ready(256)).edge, 256);
   EXPECT_EQ(cache.stats().built, 2U);
 }
 
 TEST(ImpostorCache, CanEndInTheMiddle) {
   for (int i = 0; i < 10; ++i) {
     World world(6);
-    ImpostorCache cache({.max_bytes = kRoom, .threads = {2}});
+    ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
     for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
   }
 }
@@ -220,7 +220,7 @@ TEST(ImpostorCache, CanEndInTheMiddle) {
 TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
   World world(1);
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {160, 160, 160}}, 1);
-  ImpostorCache cache({.max_bytes = kRoom, .threads = {1}});
+  ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});
   std::mt19937 random(5);
   std::vector<double> seconds;
   for (int frame = 0; frame < 200; ++frame) {

@@ -95,24 +95,25 @@ class FarTile {
 
 }  // namespace
 
-void draw_impostors(const SceneTracer& scene, const VoxelRegistry& types, std::span<const FarInstance> far,
-                    const Camera& camera, const RenderOptions& options, Picture& picture) {
+void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
+                    const RenderOptions& options, Picture& picture, Threads threads) {
   QUOIN_ASSERT(check(camera, options).has_value(), "a camera and options that CpuRenderer accepts");
   QUOIN_ASSERT(picture.colour.width == options.width && picture.colour.height == options.height &&
                    picture.depth.width == options.width && picture.depth.height == options.height,
                "a picture of the options' size, with depth");
   const SceneView view(scene, camera.position);
+  const VoxelRegistry& types = scene.scene().types;
   const Surfaces surfaces(types);
   const Lighting lighting(view, types, surfaces, options.light);
   const CameraRays rays(camera, options.width, options.height);
   const ImpostorPass pass(scene, far, camera, options.width, options.height);
   const int across = (options.width + kTile - 1) / kTile;
   const int down = (options.height + kTile - 1) / kTile;
-  parallel_for(static_cast<std::size_t>(across * down), options.threads, [&](std::size_t i) {
+  parallel_for(static_cast<std::size_t>(across * down), threads, [&](std::size_t i) {
     const int column = static_cast<int>(i) % across * kTile;
     const int row = static_cast<int>(i) / across * kTile;
     if (pass.may_show(column, row))
-      FarTile(pass, view, rays, lighting, options.light.occlusion, picture).draw(column, row);
+      FarTile(pass, view, rays, lighting, options.light.occlusion_mode, picture).draw(column, row);
   });
 }
 

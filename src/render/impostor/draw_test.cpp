@@ -173,7 +173,7 @@ TEST(DrawImpostors, EmptyPixelsKeepWhatTheyHad) {
   Picture nearer = before;
   std::fill(nearer.depth.values.begin(), nearer.depth.values.end(), 1.0F);
   const std::array far{FarInstance{world.instance, &world.impostor}};
-  draw_impostors(SceneTracer(world.scene), world.scene.types, far, camera, options, nearer);
+  draw_impostors(SceneTracer(world.scene), far, camera, options, nearer);
   EXPECT_EQ(nearer.colour.rgb, before.colour.rgb) << "what is nearer hides it";
 }
 
@@ -197,7 +197,7 @@ TEST(DrawImpostors, OrderDoesNotMatterAndTheLowerHandleWinsAtEqualDepth) {
   std::array<Picture, 2> pictures;
   for (Picture& picture : pictures) {
     picture = taken(Scene(), camera, options);
-    draw_impostors(tracer, world.scene.types, far, camera, options, picture);
+    draw_impostors(tracer, far, camera, options, picture);
     std::reverse(far.begin(), far.end());
   }
   EXPECT_EQ(pictures[0].colour.rgb, pictures[1].colour.rgb);
@@ -237,12 +237,10 @@ TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
 TEST(DrawImpostors, ThreadsAndInstructionsChangeNoByte) {
   const World world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 128.0, 148);
-  RenderOptions options = sized(148, 148);
-  options.threads = {1};
-  const Picture one = world.drawn(camera, options);
-  options.threads = {4};
+  const RenderOptions options = sized(148, 148);
+  const Picture one = world.drawn(camera, options, {1});
   const InstructionSetOverride over(InstructionSet::Plain);
-  const Picture four = world.drawn(camera, options);
+  const Picture four = world.drawn(camera, options, {4});
   EXPECT_EQ(one.colour.rgb, four.colour.rgb);
   EXPECT_EQ(one.depth.values, four.depth.values);
 }
@@ -253,7 +251,7 @@ TEST(DrawImpostorsDeathTest, WantsAPictureOfTheSizeThatIsAskedFor) {
   [[maybe_unused]] const auto draw = [&](const RenderOptions& options) {
     Picture picture;
     const Scene empty;
-    draw_impostors(SceneTracer(empty), VoxelRegistry(), {}, camera, options, picture);
+    draw_impostors(SceneTracer(empty), {}, camera, options, picture);
   };
   QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "a picture of the options' size");
   QUOIN_EXPECT_MISTAKE(draw(sized(0, 32)), "that CpuRenderer accepts");

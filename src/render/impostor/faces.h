@@ -16,6 +16,8 @@ namespace quoin {
 
 /// The faces that an impostor is drawn from.
 struct ImpostorFaces {
+  [[nodiscard]] static const ImpostorFaces& of(const Impostor& impostor) { return *impostor.faces_; }
+
   static constexpr int kLevels = 5;          ///< snapshots, each of half as many texels a side as the one before
   static constexpr std::size_t kGroup = 16;  ///< faces that are projected at once
   static constexpr std::size_t kSides = 12;  ///< the six directions of voxels' faces, then those of surfels

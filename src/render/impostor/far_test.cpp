@@ -23,12 +23,12 @@ TEST(RenderFar, WhatIsNotReadyInTimeIsTraced) {
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
   const CpuRenderer renderer(world.scene);
   const Picture truth = renderer.render(camera, options).value();
-  options.detail = DetailPolicy{};
-  options.impostor_seconds = 0.0;
+  options.detail.policy = DetailPolicy{};
+  options.detail.impostor_seconds = 0.0;
   EXPECT_EQ(renderer.render(camera, options)->colour.rgb, truth.colour.rgb);
-  options.impostor_seconds = std::numeric_limits<double>::infinity();
+  options.detail.impostor_seconds = std::numeric_limits<double>::infinity();
   EXPECT_NE(renderer.render(camera, options)->colour.rgb, truth.colour.rgb) << "occlusion is that of whole faces";
-  options.impostor_seconds = std::numeric_limits<double>::quiet_NaN();
+  options.detail.impostor_seconds = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(renderer.render(camera, options).has_value());
 }
 
@@ -43,13 +43,13 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   RenderOptions options = sized(148, 148);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
   const Picture truth = taken(world.scene, camera, options);
-  options.detail = DetailPolicy{};
+  options.detail.policy = DetailPolicy{};
   const Picture picture = taken(world.scene, camera, options);
   EXPECT_NE(truth.colour.rgb, picture.colour.rgb);
   const Likeness found = likeness(truth, picture);
   EXPECT_EQ(found.overlap, 1.0);
   EXPECT_LE(found.difference, 2.0) << "with the castle's shadow on the ground";
-  options.detail_colours = true;
+  options.detail.colours = true;
   options.light.shading = Shading::Unlit;
   const Pixel middle = pixel_at(taken(world.scene, camera, options), 74, 74);
   EXPECT_GT(middle[2], middle[0]) << "far is blue";
@@ -68,8 +68,7 @@ TEST(RenderFar, PicturesTakenAtOnceAreThoseTakenAlone) {
     world.scene.add_instance(other);
   }
   RenderOptions options = sized(120, 120);
-  options.detail = DetailPolicy{};
-  options.threads = {1};
+  options.detail.policy = DetailPolicy{};
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 40.0, 120);
   const Picture alone = taken(world.scene, camera, options);
   for (int round = 0; round < 4; ++round) {
@@ -78,7 +77,7 @@ TEST(RenderFar, PicturesTakenAtOnceAreThoseTakenAlone) {
     {
       std::vector<std::jthread> threads;
       for (Picture& picture : pictures) {
-        threads.emplace_back([&] { picture = renderer.render(camera, options).value(); });
+        threads.emplace_back([&] { picture = renderer.render(camera, options, {1}).value(); });
       }
     }
     for (const Picture& picture : pictures) EXPECT_EQ(picture.colour.rgb, alone.colour.rgb) << round;

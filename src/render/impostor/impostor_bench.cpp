@@ -180,17 +180,16 @@ void far1000(benchmark::State& state, bool impostors) {
   static const Scene scene = far_scene();
   static const CpuRenderer renderer(scene, InstanceFilter::Visible, {1});
   Camera camera;
-  camera.vertical_fov = 0.9;
+  camera.vertical_fov_radians = 0.9;
   RenderOptions options;
-  options.threads = {1};
-  if (impostors) options.detail = DetailPolicy{};
-  const auto first = renderer.render(camera, options);  // takes the impostors
+  if (impostors) options.detail.policy = DetailPolicy{};
+  const auto first = renderer.render(camera, options, {1});  // takes the impostors
   fail_unless(first.has_value() && first->pixels_hit > 100'000, "too little is seen");
   std::vector<SelectedInstance> selected;
   DetailSelector().select(scene, camera, options.width, options.height, DetailPolicy{}, selected);
   fail_unless(selected.size() > 950, "too few are in the picture");
   for (const SelectedInstance& each : selected) fail_unless(each.detail == Detail::Far, "an instance is not far");
-  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(camera, options));
+  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(camera, options, {1}));
   state.counters["pixels_hit"] = static_cast<double>(first->pixels_hit);
 }
 void traced(benchmark::State& state) {

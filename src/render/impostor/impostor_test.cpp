@@ -211,8 +211,8 @@ void expect_same(const Impostor& a, const Impostor& b) {
   EXPECT_EQ(a.box().min, b.box().min);
   EXPECT_EQ(a.box().max, b.box().max);
   EXPECT_EQ(a.content().centre, b.content().centre);
-  const ImpostorFaces& x = a.faces();
-  const ImpostorFaces& y = b.faces();
+  const ImpostorFaces& x = ImpostorFaces::of(a);
+  const ImpostorFaces& y = ImpostorFaces::of(b);
   EXPECT_EQ(x.edge, y.edge);
   ASSERT_EQ(x.faces.size(), y.faces.size());
   int different = 0;

@@ -68,6 +68,25 @@ void resize(ImpostorFaces::Level& level, std::size_t size) {
   level.face.resize(size);
 }
 
+// Puts a face, or a surfel, at a place of a level.
+void put_face(const SeenFace& seen, DVec3 centre, ImpostorFaces::Level& level, std::size_t at) {
+  const auto [voxel, direction] = seen.face;
+  const FaceFrame& frame = frame_of(direction);
+  const ImpostorFaces::Surfel* const surfel = seen.surfel;
+  for (std::size_t k = 0; surfel != nullptr && k < 2; ++k) {
+    level.slope[k][at] = surfel->slope[k];
+    level.reach[k][at] = surfel->half[k] + (level.half - 0.5F) + ImpostorFaces::kSurfelRoom;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const bool is_along = axis == frame.axis;
+    const double of_voxel = is_along ? 0.5 + 0.5 * frame.sign : 0.5;
+    const auto of_surfel = [&] { return is_along ? surfel->offset : surfel->shift[axis == frame.u ? 0 : 1]; };
+    const double edge = surfel == nullptr ? of_voxel : double{of_surfel()};
+    const auto a = static_cast<int>(axis);
+    level.centre[axis][at] = static_cast<float>(voxel[a] + edge - centre[a]);
+  }
+}
+
 template <class ViewsOf>
 ImpostorFaces::Level level_of(const std::vector<SeenFace>& faces, const ContentSphere& content, double half,
                               ViewsOf views_of) {
@@ -88,22 +107,8 @@ ImpostorFaces::Level level_of(const std::vector<SeenFace>& faces, const ContentS
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::uint32_t views = views_of(faces[i]);
     if (views == 0) continue;
-    const auto [voxel, direction] = faces[i].face;
     for (; side < faces[i].side(); ++side) fill_up(level, at, level.begin[side + 1]);
-    const FaceFrame& frame = frame_of(direction);
-    const ImpostorFaces::Surfel* const surfel = faces[i].surfel;
-    for (std::size_t k = 0; surfel != nullptr && k < 2; ++k) {
-      level.slope[k][at] = surfel->slope[k];
-      level.reach[k][at] = surfel->half[k] + (level.half - 0.5F) + ImpostorFaces::kSurfelRoom;
-    }
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const bool is_along = axis == frame.axis;
-      const double of_voxel = is_along ? 0.5 + 0.5 * frame.sign : 0.5;
-      const auto of_surfel = [&] { return is_along ? surfel->offset : surfel->shift[axis == frame.u ? 0 : 1]; };
-      const double edge = surfel == nullptr ? of_voxel : double{of_surfel()};
-      const auto a = static_cast<int>(axis);
-      level.centre[axis][at] = static_cast<float>(voxel[a] + edge - content.centre[a]);
-    }
+    put_face(faces[i], content.centre, level, at);
     level.views[at] = views;
     level.face[at++] = static_cast<std::uint32_t>(i);
   }

@@ -8,7 +8,7 @@
 #include <quoin/render/impostor.h>
 
 #include "render/camera_rays.h"
-#include "render/impostor/raster.h"
+#include "render/impostor/raster/raster.h"
 #include "render/impostor/screen.h"
 #include "scene/tracer/scene_view.h"
 

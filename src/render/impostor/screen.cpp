@@ -64,7 +64,7 @@ ImpostorScreen::ImpostorScreen(const Camera& camera, int width, int height)
       is_perspective_(camera.projection == Camera::Projection::Perspective),
       width_(width),
       height_(height),
-      focal_(height / (is_perspective_ ? 2.0 * std::tan(camera.vertical_fov / 2.0) : camera.view_height)) {}
+      focal_(height / (is_perspective_ ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height)) {}
 
 std::optional<PixelArea> ImpostorScreen::area_of(const Sphere& sphere) const {
   const DVec3 seen = sphere.seen;
@@ -105,8 +105,8 @@ std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std
   DrawnImpostor drawn;
   drawn.area = *area;
   drawn.placed = index;
-  drawn.faces = &impostor.faces();
-  drawn.level = level_for(impostor.faces().edge, sphere.diameter);
+  drawn.faces = &ImpostorFaces::of(impostor);
+  drawn.level = level_for(ImpostorFaces::of(impostor).edge, sphere.diameter);
   drawn.views = nearest_views(towards_camera, kViews[drawn.level]);
   drawn.nearest = sphere.seen.z - sphere.radius * kRoom;
   drawn.axes = axes;

@@ -9,7 +9,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "render/impostor/faces.h"
-#include "render/impostor/raster.h"
+#include "render/impostor/raster/raster.h"
 
 namespace quoin {
 

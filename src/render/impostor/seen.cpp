@@ -9,7 +9,7 @@
 
 #include <quoin/trace/packet.h>
 
-#include "render/impostor/raster.h"
+#include "render/impostor/raster/raster.h"
 #include "render/impostor/snapshot.h"
 
 namespace quoin {

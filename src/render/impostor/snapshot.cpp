@@ -103,7 +103,7 @@ Camera camera_of(const SnapshotCamera& from, int edge) {
   Camera camera;
   camera.position = from.position;
   camera.right = from.right, camera.up = from.up, camera.forward = from.forward;
-  camera.vertical_fov = 2.0 * std::atan(0.5 * edge / from.focal);
+  camera.vertical_fov_radians = 2.0 * std::atan(0.5 * edge / from.focal);
   return camera;
 }
 

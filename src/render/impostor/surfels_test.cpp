@@ -11,6 +11,7 @@
 #include <quoin/render/impostor_cache.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "render/impostor/faces.h"
 #include "render/impostor/surfels.h"
 #include "render/impostor/test_support.h"
 
@@ -47,7 +48,7 @@ Worst worst_of(ImpostorWorld& world, int pixels, int count) {
 TEST(Surfels, LookLikeTheTracedField) {
   for (const Model model : kModels) {
     ImpostorWorld world(model);
-    EXPECT_GT(world.impostor.faces().surfels.size(), 1'000U);
+    EXPECT_GT(ImpostorFaces::of(world.impostor).surfels.size(), 1'000U);
     for (const int pixels : {128, 64}) {
       const Worst found = worst_of(world, pixels, 12);
       std::printf("model %d, %d pixels: overlap %.4f, difference %.2f, mean %.2f\n", static_cast<int>(model), pixels,
@@ -109,7 +110,7 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   const Camera camera = orbiting(world, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions options = sized(120, 120);
   const Picture traced = taken(world.scene, camera, options);
-  options.detail.emplace().far_pixels = 128;
+  options.detail.policy.emplace().far_pixels = 128;
   const Picture far = taken(world.scene, camera, options);
   EXPECT_LT(far.rays, traced.rays / 2) << "no rays of occlusion";
   const Likeness found = likeness(traced, far);
@@ -135,13 +136,13 @@ TEST(Surfels, AnEditMakesThemAnew) {
   (void)cache.find(world.scene, grid);
   EXPECT_EQ(cache.wait(world.scene), 0U);
   const auto after = cache.find(world.scene, grid);
-  EXPECT_NE(before->faces().surfels.size(), after->faces().surfels.size());
-  EXPECT_EQ(after->faces().surfels.size(),
-            Impostor::build(world.scene.grids()[grid], world.scene.types).faces().surfels.size());
+  EXPECT_NE(ImpostorFaces::of(*before).surfels.size(), ImpostorFaces::of(*after).surfels.size());
+  EXPECT_EQ(ImpostorFaces::of(*after).surfels.size(),
+            ImpostorFaces::of(Impostor::build(world.scene.grids()[grid], world.scene.types)).surfels.size());
   world.scene.edit(grid).field.clear();
   (void)cache.find(world.scene, grid);
   EXPECT_EQ(cache.wait(world.scene), 0U);
-  EXPECT_TRUE(cache.find(world.scene, grid)->faces().surfels.empty());
+  EXPECT_TRUE(ImpostorFaces::of(*cache.find(world.scene, grid)).surfels.empty());
   EXPECT_FALSE(cache.find(world.scene, grid)->is_empty());
 }
 
@@ -152,7 +153,7 @@ TEST(Surfels, WhatIsTooLargeOrThinIsTraced) {
   const Camera near = orbiting(rods, 0.7, 0.4, 0.2, 100.0, 120);
   RenderOptions in_detail = sized(120, 120);
   const Picture traced = taken(rods.scene, near, in_detail);
-  in_detail.detail.emplace().far_pixels = 128;
+  in_detail.detail.policy.emplace().far_pixels = 128;
   EXPECT_EQ(taken(rods.scene, near, in_detail).depth.values, traced.depth.values);
   Scene scene;
   const VoxelType type = add_type(scene, {200, 120, 60, 255});
@@ -163,8 +164,8 @@ TEST(Surfels, WhatIsTooLargeOrThinIsTraced) {
   EXPECT_TRUE(Impostor::build(wide, scene.types, smallest).is_left_to_rays());
   scene.add_instance({"", scene.add_grid(std::move(wide))});
   RenderOptions options = sized(64, 64);
-  options.impostor_edge = 16;
-  options.detail.emplace().far_pixels = 128;
+  options.detail.impostor_edge = 16;
+  options.detail.policy.emplace().far_pixels = 128;
   const Camera camera = towards({3000, 2500, 4000}, {0, 0, 0}, 0.5);
   EXPECT_GT(taken(scene, camera, options).pixels_hit, 100);
 }

@@ -156,10 +156,9 @@ struct ImpostorWorld {
   }
   Instance& placed() { return scene.edit(instance); }
 
-  [[nodiscard]] Picture drawn(const Camera& camera, const RenderOptions& options) const {
+  [[nodiscard]] Picture drawn(const Camera& camera, const RenderOptions& options, Threads threads = {}) const {
     Picture picture = taken(Scene(), camera, options);
-    draw_impostors(SceneTracer(scene), scene.types, std::array{FarInstance{instance, &impostor}}, camera, options,
-                   picture);
+    draw_impostors(SceneTracer(scene), std::array{FarInstance{instance, &impostor}}, camera, options, picture, threads);
     return picture;
   }
 };

@@ -87,7 +87,7 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
 TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   const Camera camera = towards({20, 20, 40}, {0, 0, 0});
   RenderOptions options = sized(16, 12);
-  options.detail.emplace();
+  options.detail.policy.emplace();
   const Picture sky = render_test::taken(Scene(), camera, options);
   EXPECT_EQ(render_test::count_different(taken_as_is(camera, options), sky, 2), 0);
   Scene scene;
@@ -113,7 +113,7 @@ TEST_F(VulkanErrors, AListenerCanStopIt) {
   RenderOptions options = sized(32, 32);
   options.samples = 6;
   std::vector<double> told;
-  const auto stopped = renderer_->render(camera, options, [&](double fraction) {
+  const auto stopped = renderer_->render(camera, options, {}, [&](double fraction) {
     told.push_back(fraction);
     return told.size() < 3;
   });
@@ -122,7 +122,7 @@ TEST_F(VulkanErrors, AListenerCanStopIt) {
   EXPECT_EQ(stopped.error().message, "cancelled");
   EXPECT_EQ(told.size(), 3U);
   told.clear();
-  ASSERT_TRUE(renderer_->render(camera, options, [&](double fraction) {
+  ASSERT_TRUE(renderer_->render(camera, options, {}, [&](double fraction) {
     told.push_back(fraction);
     return true;
   }));

@@ -50,17 +50,18 @@ void DeviceDetail::look_at(const Scene& scene) {
 }
 
 Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
-                                      const Camera& camera, const RenderOptions& options, std::uint64_t max_bytes) {
+                                      const Camera& camera, const RenderOptions& options, Threads threads,
+                                      std::uint64_t max_bytes) {
   ++picture_;
   Placement placement = device.placement();
   const ImpostorScreen screen(camera, options.width, options.height);
   const auto put = [&]() -> Status {
-    const bool waits = options.impostor_seconds == std::numeric_limits<double>::infinity();
+    const bool waits = options.detail.impostor_seconds == std::numeric_limits<double>::infinity();
     const auto sent = impostors_.send(scene, detail.far, waits);
     if (!sent) return sent.error();
     std::vector<SelectedInstance> selected = detail.selected;
     keep_whole(*sent, selected);
-    if (Status done = put_halved(device, scene, selected, options.threads, placement); !done) return done;
+    if (Status done = put_halved(device, scene, selected, threads, placement); !done) return done;
     Status done = impostors_.draw(scene, *sent, screen, options.width, options.height, placement);
     return done ? memory_->flush() : done;
   };

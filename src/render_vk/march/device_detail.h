@@ -38,7 +38,7 @@ class DeviceDetail {
   /// Requires: `device` was updated with `scene`, which is as it was then; no commands run.
   /// Errors:   those of DeviceImpostors::draw; then it holds nothing.
   [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
-                                        const Camera& camera, const RenderOptions& options,
+                                        const Camera& camera, const RenderOptions& options, Threads threads,
                                         std::uint64_t max_bytes = kMaxBytes);
 
   /// Of device memory that halved grids take, and impostors.

@@ -141,7 +141,7 @@ void DeviceImpostors::release(Entry& entry) {
 Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
   memory_->release(sent.place);
   sent = {};
-  const ImpostorFaces& from = impostor->faces();
+  const ImpostorFaces& from = ImpostorFaces::of(*impostor);
   std::uint64_t bytes = 0;
   for (std::size_t i = 0; i < sent.levels.size(); ++i) {
     const std::size_t count = level_of(from, i).views.size();
@@ -158,7 +158,7 @@ Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, S
 }
 
 Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
-  const ImpostorFaces& from = sent.impostor->faces();
+  const ImpostorFaces& from = ImpostorFaces::of(*sent.impostor);
   Status done;
   while (done && sent.part < kParts && faces_left > 0) {
     const bool is_level = sent.part < sent.levels.size();

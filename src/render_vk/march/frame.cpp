@@ -208,12 +208,13 @@ std::uint32_t flags_of(const Camera& camera, const RenderOptions& options) {
   if (light.shading == Shading::Occlusion) flags |= kShowOcclusion;
   if (light.shading == Shading::Normals) flags |= kShowNormals;
   if (light.shadows) flags |= kShadows;
-  if (light.occlusion == OcclusionMode::Rays) flags |= kOcclusionRays;
+  if (light.occlusion_mode == OcclusionMode::Rays) flags |= kOcclusionRays;
   // Meshes carry the smooth occlusion of fields, and marched rays do not come here with it.
-  const bool is_of_vertices = light.occlusion == OcclusionMode::Vertex || light.occlusion == OcclusionMode::Smooth;
+  const bool is_of_vertices =
+      light.occlusion_mode == OcclusionMode::Vertex || light.occlusion_mode == OcclusionMode::Smooth;
   if (is_of_vertices) flags |= kOcclusionVertex;
   if (light.occlusion_affects == OcclusionAffects::All) flags |= kAffectsAll;
-  if (options.detail_colours) flags |= kDetailColours;
+  if (options.detail.colours) flags |= kDetailColours;
   if (light.glass_surfaces && light.shading == Shading::Lit) flags |= kGlassSurfaces;
   return flags;
 }
@@ -236,8 +237,8 @@ void set_light(const RenderOptions& options, ShaderFrame& frame) {
   frame.ground_begins = sky::kGroundBegins;
   frame.ground_is_full = sky::kGroundIsFull;
   frame.occlusion_count = light.occlusion_rays;
-  frame.occlusion_distance = capped(light.occlusion_distance);
-  frame.shadow_distance = capped(light.shadow_distance);
+  frame.occlusion_distance = capped(light.occlusion_distance_voxels);
+  frame.shadow_distance = capped(light.shadow_distance_voxels);
   frame.exposure = exposure_of(light);
 }
 

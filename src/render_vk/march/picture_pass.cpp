@@ -18,7 +18,7 @@ const char* const kDoing = "drawing";
 // `lamps`: that light a point at most.
 std::int64_t rays_of_pixel(const RenderOptions& options, int lamps) {
   const LightOptions& light = options.light;
-  return 2 + lamps + (light.occlusion == OcclusionMode::Rays ? light.occlusion_rays : 0);
+  return 2 + lamps + (light.occlusion_mode == OcclusionMode::Rays ? light.occlusion_rays : 0);
 }
 
 // The edge of the tiles, a power of two. Graphics hardware needs many pixels at a time to be busy; the lists of glass

@@ -54,9 +54,9 @@ struct VulkanRenderer::Impl {
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
   /// What lamps light, sent to the device when it is another than before.
-  [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const RenderOptions& render) {
-    if (render.light.lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
-    auto table = lamps.table(*voxels, render.light, render.threads, [this] { return scene.lamp_places(*voxels); });
+  [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
+    if (light.lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
+    auto table = lamps.table(*voxels, light, threads, [this] { return scene.lamp_places(*voxels); });
     if (Status done = sent_lamps.put(memory, std::move(table)); !done) return done.error();
     return sent_lamps;
   }
@@ -72,7 +72,8 @@ namespace vulkan {
 class Subject {
  public:
   /// As VulkanRenderer::render, of what is right.
-  [[nodiscard]] static Result<Subject> of(RendererImpl& impl, const Camera& camera, const RenderOptions& options);
+  [[nodiscard]] static Result<Subject> of(RendererImpl& impl, const Camera& camera, const RenderOptions& options,
+                                          Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return detailed_ ? *detailed_ : *plain_; }
 

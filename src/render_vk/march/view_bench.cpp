@@ -56,7 +56,7 @@ RenderOptions options_for(int height, Kind kind) {
   options.width = height * 16 / 9;
   options.light.occlusion_rays = 6;
   if (kind == Kind::Primary) options.light.shading = Shading::Unlit;
-  if (kind == Kind::Shadow) options.light.occlusion = OcclusionMode::Off;
+  if (kind == Kind::Shadow) options.light.occlusion_mode = OcclusionMode::Off;
   return options;
 }
 

@@ -35,7 +35,7 @@ void unlit(benchmark::State& state) {
 }
 void vertex(benchmark::State& state) {
   LightOptions light;
-  light.occlusion = OcclusionMode::Vertex;
+  light.occlusion_mode = OcclusionMode::Vertex;
   picture(state, light);
 }
 

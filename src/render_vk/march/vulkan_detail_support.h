@@ -66,7 +66,7 @@ inline void add_crowd(Scene& scene, const std::vector<GridHandle>& grids, int ed
 
 inline RenderOptions in_detail(int width, int height, int far_pixels) {
   RenderOptions options = render_test::sized(width, height);
-  options.detail.emplace().far_pixels = far_pixels;
+  options.detail.policy.emplace().far_pixels = far_pixels;
   return options;
 }
 

@@ -21,7 +21,7 @@ class VulkanDetail : public vulkan_test::VulkanDetailTest {
   // Of the grids that the processor traces.
   [[nodiscard]] std::set<int> halvings_of(const Camera& camera, const RenderOptions& options) const {
     std::vector<SelectedInstance> selected;
-    DetailSelector().select(scene_, camera, options.width, options.height, *options.detail, selected);
+    DetailSelector().select(scene_, camera, options.width, options.height, *options.detail.policy, selected);
     const SceneTracer whole(scene_);
     const SceneTracer detailed = whole.with_detail(selected);
     std::set<int> halvings;
@@ -33,10 +33,10 @@ class VulkanDetail : public vulkan_test::VulkanDetailTest {
 // All instances Mid, halved as often as their distance and volume allow.
 RenderOptions always_mid(double cell_pixels) {
   RenderOptions options = sized(128, 96);
-  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
-  options.detail->near_radii = 0.0;
-  options.detail->mid_radii = 1e9;
-  options.detail->cell_pixels = cell_pixels;
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = 0.0;
+  options.detail.policy->mid_radii = 1e9;
+  options.detail.policy->cell_pixels = cell_pixels;
   return options;
 }
 
@@ -63,10 +63,10 @@ TEST_F(VulkanDetail, EveryKindOfLightOnHalvedGrids) {
     change(options);
     compare(camera, options, "mid_" + name);
   };
-  with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
-  with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+  with("vertex", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Vertex; });
+  with("without", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Off; });
   with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
-  with("short", [](RenderOptions& o) { o.light.shadow_distance = 20.0; });
+  with("short", [](RenderOptions& o) { o.light.shadow_distance_voxels = 20.0; });
   with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
   with("samples", [](RenderOptions& o) { o.samples = 3; });
 }
@@ -77,8 +77,8 @@ TEST_F(VulkanDetail, NearIsThePictureWithoutDetailToTheByte) {
   const Camera camera = towards({-100, 220, -200}, {150, 0, 150}, 0.6);
   RenderOptions options = sized(96, 64);
   const Picture plain = taken_as_is(camera, options);
-  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
-  options.detail->near_radii = 1e9;
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = 1e9;
   const Picture detailed = taken_as_is(camera, options);
   EXPECT_EQ(plain.colour.rgb, detailed.colour.rgb);
   EXPECT_EQ(plain.depth.values, detailed.depth.values);
@@ -201,7 +201,7 @@ TEST_F(VulkanDetail, WhatPicturesNoLongerUseGivesWay) {
     for (const InstanceHandle handle : scene_.instances().handles()) {
       if (scene_.instances()[handle].grid == wanted) selected.push_back({handle, Detail::Mid, 1});
     }
-    ASSERT_TRUE(detail.place(vulkan::Access::of(*renderer_).scene, scene_, {selected, {}}, {}, {}, max_bytes));
+    ASSERT_TRUE(detail.place(vulkan::Access::of(*renderer_).scene, scene_, {selected, {}}, {}, {}, {}, max_bytes));
   };
   place(grids[0], vulkan::DeviceDetail::kMaxBytes);
   const std::uint64_t first = detail.halved_bytes();
@@ -236,7 +236,7 @@ TEST_F(VulkanDetail, ColoursTellTheDetail) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 7, 300.0);
   const Camera camera = towards({-150, 120, -150}, {500, -60, 500}, 0.7);
   RenderOptions options = in_detail(320, 200, 0);
-  options.detail_colours = true;
+  options.detail.colours = true;
   compare(camera, options, "detail_colours");
   options.light.shading = Shading::Unlit;
   compare(camera, options, "detail_colours_unlit");

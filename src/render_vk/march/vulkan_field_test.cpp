@@ -60,7 +60,7 @@ TEST_F(VulkanField, HillsWithAHouseAndGlass) {
   compare(scene, camera, options, "field_village");
   options.light.occlusion_rays = 16;
   compare(scene, camera, options, "field_village_16");
-  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
   compare(scene, camera, options, "field_village_vertex");
   for (const Shading shading : {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
     options.light.shading = shading;
@@ -99,10 +99,10 @@ TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
   options.light.lamps = 0;
   EXPECT_GT(render_test::count_different(with, render_test::taken(scene, camera, options), 8), 800);
   options.light.lamps = 24;
-  options.detail.emplace().far_pixels = 0;
-  options.detail->cell_pixels = 4.0;
+  options.detail.policy.emplace().far_pixels = 0;
+  options.detail.policy->cell_pixels = 4.0;
   compare(scene, camera, options, "field_glow_halved");
-  options.detail->far_pixels = 1000;
+  options.detail.policy->far_pixels = 1000;
   compare(scene, camera, options, "field_glow_far");
 }
 
@@ -256,10 +256,10 @@ TEST_F(VulkanField, GlassTurnedAndScaledFarAway) {
   RenderOptions options = sized(160, 120);
   options.light.glass_surfaces = true;
   compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_instances");
-  options.detail.emplace().far_pixels = 0;
-  options.detail->cell_pixels = 4.0;
+  options.detail.policy.emplace().far_pixels = 0;
+  options.detail.policy->cell_pixels = 4.0;
   compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_halved");
-  options.detail->far_pixels = 1000;
+  options.detail.policy->far_pixels = 1000;
   compare(scene, towards(far + DVec3(90, 80, 110), far), options, "field_glass_far");
 }
 

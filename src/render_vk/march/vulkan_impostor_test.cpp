@@ -66,14 +66,14 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
       change(options);
       compare(camera, options, "far_" + name);
     };
-    with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
-    with("without", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+    with("vertex", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Vertex; });
+    with("without", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Off; });
     with("all", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
     with("spread", [](RenderOptions& o) { o.light.occlusion_rays = 5; });
     with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
     with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
     with("samples", [](RenderOptions& o) { o.samples = 5; });
-    with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+    with("colours", [](RenderOptions& o) { o.detail.colours = true; });
     const Picture far = taken_as_is(camera, far_options(148));
     EXPECT_NE(far.colour.rgb, taken_as_is(camera, sized(148, 148)).colour.rgb) << "occlusion is that of whole faces";
   }
@@ -85,7 +85,7 @@ TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
   // More than a tile, Near, Mid and Far.
   RenderOptions options = in_detail(320, 200, 128);
   compare(camera, options, "crowd");
-  options.detail_colours = true;
+  options.detail.colours = true;
   compare(camera, options, "crowd_colours");
   options.samples = 2;
   compare(camera, options, "crowd_samples");
@@ -110,9 +110,9 @@ TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
   scene_.add_instance(instance);
   const Camera camera = towards({700, 500, 1300}, {0, 0, 0}, 0.3);
   RenderOptions frames = in_detail(96, 96, 200);
-  frames.impostor_seconds = 0.0;
+  frames.detail.impostor_seconds = 0.0;
   RenderOptions waiting = frames;
-  waiting.impostor_seconds = std::numeric_limits<double>::infinity();
+  waiting.detail.impostor_seconds = std::numeric_limits<double>::infinity();
   const auto frames_until = [&](const Picture& wanted) {
     for (int frame = 1; frame < 2000; ++frame) {
       if (taken_as_is(camera, frames).colour.rgb == wanted.colour.rgb) return frame;
@@ -255,11 +255,11 @@ TEST_F(VulkanImpostors, RandomScenesAndPolicies) {
     std::uniform_real_distribution<double> unit(-1.0, 1.0);
     add_crowd(scene_, {add_blobs(scene_, seed, 8), add_blobs(scene_, seed + 100, 5)}, 4, 150.0 + 100.0 * unit(random));
     RenderOptions options = in_detail(96 + static_cast<int>(random() % 200), 64, static_cast<int>(random() % 400));
-    options.detail->cell_pixels = 1.0 + unit(random);
-    options.detail->voxel_pixels = 1.5 + unit(random);
+    options.detail.policy->cell_pixels = 1.0 + unit(random);
+    options.detail.policy->voxel_pixels = 1.5 + unit(random);
     options.samples = 1 + static_cast<int>(random() % 2);
-    options.light.occlusion = random() % 2 == 0 ? OcclusionMode::Rays : OcclusionMode::Vertex;
-    options.detail_colours = random() % 3 == 0;
+    options.light.occlusion_mode = random() % 2 == 0 ? OcclusionMode::Rays : OcclusionMode::Vertex;
+    options.detail.colours = random() % 3 == 0;
     const double distance = std::exp(7.0 + 2.0 * unit(random));
     const DVec3 eye = DVec3(unit(random), 0.2 + std::abs(unit(random)), unit(random)) * distance;
     Camera camera = towards(eye, {200, 0, 200}, 0.6 + 0.3 * unit(random));
@@ -276,7 +276,7 @@ TEST_F(VulkanImpostors, WhatIsNotReadyInTimeIsTraced) {
   const ImpostorWorld world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);
   RenderOptions options = far_options(148);
-  options.impostor_seconds = 0.0;
+  options.detail.impostor_seconds = 0.0;
   compare(camera, options, "far_not_ready");
   EXPECT_EQ(impostor_bytes(), 0U);
 }

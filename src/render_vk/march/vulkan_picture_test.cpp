@@ -90,7 +90,7 @@ TEST_F(VulkanPictures, SayWhatCannotBe) {
   EXPECT_EQ(picture.samples(), 1) << "a refusal changes nothing";
   options_.samples = 1;
   const Status stopped =
-      renderer_->draw(picture, camera, options_, Accumulation::Continue, [](double) { return false; });
+      renderer_->draw(picture, camera, options_, Accumulation::Continue, {}, [](double) { return false; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
   EXPECT_EQ(picture.samples(), 0);

@@ -12,7 +12,7 @@ namespace quoin {
 namespace {
 
 Status check_request(const Camera& camera, const RenderOptions& options) {
-  if (options.light.occlusion == OcclusionMode::Smooth) {
+  if (options.light.occlusion_mode == OcclusionMode::Smooth) {
     return make_error(ErrorCode::Unsupported, "vulkan: smooth occlusion of marched fields is the processor's");
   }
   return check(camera, options);
@@ -20,11 +20,12 @@ Status check_request(const Camera& camera, const RenderOptions& options) {
 
 }  // namespace
 
-Result<vulkan::Subject> vulkan::Subject::of(RendererImpl& impl, const Camera& camera, const RenderOptions& options) {
+Result<vulkan::Subject> vulkan::Subject::of(RendererImpl& impl, const Camera& camera, const RenderOptions& options,
+                                            Threads threads) {
   Subject subject(impl.scene.placement());
-  if (!options.detail || impl.voxels == nullptr) return subject;
+  if (!options.detail.policy || impl.voxels == nullptr) return subject;
   const PictureDetail detail = impl.chooser->choose(*impl.voxels, impl.instances, camera, options);
-  auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options);
+  auto placed = impl.detail.place(impl.scene, *impl.voxels, detail, camera, options, threads);
   if (!placed) return placed.error();
   subject.detailed_ = std::move(*placed);
   return subject;
@@ -79,11 +80,12 @@ std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return impl_->uploaded;
 }
 
-Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, const Progress& progress) {
+Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
+                                       const Progress& progress) {
   if (const Status status = check_request(camera, options); !status) return status.error();
-  const auto subject = vulkan::Subject::of(*impl_, camera, options);
+  const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto lamps = impl_->lamp_table(options);
+  auto lamps = impl_->lamp_table(options.light, threads);
   if (!lamps) return lamps.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
                            std::move(*lamps));
@@ -91,7 +93,7 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
 }
 
 Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
-                            Accumulation accumulation, const Progress& progress) {
+                            Accumulation accumulation, Threads threads, const Progress& progress) {
   constexpr int kMaxSamples = 4096;
   if (Status status = check_request(camera, options); !status) return status;
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
@@ -109,9 +111,9 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: a picture has 4096 samples a pixel at most");
   }
-  const auto subject = vulkan::Subject::of(*impl_, camera, options);
+  const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto lamps = impl_->lamp_table(options);
+  auto lamps = impl_->lamp_table(options.light, threads);
   if (!lamps) return lamps.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
                            std::move(*lamps));

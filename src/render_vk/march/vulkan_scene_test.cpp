@@ -180,12 +180,12 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
     change(options);
     compare(scene, camera, options, name);
   };
-  with("vertex", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Vertex; });
+  with("vertex", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Vertex; });
   with("vertex_all", [](RenderOptions& o) {
-    o.light.occlusion = OcclusionMode::Vertex;
+    o.light.occlusion_mode = OcclusionMode::Vertex;
     o.light.occlusion_affects = OcclusionAffects::All;
   });
-  with("no_occlusion", [](RenderOptions& o) { o.light.occlusion = OcclusionMode::Off; });
+  with("no_occlusion", [](RenderOptions& o) { o.light.occlusion_mode = OcclusionMode::Off; });
   with("no_shadows", [](RenderOptions& o) { o.light.shadows = false; });
   with("unlit", [](RenderOptions& o) { o.light.shading = Shading::Unlit; });
   with("all_rays", [](RenderOptions& o) { o.light.occlusion_affects = OcclusionAffects::All; });
@@ -196,7 +196,7 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
     o.samples = 3;
     o.light.occlusion_rays = 5;
   });
-  with("short_shadows", [](RenderOptions& o) { o.light.shadow_distance = 3.0; });
+  with("short_shadows", [](RenderOptions& o) { o.light.shadow_distance_voxels = 3.0; });
   with("low_sun", [](RenderOptions& o) { o.light.sun = {1e-30, 0.3e-30, 1e-30}; });
   with("exposed", [](RenderOptions& o) { o.light.exposure = 2.5; });
   with("many_tiles", [](RenderOptions& o) {
@@ -204,7 +204,7 @@ TEST_F(VulkanScene, EveryOptionOfLight) {
     o.height = 20;
     o.light.shading = Shading::Unlit;
   });
-  with("colours", [](RenderOptions& o) { o.detail_colours = true; });
+  with("colours", [](RenderOptions& o) { o.detail.colours = true; });
 }
 
 TEST_F(VulkanScene, EveryShading) {
@@ -215,7 +215,7 @@ TEST_F(VulkanScene, EveryShading) {
   for (const Shading shading : {Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
     for (const OcclusionMode mode : {OcclusionMode::Rays, OcclusionMode::Vertex, OcclusionMode::Off}) {
       options.light.shading = shading;
-      options.light.occlusion = mode;
+      options.light.occlusion_mode = mode;
       options.samples = mode == OcclusionMode::Rays ? 3 : 1;
       compare(scene, camera, options,
               "shading_" + std::to_string(static_cast<int>(shading)) + "_" + std::to_string(static_cast<int>(mode)));
@@ -340,8 +340,8 @@ Scene lit_by_night(DVec3 origin) {
   lamp.direction = {1.0, -1.0, -0.8};
   lamp.colour = Vec3(1.0F);
   lamp.intensity = 300.0;
-  lamp.inner_angle = 0.1;
-  lamp.outer_angle = 0.45;
+  lamp.inner_angle_radians = 0.1;
+  lamp.outer_angle_radians = 0.45;
   scene.lamps.push_back(lamp);
   return scene;
 }

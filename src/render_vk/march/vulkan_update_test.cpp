@@ -181,7 +181,7 @@ TEST_F(VulkanUpdate, HundredsOfTypesInOneChunk) {
     place(each, std::move(grid));
     const Camera camera = towards({90, 60, 80}, {32, 10, 32});
     RenderOptions options = sized(80, 60);
-    options.light.occlusion = OcclusionMode::Vertex;
+    options.light.occlusion_mode = OcclusionMode::Vertex;
     expect_equal(taken(each, camera, options), render_test::taken(each, camera, options),
                  "types_" + std::to_string(types));
   }

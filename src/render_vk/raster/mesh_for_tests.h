@@ -88,15 +88,12 @@ inline MeshPictureOptions mesh_options(const RenderOptions& options) {
   mesh.samples = 1;
   mesh.light = options.light;
   mesh.detail = options.detail;
-  mesh.selector = options.selector;
-  mesh.impostor_seconds = options.impostor_seconds;
-  mesh.detail_colours = options.detail_colours;
   return mesh;
 }
 
 /// The light that meshes have.
 inline RenderOptions with_mesh_light(RenderOptions options) {
-  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
   return options;
 }
 inline RenderOptions without_shadows(RenderOptions options) {

@@ -48,10 +48,10 @@ class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
 
 RenderOptions always(Detail detail, double cell_pixels) {
   RenderOptions options = sized(256, 192);
-  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
-  options.detail->near_radii = 0.0;
-  options.detail->mid_radii = detail == Detail::Mid ? 1e9 : 0.0;
-  options.detail->cell_pixels = cell_pixels;
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = 0.0;
+  options.detail.policy->mid_radii = detail == Detail::Mid ? 1e9 : 0.0;
+  options.detail.policy->cell_pixels = cell_pixels;
   return options;
 }
 
@@ -85,7 +85,7 @@ TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
   Camera above = render_test::from_above(700, 4000, 700, 2000);
   compare_all(above, options, "mesh_far_above");
   RenderOptions whole = options;
-  whole.detail.reset();
+  whole.detail.policy.reset();
   EXPECT_GT(with, 0);
   EXPECT_LT(with, triangles_of(camera, with_mesh_light(whole)));
   // What is merged is simpler than its impostor.
@@ -97,15 +97,15 @@ TEST_F(VulkanMeshDetail, AllThreeInOnePicture) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 8, 260.0);
   make_opaque();
   RenderOptions options = in_detail(480, 270, 60);
-  options.detail->voxel_pixels = 0.7;
+  options.detail.policy->voxel_pixels = 0.7;
   const Camera camera = towards({-120, 260, -220}, {900, -100, 900}, 1.0);
   std::vector<SelectedInstance> selected;
-  DetailSelector().select(scene_, camera, options.width, options.height, *options.detail, selected);
+  DetailSelector().select(scene_, camera, options.width, options.height, *options.detail.policy, selected);
   std::array<int, 3> count{};
   for (const SelectedInstance& each : selected) ++count.at(static_cast<std::size_t>(each.detail));
   for (const int each : count) EXPECT_GT(each, 0);
   compare_all(camera, options, "mesh_all_details");
-  options.detail_colours = true;
+  options.detail.colours = true;
   compare_all(camera, options, "mesh_detail_colours");
 }
 
@@ -120,7 +120,7 @@ TEST_F(VulkanMeshDetail, GlassOfFarInstancesIsDrawn) {
   const Camera camera = towards({20, 40, 300}, {20, 10, 0}, 0.3);
   RenderOptions options = with_mesh_light(always(Detail::Far, 1.0));
   const Image far = drawn(camera, mesh_options(options));
-  options.detail.reset();
+  options.detail.policy.reset();
   const Image whole = drawn(camera, mesh_options(options));
   const int different = bytes_that_differ(far, whole, 3);
   EXPECT_LE(different * 100, static_cast<int>(far.rgb.size()));
@@ -151,9 +151,9 @@ TEST_F(VulkanMeshDetail, WhatHasNoImpostorYetIsDrawnHalved) {
   put(scene_, blocky_surfaces(scene_, false));
   const Camera camera = towards({-300, 420, -500}, {260, 0, 260}, 0.7);
   RenderOptions options = with_mesh_light(always(Detail::Far, 2.0));
-  options.impostor_seconds = 0.0;
+  options.detail.impostor_seconds = 0.0;
   const Image first = drawn(camera, mesh_options(options));
-  options.impostor_seconds = std::numeric_limits<double>::infinity();
+  options.detail.impostor_seconds = std::numeric_limits<double>::infinity();
   expect_like(drawn(camera, mesh_options(options)), render_test::taken(scene_, camera, options), "mesh_waited");
   const Image last = drawn(camera, mesh_options(options));
   const int different = bytes_that_differ(first, last, 60);
@@ -172,7 +172,7 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   options.light.shading = Shading::Normals;
   const Image halved = drawn(camera, mesh_options(options));
   const std::int64_t triangles = meshes_->stats().drawn_triangles;
-  options.detail.reset();
+  options.detail.policy.reset();
   const Image whole = drawn(camera, mesh_options(options));
   EXPECT_LT(triangles * 2, meshes_->stats().drawn_triangles);
   const int different = bytes_that_differ(halved, whole, 40);
@@ -207,11 +207,11 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
     const Image distant = shown(
         [&] {
           RenderOptions of_far = options;
-          of_far.detail = always(Detail::Far, 1.0).detail;
+          of_far.detail.policy = always(Detail::Far, 1.0).detail;
           return of_far;
         }(),
         far);
-    options.detail.reset();
+    options.detail.policy.reset();
     const Image fine = shown(options, whole);
     EXPECT_LT(halved * 2, whole);
     EXPECT_EQ(far, whole);
@@ -222,7 +222,7 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
     RenderOptions lit = with_mesh_light(always(Detail::Mid, 1.0));
     std::int64_t triangles = 0;
     const Image shaded = shown(lit, triangles);
-    lit.detail.reset();
+    lit.detail.policy.reset();
     EXPECT_LE(bytes_that_differ(shaded, shown(lit, triangles), 60) * 20, static_cast<int>(shaded.rgb.size()));
     // Edits reach the levels.
     scene_.edit(grid).field.add_sphere({-50.0, 30.0, 10.0}, 20.0, brick);
@@ -235,12 +235,12 @@ TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
   make_opaque();
   put(scene_, blocky_surfaces(scene_));
   RenderOptions options = with_mesh_light(sized(128, 96));
-  options.detail.emplace().rule = DetailPolicy::Rule::ByRadius;
-  options.detail->near_radii = 5.0;
-  options.detail->mid_radii = 1e9;
+  options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
+  options.detail.policy->near_radii = 5.0;
+  options.detail.policy->mid_radii = 1e9;
   DetailSelector selector;
-  options.selector = &selector;
-  options.detail_colours = true;
+  options.detail.selector = &selector;
+  options.detail.colours = true;
   std::set<std::int64_t> triangles;
   for (int i = 0; i < 6; ++i) {
     std::vector<SelectedInstance> selected;
@@ -250,7 +250,7 @@ TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
     double far = 10'000.0;
     for (int step = 0; step < 50; ++step) {
       const double middle = 0.5 * (near + far);
-      without.select(scene_, towards({middle, 0, 0}, {0, 0, 0}), 128, 96, *options.detail, selected);
+      without.select(scene_, towards({middle, 0, 0}, {0, 0, 0}), 128, 96, *options.detail.policy, selected);
       (selected.empty() || selected.front().detail != Detail::Near ? far : near) = middle;
       without = DetailSelector();
     }

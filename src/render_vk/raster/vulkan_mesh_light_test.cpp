@@ -104,11 +104,11 @@ TEST_F(VulkanMeshLight, LightHasTheSameOptions) {
   options.light.occlusion_affects = OcclusionAffects::All;
   options.light.sun = {-1, 2, 0.5};
   compare(scene, camera, options, "affects_all");
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   compare(scene, camera, options, "no_occlusion");
   options.light.exposure = 2.5;
   compare(scene, camera, options, "exposed");
-  options.light.occlusion = OcclusionMode::Vertex;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.shading = Shading::UnlitWithOcclusion;
   compare(scene, camera, options, "unlit_with_occlusion");
   options.light.shading = Shading::Normals;
@@ -161,7 +161,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   expect(colour * (0.15F + up) + colour * 0.125F, "all of it is open");
   options.light.exposure = 0.5;
   expect(0.5F * (colour * (0.15F + up) + colour * 0.125F), "exposed");
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   expect(0.5F * (colour * (0.10F + up) + colour * 0.125F), "without occlusion");
   options.light.sun = {0, -1, 0};
   expect(0.5F * (colour * 0.10F + colour * 0.125F), "the sun below");

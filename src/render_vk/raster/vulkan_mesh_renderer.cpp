@@ -31,11 +31,6 @@ RenderOptions request_of(const MeshPictureOptions& options) {
   request.height = options.height;
   request.light = options.light;
   request.detail = options.detail;
-  request.selector = options.selector;
-  request.impostor_seconds = options.impostor_seconds;
-  request.impostor_edge = options.impostor_edge;
-  request.detail_colours = options.detail_colours;
-  request.threads = options.threads;
   return request;
 }
 
@@ -92,10 +87,10 @@ struct VulkanMeshRenderer::Impl {
                                      const MeshPictureOptions& options) const;
   [[nodiscard]] Result<std::vector<vulkan::MeshInstance>> detailed(const vulkan::Placement& placement, Threads threads);
   Status put_picture(const vulkan::Placement& placement, const Camera& camera, const RenderOptions& request,
-                     vulkan::MeshFrameData& data);
+                     Threads threads, vulkan::MeshFrameData& data);
   [[nodiscard]] bool has_glass_by_rays(const MeshPictureOptions& options) const;
   [[nodiscard]] Result<vulkan::MeshFrameData> make_frame(const Camera& camera, const MeshPictureOptions& options,
-                                                         vulkan::MeshLight& light);
+                                                         vulkan::MeshLight& light, Threads threads);
 
   vulkan::RendererImpl* renderer;
   vulkan::Device* device;
@@ -190,7 +185,8 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
     return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
   }
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
-  const bool needs_voxels = options.detail.has_value() || traces_light(options.light) || has_glass_by_rays(options);
+  const bool needs_voxels =
+      options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
   if (needs_voxels && scene != nullptr && (renderer->voxels != scene || renderer->instances != shown)) {
     return refuse(
         "vulkan: shadows, lamps, glass by rays and levels of detail need VulkanRenderer::update with the scene of the "
@@ -246,7 +242,8 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
 
 // What rays meet, and light.
 Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement, const Camera& camera,
-                                             const RenderOptions& request, vulkan::MeshFrameData& data) {
+                                             const RenderOptions& request, Threads threads,
+                                             vulkan::MeshFrameData& data) {
   data.picture = vulkan::make_frame(placement, camera, request);
   data.has_fields = placement.has_fields;
   vulkan::ShaderFrame& frame = data.picture.frame;
@@ -254,7 +251,7 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
   frame.surfaces = surfaces.address;
   frame.last_surface = static_cast<std::uint32_t>(std::max<std::size_t>(surface_table.size() / 3, 1) - 1);
   if (scene == nullptr || !traces_light(request.light)) return {};
-  const auto lamps = renderer->lamp_table(request);
+  const auto lamps = renderer->lamp_table(request.light, threads);
   if (!lamps) return lamps.error();
   if (lamps->table != nullptr) {
     data.lamps = vulkan::put_lamps(*lamps, camera, data.picture);
@@ -264,34 +261,35 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
 
 Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera& camera,
                                                                    const MeshPictureOptions& options,
-                                                                   vulkan::MeshLight& light) {
+                                                                   vulkan::MeshLight& light, Threads threads) {
   const RenderOptions request = request_of(options);
   const bool traces = traces_light(request.light) && scene != nullptr;
   const bool glass_by_rays = has_glass_by_rays(options);
   const vulkan::Placement nothing;
   std::optional<vulkan::Subject> subject;
-  if (scene != nullptr && (traces || glass_by_rays || request.detail)) {
-    auto made = vulkan::Subject::of(*renderer, camera, request);
+  if (scene != nullptr && (traces || glass_by_rays || request.detail.policy)) {
+    auto made = vulkan::Subject::of(*renderer, camera, request, threads);
     if (!made) return made.error();
     subject.emplace(std::move(*made));
   }
   const vulkan::Placement& placement = subject ? subject->placement() : nothing;
   // Nothing was updated yet, or that failed: then there are no types either.
   if (surface_table.empty()) instances.clear();
-  const auto shown_as = detailed(placement, request.threads);
+  const auto shown_as = detailed(placement, threads);
   if (!shown_as) return shown_as.error();
   auto data = vulkan::make_mesh_frame(store, *shown_as, camera, request, pass->subpixels(), glass_by_rays);
   if (!data) return data.error();
-  if (Status done = put_picture(placement, camera, request, *data); !done) return done.error();
+  if (Status done = put_picture(placement, camera, request, threads, *data); !done) return done.error();
   if (traces) light = placement.has_transparent ? vulkan::MeshLight::TracedThroughGlass : vulkan::MeshLight::Traced;
   return data;
 }
 
-Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options) {
+Status VulkanMeshRenderer::draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options,
+                                Threads threads) {
   vulkan::PictureImpl& target = vulkan::Access::of(picture);
   if (Status right = impl_->check_request(target, camera, options); !right) return right;
   auto light = vulkan::MeshLight::Plain;
-  auto data = impl_->make_frame(camera, options, light);
+  auto data = impl_->make_frame(camera, options, light, threads);
   if (!data) return data.error();
   if (Status sized = target.resize(options.width, options.height); !sized) return sized;
   target.samples = 0;

@@ -98,7 +98,7 @@ TEST_F(VulkanMeshSeeThrough, ColoursAndLightHaveTheSameOptions) {
   options.light.shading = Shading::UnlitWithOcclusion;
   compare(glass_yard(), over_glass_yard(), options, "glass_unlit_with_occlusion");
   options.light.shading = Shading::Lit;
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   options.light.glass_surfaces = false;
   compare(glass_yard(), over_glass_yard(), options, "glass_without_surfaces");
 }
@@ -193,7 +193,7 @@ int different_walls(const std::vector<Image>& images, const std::vector<Image>& 
 TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(48, 36);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   std::vector<Image> marched;
   for (const Camera& camera : onto_walls()) marched.push_back(render_test::taken(scene, camera, options).colour);
   const int all = 48 * 36 * static_cast<int>(marched.size());

@@ -79,7 +79,7 @@ TEST_F(VulkanMeshShadow, FarFromTheOriginAndOrthographicTheyAreTheSame) {
 TEST_F(VulkanMeshShadow, TheyAreAsLongAsTheyMayBe) {
   const Scene scene = yard();
   RenderOptions options = with_mesh_light(sized(320, 180));
-  options.light.shadow_distance = 6.0;
+  options.light.shadow_distance_voxels = 6.0;
   compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "yard_short");
 }
 
@@ -94,7 +94,7 @@ TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
   put(scene, blocky_surfaces(scene));
   RenderOptions options = with_mesh_light(sized(400, 400));
   options.light.sun = {1, 1, 0.2};  // it shines on the wall and on the floor before it
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   const Camera camera = towards({31.3, 17.7, 22.1}, {9, 2, 19}, 0.5);
   const Image with = drawn(camera, mesh_options(options));
   options.light.shadows = false;
@@ -213,7 +213,7 @@ TEST_F(VulkanMeshShadow, TheyNeedTheVoxelsOfTheSameScene) {
   EXPECT_TRUE(refused()) << "another filter";
   options.light.shadows = false;
   EXPECT_FALSE(refused()) << "it needs no voxels";
-  options.detail.emplace();
+  options.detail.policy.emplace();
   EXPECT_TRUE(refused()) << "levels do";
   ASSERT_TRUE(renderer_->update(scene));
   options.light.shadows = true;

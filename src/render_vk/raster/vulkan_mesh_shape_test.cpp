@@ -72,7 +72,7 @@ TEST_F(VulkanMeshShape, MergedFacesHaveNoHolesBetweenThem) {
 
 // The normal that a sphere's picture shows at a pixel; nothing at its rim and beside it.
 std::optional<DVec3> normal_at(const Camera& camera, int x, int y, DVec3 centre, double radius) {
-  const Ray ray = ray_through(camera, x + 0.5, y + 0.5, 160, 160);
+  const Ray ray = ray_through(camera, {x + 0.5, y + 0.5, 160, 160});
   const DVec3 to_centre = centre - ray.origin;
   const double along = glm::dot(to_centre, ray.direction);
   const double beside = glm::dot(to_centre, to_centre) - along * along;

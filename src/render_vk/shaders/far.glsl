@@ -1,4 +1,4 @@
-// Impostors: the faces of far instances, as render/impostor/raster.inl draws them on the processor's side.
+// Impostors: the faces of far instances, as render/impostor/raster/raster.inl draws them on the processor's side.
 
 // A face of a level: the voxel's face that it stands for, and which of 26 views saw it.
 struct FarFace {

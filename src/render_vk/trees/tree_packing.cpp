@@ -151,7 +151,7 @@ class RecordWriter {
   }
 
   void add_types(const Chunk& voxels) {
-    const ChunkStorage* mixed = voxels.storage();
+    const ChunkStorage* mixed = ChunkStorage::of(voxels);
     const std::size_t begin = record.words.size();
     for (const std::size_t header : headers_) {
       if (mixed == nullptr) {

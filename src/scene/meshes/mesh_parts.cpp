@@ -90,7 +90,11 @@ Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& typ
   return mesh;
 }
 
-void append(SmoothMesh& all, const SmoothMesh& more) {
+void append(SmoothMesh& all, SmoothMesh more) {
+  if (all.indices.empty()) {
+    all = std::move(more);
+    return;
+  }
   const auto first = static_cast<std::uint32_t>(all.positions.size());
   const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
   add(all.positions, more.positions);
@@ -126,12 +130,7 @@ Result<SmoothBodies> bodies_of_field(const DensityGrid& field, const VoxelRegist
     auto mesh =
         surface_of(is_alone ? field : own, types, wanted, stats, threads, part_of(progress, share(i), share(i + 1)));
     if (!mesh) return mesh.error();
-    SmoothMesh& out = made[bodies[i] == 0 ? 0 : 1];
-    if (out.indices.empty()) {
-      out = std::move(*mesh);
-    } else {
-      append(out, *mesh);
-    }
+    append(made[bodies[i] == 0 ? 0 : 1], std::move(*mesh));
   }
   return made;
 }

@@ -39,8 +39,8 @@ class MeshHierarchy {
 /// Surfaces of one grid: what is opaque, then all that is transparent.
 using SmoothBodies = std::array<SmoothMesh, 2>;
 
-/// Adds the vertices and triangles of a mesh to another.
-void append(SmoothMesh& all, const SmoothMesh& more);
+/// Adds the vertices and triangles of a mesh to another, which becomes that mesh where it has no triangles.
+void append(SmoothMesh& all, SmoothMesh more);
 
 /// A part of what there is of a grid's surfaces.
 [[nodiscard]] MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivot);

@@ -96,7 +96,7 @@ BlockyTriangles& opaque_of(BlockyMesh& mesh) {
 }
 
 Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, const BlockyMeshOptions& options) {
-  if (!options.merge || !options.occlusion || options.watertight) {
+  if (!options.merge || !options.bake_occlusion || options.watertight) {
     return make_error(ErrorCode::InvalidArgument,
                       "an atlas is of faces that are merged, not watertight, and have occlusion");
   }
@@ -115,7 +115,7 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
 Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
                                                  MeshResults& results, Threads threads, const Progress& progress,
                                                  SceneMeshes& meshes) {
-  MeshResults merged = mesh_all(scene, grids, {.occlusion = false}, threads, progress);
+  MeshResults merged = mesh_all(scene, grids, {.bake_occlusion = false}, threads, progress);
   OcclusionAtlas atlas;
   for (std::size_t i = 0; i < grids.size(); ++i) {
     if (!merged[i] || !*merged[i])
@@ -181,6 +181,21 @@ MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot) {
   return part;
 }
 
+namespace {
+
+// Places the parts of grids where drawn instances do.
+void place_parts(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
+                 MeshHierarchy& hierarchy, SceneMeshes& meshes) {
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (!is_drawn(scene, instance, filter)) continue;
+    const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
+    meshes.placements.push_back(hierarchy.place(handle, static_cast<std::size_t>(part)));
+  }
+}
+
+}  // namespace
+
 Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options, Threads threads,
                                const Progress& progress) {
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
@@ -208,18 +223,13 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
     part.thickness = glass_thickness(grid.grid, part.surfaces);
     if (!meshes.atlas.rgb.empty()) part = with_atlas(std::move(part), std::move(coordinates[i]));
     for (MeshView& view : part.surfaces) {
-      if (!options.mesh.occlusion) view.block_occlusion = {};
+      if (!options.mesh.bake_occlusion) view.block_occlusion = {};
     }
   }
   MeshHierarchy hierarchy(scene, meshes);
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    const Instance& instance = scene.instances()[handle];
-    if (!is_drawn(scene, instance, options.instances)) continue;
-    const auto part = std::lower_bound(grids.begin(), grids.end(), instance.grid) - grids.begin();
-    meshes.placements.push_back(hierarchy.place(handle, static_cast<std::size_t>(part)));
-  }
+  place_parts(scene, grids, options.instances, hierarchy, meshes);
   SmoothMeshOptions smooth;
-  if (!options.mesh.occlusion) smooth.occlusion.form = SmoothOcclusion::None;
+  if (!options.mesh.bake_occlusion) smooth.occlusion.method = SmoothOcclusion::None;
   auto done = add_fields(scene, grids, options.instances, {smooth, std::nullopt}, hierarchy, meshes, threads, {});
   if (!done) return done.error();
   return meshes;

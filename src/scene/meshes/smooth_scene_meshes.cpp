@@ -152,11 +152,7 @@ class Mesher {
                    : mesh_body(smooth::field_of_body(whole, scene_.types, bodies[i], threads_), &whole, united, part);
       if (!body) return body.error();
       Body& out = made[bodies[i] == 0 ? 0 : 1];
-      if (out.mesh.indices.empty()) {
-        out = std::move(*body);
-        continue;
-      }
-      append(out.mesh, body->mesh);
+      append(out.mesh, std::move(body->mesh));
       out.owners.insert(out.owners.end(), body->owners.begin(), body->owners.end());
     }
     return made;

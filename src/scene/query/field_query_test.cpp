@@ -2,6 +2,7 @@
 // analysis.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -85,7 +86,7 @@ TEST(FieldQuery, SweepsStopBeforeEveryPointOfTheSolidAndNoSooner) {
       const OrientedBox box{about + random.vector() * 14.0 * size, half, random.rotation()};
       const DVec3 way = about + random.vector() * 5.0 * size - box.centre;
       const DVec3 displacement = way * (i % 3 == 0 ? 0.3 : 2.0);
-      const auto hit = sweep_box(tracer, scene.types, box, displacement);
+      const auto hit = sweep_box(tracer, box, displacement);
       double soonest = kInfinity;
       const Way on_its_way(box, displacement);
       for (const DVec3 point : solid) soonest = std::min(soonest, on_its_way.entry(point, 2e-6 * size));
@@ -97,15 +98,15 @@ TEST(FieldQuery, SweepsStopBeforeEveryPointOfTheSolidAndNoSooner) {
       if (hit->depth > 0.0) {
         ++inside;
         EXPECT_EQ(hit->fraction, 0.0);
-        EXPECT_FALSE(overlaps(tracer, scene.types, box).empty()) << where;
+        EXPECT_FALSE(overlaps(tracer, box).empty()) << where;
         continue;
       }
       ++hits;
       EXPECT_LE(glm::dot(hit->normal, displacement), 1e-9) << where;
       OrientedBox there = moved(box, displacement * hit->fraction);
-      EXPECT_TRUE(overlaps(tracer, scene.types, there).empty()) << where;
+      EXPECT_TRUE(overlaps(tracer, there).empty()) << where;
       there.half_size += 2e-5 * size;
-      EXPECT_FALSE(overlaps(tracer, scene.types, there).empty()) << where;
+      EXPECT_FALSE(overlaps(tracer, there).empty()) << where;
     }
   }
   EXPECT_GT(hits, 200);
@@ -127,7 +128,7 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
     for (int i = 0; i < 100; ++i) {
       const OrientedBox box{about + random.vector() * 9.0 * size, glm::abs(random.vector()) * size * 2.0,
                             random.rotation()};
-      const auto found = overlaps(tracer, scene.types, box);
+      const auto found = overlaps(tracer, box);
       const bool has_point = Way(box, DVec3(0.0)).holds_any(solid, 2e-6 * size);
       if (has_point) {
         ASSERT_EQ(found.size(), 1U) << round << ", " << i;
@@ -146,7 +147,7 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
       const double radius = std::abs(random.share()) * 3.0 * size;
       double nearest = kInfinity;
       for (const DVec3 p : solid) nearest = std::min(nearest, glm::length(p - box.centre));
-      const bool in_ball = !overlaps(tracer, scene.types, box.centre, radius).empty();
+      const bool in_ball = !overlaps(tracer, box.centre, radius).empty();
       if (nearest < radius - 2e-6 * size) {
         EXPECT_TRUE(in_ball) << round << ", " << i;
       }
@@ -184,7 +185,7 @@ TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
       for (int k = 0; k < 3; ++k) reach += std::abs(glm::dot(axes[k], up)) * box.half_size[k];
       const DVec3 way = (random.vector() - 2.0 * up) * 6.0 * size;
       const double expected = (glm::dot(box.centre - instance.position, up) - reach - height) / -glm::dot(way, up);
-      const auto hit = sweep_box(tracer, scene.types, box, way);
+      const auto hit = sweep_box(tracer, box, way);
       ASSERT_EQ(hit.has_value(), expected <= 1.0) << i;
       if (!hit) continue;
       EXPECT_NEAR(hit->fraction, expected, 1e-9) << i;
@@ -207,7 +208,7 @@ TEST(FieldQuery, ABallIsMetByFacesEdgesAndCorners) {
     const DVec3 from = centre + random.direction() * 20.0;
     const OrientedBox box{from, half, rotation};
     const DVec3 way = (centre + random.vector() - from) * 1.2;
-    const auto hit = sweep_box(tracer, scene.types, box, way);
+    const auto hit = sweep_box(tracer, box, way);
     ASSERT_TRUE(hit.has_value());
     // There the nearest point of the box is a radius away; the trilinear field is off by some hundredths.
     const glm::dmat3 axes = glm::mat3_cast(rotation);
@@ -234,7 +235,7 @@ TEST(FieldQuery, NeverTunnelsAtAnySpeed) {
       const DVec3 aside = glm::cross(random.vector(), normal) * 4.0;
       const DVec3 half = i % 4 == 0 ? DVec3(0.0) : glm::abs(random.vector()) * 0.4;
       const OrientedBox box{normal * 2.5 + aside, half, random.rotation()};
-      const auto hit = sweep_box(tracer, scene.types, box, -normal * speed);
+      const auto hit = sweep_box(tracer, box, -normal * speed);
       ASSERT_TRUE(hit.has_value()) << speed;
       EXPECT_LT(hit->fraction * speed, 2.5);
       EXPECT_GT(glm::dot(hit->normal, normal), 0.999);
@@ -253,15 +254,43 @@ TEST(FieldQuery, APointIsMetWhereItsRayIs) {
     const Ray ray{instance.position + random.direction() * 20.0 * instance.voxel_size, {}};
     const DVec3 way = (instance.position + random.vector() * 6.0 * instance.voxel_size - ray.origin) * 1.5;
     const auto expected = first_hit(tracer, {ray.origin, way}, 1.0);
-    const auto hit = sweep_box(tracer, scene.types, {ray.origin, DVec3(0.0), random.rotation()}, way);
+    const auto hit = sweep_box(tracer, {ray.origin, DVec3(0.0), random.rotation()}, way);
     ASSERT_EQ(hit.has_value(), expected.has_value()) << i;
     if (!hit) continue;
     ++hits;
-    EXPECT_NEAR(hit->fraction, expected->distance, 1e-5) << i;
+    EXPECT_NEAR(hit->fraction, expected->t, 1e-5) << i;
     EXPECT_GT(glm::dot(hit->normal, expected->normal), 0.999) << i;
     EXPECT_EQ(hit->type, expected->type);
   }
   EXPECT_GT(hits, 100);
+}
+
+TEST(FieldQuery, AnyHitSaysWhetherThereIsAFirst) {
+  Random random(53);
+  Scene scene = random_blobs(random);
+  SceneGrid& blocks = scene.edit(scene.grids().handles()[0]);
+  for (int i = 0; i < 20; ++i) blocks.grid.set(IVec3(random.vector() * 9.0), i % 2 == 0 ? kWood : kWater);
+  const GridHandle handle = scene.grids().handles()[0];
+  for (int i = 0; i < 12; ++i) {
+    Instance instance;
+    instance.grid = handle;
+    place_anywhere(instance, random);
+    instance.position = random.vector() * 40.0;
+    scene.add_instance(instance);
+  }
+  const SceneTracer tracer(scene);
+  std::array<int, 2> answers{};
+  for (int i = 0; i < 2'000; ++i) {
+    const Ray ray{random.vector() * 50.0, random.vector()};
+    const double max_t = i % 3 == 0 ? kInfinity : 60.0 * std::abs(random.share());
+    const auto first = first_hit(tracer, ray, max_t);
+    ASSERT_EQ(any_hit(tracer, ray, max_t), first.has_value()) << i;
+    ++answers.at(first.has_value() ? 1 : 0);
+    if (!first) continue;
+    EXPECT_TRUE(any_hit(tracer, ray, first->t)) << i;
+    EXPECT_TRUE(first->t == 0.0 || !any_hit(tracer, ray, first->t * (1.0 - 1e-6))) << i;
+  }
+  EXPECT_GT(std::min(answers[0], answers[1]), 200);
 }
 
 TEST(FieldQuery, MovesOutOfWhatItStartsIn) {
@@ -279,18 +308,17 @@ TEST(FieldQuery, MovesOutOfWhatItStartsIn) {
       const DVec3 half = (0.2 + glm::abs(random.vector())) * instance.voxel_size;
       const OrientedBox box{world_from_grid(instance, grid, {place.x, ground + random.share(), place.z}), half,
                             random.rotation()};
-      if (overlaps(tracer, scene.types, box).empty()) continue;
-      const auto hit = sweep_box(tracer, scene.types, box, random.vector());
+      if (overlaps(tracer, box).empty()) continue;
+      const auto hit = sweep_box(tracer, box, random.vector());
       ASSERT_TRUE(hit.has_value());
       EXPECT_EQ(hit->fraction, 0.0);
       EXPECT_GT(hit->depth, 0.0);
-      EXPECT_TRUE(
-          overlaps(tracer, scene.types, moved(box, hit->normal * (hit->depth + 1e-4 * instance.voxel_size))).empty());
-      const SlideResult out = move_and_slide(tracer, scene.types, box, DVec3(0.0));
-      EXPECT_TRUE(overlaps(tracer, scene.types, moved(box, out.centre - box.centre)).empty());
+      EXPECT_TRUE(overlaps(tracer, moved(box, hit->normal * (hit->depth + 1e-4 * instance.voxel_size))).empty());
+      const SlideResult out = move_and_slide(tracer, box, DVec3(0.0));
+      EXPECT_TRUE(overlaps(tracer, moved(box, out.centre - box.centre)).empty());
       SlideOptions stays;
       stays.pushes_out = false;
-      const SlideResult stayed = move_and_slide(tracer, scene.types, box, random.vector(), stays);
+      const SlideResult stayed = move_and_slide(tracer, box, random.vector(), stays);
       EXPECT_EQ(stayed.centre, box.centre);
       EXPECT_TRUE(stayed.is_blocked);
       ++moved_out;
@@ -306,13 +334,13 @@ TEST(FieldQuery, OnlyMaterialsThatCollideStop) {
   const Scene scene = scene_of(std::move(sea), {});
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.3, 9.0, 0.2}, DVec3(0.4), {1, 0, 0, 0}};
-  const auto hit = sweep_box(tracer, scene.types, box, {0, -20, 0});
+  const auto hit = sweep_box(tracer, box, {0, -20, 0});
   ASSERT_TRUE(hit.has_value());
   EXPECT_EQ(hit->type, kStone);
   // The cells between the last samples of stone and the first of water collide.
   EXPECT_NEAR(9.0 - 20.0 * hit->fraction - 0.4, 1.0, 1.0 + 1e-6);
-  EXPECT_TRUE(overlaps(tracer, scene.types, moved(box, {0, -6.5, 0})).empty());
-  EXPECT_EQ(overlaps(tracer, scene.types, moved(box, {0, -9.5, 0})).size(), 1U);
+  EXPECT_TRUE(overlaps(tracer, moved(box, {0, -6.5, 0})).empty());
+  EXPECT_EQ(overlaps(tracer, moved(box, {0, -9.5, 0})).size(), 1U);
   // Solid without a material, or with one that nobody registered, is solid.
   for (const VoxelType type : {kAir, VoxelType{99}}) {
     DensityGrid bare;
@@ -321,7 +349,7 @@ TEST(FieldQuery, OnlyMaterialsThatCollideStop) {
     });
     const Scene other = scene_of(std::move(bare), {});
     const SceneTracer of_other(other);
-    EXPECT_TRUE(sweep_box(of_other, other.types, box, {0, -20, 0}).has_value());
+    EXPECT_TRUE(sweep_box(of_other, box, {0, -20, 0}).has_value());
   }
 }
 
@@ -333,11 +361,11 @@ TEST(FieldQuery, TouchingIsNotMeeting) {
   const Scene scene = scene_of(std::move(floor), {});
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.3, 0.5, 0.2}, DVec3(0.5), {1, 0, 0, 0}};
-  EXPECT_TRUE(overlaps(tracer, scene.types, box).empty());
-  EXPECT_TRUE(overlaps(tracer, scene.types, {0.3, 0.5, 0.2}, 0.5).empty());
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, {5, 0, 3}).has_value());
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, {0, 3, 0}).has_value());
-  const auto hit = sweep_box(tracer, scene.types, box, {5, -1, 3});
+  EXPECT_TRUE(overlaps(tracer, box).empty());
+  EXPECT_TRUE(overlaps(tracer, {0.3, 0.5, 0.2}, 0.5).empty());
+  EXPECT_FALSE(sweep_box(tracer, box, {5, 0, 3}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, box, {0, 3, 0}).has_value());
+  const auto hit = sweep_box(tracer, box, {5, -1, 3});
   ASSERT_TRUE(hit.has_value());
   EXPECT_EQ(hit->fraction, 0.0);
   EXPECT_EQ(hit->depth, 0.0);
@@ -357,23 +385,23 @@ TEST(FieldQuery, WhatIsNoNumberMeetsNothing) {
     for (int axis = 0; axis < 3; ++axis) {
       OrientedBox box;
       box.centre[axis] = bad;
-      EXPECT_TRUE(overlaps(tracer, scene.types, box).empty());
-      EXPECT_FALSE(sweep_box(tracer, scene.types, box, {1, 0, 0}).has_value());
+      EXPECT_TRUE(overlaps(tracer, box).empty());
+      EXPECT_FALSE(sweep_box(tracer, box, {1, 0, 0}).has_value());
       box = {};
       box.half_size[axis] = bad;
-      EXPECT_TRUE(overlaps(tracer, scene.types, box).empty());
-      EXPECT_FALSE(sweep_box(tracer, scene.types, box, {1, 0, 0}).has_value());
+      EXPECT_TRUE(overlaps(tracer, box).empty());
+      EXPECT_FALSE(sweep_box(tracer, box, {1, 0, 0}).has_value());
       DVec3 way(0.0);
       way[axis] = bad;
-      EXPECT_FALSE(sweep_box(tracer, scene.types, {}, way).has_value());
+      EXPECT_FALSE(sweep_box(tracer, {}, way).has_value());
     }
-    EXPECT_TRUE(overlaps(tracer, scene.types, DVec3(0.0), bad).empty());
+    EXPECT_TRUE(overlaps(tracer, DVec3(0.0), bad).empty());
   }
   // Everything far away, and nothing at all.
-  EXPECT_FALSE(sweep_box(tracer, scene.types, {DVec3(1e9)}, {1e8, 0, 0}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, {DVec3(1e9)}, {1e8, 0, 0}).has_value());
   const Scene empty = scene_of(DensityGrid(), {});
-  EXPECT_TRUE(overlaps(SceneTracer(empty), empty.types, OrientedBox{}).empty());
-  EXPECT_FALSE(sweep_box(SceneTracer(empty), empty.types, {}, {5, 0, 0}).has_value());
+  EXPECT_TRUE(overlaps(SceneTracer(empty), OrientedBox{}).empty());
+  EXPECT_FALSE(sweep_box(SceneTracer(empty), {}, {5, 0, 0}).has_value());
 }
 
 // Whatever densities mean: only their signs and the trilinear field between them count.
@@ -387,11 +415,11 @@ TEST(FieldQuery, DensitiesNeedNotBeDistances) {
     const SceneTracer tracer(scene);
     for (const double thick : {0.0, 0.5}) {
       const OrientedBox box{{0.3, 8.0, 0.2}, DVec3(thick), glm::angleAxis(0.3, DVec3(0, 1, 0))};
-      const auto hit = sweep_box(tracer, scene.types, box, {0, -20, 0});
+      const auto hit = sweep_box(tracer, box, {0, -20, 0});
       ASSERT_TRUE(hit.has_value());
       EXPECT_NEAR(8.0 - thick - 20.0 * hit->fraction, 0.5, 1e-3) << scale;
       EXPECT_NEAR(hit->normal.y, 1.0, 1e-3);
-      const auto inside = sweep_box(tracer, scene.types, moved(box, {0, -8.0, 0}), {1, 0, 0});
+      const auto inside = sweep_box(tracer, moved(box, {0, -8.0, 0}), {1, 0, 0});
       ASSERT_TRUE(inside.has_value());
       EXPECT_NEAR(inside->depth, 0.5 + thick, 1e-2) << scale;
     }
@@ -417,8 +445,8 @@ TEST(FieldQuery, AnswersMoveWithTheInstance) {
       const DVec3 way = (random.vector() * 4.0 - box.centre) * 1.5;
       const OrientedBox other{world_from_grid(instance, grid, box.centre), box.half_size * instance.voxel_size,
                               instance.rotation * box.rotation};
-      const auto expected = sweep_box(in_plain, plain.types, box, way);
-      const auto hit = sweep_box(in_turned, turned.types, other, world_from_grid_direction(instance, way));
+      const auto expected = sweep_box(in_plain, box, way);
+      const auto hit = sweep_box(in_turned, other, world_from_grid_direction(instance, way));
       ASSERT_EQ(hit.has_value(), expected.has_value());
       if (!hit) continue;
       EXPECT_NEAR(hit->fraction, expected->fraction, 1e-5);
@@ -437,21 +465,21 @@ TEST(FieldQuery, BlocksAndFieldsOfOneGridAreMetTogether) {
   Scene scene = scene_of(std::move(farm), {});
   const SceneTracer tracer(scene);
   const OrientedBox box{{-5.0, 3.0, 0.1}, DVec3(0.5), {1, 0, 0, 0}};
-  const auto ground = sweep_box(tracer, scene.types, box, {0, -9, 0});
+  const auto ground = sweep_box(tracer, box, {0, -9, 0});
   ASSERT_TRUE(ground.has_value());
   EXPECT_TRUE(ground->in_field);
   EXPECT_EQ(ground->type, kStone);
   EXPECT_NEAR(ground->fraction, 2.0 / 9.0, 1e-9);
-  const auto wall = sweep_box(tracer, scene.types, box, {9, 0, 0});
+  const auto wall = sweep_box(tracer, box, {9, 0, 0});
   ASSERT_TRUE(wall.has_value());
   EXPECT_FALSE(wall->in_field);
   EXPECT_EQ(wall->type, kWood);
   EXPECT_NEAR(wall->fraction, 6.5 / 9.0, 1e-9);
   // One answer an instance: its voxel, where it has one in the box.
-  const auto both = overlaps(tracer, scene.types, {{1.7, 0.6, 0.0}, DVec3(0.5), {1, 0, 0, 0}});
+  const auto both = overlaps(tracer, {{1.7, 0.6, 0.0}, DVec3(0.5), {1, 0, 0, 0}});
   ASSERT_EQ(both.size(), 1U);
   EXPECT_FALSE(both[0].in_field);
-  const auto field = overlaps(tracer, scene.types, {{-1.7, 0.6, 0.0}, DVec3(0.5), {1, 0, 0, 0}});
+  const auto field = overlaps(tracer, {{-1.7, 0.6, 0.0}, DVec3(0.5), {1, 0, 0, 0}});
   ASSERT_EQ(field.size(), 1U);
   EXPECT_TRUE(field[0].in_field);
   EXPECT_LT(glm::length(field[0].normal - DVec3(0, 1, 0)), 1e-9);
@@ -464,12 +492,12 @@ TEST(FieldQuery, PointsAndPlatesMeetBlocksAsWell) {
   const SceneTracer tracer(scene);
   for (const DVec3 half : {DVec3(0.0), DVec3(0.0, 1.0, 1.0), DVec3(0.0, 0.0, 1.0)}) {
     const OrientedBox box{{0.1, 0.2, 0.3}, half, {1, 0, 0, 0}};
-    const auto hit = sweep_box(tracer, scene.types, box, {4, 0, 0});
+    const auto hit = sweep_box(tracer, box, {4, 0, 0});
     ASSERT_TRUE(hit.has_value());
     EXPECT_NEAR(hit->fraction, 1.9 / 4.0, 1e-8);
     EXPECT_EQ(hit->normal, DVec3(-1, 0, 0));
-    EXPECT_TRUE(overlaps(tracer, scene.types, box).empty());
-    EXPECT_EQ(overlaps(tracer, scene.types, moved(box, {2.5, 0, 0})).size(), 1U);
+    EXPECT_TRUE(overlaps(tracer, box).empty());
+    EXPECT_EQ(overlaps(tracer, moved(box, {2.5, 0, 0})).size(), 1U);
   }
 }
 
@@ -478,15 +506,15 @@ TEST(FieldQuery, EditsAreMetOnceTheTracerIsUpdated) {
   const GridHandle grid = scene.grids().handles()[0];
   SceneTracer tracer(scene);
   const OrientedBox box{{0.0, 9.0, 0.0}, DVec3(0.4), {1, 0, 0, 0}};
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, {0, -18, 0}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, box, {0, -18, 0}).has_value());
   scene.edit(grid).field.add_sphere(DVec3(0.0), 4.0, kStone);
   tracer.update();
-  const auto hit = sweep_box(tracer, scene.types, box, {0, -18, 0});
+  const auto hit = sweep_box(tracer, box, {0, -18, 0});
   ASSERT_TRUE(hit.has_value());
   EXPECT_NEAR(9.0 - 18.0 * hit->fraction - 0.4, 4.0, 0.05);
   scene.edit(grid).field.clear();
   tracer.update();
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, {0, -18, 0}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, box, {0, -18, 0}).has_value());
 }
 
 }  // namespace

@@ -38,6 +38,21 @@ std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, d
       {hit->cell, nearest_direction(hit->normal), hit->t, hit->starts_inside}, true, hit->material, hit->normal};
 }
 
+bool is_any_in_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
+  return any_hit(*placed.opaque, ray, max_t) ||
+         (placed.transparent != nullptr && any_hit(*placed.transparent, ray, max_t)) ||
+         (placed.field != nullptr && any_hit(*placed.field, ray, max_t));
+}
+
+bool can_meet_anything(const Ray& ray, double max_t) {
+  return is_finite(ray.origin) && is_finite(ray.direction) && ray.direction != DVec3(0.0) && max_t >= 0.0;
+}
+
+Ray ray_in_grid(const PlacedGrid& placed, const Ray& ray) {
+  const ToGrid to_grid(placed);
+  return {to_grid.point(ray.origin), to_grid.axes * ray.direction};
+}
+
 // What overlap queries ask of a shape in a grid's space.
 class SphereInGrid {
  public:
@@ -105,8 +120,8 @@ std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const Voxel
 
 // `shape_of(placed)` is the shape in that grid's space.
 template <class ShapeOf>
-std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegistry& types, const DBox& bounds,
-                                      ShapeOf shape_of) {
+std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const DBox& bounds, ShapeOf shape_of) {
+  const VoxelRegistry& types = tracer.scene().types;
   std::vector<std::size_t> near;
   SceneQuery::instances(tracer).visit_box(bounds, [&](std::size_t i) { near.push_back(i); });
   std::sort(near.begin(), near.end());
@@ -123,18 +138,13 @@ std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const VoxelRegi
 
 }  // namespace
 
-std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world, double max_distance) {
-  const Ray& ray = ray_in_world;
-  if (!is_finite(ray.origin) || !is_finite(ray.direction) || ray.direction == DVec3(0.0) || !(max_distance >= 0.0)) {
-    return std::nullopt;
-  }
-  double max_t = max_distance;
+std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, double max_t) {
+  if (!can_meet_anything(ray, max_t)) return std::nullopt;
   std::optional<GridHit> best;
   std::size_t best_placed = 0;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = tracer.placed()[i];
-    const ToGrid to_grid(placed);
-    const auto hit = first_of_grid(placed, {to_grid.point(ray.origin), to_grid.axes * ray.direction}, max_t);
+    const auto hit = first_of_grid(placed, ray_in_grid(placed, ray), max_t);
     if (hit && (!best || hit->hit.t < best->hit.t || (hit->hit.t == best->hit.t && i < best_placed))) {
       best = hit;
       best_placed = i;
@@ -150,36 +160,46 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_w
                   hit.starts_inside, best->in_field, placed.world_axes * best->normal};
 }
 
-std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, double x, double y, int width,
-                             int height) {
-  return first_hit(tracer, ray_through(camera, x, y, width, height));
+bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t) {
+  if (!can_meet_anything(ray, max_t)) return false;
+  bool is_hit = false;
+  SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
+    const PlacedGrid& placed = tracer.placed()[i];
+    is_hit = is_any_in_grid(placed, ray_in_grid(placed, ray), max_t);
+    return !is_hit;
+  });
+  return is_hit;
 }
 
-std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, double x, double y, int width,
-                                       int height, float depth) {
+std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point) {
+  return first_hit(tracer, ray_through(camera, point));
+}
+
+std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+                                       float depth) {
   if (!(depth >= 0.0F) || std::isinf(depth)) return std::nullopt;
   // Half a unit in a float's last place, twice over.
   const double room = double{depth} * 0x1p-23 + 1e-6;
-  Ray ray = ray_through(camera, x, y, width, height);
+  Ray ray = ray_through(camera, point);
   const double begin = std::max(double{depth} - room, 0.0);
   ray.origin += begin * ray.direction;
   auto hit = first_hit(tracer, ray, double{depth} + room - begin);
-  if (hit) hit->distance += begin;
+  if (hit) hit->t += begin;
   return hit;
 }
 
-std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, DVec3 centre, double radius) {
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius) {
   if (!is_finite(centre) || !std::isfinite(radius) || radius <= 0.0) return {};
-  return overlaps_of(tracer, types, {centre - radius, centre + radius}, [&](const PlacedGrid& placed) {
+  return overlaps_of(tracer, {centre - radius, centre + radius}, [&](const PlacedGrid& placed) {
     return SphereInGrid(ToGrid(placed).point(centre), radius / placed.voxel_size);
   });
 }
 
-std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box) {
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box) {
   if (!is_box(box)) return {};
   const glm::dmat3 half_axes = half_axes_of(box);
   const DVec3 reach = reach_of_axes(half_axes);
-  return overlaps_of(tracer, types, {box.centre - reach, box.centre + reach}, [&](const PlacedGrid& placed) {
+  return overlaps_of(tracer, {box.centre - reach, box.centre + reach}, [&](const PlacedGrid& placed) {
     return BoxInGrid(moving_in_grid(placed, box, half_axes, DVec3(0.0)));
   });
 }

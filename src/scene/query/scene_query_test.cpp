@@ -114,13 +114,16 @@ TEST(SceneQuery, FirstHitIsTheNearestVoxelOfAllHereAndFarAway) {
       for (const PlainVoxel& voxel : voxels) nearest = std::min(nearest, entry(voxel, origin, direction));
       const auto hit = first_hit(tracer, {away + origin, direction});
       ASSERT_EQ(hit.has_value(), std::isfinite(nearest)) << i;
+      ASSERT_EQ(any_hit(tracer, {away + origin, direction}), std::isfinite(nearest)) << i;
       if (!hit) continue;
       ++hits;
-      EXPECT_NEAR(hit->distance, nearest, away == DVec3(0.0) ? 1e-9 : 1e-6);
+      EXPECT_NEAR(hit->t, nearest, away == DVec3(0.0) ? 1e-9 : 1e-6);
       EXPECT_EQ(hit->type, scene.grids()[scene.instances()[hit->instance].grid].grid.get(hit->voxel));
       EXPECT_NE(hit->type, kAir);
       EXPECT_LT(glm::length(hit->position - away - origin - nearest * direction), 1e-5);
       EXPECT_FALSE(first_hit(tracer, {away + origin, direction}, nearest * 0.999 - 1e-6).has_value());
+      EXPECT_FALSE(any_hit(tracer, {away + origin, direction}, nearest * 0.999 - 1e-6));
+      EXPECT_TRUE(any_hit(tracer, {away + origin, direction}, nearest * 1.001 + 1e-6));
     }
     EXPECT_GT(hits, 50);
   }
@@ -136,9 +139,13 @@ TEST(SceneQuery, RefusesWhatIsNoRay) {
   EXPECT_FALSE(first_hit(tracer, {DVec3(0.0), DVec3(0.0)}).has_value());
   EXPECT_FALSE(first_hit(tracer, {DVec3(0.0), DVec3(infinity, 0.0, 0.0)}).has_value());
   EXPECT_FALSE(first_hit(tracer, {DVec3(0.0), DVec3(1.0)}, nan).has_value());
-  EXPECT_TRUE(overlaps(tracer, scene.types, DVec3(nan), 1.0).empty());
-  EXPECT_TRUE(overlaps(tracer, scene.types, DVec3(0.0), -1.0).empty());
-  EXPECT_TRUE(overlaps(tracer, scene.types, {DVec3(0.0), DVec3(nan), {}}).empty());
+  EXPECT_FALSE(any_hit(tracer, {DVec3(nan), DVec3(1.0)}));
+  EXPECT_FALSE(any_hit(tracer, {DVec3(0.0), DVec3(0.0)}));
+  EXPECT_FALSE(any_hit(tracer, {DVec3(0.0), DVec3(1.0)}, nan));
+  EXPECT_FALSE(any_hit(tracer, {DVec3(0.0), DVec3(1.0)}, -1.0));
+  EXPECT_TRUE(overlaps(tracer, DVec3(nan), 1.0).empty());
+  EXPECT_TRUE(overlaps(tracer, DVec3(0.0), -1.0).empty());
+  EXPECT_TRUE(overlaps(tracer, {DVec3(0.0), DVec3(nan), {}}).empty());
 }
 
 TEST(SceneQuery, PickAndDepthNameTheSameVoxel) {
@@ -151,18 +158,19 @@ TEST(SceneQuery, PickAndDepthNameTheSameVoxel) {
   for (int i = 0; i < 1'000; ++i) {
     const double x = 160.0 + 160.0 * random.share();
     const double y = 120.0 + 120.0 * random.share();
-    const auto picked = pick(tracer, *camera, x, y, 320, 240);
+    const auto picked = pick(tracer, *camera, {x, y, 320, 240});
     if (!picked) continue;
-    const auto again = voxel_at_depth(tracer, *camera, x, y, 320, 240, static_cast<float>(picked->distance));
+    const auto again = voxel_at_depth(tracer, *camera, {x, y, 320, 240}, static_cast<float>(picked->t));
     ASSERT_TRUE(again.has_value());
     EXPECT_EQ(again->instance, picked->instance);
     EXPECT_EQ(again->voxel, picked->voxel);
-    EXPECT_NEAR(again->distance, picked->distance, 1e-4);
+    EXPECT_NEAR(again->t, picked->t, 1e-4);
     ++hits;
   }
   EXPECT_GT(hits, 100);
-  EXPECT_FALSE(voxel_at_depth(tracer, *camera, 160, 120, 320, 240, 1.0F).has_value());
-  EXPECT_FALSE(voxel_at_depth(tracer, *camera, 160, 120, 320, 240, std::numeric_limits<float>::infinity()).has_value());
+  EXPECT_FALSE(voxel_at_depth(tracer, *camera, {160, 120, 320, 240}, 1.0F).has_value());
+  EXPECT_FALSE(
+      voxel_at_depth(tracer, *camera, {160, 120, 320, 240}, std::numeric_limits<float>::infinity()).has_value());
 }
 
 // The least distance of a sphere's centre from a voxel, by projecting onto its edges.
@@ -200,7 +208,7 @@ TEST(SceneQuery, SpheresOverlapWhatIsNearerThanTheirRadius) {
     const double radius = 4.0 + 3.9 * random.share();
     const auto expected =
         plain_overlaps(voxels, [&](const PlainVoxel& voxel) { return distance_to(voxel, centre) < radius; });
-    EXPECT_EQ(instances_of(overlaps(tracer, scene.types, centre, radius)), expected);
+    EXPECT_EQ(instances_of(overlaps(tracer, centre, radius)), expected);
     found += expected.size();
   }
   EXPECT_GT(found, 100U);
@@ -236,12 +244,12 @@ TEST(SceneQuery, BoxesOverlapWhatTheyHoldAPointOf) {
   for (int i = 0; i < 60; ++i) {
     const OrientedBox box{random.vector() * 30.0, glm::abs(random.vector()) * 5.0 + 0.3, random.rotation()};
     const auto expected = plain_overlaps(voxels, [&](const PlainVoxel& voxel) { return holds_a_point(box, voxel); });
-    const auto answer = instances_of(overlaps(tracer, scene.types, box));
+    const auto answer = instances_of(overlaps(tracer, box));
     for (const InstanceHandle handle : expected)
       EXPECT_NE(std::find(answer.begin(), answer.end(), handle), answer.end());
     // What is answered beyond that must be shallow: a slightly smaller box does not overlap it.
     const OrientedBox smaller{box.centre, box.half_size - 0.25, box.rotation};
-    const auto deep = instances_of(overlaps(tracer, scene.types, smaller));
+    const auto deep = instances_of(overlaps(tracer, smaller));
     for (const InstanceHandle handle : deep)
       EXPECT_NE(std::find(expected.begin(), expected.end(), handle), expected.end());
     found += expected.size();
@@ -261,13 +269,13 @@ TEST(SceneQuery, TouchingIsNotOverlapping) {
   instance.grid = scene.add_grid(std::move(grid));
   scene.add_instance(instance);
   const SceneTracer tracer(scene);
-  EXPECT_TRUE(overlaps(tracer, scene.types, {2.0, 0.5, 0.5}, 1.0).empty());
-  EXPECT_EQ(overlaps(tracer, scene.types, {2.0, 0.5, 0.5}, 1.001).size(), 1U);
-  EXPECT_TRUE(overlaps(tracer, scene.types, {DVec3(2.0, 0.5, 0.5), DVec3(1.0), {1, 0, 0, 0}}).empty());
-  EXPECT_EQ(overlaps(tracer, scene.types, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {1, 0, 0, 0}}).size(), 1U);
+  EXPECT_TRUE(overlaps(tracer, {2.0, 0.5, 0.5}, 1.0).empty());
+  EXPECT_EQ(overlaps(tracer, {2.0, 0.5, 0.5}, 1.001).size(), 1U);
+  EXPECT_TRUE(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.0), {1, 0, 0, 0}}).empty());
+  EXPECT_EQ(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {1, 0, 0, 0}}).size(), 1U);
   // A zero rotation is none; the ghost above does not collide.
-  EXPECT_EQ(overlaps(tracer, scene.types, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {0, 0, 0, 0}}).size(), 1U);
-  EXPECT_TRUE(overlaps(tracer, scene.types, {0.5, 5.5, 0.5}, 2.0).empty());
+  EXPECT_EQ(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {0, 0, 0, 0}}).size(), 1U);
+  EXPECT_TRUE(overlaps(tracer, {0.5, 5.5, 0.5}, 2.0).empty());
 }
 
 TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
@@ -288,12 +296,12 @@ TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
   const auto expected = first_hit(full, ray);
   const auto hit = first_hit(halved, ray);
   ASSERT_TRUE(expected.has_value() && hit.has_value());
-  EXPECT_NEAR(hit->distance, expected->distance, 1e-9);
+  EXPECT_NEAR(hit->t, expected->t, 1e-9);
   EXPECT_EQ(hit->type, 1);
   EXPECT_EQ(hit->voxel, expected->voxel / 2);
   const OrientedBox box{{110.3, 40.0, 10.2}, DVec3(0.5), {1, 0, 0, 0}};
-  EXPECT_TRUE(overlaps(halved, scene.types, box).empty());
-  EXPECT_EQ(overlaps(halved, scene.types, {{110.3, 29.0, 10.2}, DVec3(0.5), {1, 0, 0, 0}}).size(), 1U);
+  EXPECT_TRUE(overlaps(halved, box).empty());
+  EXPECT_EQ(overlaps(halved, {{110.3, 29.0, 10.2}, DVec3(0.5), {1, 0, 0, 0}}).size(), 1U);
 }
 
 }  // namespace

@@ -38,13 +38,10 @@ DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
 // A box among what it may meet.
 struct Body {
   const SceneTracer& tracer;
-  const VoxelRegistry& types;
   const SlideOptions& options;
   OrientedBox box;
 
-  [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
-    return sweep_box(tracer, types, box, displacement);
-  }
+  [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const { return sweep_box(tracer, box, displacement); }
   // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
   // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
   double move_to(const SweepHit& hit, DVec3 displacement) {
@@ -301,9 +298,9 @@ class Walk {
 
 }  // namespace
 
-SlideResult move_and_slide(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
-                           DVec3 displacement, const SlideOptions& options) {
-  const Body body{tracer, types, options, box};
+SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
+                           const SlideOptions& options) {
+  const Body body{tracer, options, box};
   if (options.floor) {
     const double length = glm::length(options.floor->up);
     if (length > 0.0 && std::isfinite(length) && is_finite(displacement)) {

@@ -173,8 +173,8 @@ bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
 
 }  // namespace
 
-std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
-                                  DVec3 displacement) {
+std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement) {
+  const VoxelRegistry& types = tracer.scene().types;
   if (!is_box(box) || !is_finite(displacement)) return std::nullopt;
   const glm::dmat3 half_axes = half_axes_of(box);
   const DVec3 reach = reach_of_axes(half_axes);

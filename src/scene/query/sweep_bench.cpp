@@ -74,7 +74,7 @@ std::vector<Query> queries(const World& world, Turn turn, double down) {
     const DVec3 axis = turn == Turn::Any ? glm::normalize(DVec3(1, 2, 3)) : DVec3(0, 1, 0);
     OrientedBox box{{20.0 + 216.0 * share(random), 100.0, 20.0 + 216.0 * share(random)}, {0.4, 0.9, 0.4}};
     if (turn != Turn::None) box.rotation = glm::angleAxis(angle, axis);
-    const auto ground = sweep_box(world.tracer, world.scene.types, box, {0, -100, 0});
+    const auto ground = sweep_box(world.tracer, box, {0, -100, 0});
     if (!ground || ground->depth > 0.0) std::abort();
     box.centre.y -= 100.0 * ground->fraction - 1e-3 / std::max(0.3, ground->normal.y);
     all.push_back({box, 0.2 * glm::normalize(DVec3(std::cos(angle), -down, std::sin(angle)))});
@@ -88,11 +88,11 @@ void sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, doub
   std::size_t next = 0;
   for (auto _ : state) {
     const Query& query = all[next++ % all.size()];
-    benchmark::DoNotOptimize(sweep_box(world.tracer, world.scene.types, query.box, query.displacement));
+    benchmark::DoNotOptimize(sweep_box(world.tracer, query.box, query.displacement));
   }
   int hits = 0;
   for (const Query& query : all) {
-    const auto hit = sweep_box(world.tracer, world.scene.types, query.box, query.displacement);
+    const auto hit = sweep_box(world.tracer, query.box, query.displacement);
     if (hit && hit->depth > 0.0) state.SkipWithError("a box starts inside");
     hits += hit.has_value();
   }
@@ -107,8 +107,7 @@ void walks(benchmark::State& state, const World& (*world_of)()) {
   std::size_t next = 0;
   for (auto _ : state) {
     const Query& query = all[next++ % all.size()];
-    benchmark::DoNotOptimize(
-        move_and_slide(world.tracer, world.scene.types, query.box, query.displacement, options).centre);
+    benchmark::DoNotOptimize(move_and_slide(world.tracer, query.box, query.displacement, options).centre);
   }
 }
 

@@ -77,8 +77,8 @@ TEST(Sweep, StopsExactlyBeforeTheFirstOverlap) {
   for (int i = 0; i < 600; ++i) {
     const OrientedBox box{random.vector() * 30.0, glm::abs(random.vector()) * 1.5 + 0.1, random.rotation()};
     const DVec3 displacement = random.direction() * (i % 2 == 0 ? 25.0 : 3.0);
-    const bool starts_inside = !overlaps(tracer, scene.types, box).empty();
-    const auto hit = sweep_box(tracer, scene.types, box, displacement);
+    const bool starts_inside = !overlaps(tracer, box).empty();
+    const auto hit = sweep_box(tracer, box, displacement);
     if (starts_inside) {
       ASSERT_TRUE(hit.has_value());
       EXPECT_EQ(hit->fraction, 0.0);
@@ -88,7 +88,7 @@ TEST(Sweep, StopsExactlyBeforeTheFirstOverlap) {
     const double until = hit ? hit->fraction : 1.0;
     for (int step = 0; step < 100; ++step) {
       const double t = until * step / 100.0 - (hit ? 1e-7 : 0.0);
-      ASSERT_TRUE(t < 0.0 || overlaps(tracer, scene.types, moved(box, displacement * t)).empty()) << i << " at " << t;
+      ASSERT_TRUE(t < 0.0 || overlaps(tracer, moved(box, displacement * t)).empty()) << i << " at " << t;
     }
     if (!hit) {
       ++misses;
@@ -98,7 +98,7 @@ TEST(Sweep, StopsExactlyBeforeTheFirstOverlap) {
     EXPECT_EQ(hit->depth, 0.0);
     EXPECT_NEAR(glm::length(hit->normal), 1.0, 1e-9);
     EXPECT_LT(glm::dot(hit->normal, displacement), 0.0);
-    EXPECT_FALSE(overlaps(tracer, scene.types, moved(box, displacement * (hit->fraction + 1e-7))).empty()) << i;
+    EXPECT_FALSE(overlaps(tracer, moved(box, displacement * (hit->fraction + 1e-7))).empty()) << i;
   }
   EXPECT_GT(hits, 60);
   EXPECT_GT(misses, 80);
@@ -115,7 +115,7 @@ TEST(Sweep, NeverTunnelsAtAnySpeed) {
     for (int i = 0; i < 20; ++i) {
       const DVec3 aside = glm::cross(random.vector(), normal) * 4.0;
       const OrientedBox box{normal * 2.5 + aside, glm::abs(random.vector()) * 0.4 + 0.01, random.rotation()};
-      const auto hit = sweep_box(tracer, scene.types, box, -normal * speed);
+      const auto hit = sweep_box(tracer, box, -normal * speed);
       ASSERT_TRUE(hit.has_value()) << speed;
       EXPECT_LT(hit->fraction * speed, 2.0);
       EXPECT_GT(glm::dot(hit->normal, normal), 0.999);
@@ -130,17 +130,17 @@ TEST(Sweep, ReadsOnlyWhatCollidesAndIgnoresImpossibleNumbers) {
   const Scene scene = scene_of(std::move(grid));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 0.5, -3.0}, DVec3(0.25), {0, 0, 0, 0}};
-  const auto hit = sweep_box(tracer, scene.types, box, {0, 0, 20});
+  const auto hit = sweep_box(tracer, box, {0, 0, 20});
   ASSERT_TRUE(hit.has_value());
   EXPECT_EQ(hit->voxel, IVec3(0, 0, 5));
   EXPECT_NEAR(hit->fraction * 20.0, 7.75, 1e-6);
   EXPECT_EQ(hit->normal, DVec3(0, 0, -1));
   const double nan = std::nan("");
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, DVec3(nan)).has_value());
-  EXPECT_FALSE(sweep_box(tracer, scene.types, {DVec3(nan), DVec3(1.0), {}}, {0, 0, 1}).has_value());
-  EXPECT_FALSE(sweep_box(tracer, scene.types, {DVec3(0.0), DVec3(-1.0), {}}, {0, 0, 1}).has_value());
-  EXPECT_FALSE(sweep_box(tracer, scene.types, box, DVec3(0.0)).has_value());
-  EXPECT_TRUE(is_finite(move_and_slide(tracer, scene.types, box, DVec3(nan)).centre));
+  EXPECT_FALSE(sweep_box(tracer, box, DVec3(nan)).has_value());
+  EXPECT_FALSE(sweep_box(tracer, {DVec3(nan), DVec3(1.0), {}}, {0, 0, 1}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, {DVec3(0.0), DVec3(-1.0), {}}, {0, 0, 1}).has_value());
+  EXPECT_FALSE(sweep_box(tracer, box, DVec3(0.0)).has_value());
+  EXPECT_TRUE(is_finite(move_and_slide(tracer, box, DVec3(nan)).centre));
 }
 
 TEST(Sweep, RestingNeitherSinksNorJitters) {
@@ -155,7 +155,7 @@ TEST(Sweep, RestingNeitherSinksNorJitters) {
     OrientedBox box{away + up * 3.0, {0.4, 0.9, 0.4}, rotation};
     double settled = 0.0;
     for (int frame = 0; frame < 1'000; ++frame) {
-      box.centre = move_and_slide(tracer, scene.types, box, up * -0.3).centre;
+      box.centre = move_and_slide(tracer, box, up * -0.3).centre;
       const double height = glm::dot(box.centre - away, up);
       if (frame == 20) settled = height;
       if (frame < 20) continue;
@@ -176,7 +176,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
     const SceneTracer tracer(scene);
     const OrientedBox box{rotation * DVec3(10.3, 10.1, 10.2), DVec3(0.6), rotation};
     // Over the floor: what goes down is dropped, the rest kept, across the borders of its voxels.
-    const SlideResult slid = move_and_slide(tracer, scene.types, box, rotation * DVec3(5.0, -20.0, 3.0));
+    const SlideResult slid = move_and_slide(tracer, box, rotation * DVec3(5.0, -20.0, 3.0));
     const DVec3 ended = glm::conjugate(rotation) * slid.centre;
     EXPECT_TRUE(slid.is_blocked);
     EXPECT_NEAR(ended.x, 15.3, 1e-6);
@@ -186,8 +186,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
     // Into a corner, a thousand times: never out of the room.
     OrientedBox pushed = box;
     for (int i = 0; i < 1'000; ++i) {
-      pushed.centre =
-          move_and_slide(tracer, scene.types, pushed, rotation * (DVec3(9, 8, 10) + random.vector())).centre;
+      pushed.centre = move_and_slide(tracer, pushed, rotation * (DVec3(9, 8, 10) + random.vector())).centre;
     }
     const DVec3 corner = glm::conjugate(rotation) * pushed.centre;
     for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(corner[axis], 20.0 - 0.6, 0.01) << axis;
@@ -200,13 +199,13 @@ TEST(Sweep, MovesOutOfWhatItStartsIn) {
   const Scene scene = scene_of(std::move(floor));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 1.2, 0.5}, DVec3(0.4), {1, 0, 0, 0}};
-  const auto hit = sweep_box(tracer, scene.types, box, {0.1, 0, 0});
+  const auto hit = sweep_box(tracer, box, {0.1, 0, 0});
   ASSERT_TRUE(hit.has_value());
   EXPECT_EQ(hit->fraction, 0.0);
   EXPECT_NEAR(hit->depth, 0.2, 1e-6);
   EXPECT_EQ(hit->normal, DVec3(0, 1, 0));
-  const SlideResult out = move_and_slide(tracer, scene.types, box, {0.1, 0, 0});
-  EXPECT_TRUE(overlaps(tracer, scene.types, moved(box, out.centre - box.centre)).empty());
+  const SlideResult out = move_and_slide(tracer, box, {0.1, 0, 0});
+  EXPECT_TRUE(overlaps(tracer, moved(box, out.centre - box.centre)).empty());
   EXPECT_NEAR(out.centre.y, 1.4 + 1e-3, 1e-6);
   EXPECT_NEAR(out.centre.x, 0.6, 1e-6);
 }

@@ -36,7 +36,6 @@ SlideOptions on_foot(double max_slope = 45.0, double step_height = 0.0, double s
 // As a game does: what is left of the velocity, and gravity, over sixtieths of a second.
 struct Player {
   const SceneTracer& tracer;
-  const VoxelRegistry& types;
   SlideOptions options;
   OrientedBox box = kPlayer;
   double falling = 0.0;
@@ -45,7 +44,7 @@ struct Player {
   void step(DVec3 speed) {
     constexpr double kFrame = 1.0 / 60.0;
     falling -= 9.81 * kFrame;
-    last = move_and_slide(tracer, types, box, (speed + kUp * falling) * kFrame, options);
+    last = move_and_slide(tracer, box, (speed + kUp * falling) * kFrame, options);
     box.centre = last.centre;
     falling = glm::dot(last.displacement, kUp) / kFrame;
   }
@@ -55,8 +54,8 @@ struct Player {
   [[nodiscard]] double feet() const { return box.centre.y - box.half_size.y; }
 };
 
-Player player_at(const SceneTracer& tracer, const Scene& scene, DVec3 centre, const SlideOptions& options) {
-  Player player{tracer, scene.types, options, kPlayer, 0.0, {}};
+Player player_at(const SceneTracer& tracer, DVec3 centre, const SlideOptions& options) {
+  Player player{tracer, options, kPlayer, 0.0, {}};
   player.box.centre = centre;
   return player;
 }
@@ -64,7 +63,7 @@ Player player_at(const SceneTracer& tracer, const Scene& scene, DVec3 centre, co
 TEST(Walk, StandsStillOnASlope) {
   const Scene scene = slope_of(30.0);
   const SceneTracer tracer(scene);
-  Player player = player_at(tracer, scene, {0.0, 2.5, 0.3}, on_foot());
+  Player player = player_at(tracer, {0.0, 2.5, 0.3}, on_foot());
   player.steps(60, DVec3(0.0));
   const DVec3 settled = player.box.centre;
   EXPECT_TRUE(player.last.is_on_floor);
@@ -73,7 +72,7 @@ TEST(Walk, StandsStillOnASlope) {
   EXPECT_LT(glm::length(player.box.centre - settled), 1e-6);
   EXPECT_TRUE(player.last.is_on_floor);
   // Without a floor it is as if on ice.
-  Player sliding = player_at(tracer, scene, settled, {});
+  Player sliding = player_at(tracer, settled, {});
   sliding.steps(60, DVec3(0.0));
   EXPECT_LT(sliding.box.centre.x, settled.x - 0.05);
 }
@@ -82,7 +81,7 @@ TEST(Walk, ClimbsWhatIsAFloorAndNothingSteeper) {
   const Scene scene = slope_of(40.0);
   const SceneTracer tracer(scene);
   for (const double max_slope : {45.0, 30.0}) {
-    Player player = player_at(tracer, scene, {-10.0, -6.0, 0.3}, on_foot(max_slope, 0.5));
+    Player player = player_at(tracer, {-10.0, -6.0, 0.3}, on_foot(max_slope, 0.5));
     player.steps(60, DVec3(0.0));
     const DVec3 start = player.box.centre;
     player.steps(180, {3.0, 0.0, 0.0});
@@ -102,7 +101,7 @@ TEST(Walk, ClimbsWhatIsAFloorAndNothingSteeper) {
 TEST(Walk, GoesDownWithoutAHop) {
   const Scene scene = slope_of(35.0);
   const SceneTracer tracer(scene);
-  Player player = player_at(tracer, scene, {10.0, 10.0, 0.3}, on_foot());
+  Player player = player_at(tracer, {10.0, 10.0, 0.3}, on_foot());
   player.steps(60, DVec3(0.0));
   const DVec3 start = player.box.centre;
   const double tangent = std::tan(35.0 / 180.0 * std::numbers::pi);
@@ -117,7 +116,7 @@ TEST(Walk, GoesDownWithoutAHop) {
 TEST(Walk, JumpsAndLands) {
   const Scene scene = slope_of(20.0);
   const SceneTracer tracer(scene);
-  Player player = player_at(tracer, scene, {0.0, 3.0, 0.3}, on_foot());
+  Player player = player_at(tracer, {0.0, 3.0, 0.3}, on_foot());
   player.steps(60, DVec3(0.0));
   const double ground = player.feet();
   player.falling = 5.0;
@@ -141,7 +140,7 @@ TEST(Walk, FollowsRollingGroundInAnyPlacement) {
     placed.position = random.vector() * 20.0;
     const Scene scene = scene_of(rolling_ground(random, 30, 0.4 + 0.3 * (round % 2)), placed);
     const SceneTracer tracer(scene);
-    Player player = player_at(tracer, scene, placed.position + kUp * 8.0, on_foot());
+    Player player = player_at(tracer, placed.position + kUp * 8.0, on_foot());
     if (round % 3 == 0) player.box.rotation = glm::angleAxis(random.share() * 3.0, kUp);
     player.steps(120, DVec3(0.0));
     const DVec3 start = player.box.centre;
@@ -152,11 +151,11 @@ TEST(Walk, FollowsRollingGroundInAnyPlacement) {
       // No invisible walls where cells meet.
       ASSERT_FALSE(player.last.is_blocked) << round << ", " << i;
       ASSERT_LT(std::abs(player.box.centre.y - before.y), 0.1) << round << ", " << i;
-      ASSERT_TRUE(overlaps(tracer, scene.types, player.box).empty());
+      ASSERT_TRUE(overlaps(tracer, player.box).empty());
       // The ground is within the skin of some part of the box.
       OrientedBox thicker = player.box;
       thicker.half_size += 2.1e-3;
-      ASSERT_FALSE(overlaps(tracer, scene.types, thicker).empty()) << round << ", " << i;
+      ASSERT_FALSE(overlaps(tracer, thicker).empty()) << round << ", " << i;
       before = player.box.centre;
     }
     EXPECT_NEAR(glm::length((before - start) * DVec3(1, 0, 1)), 200.0 / 60.0 * std::sqrt(17.0), 0.1) << round;
@@ -173,7 +172,7 @@ TEST(Walk, StepsOntoWhatIsNoHigher) {
   const Scene scene = scene_of(std::move(yard), {});
   const SceneTracer tracer(scene);
   const auto walk = [&](double step_height) {
-    Player player = player_at(tracer, scene, {0.0, 1.0, 0.2}, on_foot(45.0, step_height));
+    Player player = player_at(tracer, {0.0, 1.0, 0.2}, on_foot(45.0, step_height));
     player.steps(30, DVec3(0.0));
     player.steps(240, {4.0, 0.0, 0.0});
     EXPECT_TRUE(player.last.is_on_floor);
@@ -204,7 +203,7 @@ TEST(Walk, StepsOntoRocksOfAField) {
   const Scene scene = scene_of(std::move(yard), {});
   const SceneTracer tracer(scene);
   for (const double step_height : {0.0, 1.0}) {
-    Player player = player_at(tracer, scene, {0.0, 1.0, 0.2}, on_foot(35.0, step_height));
+    Player player = player_at(tracer, {0.0, 1.0, 0.2}, on_foot(35.0, step_height));
     player.steps(30, DVec3(0.0));
     player.steps(120, {3.0, 0.0, 0.0});
     if (step_height == 0.0) {
@@ -220,7 +219,7 @@ TEST(Walk, StepsOntoRocksOfAField) {
 TEST(Walk, DoesNotStepOntoSlopesThatAreTooSteep) {
   const Scene scene = slope_of(60.0);
   const SceneTracer tracer(scene);
-  Player player = player_at(tracer, scene, {-3.0, 1.0, 0.3}, on_foot(45.0, 0.6));
+  Player player = player_at(tracer, {-3.0, 1.0, 0.3}, on_foot(45.0, 0.6));
   player.steps(20, {2.0, 0.0, 0.0});
   const double height = player.box.centre.y;
   player.steps(200, {2.0, 0.0, 0.0});
@@ -235,13 +234,13 @@ TEST(Walk, StaysOutOfCornersOfBlocksAndSlopes) {
       Scene scene = slope_of(degrees);
       scene.edit(scene.grids().handles()[0]).grid.fill_box({{4, -20, -12}, {6, 20, 12}}, kWood);
       const SceneTracer tracer(scene);
-      Player player = player_at(tracer, scene, {0.0, 3.0, 0.3}, walks ? on_foot(45.0, 0.5) : SlideOptions());
+      Player player = player_at(tracer, {0.0, 3.0, 0.3}, walks ? on_foot(45.0, 0.5) : SlideOptions());
       for (int i = 0; i < 600; ++i) {
         DVec3 speed = DVec3(6.0, 0.0, 0.0) + random.vector() * DVec3(4.0, 0.0, 4.0);
         if (std::abs(player.box.centre.z) > 8.0) speed.z = -player.box.centre.z;
         player.step(speed);
         ASSERT_LT(player.box.centre.x, 4.0 - 0.4);
-        ASSERT_TRUE(overlaps(tracer, scene.types, player.box).empty()) << degrees << ", " << i;
+        ASSERT_TRUE(overlaps(tracer, player.box).empty()) << degrees << ", " << i;
       }
     }
   }
@@ -279,10 +278,10 @@ TEST(Walk, WandersWithoutComingIntoAnything) {
       if (i % 40 == 0) heading = random.vector() * 0.3;
       DVec3 way = heading + random.vector() * 0.05 - up * (i % 100 < 90 ? 0.08 : -0.1);
       if (i % 200 == 0) way *= 20.0;
-      const SlideResult result = move_and_slide(tracer, scene.types, box, way, options);
+      const SlideResult result = move_and_slide(tracer, box, way, options);
       box.centre = result.centre;
       ASSERT_TRUE(is_finite(box.centre));
-      ASSERT_TRUE(overlaps(tracer, scene.types, box).empty()) << round << ", " << i;
+      ASSERT_TRUE(overlaps(tracer, box).empty()) << round << ", " << i;
       ASSERT_LE(glm::length(result.displacement), glm::length(way) + 1e-9) << round << ", " << i;
     }
   }
@@ -295,7 +294,7 @@ TEST(Walk, WalksOnBlocks) {
   yard.grid.fill_box({{3, 0, -10}, {5, 3, 10}}, kWood);
   const Scene scene = scene_of(std::move(yard), {});
   const SceneTracer tracer(scene);
-  Player player = player_at(tracer, scene, {0.0, 2.0, 0.2}, on_foot());
+  Player player = player_at(tracer, {0.0, 2.0, 0.2}, on_foot());
   player.steps(60, DVec3(0.0));
   EXPECT_TRUE(player.last.is_on_floor);
   EXPECT_FALSE(player.last.is_blocked);
@@ -320,14 +319,14 @@ TEST(Walk, ImpossibleDirectionsOfUpAreNoFloors) {
     SlideOptions options = on_foot();
     options.floor->up = up;
     const OrientedBox box = moved(kPlayer, {0.0, 2.0, 0.0});
-    const SlideResult plain = move_and_slide(tracer, scene.types, box, {0.5, -3.0, 0.2});
-    const SlideResult result = move_and_slide(tracer, scene.types, box, {0.5, -3.0, 0.2}, options);
+    const SlideResult plain = move_and_slide(tracer, box, {0.5, -3.0, 0.2});
+    const SlideResult result = move_and_slide(tracer, box, {0.5, -3.0, 0.2}, options);
     EXPECT_EQ(result.centre, plain.centre);
     EXPECT_FALSE(result.is_on_floor);
   }
-  EXPECT_EQ(move_and_slide(tracer, scene.types, kPlayer, DVec3(nan), on_foot()).centre, kPlayer.centre);
+  EXPECT_EQ(move_and_slide(tracer, kPlayer, DVec3(nan), on_foot()).centre, kPlayer.centre);
   SlideOptions no_slope = on_foot(nan);
-  EXPECT_FALSE(move_and_slide(tracer, scene.types, moved(kPlayer, {0, 2, 0}), {0, -3, 0}, no_slope).is_on_floor);
+  EXPECT_FALSE(move_and_slide(tracer, moved(kPlayer, {0, 2, 0}), {0, -3, 0}, no_slope).is_on_floor);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
 
 // The same of a field; and whether little of its surface is so thin that the next halving would tear it.
 bool has_shape_of(const DensityPyramid& fields, int halvings) {
-  const HalvedDensityCounts& now = fields.counts(halvings);
+  const DownsampledDensityCounts& now = fields.counts(halvings);
   const auto cells = std::ldexp(static_cast<double>(now.solid), 3 * halvings);
   const auto samples = static_cast<double>(fields.counts(1).finer_solid);
   return std::abs(cells - samples) <= 0.125 * samples && 8 * now.thin <= now.surface;

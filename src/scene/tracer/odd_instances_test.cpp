@@ -70,7 +70,7 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
     const auto hit = first_hit(tracer, ray);
     ASSERT_TRUE(hit.has_value());
     EXPECT_EQ(hit->voxel, expected_hit->voxel);
-    EXPECT_NEAR(hit->distance, expected_hit->distance, 1e-9);
+    EXPECT_NEAR(hit->t, expected_hit->t, 1e-9);
     EXPECT_LT(glm::distance(world.scene.bounds().max, expected.scene.bounds().max), 1e-9);
     const auto chosen = selected(world.scene);
     ASSERT_EQ(chosen.size(), 1U);
@@ -107,8 +107,8 @@ TEST(OddInstances, WhatIsNotFiniteOrHasNoSizeIsLeftOutOfEverything) {
   EXPECT_TRUE(world.scene.bounds(InstanceFilter::All).empty());
   EXPECT_TRUE(selected(world.scene).empty());
   EXPECT_FALSE(first_hit(tracer, {{10, 0.5, 60}, {0, 0, -1}}).has_value());
-  EXPECT_TRUE(overlaps(tracer, world.scene.types, DVec3(0.0), 1e9).empty());
-  EXPECT_FALSE(sweep_box(tracer, world.scene.types, {}, {100, 0, 0}).has_value());
+  EXPECT_TRUE(overlaps(tracer, DVec3(0.0), 1e9).empty());
+  EXPECT_FALSE(sweep_box(tracer, {}, {100, 0, 0}).has_value());
   EXPECT_TRUE(is_finite(frame_scene(world.scene, View::Iso, 1.5, InstanceFilter::All).position));
 }
 
@@ -131,8 +131,8 @@ TEST(OddInstances, ACameraWithinAGridOrAtItsContentsCentreSeesItNear) {
   const auto hit = first_hit(tracer, {{5.5, 0.5, 0.5}, {0, 0, -1}});
   ASSERT_TRUE(hit.has_value());
   EXPECT_TRUE(hit->starts_inside);
-  EXPECT_EQ(hit->distance, 0.0);
-  const auto inside = sweep_box(tracer, world.scene.types, {{5.5, 0.5, 0.5}, DVec3(0.1)}, DVec3(0.0));
+  EXPECT_EQ(hit->t, 0.0);
+  const auto inside = sweep_box(tracer, {{5.5, 0.5, 0.5}, DVec3(0.1)}, DVec3(0.0));
   ASSERT_TRUE(inside.has_value());
   EXPECT_EQ(inside->fraction, 0.0);
 }
@@ -141,21 +141,20 @@ TEST(OddInstances, OddQueriesMeetNothingAndComeToAnEnd) {
   SlabScene world;
   world.scene.add_instance(world.instance());
   const SceneTracer tracer(world.scene);
-  const VoxelRegistry& types = world.scene.types;
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     EXPECT_FALSE(first_hit(tracer, {{bad, 0, 0}, {1, 0, 0}}).has_value());
     EXPECT_FALSE(first_hit(tracer, {{0, 0, 0}, {bad, 0, 0}}).has_value());
-    EXPECT_TRUE(overlaps(tracer, types, DVec3(bad), 5.0).empty());
-    EXPECT_TRUE(overlaps(tracer, types, DVec3(5.0), bad).empty());
+    EXPECT_TRUE(overlaps(tracer, DVec3(bad), 5.0).empty());
+    EXPECT_TRUE(overlaps(tracer, DVec3(5.0), bad).empty());
     const OrientedBox turned{DVec3(5.0), DVec3(9.0), {bad, 0.0, 0.0, 0.0}};
-    EXPECT_TRUE(overlaps(tracer, types, turned).empty());
-    EXPECT_FALSE(sweep_box(tracer, types, turned, {1, 0, 0}).has_value());
-    EXPECT_FALSE(sweep_box(tracer, types, {}, DVec3(bad)).has_value());
-    EXPECT_EQ(move_and_slide(tracer, types, {}, DVec3(bad, 0, 0)).centre, DVec3(0.0));
+    EXPECT_TRUE(overlaps(tracer, turned).empty());
+    EXPECT_FALSE(sweep_box(tracer, turned, {1, 0, 0}).has_value());
+    EXPECT_FALSE(sweep_box(tracer, {}, DVec3(bad)).has_value());
+    EXPECT_EQ(move_and_slide(tracer, {}, DVec3(bad, 0, 0)).centre, DVec3(0.0));
   }
   EXPECT_FALSE(first_hit(tracer, {{0, 0, 0}, {0, 0, 0}}).has_value());
   const OrientedBox unturned{{5, 0, 0}, DVec3(9.0), {0.0, 0.0, 0.0, 0.0}};
-  EXPECT_EQ(overlaps(tracer, types, unturned).size(), 1U);
+  EXPECT_EQ(overlaps(tracer, unturned).size(), 1U);
 }
 
 // Steps of a box's own size are lost in the rounding of such distances.
@@ -167,12 +166,12 @@ TEST(OddInstances, ASweepThroughEndlessSpaceComesToAnEnd) {
   const SceneTracer tracer(world.scene);
   for (const double length : {2e17, 1e30, 1e200}) {
     const OrientedBox box{{0, 1, 3}, DVec3(0.4)};
-    const auto hit = sweep_box(tracer, world.scene.types, box, {length, 0, 0});
+    const auto hit = sweep_box(tracer, box, {length, 0, 0});
     if (hit) {
       EXPECT_GT(hit->fraction, 0.0);
       EXPECT_LE(hit->fraction, 1.0);
     }
-    (void)move_and_slide(tracer, world.scene.types, box, {length, 0, 0});
+    (void)move_and_slide(tracer, box, {length, 0, 0});
   }
 }
 

@@ -94,7 +94,7 @@ TEST(SceneFields, RaysMeetThemWhereTheyArePlaced) {
     const DVec3 out = random_direction(random);
     const auto hit = first_hit(tracer, {kCentre + out * 90.0, -out});
     ASSERT_TRUE(hit);
-    EXPECT_NEAR(hit->distance, 90.0 - 24.0, 0.05);
+    EXPECT_NEAR(hit->t, 90.0 - 24.0, 0.05);
     EXPECT_LT(glm::distance(hit->position, kCentre + out * 24.0), 0.05);
     EXPECT_TRUE(hit->in_field);
     EXPECT_EQ(hit->type, 3);
@@ -142,7 +142,7 @@ TEST(SceneFields, TheNearestCountsBesideBlocks) {
         const auto alone = first_hit(tracer, packet.ray(lane), 200.0);
         ASSERT_EQ(hits.grids.hit >> lane & 1U, alone.has_value());
         if (!alone) continue;
-        EXPECT_NEAR(hits.grids.t[at], alone->distance, 1e-9);
+        EXPECT_NEAR(hits.grids.t[at], alone->t, 1e-9);
         ASSERT_EQ((hits.in_field >> lane & 1U) != 0, alone->in_field);
         EXPECT_EQ(IVec3(hits.grids.x[at], hits.grids.y[at], hits.grids.z[at]), alone->voxel);
         if (!alone->in_field) continue;
@@ -183,7 +183,7 @@ TEST(SceneFields, ATracerThatFollowsIsAsOneMadeAnew) {
       const auto b = first_hit(anew, ray);
       ASSERT_EQ(a.has_value(), b.has_value());
       if (!a) continue;
-      EXPECT_EQ(a->distance, b->distance);
+      EXPECT_EQ(a->t, b->t);
       EXPECT_EQ(a->type, b->type);
     }
   }

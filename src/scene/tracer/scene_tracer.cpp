@@ -49,6 +49,9 @@ SceneTracer::SceneTracer(SceneTracer&&) noexcept = default;
 SceneTracer& SceneTracer::operator=(SceneTracer&&) noexcept = default;
 SceneTracer::~SceneTracer() = default;
 
+const Scene& SceneTracer::scene() const {
+  return *impl_->scene;
+}
 const std::vector<PlacedGrid>& SceneTracer::placed() const {
   return impl_->placed;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "grid/density/cell_corners.h"
+#include "grid/density/density_storage.h"
 #include "grid/density/trilinear.h"
 #include "trace/kernel/kernel.h"
 
@@ -14,7 +15,7 @@ using trace::FieldHit;
 
 const DensityStorage* find_storage(const DensityGrid& field, int x, int y, int z) {
   const DensityChunk* const chunk = field.find_chunk({x, y, z});
-  return chunk == nullptr ? nullptr : chunk->storage();
+  return chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
 }
 
 void read_corners(const DensityGrid& field, int x, int y, int z, float* corners) {
@@ -24,7 +25,7 @@ void read_corners(const DensityGrid& field, int x, int y, int z, float* corners)
 }
 
 trace::FieldView view_of(const DensityTree& tree) {
-  return {tree.cells().view(), &tree.field(), find_storage, read_corners};
+  return {trace::TreeView::of(tree.cells()), &tree.field(), find_storage, read_corners};
 }
 
 template <bool kAsksWhere>

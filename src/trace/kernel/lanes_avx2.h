@@ -7,7 +7,7 @@
 
 #include <immintrin.h>
 
-#include "core/lanes_avx2.h"
+#include "core/lanes/lanes_avx2.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {

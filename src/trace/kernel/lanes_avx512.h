@@ -4,7 +4,7 @@
 
 #include <immintrin.h>
 
-#include "core/lanes_avx512.h"
+#include "core/lanes/lanes_avx512.h"
 #include "trace/tree_view.h"
 
 namespace quoin::trace {

@@ -251,16 +251,16 @@ void draw_picture_part(ViewState& state) {
 
 // Of smooth surfaces: 27 samples of the densities around a place.
 void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
-  int form = static_cast<int>(options.form);
+  int form = static_cast<int>(options.method);
   if (ImGui::Combo("smooth form", &form, "none\0share solid\0weighted\0weighted, published\0")) {
-    options.form = static_cast<SmoothOcclusion>(form);
+    options.method = static_cast<SmoothOcclusion>(form);
   }
-  ImGui::BeginDisabled(options.form == SmoothOcclusion::None);
+  ImGui::BeginDisabled(options.method == SmoothOcclusion::None);
   const ImGuiSliderFlags flags = ImGuiSliderFlags_AlwaysClamp;
   ImGui::SliderFloat("spread", &options.spread, 0.25F, 4.0F, "%.2f samples", flags);
   ImGui::EndDisabled();
   const bool is_weighted =
-      options.form == SmoothOcclusion::Weighted || options.form == SmoothOcclusion::WeightedPublished;
+      options.method == SmoothOcclusion::Weighted || options.method == SmoothOcclusion::WeightedPublished;
   ImGui::BeginDisabled(!is_weighted);
   ImGui::SliderFloat("offset", &options.offset, 0.0F, 0.99F, "%.2f", flags);
   ImGui::SliderFloat("power", &options.power, 0.25F, 8.0F, "%.2f", flags | ImGuiSliderFlags_Logarithmic);
@@ -268,30 +268,31 @@ void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
 }
 
 void draw_occlusion(LightOptions& light, bool has_rays) {
-  int mode = static_cast<int>(light.occlusion);
+  int mode = static_cast<int>(light.occlusion_mode);
   if (ImGui::Combo("occlusion", &mode, "off\0by rays\0of vertices\0of smooth surfaces\0"))
-    light.occlusion = static_cast<OcclusionMode>(mode);
+    light.occlusion_mode = static_cast<OcclusionMode>(mode);
   if (!has_rays && ImGui::IsItemHovered()) ImGui::SetTooltip("meshes carry that of their vertices");
-  ImGui::BeginDisabled(!has_rays || light.occlusion != OcclusionMode::Rays);
-  auto reach = static_cast<float>(light.occlusion_distance);
+  ImGui::BeginDisabled(!has_rays || light.occlusion_mode != OcclusionMode::Rays);
+  auto reach = static_cast<float>(light.occlusion_distance_voxels);
   if (ImGui::SliderFloat("its rays reach", &reach, 0.5F, 64.0F, "%.1f voxels",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
-    light.occlusion_distance = reach;
+    light.occlusion_distance_voxels = reach;
   }
   ImGui::EndDisabled();
-  ImGui::BeginDisabled(has_rays ? light.occlusion != OcclusionMode::Smooth : light.occlusion == OcclusionMode::Off);
-  draw_smooth_occlusion(light.smooth);
+  ImGui::BeginDisabled(has_rays ? light.occlusion_mode != OcclusionMode::Smooth
+                                : light.occlusion_mode == OcclusionMode::Off);
+  draw_smooth_occlusion(light.smooth_occlusion);
   ImGui::EndDisabled();
 }
 
 // The slider's end stands for any distance.
 void draw_shadow_distance(LightOptions& light) {
   constexpr float kEnd = 4096.0F;
-  const bool is_any = !(light.shadow_distance < static_cast<double>(kEnd));
-  float reach = is_any ? kEnd : static_cast<float>(light.shadow_distance);
+  const bool is_any = !(light.shadow_distance_voxels < static_cast<double>(kEnd));
+  float reach = is_any ? kEnd : static_cast<float>(light.shadow_distance_voxels);
   if (ImGui::SliderFloat("shadows reach", &reach, 1.0F, kEnd, is_any ? "any distance" : "%.0f voxels",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
-    light.shadow_distance = reach < kEnd ? static_cast<double>(reach) : LightOptions{}.shadow_distance;
+    light.shadow_distance_voxels = reach < kEnd ? static_cast<double>(reach) : LightOptions{}.shadow_distance_voxels;
   }
 }
 

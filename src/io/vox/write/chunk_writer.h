@@ -55,8 +55,6 @@ class ChunkWriter {
     patch(begin - 8, bytes_.size() - begin);
     patch(begin - 4, children);
   }
-  /// As end_chunk, for a chunk that holds nothing but other chunks.
-  void end_parent(std::size_t begin) { patch(begin - 4, bytes_.size() - begin); }
 
   /// Makes room for bytes that are written through `bytes` later.
   void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }

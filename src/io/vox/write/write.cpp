@@ -93,7 +93,7 @@ class Writer {
  public:
   Writer(const Scene& scene, const VoxSource& source) : scene_(scene), source_(source) {}
 
-  Result<std::vector<std::byte>> run(std::vector<std::string>& warnings);
+  Result<VoxBytes> run();
   /// Only what `run` would warn of. Errors: those of `run`, but for the size.
   Result<std::vector<std::string>> losses();
 
@@ -574,7 +574,7 @@ void Writer::write_chunks() {
   }
 }
 
-Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
+Result<VoxBytes> Writer::run() {
   if (Status planned = plan(); !planned) return planned.error();
   const std::span<const std::byte> file = source_.bytes;
   out_.reserve(file.size() + bytes_of_new_models());
@@ -591,13 +591,14 @@ Result<std::vector<std::byte>> Writer::run(std::vector<std::string>& warnings) {
   if (out_.size() > std::numeric_limits<std::uint32_t>::max()) {
     return make_error(ErrorCode::LimitExceeded, "the scene takes more than the 4 GiB that a .vox file can hold");
   }
+  std::vector<std::string> warnings;
   warn(warnings);
   const auto before =
       file.subspan(source_.document.chunks_begin, source_.document.chunks_end - source_.document.chunks_begin);
-  if (!is_new() && std::ranges::equal(out_.bytes().subspan(begin), before)) return source_.bytes;
+  if (!is_new() && std::ranges::equal(out_.bytes().subspan(begin), before)) return VoxBytes{source_.bytes, warnings};
   out_.patch(kChildrenOfMain, out_.size() - begin);
   out_.raw(file.subspan(source_.document.chunks_end));
-  return out_.take();
+  return VoxBytes{out_.take(), warnings};
 }
 
 Result<std::vector<std::string>> Writer::losses() {
@@ -607,28 +608,37 @@ Result<std::vector<std::string>> Writer::losses() {
   return warnings;
 }
 
+Result<SavedScene> save(Result<VoxBytes> file, const std::filesystem::path& path) {
+  if (!file) return with_path(Result<SavedScene>(file.error()), path);
+  const auto bytes = write_whole(path, std::move(file->bytes));
+  if (!bytes) return bytes.error();
+  return SavedScene{*bytes, std::move(file->warnings)};
+}
+
 const VoxSource& source_of(const LoadedScene& loaded) {
   return loaded.source != nullptr ? *loaded.source : no_source();
 }
 
 }  // namespace
 
-Result<std::vector<std::byte>> write_vox(const Scene& scene, std::vector<std::string>& warnings) {
-  return Writer(scene, no_source()).run(warnings);
+Result<VoxBytes> write_vox(const Scene& scene) {
+  return Writer(scene, no_source()).run();
 }
 
-Result<std::vector<std::byte>> write_vox(const LoadedScene& loaded, std::vector<std::string>& warnings) {
-  return Writer(loaded.scene, source_of(loaded)).run(warnings);
+Result<VoxBytes> write_vox(const LoadedScene& loaded) {
+  return Writer(loaded.scene, source_of(loaded)).run();
 }
 
-Result<std::uint64_t> write_vox(const Scene& scene, const std::filesystem::path& path,
-                                std::vector<std::string>& warnings) {
-  return write_whole(path, write_vox(scene, warnings));
+Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path) {
+  return save(write_vox(scene), path);
 }
 
-Result<std::uint64_t> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
-                                std::vector<std::string>& warnings) {
-  return write_whole(path, write_vox(loaded, warnings));
+Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path) {
+  return save(write_vox(loaded), path);
+}
+
+Result<std::vector<std::string>> losses_of_vox(const Scene& scene) {
+  return Writer(scene, no_source()).losses();
 }
 
 Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded) {

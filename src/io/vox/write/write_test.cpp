@@ -102,16 +102,14 @@ Scene random_scene(std::uint32_t seed) {
 TEST(VoxWrite, WritingAndReadingIsTheIdentityOnRandomScenes) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     const Scene scene = random_scene(seed);
-    std::vector<std::string> warnings;
-    const auto bytes = write_vox(scene, warnings);
-    ASSERT_TRUE(bytes) << seed;
-    const auto loaded = read_vox(*bytes);
+    const auto written = write_vox(scene);
+    ASSERT_TRUE(written) << seed;
+    const auto loaded = read_vox(written->bytes);
     ASSERT_TRUE(loaded) << seed;
     EXPECT_EQ(difference(scene, loaded->scene), "") << seed;
     EXPECT_EQ(difference_after_round_trip(loaded->scene), "") << seed;
-    EXPECT_TRUE(warnings.empty());
-    std::vector<std::string> again_warnings;
-    EXPECT_EQ(*write_vox(loaded->scene, again_warnings), *bytes) << seed;
+    EXPECT_TRUE(written->warnings.empty());
+    EXPECT_EQ(write_vox(loaded->scene)->bytes, written->bytes) << seed;
   }
 }
 
@@ -132,9 +130,10 @@ WorldVoxels world_voxels(const Scene& scene) {
 }
 
 Scene reread(const Scene& scene, std::vector<std::string>& warnings) {
-  const auto bytes = write_vox(scene, warnings);
-  EXPECT_TRUE(bytes) << to_string(bytes.error());
-  auto loaded = read_vox(*bytes);
+  auto written = write_vox(scene);
+  EXPECT_TRUE(written) << to_string(written.error());
+  warnings = std::move(written->warnings);
+  auto loaded = read_vox(written->bytes);
   EXPECT_TRUE(loaded) << to_string(loaded.error());
   return std::move(loaded->scene);
 }
@@ -238,11 +237,10 @@ TEST(VoxWrite, MoreThan255TypesAreRefused) {
   SceneGrid grid;
   for (int i = 1; i <= 256; ++i) grid.grid.set({i, 0, 0}, static_cast<VoxelType>(i));
   scene.add_grid(std::move(grid));
-  std::vector<std::string> warnings;
-  const auto bytes = write_vox(scene, warnings);
-  ASSERT_FALSE(bytes);
-  EXPECT_EQ(bytes.error().code, ErrorCode::LimitExceeded);
-  EXPECT_EQ(bytes.error().message, "the scene uses 256 voxel types; a .vox file holds 255");
+  const auto written = write_vox(scene);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(written.error().message, "the scene uses 256 voxel types; a .vox file holds 255");
 }
 
 TEST(VoxWrite, WhatVoxCannotSayIsRefused) {
@@ -253,8 +251,10 @@ TEST(VoxWrite, WhatVoxCannotSayIsRefused) {
   const InstanceHandle instance = scene.add_instance({"crooked", handle});
   std::vector<std::string> warnings;
   const auto code = [&] {
-    const auto bytes = write_vox(scene, warnings);
-    return bytes ? std::optional<ErrorCode>{} : bytes.error().code;
+    const auto written = write_vox(scene);
+    if (!written) return std::optional(written.error().code);
+    warnings = written->warnings;
+    return std::optional<ErrorCode>{};
   };
   EXPECT_EQ(code(), std::nullopt);
   scene.edit(instance).voxel_size = 2.0;
@@ -295,8 +295,7 @@ TEST(VoxWrite, VoxelsAreVisitedInTheOrderOfTheGrid) {
 }
 
 TEST(VoxWrite, TheSameSceneGivesTheSameBytes) {
-  std::vector<std::string> warnings;
-  EXPECT_EQ(*write_vox(random_scene(7), warnings), *write_vox(random_scene(7), warnings));
+  EXPECT_EQ(write_vox(random_scene(7))->bytes, write_vox(random_scene(7))->bytes);
 }
 
 TEST(VoxMistakes, PiecesWithoutAPlaceInTheFileAreFound) {

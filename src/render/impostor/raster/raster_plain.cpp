@@ -1,6 +1,6 @@
 // The kernel of impostors for any processor.
 
-#include "render/impostor/raster.inl"
+#include "render/impostor/raster/raster.inl"
 
 namespace quoin::raster {
 

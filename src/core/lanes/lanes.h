@@ -2,17 +2,17 @@
 
 // The lanes of the instruction set for which a file is compiled.
 #if defined(QUOIN_KERNEL_AVX512)
-#include "core/lanes_avx512.h"
+#include "core/lanes/lanes_avx512.h"
 namespace quoin {
 namespace lanes = lanes_avx512;
 }
 #elif defined(QUOIN_KERNEL_AVX2)
-#include "core/lanes_avx2.h"
+#include "core/lanes/lanes_avx2.h"
 namespace quoin {
 namespace lanes = lanes_avx2;
 }
 #else
-#include "core/lanes_plain.h"
+#include "core/lanes/lanes_plain.h"
 namespace quoin {
 namespace lanes = lanes_plain;
 }

@@ -2,7 +2,7 @@
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "render/impostor/raster.inl"
+#include "render/impostor/raster/raster.inl"
 
 namespace quoin::raster {
 

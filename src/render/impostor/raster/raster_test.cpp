@@ -1,6 +1,6 @@
 // The kernels that draw faces, against every face asked for every pixel in double precision.
 
-#include "render/impostor/raster.h"
+#include "render/impostor/raster/raster.h"
 
 #include <algorithm>
 #include <array>

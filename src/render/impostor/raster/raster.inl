@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/lanes.h"
-#include "render/impostor/raster.h"
+#include "core/lanes/lanes.h"
+#include "render/impostor/raster/raster.h"
 
 namespace quoin::raster {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/impostor/raster.h"
+#include "render/impostor/raster/raster.h"
 
 #include <limits>
 

@@ -1,0 +1,16 @@
+#pragma once
+
+// For tests, and for benchmarks, which know no GoogleTest.
+
+#include "core/instruction_set.h"
+
+namespace quoin {
+
+/// An object whose kernels are those of `set`.
+template <class T>
+[[nodiscard]] T made_with(InstructionSet set) {
+  const InstructionSetOverride over(set);
+  return T();
+}
+
+}  // namespace quoin
