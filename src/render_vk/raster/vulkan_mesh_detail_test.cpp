@@ -207,7 +207,7 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
     const Image distant = shown(
         [&] {
           RenderOptions of_far = options;
-          of_far.detail.policy = always(Detail::Far, 1.0).detail;
+          of_far.detail.policy = always(Detail::Far, 1.0).detail.policy;
           return of_far;
         }(),
         far);

@@ -229,7 +229,7 @@ TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
   const VoxelType water = vulkan_test::add_water(scene);
   scene.add_instance({"", scene.add_grid(vulkan_test::lakeside(types, water)), DVec3(0.0)});
   RenderOptions options = glass_yard_options(120, 90);
-  options.light.occlusion = OcclusionMode::Off;
+  options.light.occlusion_mode = OcclusionMode::Off;
   put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
   const Picture marched = render_test::taken(scene, camera, options);
