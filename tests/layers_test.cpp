@@ -55,7 +55,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"mesh/surface/shape.h", {"live"}},
     {"mesh/surface/simplify_tagged.h", {"scene"}},
     {"render/camera_rays.h", {"render_vk"}},
-    {"render/impostor/faces.h", {"render_vk"}},
+    {"render/impostor/raster/faces.h", {"render_vk"}},
     {"render/impostor/far.h", {"render_vk"}},
     {"render/impostor/screen.h", {"render_vk"}},
     {"render/picture_detail.h", {"render_vk"}},

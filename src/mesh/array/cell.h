@@ -7,7 +7,7 @@
 
 #include <quoin/core/vec.h>
 
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 #include "mesh/smooth/cell.h"
 
 namespace quoin::array {

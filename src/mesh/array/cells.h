@@ -15,7 +15,7 @@
 #include <quoin/core/result.h>
 
 #include "core/progress_steps.h"
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 #include "mesh/array/lattice.h"
 
 namespace quoin::array {

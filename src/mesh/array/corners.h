@@ -6,7 +6,7 @@
 #include <quoin/grid/volume.h>
 
 #include "mesh/array/density.h"
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 #include "mesh/array/lattice.h"
 
 namespace quoin::array {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "mesh/array/cells.h"
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 #include "mesh/array/lattice.h"
 
 namespace quoin {

@@ -12,7 +12,7 @@
 
 #include "core/progress_steps.h"
 #include "mesh/array/cells.h"
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 #include "mesh/array/placement.h"
 #include "mesh/array/signs.h"
 #include "mesh/smooth/cell.h"

@@ -4,7 +4,7 @@
 
 #include "mesh/array/cells.h"
 #include "mesh/array/corners.h"
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 namespace {

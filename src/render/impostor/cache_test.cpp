@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/workloads.h"
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 
 namespace quoin {
 namespace {

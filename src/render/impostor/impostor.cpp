@@ -9,7 +9,7 @@
 #include <quoin/core/assert.h>
 
 #include "light/corner_light.h"
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render/impostor/snapshot.h"
 
 namespace quoin {

@@ -8,7 +8,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene_tracer.h>
 
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render/impostor/raster/raster.h"
 
 namespace quoin {

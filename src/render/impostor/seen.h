@@ -8,7 +8,7 @@
 #include <quoin/render/impostor.h>
 #include <quoin/trace/occupancy_tree.h>
 
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render/impostor/snapshot.h"
 #include "render/impostor/surfels.h"
 #include "render/shell/shell.h"

@@ -6,7 +6,7 @@
 
 #include <quoin/grid/density_grid.h>
 
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render/shell/shell.h"
 
 namespace quoin {

@@ -11,7 +11,7 @@
 #include <quoin/render/impostor_cache.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render/impostor/surfels.h"
 #include "render/impostor/test_support.h"
 

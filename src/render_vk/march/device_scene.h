@@ -10,7 +10,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "light/lamp_table.h"
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/device_grid.h"
 #include "scene/tracer/instance_tree.h"

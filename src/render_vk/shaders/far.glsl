@@ -47,7 +47,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vo
 
 const uint kIsSurfel = 8;
 const uint kSurfelHalvesShift = 4;  // in whole 1/1,024, twelve bits each
-const float kSurfelRoom = 0.05;  // as render/impostor/faces.h has them
+const float kSurfelRoom = 0.05;  // as render/impostor/raster/faces.h has them
 const float kSurfelLift = 0.5;
 
 const uint kNoFace = 0xFFFFFFFFu;

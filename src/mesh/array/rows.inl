@@ -14,7 +14,7 @@
 #include <immintrin.h>
 #endif
 
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 namespace {

@@ -11,8 +11,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mesh/array/kernel/kernel.h"
-#include "mesh/array/kernel/rows.inl"
+#include "mesh/array/kernel.h"
+#include "mesh/array/rows.inl"
 
 namespace quoin::array {
 namespace {

@@ -3,9 +3,9 @@
 #include <cstddef>
 
 #include "mesh/array/cell.h"
-#include "mesh/array/kernel/kernel.h"
-#include "mesh/array/kernel/place.inl"
-#include "mesh/array/kernel/table.inl"
+#include "mesh/array/kernel.h"
+#include "mesh/array/place.inl"
+#include "mesh/array/table.inl"
 
 namespace quoin::array {
 namespace {

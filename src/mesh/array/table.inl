@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mesh/array/kernel/kernel.h"
-#include "mesh/array/kernel/place.inl"
-#include "mesh/array/kernel/quads.inl"
-#include "mesh/array/kernel/relax.inl"
-#include "mesh/array/kernel/rows.inl"
+#include "mesh/array/kernel.h"
+#include "mesh/array/place.inl"
+#include "mesh/array/quads.inl"
+#include "mesh/array/relax.inl"
+#include "mesh/array/rows.inl"
 
 namespace quoin::array {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <cstddef>
 
-#include "mesh/array/kernel/kernel.h"
-#include "mesh/array/kernel/place.inl"
+#include "mesh/array/kernel.h"
+#include "mesh/array/place.inl"
 #include "mesh/trilinear_normals.inl"
 
 namespace quoin::array {

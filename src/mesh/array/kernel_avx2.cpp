@@ -1,11 +1,11 @@
 // The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
 
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 
 #ifdef QUOIN_X86_KERNELS
 
-#include "mesh/array/kernel/table.inl"
-#include "mesh/array/kernel/vertices.inl"
+#include "mesh/array/table.inl"
+#include "mesh/array/vertices.inl"
 
 namespace quoin::array {
 

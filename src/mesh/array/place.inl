@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "mesh/array/kernel/kernel.h"
+#include "mesh/array/kernel.h"
 
 namespace quoin::array {
 namespace {
