@@ -50,8 +50,8 @@ struct FormatInfo {
 /// Errors: Unsupported, naming the extensions there are.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
-// What reads and what writes has a twin for bytes and one for a path. Warnings are part of what is returned: of what was
-// read, and of what was written where its format may not hold all. Options, Threads (where several are used) and
+// What reads and what writes has a twin for bytes and one for a path. Warnings are part of what is returned: of what
+// was read, and of what was written where its format may not hold all. Options, Threads (where several are used) and
 // Progress (of what may take long) come last, in this order, and may be left out.
 
 /// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it.

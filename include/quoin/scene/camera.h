@@ -37,8 +37,8 @@ struct Camera {
 ///         than 0 and less than pi.
 [[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians);
 
-/// The view matrix: x to the right, y up, and -z forward, as glm::perspective(camera.vertical_fov_radians, aspect, near,
-/// far) and glTF's cameras expect.
+/// The view matrix: x to the right, y up, and -z forward, as glTF's cameras and
+/// glm::perspective(camera.vertical_fov_radians, aspect, near, far) expect.
 [[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);
 
 /// A point of a picture of `width` by `height` pixels.

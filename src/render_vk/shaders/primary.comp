@@ -93,8 +93,8 @@ struct Nearest {
   float t;
 };
 
-// Takes over what the pixel's ray meets of what a grid holds if that is nearer than all before. `scale`: the length of a
-// depth.
+// Takes over what the pixel's ray meets of what a grid holds if that is nearer than all before. `scale`: the length of
+// a depth.
 void meet_content(int content, int i, Placed placed, Pair direction, float scale, inout Nearest nearest,
                   inout Point point) {
   bool is_field = is_field_content(content);
