@@ -40,6 +40,19 @@ struct SweepHit {
 ///         trilinear field, halved until these are near enough to it.
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement);
 
+/// How far a box has to be moved to meet nothing, in the world: 0 where it meets nothing; nothing where there is no such
+/// place within `max_distance`, world units.
+///
+/// Exact:  among voxels whose axes are the box's own, the nearest such place, gaps that are as wide as the box
+///         included; of several that are as near, one.
+/// Others: of grids that are turned against the box, and of fields, a place at most max_distance / 32 farther away than
+///         the nearest, and surely one where there is that much room.
+/// Cost:   an overlap query for each place that is nearer: some hundred of them for a box of the size of a voxel and
+///         twice that distance.
+/// Errors: sizes, places and distances that are not finite, or below 0, have none.
+[[nodiscard]] std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const VoxelRegistry& types,
+                                                      const OrientedBox& box, double max_distance);
+
 /// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {
   DVec3 up{0.0, 1.0, 0.0};          ///< in the world, of any length; where it is 0 or not finite nothing is a floor
@@ -56,9 +69,12 @@ struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
   int max_contacts = 5;  ///< at least 1; after which what is left of the displacement is dropped
-  /// A box that starts inside is moved out first. Without, it stays where it is: `is_blocked`, with the displacement as
-  /// it was.
+  /// A box that starts inside is moved out first: of a field's solid along the gradient where that leads out, else to
+  /// the `nearest_free_place`. Without, and where there is none, it stays where it is: `is_blocked`, with the
+  /// displacement as it was.
   bool pushes_out = true;
+  /// How far that may be, world units; nothing: the longest edge of the box, and the way out of what it is in.
+  std::optional<double> max_push_out = std::nullopt;
   std::optional<FloorOptions> floor = std::nullopt;  ///< nothing: a body that slides, whatever it lies on
 };
 

@@ -56,7 +56,30 @@ struct Body {
     }
     return fraction;
   }
-  void move_out(const SweepHit& hit) { box.centre += hit.normal * (hit.depth + options.skin); }
+  // Out of what it starts inside of; false where it stays there.
+  bool move_out(const SweepHit& hit) {
+    if (!options.pushes_out) return false;
+    const double longest = 2.0 * std::max({box.half_size.x, box.half_size.y, box.half_size.z});
+    const double furthest = options.max_push_out.value_or(longest + hit.depth + options.skin);
+    const DVec3 along_normal = hit.normal * (hit.depth + options.skin);
+    if (hit.in_field && glm::length(along_normal) <= furthest) {
+      OrientedBox moved = box;
+      moved.centre += along_normal;
+      if (overlaps(tracer, types, moved).empty()) {
+        box.centre = moved.centre;
+        return true;
+      }
+    }
+    const auto away = nearest_free_place(tracer, types, box, furthest);
+    if (!away) return false;
+    box.centre += *away;
+    // And on by the skin where there is room.
+    const double length = glm::length(*away);
+    OrientedBox further = box;
+    if (length > 0.0) further.centre += *away * (options.skin / length);
+    if (overlaps(tracer, types, further).empty()) box = further;
+    return true;
+  }
   // Moves it as far as it goes; returns what it met.
   std::optional<SweepHit> advance(DVec3 displacement) {
     const auto hit = sweep(displacement);
@@ -82,8 +105,7 @@ SlideResult slide(Body body, DVec3 displacement) {
     result.is_blocked = true;
     result.normal = hit->normal;
     if (hit->depth > 0.0) {
-      if (!body.options.pushes_out) break;
-      body.move_out(*hit);
+      if (!body.move_out(*hit)) break;
       continue;
     }
     const double fraction = body.move_to(*hit, left);
@@ -153,8 +175,7 @@ class Walk {
       }
       result_.is_blocked = true;
       result_.normal = hit->normal;
-      if (!body_.options.pushes_out) return false;
-      body_.move_out(*hit);
+      if (!body_.move_out(*hit)) return false;
     }
     return true;
   }
@@ -187,8 +208,7 @@ class Walk {
     if (hit.depth > 0.0) {
       result_.is_blocked = true;
       result_.normal = hit.normal;
-      if (body_.options.pushes_out) body_.move_out(hit);
-      return body_.options.pushes_out;
+      return body_.move_out(hit);
     }
     left_ *= 1.0 - body_.move_to(hit, way);
     if (is_floor(hit.normal) && !(glm::dot(displacement_, up_) > 0.0)) {

@@ -111,6 +111,22 @@ void walks(benchmark::State& state, const World& (*world_of)()) {
   }
 }
 
+// Out of ground that they stand `depth` deep in.
+void free_places(benchmark::State& state, const World& (*world_of)(), Turn turn, double depth) {
+  const World& world = world_of();
+  std::vector<Query> all = queries(world, turn, 0.3);
+  for (Query& query : all) query.box.centre.y -= depth;
+  std::size_t next = 0;
+  int found = 0;
+  for (auto _ : state) {
+    const Query& query = all[next++ % all.size()];
+    const auto away = nearest_free_place(world.tracer, world.scene.types, query.box, 2.0);
+    found += away.has_value();
+    benchmark::DoNotOptimize(away);
+  }
+  state.counters["found"] = static_cast<double>(found) / static_cast<double>(state.iterations());
+}
+
 [[maybe_unused]] const bool registered = [] {
   for (const bool is_field : {true, false}) {
     const std::string path = is_field ? "scene/sweep/field/" : "scene/sweep/blocks/";
@@ -123,6 +139,8 @@ void walks(benchmark::State& state, const World& (*world_of)()) {
     add("down_upright", Turn::Upright, 0.3);
     add("down_any", Turn::Any, 0.3);
     benchmark::RegisterBenchmark((path + "walk").c_str(), walks, world);
+    benchmark::RegisterBenchmark((path + "free_place").c_str(), free_places, world, Turn::None, 0.7);
+    benchmark::RegisterBenchmark((path + "free_place_any").c_str(), free_places, world, Turn::Any, 0.7);
   }
   return true;
 }();

@@ -1,0 +1,193 @@
+// The nearest place at which a box meets nothing.
+//
+//   voxels along the box's axes:                turned grids, and fields:
+//   there the box touches something on each     cubes of displacements, the nearest first; all of one is blocked
+//   axis along which it was moved               where the box, less the cube, meets something
+//     +--+--+                                     +-------+
+//     |##|##|  <- box: its place is one of        |  +-+  |  box     +-+ what all places of the cube
+//     +--+--+     few for each axis, tried        |  +-+  |          +-+ have in common
+//                 from the nearest on             +-------+
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <queue>
+#include <vector>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <quoin/scene/sweep.h>
+
+#include "scene/query/query_in_grid.h"
+
+namespace quoin {
+namespace {
+
+class FreePlace {
+ public:
+  FreePlace(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box, double max_distance)
+      : tracer_(tracer),
+        types_(types),
+        box_(box),
+        axes_(glm::mat3_cast(unit_rotation(box.rotation))),
+        max_distance_(max_distance) {}
+
+  [[nodiscard]] std::optional<DVec3> find() {
+    if (is_free(DVec3(0.0))) return DVec3(0.0);
+    return has_own_axes() ? among_planes() : among_cubes();
+  }
+
+ private:
+  // Displacements are along the box's axes.
+  [[nodiscard]] DVec3 in_world(DVec3 displacement) const { return axes_ * displacement; }
+  [[nodiscard]] OrientedBox at(DVec3 displacement) const {
+    return {box_.centre + in_world(displacement), box_.half_size, box_.rotation};
+  }
+  [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, types_, at(displacement)).empty(); }
+
+  // Whether all that may be in the way are voxels whose axes are the box's. Collects where it touches their faces.
+  [[nodiscard]] bool has_own_axes() {
+    const DVec3 reach = reach_of_axes(half_axes_of(box_)) + max_distance_;
+    bool are_own = true;
+    SceneQuery::instances(tracer_).visit_box({box_.centre - reach, box_.centre + reach}, [&](std::size_t i) {
+      const PlacedGrid& placed = tracer_.placed()[i];
+      are_own = are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed));
+    });
+    return are_own;
+  }
+
+  bool add_planes(const PlacedGrid& placed) {
+    const ToGrid to_grid(placed);
+    const DVec3 centre = to_grid.point(box_.centre);
+    const IBox bounds = placed.voxels->bounds();
+    // What rounding may leave of an overlap.
+    const double room = 0x1p-50 * (glm::length(box_.centre) + glm::length(placed.position) + max_distance_);
+    for (int axis = 0; axis < 3; ++axis) {
+      const DVec3 direction = to_grid.axes * axes_[axis] * placed.voxel_size;
+      const DVec3 size = glm::abs(direction);
+      const int of_grid = size.x > size.y ? (size.x > size.z ? 0 : 2) : size.y > size.z ? 1 : 2;
+      if (!(size[of_grid] > 1.0 - 1e-12) || !(size.x + size.y + size.z < 1.0 + 1e-9)) return false;
+      const double half = box_.half_size[axis];
+      const double reach = (half + max_distance_) / placed.voxel_size;
+      const double first = std::max(std::floor(centre[of_grid] - reach), double(bounds.min[of_grid]));
+      const double last = std::min(std::ceil(centre[of_grid] + reach), double(bounds.max[of_grid]));
+      for (double plane = first; plane <= last; ++plane) {
+        const double away = std::copysign(plane - centre[of_grid], (plane - centre[of_grid]) * direction[of_grid]);
+        for (const double side : {-half, half}) {
+          const double to = away * placed.voxel_size + side;
+          add_place(axis, to + std::copysign(room, to));
+        }
+      }
+    }
+    return true;
+  }
+  void add_place(int axis, double along) {
+    if (std::abs(along) <= max_distance_) places_[static_cast<std::size_t>(axis)].push_back(along);
+  }
+
+  // One of the places of each axis, 0 included.
+  [[nodiscard]] std::optional<DVec3> among_planes() {
+    for (std::vector<double>& along : places_) {
+      along.push_back(0.0);
+      std::sort(along.begin(), along.end(),
+                [](double a, double b) { return std::abs(a) != std::abs(b) ? std::abs(a) < std::abs(b) : a > b; });
+      along.erase(std::unique(along.begin(), along.end()), along.end());
+    }
+    struct Candidate {
+      double square;
+      std::array<std::size_t, 3> which;
+      bool operator<(const Candidate& other) const {
+        return square != other.square ? square > other.square : which > other.which;
+      }
+    };
+    std::priority_queue<Candidate> next;
+    const auto displacement = [&](const std::array<std::size_t, 3>& which) {
+      return DVec3(places_[0][which[0]], places_[1][which[1]], places_[2][which[2]]);
+    };
+    const auto push = [&](std::array<std::size_t, 3> which, std::size_t axis) {
+      if (++which[axis] >= places_[axis].size()) return;
+      const DVec3 d = displacement(which);
+      if (glm::dot(d, d) <= max_distance_ * max_distance_) next.push({glm::dot(d, d), which});
+    };
+    next.push({0.0, {}});
+    while (!next.empty()) {
+      const std::array<std::size_t, 3> which = next.top().which;
+      next.pop();
+      if (is_free(displacement(which))) return in_world(displacement(which));
+      // Each once: the last axis that was gone along, and those after it.
+      push(which, 2);
+      if (which[2] == 0) push(which, 1);
+      if (which[2] == 0 && which[1] == 0) push(which, 0);
+    }
+    return std::nullopt;
+  }
+
+  // Displacements from `middle` - `half` to `middle` + `half`.
+  struct Cube {
+    DVec3 middle{0.0};
+    double half = 0.0;
+    double least = 0.0;  // length of one of them
+    bool operator<(const Cube& other) const { return least > other.least; }
+  };
+
+  [[nodiscard]] bool is_blocked(const Cube& cube) const {
+    OrientedBox common = at(cube.middle);
+    common.half_size -= cube.half;
+    return is_box(common) && !overlaps(tracer_, types_, common).empty();
+  }
+
+  // From a free place back towards where it was, sliding along what it meets.
+  [[nodiscard]] DVec3 nearer(DVec3 free) const {
+    SlideOptions options;
+    options.pushes_out = false;
+    options.max_contacts = 8;
+    options.skin = std::min(options.skin, 0.01 * max_distance_);
+    const DVec3 back = move_and_slide(tracer_, types_, at(free), -in_world(free), options).centre - box_.centre;
+    return glm::length(back) < glm::length(free) ? back : in_world(free);
+  }
+
+  [[nodiscard]] std::optional<DVec3> among_cubes() {
+    const double finest = max_distance_ / 64.0;
+    double shortest = std::nextafter(max_distance_, std::numeric_limits<double>::infinity());
+    std::optional<DVec3> best;
+    std::priority_queue<Cube> next;
+    next.push({DVec3(0.0), max_distance_, 0.0});
+    while (!next.empty() && next.top().least < shortest) {
+      const Cube cube = next.top();
+      next.pop();
+      if (is_blocked(cube)) continue;
+      if (glm::length(cube.middle) < shortest && is_free(cube.middle)) {
+        best = nearer(cube.middle);
+        shortest = glm::length(*best) - finest;
+      }
+      if (cube.half <= finest) continue;
+      for (int i = 0; i < 8; ++i) {
+        const double half = 0.5 * cube.half;
+        const DVec3 middle = cube.middle + half * (2.0 * DVec3(i & 1, i >> 1 & 1, i >> 2) - 1.0);
+        const double least = glm::length(glm::max(glm::abs(middle) - half, 0.0));
+        if (least < shortest) next.push({middle, half, least});
+      }
+    }
+    return best;
+  }
+
+  const SceneTracer& tracer_;
+  const VoxelRegistry& types_;
+  const OrientedBox& box_;
+  const glm::dmat3 axes_;
+  const double max_distance_;
+  std::array<std::vector<double>, 3> places_;  // along each of the box's axes
+};
+
+}  // namespace
+
+std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
+                                        double max_distance) {
+  if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
+  return FreePlace(tracer, types, box, max_distance).find();
+}
+
+}  // namespace quoin
