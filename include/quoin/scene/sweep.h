@@ -40,8 +40,8 @@ struct SweepHit {
 ///         trilinear field, halved until these are near enough to it.
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement);
 
-/// How far a box has to be moved to meet nothing, in the world: 0 where it meets nothing; nothing where there is no such
-/// place within `max_distance`, world units.
+/// How far a box has to be moved to meet nothing, in the world: 0 where it meets nothing; nothing where there is no
+/// such place within `max_distance`, world units.
 ///
 /// Exact:  among voxels whose axes are the box's own, the nearest such place, gaps that are as wide as the box
 ///         included; of several that are as near, one.
@@ -50,8 +50,8 @@ struct SweepHit {
 /// Cost:   an overlap query for each place that is nearer: some hundred of them for a box of the size of a voxel and
 ///         twice that distance.
 /// Errors: sizes, places and distances that are not finite, or below 0, have none.
-[[nodiscard]] std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const VoxelRegistry& types,
-                                                      const OrientedBox& box, double max_distance);
+[[nodiscard]] std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box,
+                                                      double max_distance);
 
 /// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {

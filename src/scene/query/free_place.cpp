@@ -28,12 +28,8 @@ namespace {
 
 class FreePlace {
  public:
-  FreePlace(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box, double max_distance)
-      : tracer_(tracer),
-        types_(types),
-        box_(box),
-        axes_(glm::mat3_cast(unit_rotation(box.rotation))),
-        max_distance_(max_distance) {}
+  FreePlace(const SceneTracer& tracer, const OrientedBox& box, double max_distance)
+      : tracer_(tracer), box_(box), axes_(glm::mat3_cast(unit_rotation(box.rotation))), max_distance_(max_distance) {}
 
   [[nodiscard]] std::optional<DVec3> find() {
     if (is_free(DVec3(0.0))) return DVec3(0.0);
@@ -46,7 +42,7 @@ class FreePlace {
   [[nodiscard]] OrientedBox at(DVec3 displacement) const {
     return {box_.centre + in_world(displacement), box_.half_size, box_.rotation};
   }
-  [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, types_, at(displacement)).empty(); }
+  [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement)).empty(); }
 
   // Whether all that may be in the way are voxels whose axes are the box's. Collects where it touches their faces.
   [[nodiscard]] bool has_own_axes() {
@@ -136,7 +132,7 @@ class FreePlace {
   [[nodiscard]] bool is_blocked(const Cube& cube) const {
     OrientedBox common = at(cube.middle);
     common.half_size -= cube.half;
-    return is_box(common) && !overlaps(tracer_, types_, common).empty();
+    return is_box(common) && !overlaps(tracer_, common).empty();
   }
 
   // From a free place back towards where it was, sliding along what it meets.
@@ -145,7 +141,7 @@ class FreePlace {
     options.pushes_out = false;
     options.max_contacts = 8;
     options.skin = std::min(options.skin, 0.01 * max_distance_);
-    const DVec3 back = move_and_slide(tracer_, types_, at(free), -in_world(free), options).centre - box_.centre;
+    const DVec3 back = move_and_slide(tracer_, at(free), -in_world(free), options).centre - box_.centre;
     return glm::length(back) < glm::length(free) ? back : in_world(free);
   }
 
@@ -175,7 +171,6 @@ class FreePlace {
   }
 
   const SceneTracer& tracer_;
-  const VoxelRegistry& types_;
   const OrientedBox& box_;
   const glm::dmat3 axes_;
   const double max_distance_;
@@ -184,10 +179,9 @@ class FreePlace {
 
 }  // namespace
 
-std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const VoxelRegistry& types, const OrientedBox& box,
-                                        double max_distance) {
+std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance) {
   if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
-  return FreePlace(tracer, types, box, max_distance).find();
+  return FreePlace(tracer, box, max_distance).find();
 }
 
 }  // namespace quoin

@@ -31,12 +31,11 @@ Grid heap(Random& random, int count) {
 }
 
 // The least length of displacements, among many, at which the box meets nothing.
-double least_of_samples(const SceneTracer& tracer, const Scene& scene, const OrientedBox& box, double below,
-                        Random& random) {
+double least_of_samples(const SceneTracer& tracer, const OrientedBox& box, double below, Random& random) {
   double least = below;
   for (int i = 0; i < 3000; ++i) {
     const DVec3 by = random.direction() * (least * std::cbrt(std::abs(random.share())));
-    if (glm::length(by) < least && overlaps(tracer, scene.types, moved(box, by)).empty()) least = glm::length(by);
+    if (glm::length(by) < least && overlaps(tracer, moved(box, by)).empty()) least = glm::length(by);
   }
   return least;
 }
@@ -57,15 +56,15 @@ TEST(FreePlace, AmongHeapsOfBlocksItIsTheNearest) {
     const DVec3 half = glm::abs(random.vector()) * 1.2 * instance.voxel_size;
     const OrientedBox box{instance.position + random.vector() * 2.0, half, {1, 0, 0, 0}};
     const double reach = 2.5 * instance.voxel_size;
-    const auto away = nearest_free_place(tracer, scene.types, box, reach);
-    const double least = least_of_samples(tracer, scene, box, reach, random);
+    const auto away = nearest_free_place(tracer, box, reach);
+    const double least = least_of_samples(tracer, box, reach, random);
     if (!away) {
       ++none;
       EXPECT_EQ(least, reach) << round;
       continue;
     }
     ++found;
-    EXPECT_TRUE(overlaps(tracer, scene.types, moved(box, *away)).empty()) << round;
+    EXPECT_TRUE(overlaps(tracer, moved(box, *away)).empty()) << round;
     EXPECT_LE(glm::length(*away), least + 1e-5) << round;
   }
   EXPECT_GT(found, 80);
@@ -82,15 +81,15 @@ TEST(FreePlace, AmongTurnedBlocksAndFieldsItIsNearTheNearest) {
     const SceneTracer tracer(scene);
     const OrientedBox box{random.vector() * 3.0, 0.2 + glm::abs(random.vector()) * 0.6, random.rotation()};
     constexpr double kReach = 2.0;
-    const auto away = nearest_free_place(tracer, scene.types, box, kReach);
-    const double least = least_of_samples(tracer, scene, box, kReach, random);
+    const auto away = nearest_free_place(tracer, box, kReach);
+    const double least = least_of_samples(tracer, box, kReach, random);
     if (!away) {
       // What little room there may be is smaller than a 32nd.
       EXPECT_GT(least, 0.5 * kReach) << round;
       continue;
     }
     ++found;
-    EXPECT_TRUE(overlaps(tracer, scene.types, moved(box, *away)).empty()) << round;
+    EXPECT_TRUE(overlaps(tracer, moved(box, *away)).empty()) << round;
     EXPECT_LE(glm::length(*away), least + kReach / 32.0) << round;
   }
   EXPECT_GT(found, 8);
@@ -102,7 +101,7 @@ TEST(FreePlace, AShaftAsWideAsTheBoxIsFound) {
   grid.fill_box({{1, -4, 0}, {2, 5, 1}}, kAir);
   const Scene scene = scene_of(std::move(grid));
   const SceneTracer tracer(scene);
-  const auto away = nearest_free_place(tracer, scene.types, {{0.7, 0.3, 0.6}, DVec3(0.5), {1, 0, 0, 0}}, 2.0);
+  const auto away = nearest_free_place(tracer, {{0.7, 0.3, 0.6}, DVec3(0.5), {1, 0, 0, 0}}, 2.0);
   ASSERT_TRUE(away.has_value());
   EXPECT_NEAR(glm::distance(*away, DVec3(0.8, 0.0, -0.1)), 0.0, 1e-9);
 }
@@ -113,17 +112,17 @@ TEST(FreePlace, ThereIsNoneBeyondTheDistance) {
   const Scene scene = scene_of(std::move(grid));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 8.6, 0.5}, DVec3(0.5), {1, 0, 0, 0}};
-  EXPECT_FALSE(nearest_free_place(tracer, scene.types, box, 1.89).has_value());
-  EXPECT_NEAR(nearest_free_place(tracer, scene.types, box, 1.91)->y, 1.9, 1e-9);
-  EXPECT_FALSE(nearest_free_place(tracer, scene.types, box, 0.0).has_value());
-  EXPECT_EQ(*nearest_free_place(tracer, scene.types, moved(box, {0, 2, 0}), 0.0), DVec3(0.0));
+  EXPECT_FALSE(nearest_free_place(tracer, box, 1.89).has_value());
+  EXPECT_NEAR(nearest_free_place(tracer, box, 1.91)->y, 1.9, 1e-9);
+  EXPECT_FALSE(nearest_free_place(tracer, box, 0.0).has_value());
+  EXPECT_EQ(*nearest_free_place(tracer, moved(box, {0, 2, 0}), 0.0), DVec3(0.0));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double bad : {-1.0, nan, kInfinity}) {
-    EXPECT_FALSE(nearest_free_place(tracer, scene.types, box, bad).has_value());
+    EXPECT_FALSE(nearest_free_place(tracer, box, bad).has_value());
   }
-  EXPECT_FALSE(nearest_free_place(tracer, scene.types, {{nan, 0, 0}, DVec3(0.5), {1, 0, 0, 0}}, 1.0).has_value());
+  EXPECT_FALSE(nearest_free_place(tracer, {{nan, 0, 0}, DVec3(0.5), {1, 0, 0, 0}}, 1.0).has_value());
   // A point.
-  EXPECT_NEAR(nearest_free_place(tracer, scene.types, {{0.5, 9.8, 0.5}, DVec3(0.0), {1, 0, 0, 0}}, 1.0)->y, 0.2, 1e-9);
+  EXPECT_NEAR(nearest_free_place(tracer, {{0.5, 9.8, 0.5}, DVec3(0.0), {1, 0, 0, 0}}, 1.0)->y, 0.2, 1e-9);
 }
 
 TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {
@@ -136,12 +135,11 @@ TEST(FreePlace, ABoxOnAHumpStandsOnItAndStaysThere) {
   for (const bool walks : {false, true}) {
     SlideOptions options;
     if (walks) options.floor.emplace();
-    const SlideResult out = move_and_slide(tracer, scene.types, box, {0, -0.02, 0}, options);
+    const SlideResult out = move_and_slide(tracer, box, {0, -0.02, 0}, options);
     EXPECT_NEAR(out.centre.x, 50.5, 1e-9);
     EXPECT_NEAR(out.centre.y, 22.9, 0.003);
     EXPECT_NEAR(out.centre.z, 50.5, 1e-9);
-    const SlideResult again =
-        move_and_slide(tracer, scene.types, {out.centre, box.half_size, box.rotation}, {0, -0.02, 0}, options);
+    const SlideResult again = move_and_slide(tracer, {out.centre, box.half_size, box.rotation}, {0, -0.02, 0}, options);
     EXPECT_NEAR(glm::distance(again.centre, out.centre), 0.0, 0.003);
   }
 }
@@ -156,15 +154,15 @@ TEST(FreePlace, WhoWasMovedOutStaysOut) {
     const OrientedBox box{random.vector() * 3.0, {0.4, 0.9, 0.4}, {1, 0, 0, 0}};
     SlideOptions options;
     options.max_push_out = 20.0;
-    const SlideResult out = move_and_slide(tracer, scene.types, box, DVec3(0.0), options);
+    const SlideResult out = move_and_slide(tracer, box, DVec3(0.0), options);
     const OrientedBox there{out.centre, box.half_size, box.rotation};
-    EXPECT_TRUE(overlaps(tracer, scene.types, there).empty()) << round;
-    const SlideResult again = move_and_slide(tracer, scene.types, there, DVec3(0.0), options);
+    EXPECT_TRUE(overlaps(tracer, there).empty()) << round;
+    const SlideResult again = move_and_slide(tracer, there, DVec3(0.0), options);
     EXPECT_EQ(again.centre, out.centre) << round;
     EXPECT_FALSE(again.is_blocked) << round;
     options.max_push_out = 0.0;
-    const bool was_inside = !overlaps(tracer, scene.types, box).empty();
-    const SlideResult stays = move_and_slide(tracer, scene.types, box, DVec3(0.0), options);
+    const bool was_inside = !overlaps(tracer, box).empty();
+    const SlideResult stays = move_and_slide(tracer, box, DVec3(0.0), options);
     EXPECT_EQ(stays.is_blocked, was_inside) << round;
     EXPECT_EQ(stays.centre, box.centre) << round;
   }

@@ -65,19 +65,19 @@ struct Body {
     if (hit.in_field && glm::length(along_normal) <= furthest) {
       OrientedBox moved = box;
       moved.centre += along_normal;
-      if (overlaps(tracer, types, moved).empty()) {
+      if (overlaps(tracer, moved).empty()) {
         box.centre = moved.centre;
         return true;
       }
     }
-    const auto away = nearest_free_place(tracer, types, box, furthest);
+    const auto away = nearest_free_place(tracer, box, furthest);
     if (!away) return false;
     box.centre += *away;
     // And on by the skin where there is room.
     const double length = glm::length(*away);
     OrientedBox further = box;
     if (length > 0.0) further.centre += *away * (options.skin / length);
-    if (overlaps(tracer, types, further).empty()) box = further;
+    if (overlaps(tracer, further).empty()) box = further;
     return true;
   }
   // Moves it as far as it goes; returns what it met.
