@@ -202,7 +202,7 @@ void add_generate_command(CLI::App& app, int& status) {
   smooth->add_flag("!--no-caves", options->smooth.caves, "No caves");
   smooth->footer(
       "The same seed gives the same world on every machine, of the same heights as `terrain` has.\n"
-      "Example: quoin generate smooth-terrain hills.json && quoin render hills.json hills.png");
+      "Example: quoin generate smooth-terrain hills.json && quoin render hills.json -o hills.png");
 }
 
 }  // namespace quoin::tool

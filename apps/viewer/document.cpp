@@ -77,6 +77,18 @@ bool Document::can_save_in_place() const {
   return can_write(path_) && loaded_.named_files.empty();
 }
 
+std::filesystem::path Document::proposed_path() const {
+  bool has_field = false;
+  loaded_.scene.grids().for_each(
+      [&](GridHandle, const SceneGrid& grid) { has_field = has_field || grid.field.chunk_count() > 0; });
+  const auto own = format_to_write(path_);
+  if (own && !(has_field && *own == FileFormat::Vox)) return path_;
+  // NAME of NAME.nii.gz too.
+  std::filesystem::path proposed = path_;
+  if (proposed.extension() == ".gz") proposed.replace_extension();
+  return proposed.replace_extension(has_field || loaded_.format == "scene" ? ".json" : ".vox");
+}
+
 std::string Document::name() const {
   return path_.empty() ? "empty scene" : path_.filename().string();
 }

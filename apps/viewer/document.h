@@ -42,6 +42,9 @@ class Document {
   /// Whether it may be saved under its own name without a question: that can be written, and it is no scene file that
   /// names others, whose models would then be in it.
   [[nodiscard]] bool can_save_in_place() const;
+  /// The name to save it under that is proposed: its own, where that format is written and holds what is there, else
+  /// one beside it of a format that does.
+  [[nodiscard]] std::filesystem::path proposed_path() const;
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
   [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }

@@ -132,6 +132,23 @@ TEST(Document, ASceneFileIsItsOwnOnceItHoldsItsModels) {
   EXPECT_EQ(first(**again).position, first(**hills).position);
 }
 
+TEST(Document, TheNameThatIsProposedIsOfAFormatThatHoldsIt) {
+  const auto proposed = [](const char* path, const char* format, bool has_field) {
+    LoadedScene loaded;
+    loaded.format = format;
+    SceneGrid grid;
+    if (has_field) grid.field.add_sphere({0, 0, 0}, 4.0, 1);
+    loaded.scene.add_grid(std::move(grid));
+    return Document(std::move(loaded), path).proposed_path().string();
+  };
+  EXPECT_EQ(proposed("a/castle.vox", "vox", false), "a/castle.vox");
+  EXPECT_EQ(proposed("a/hills.json", "scene", true), "a/hills.json");
+  EXPECT_EQ(proposed("a/scan.nii.gz", "nifti", true), "a/scan.json");
+  EXPECT_EQ(proposed("a/scan.nrrd", "nrrd", true), "a/scan.json");
+  EXPECT_EQ(proposed("a/dug.vox", "vox", true), "a/dug.json");
+  EXPECT_EQ(proposed("a/model.qb", "qubicle", false), "a/model.vox");
+}
+
 TEST(Document, FacesFollowEdits) {
   Document document = small_document();
   const FaceCounts before = document.faces();

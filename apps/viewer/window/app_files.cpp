@@ -139,9 +139,7 @@ void App::adopt(OpenDocument opened) {
 
 void App::ask_where_to_save() {
   if (!state_.can_edit()) return;
-  std::filesystem::path start = state_.open.document->path();
-  if (!can_write(start)) start.replace_extension(state_.open.document->loaded().format == "scene" ? ".json" : ".vox");
-  chooser_.show(FileChooser::Purpose::Save, start);
+  chooser_.show(FileChooser::Purpose::Save, state_.open.document->proposed_path());
 }
 
 void App::save(const std::filesystem::path& path, bool accepts_losses) {
