@@ -17,7 +17,7 @@ enum class BrushAction : std::uint8_t {
   Remove,   ///< everything becomes air
   Paint,    ///< what is not air becomes the brush's type
   Smooth,   ///< of fields only
-  Flatten,  ///< likewise: towards the plane of the first touch
+  Flatten,  ///< likewise: towards the plane of the first touch, with what is there
 };
 
 /// Whether a stroke follows the surface, rather than the layer or plane of its first touch.

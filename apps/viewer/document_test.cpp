@@ -217,6 +217,7 @@ TEST(Document, FieldsAreSculptedPaintedAndUndone) {
   hit.in_field = true;
   hit.position = {10.0 + 30.0, 10.0, -30.0 + 30.0};  // sample (60, 20, 60): across the border of chunks
   hit.normal = {0.0, 1.0, 0.0};
+  hit.type = 1;
   Document document(std::move(loaded), "hill.json");
   const auto field = [&]() -> const DensityGrid& { return document.scene().grids()[handle].field; };
   const DensityGrid before = field().snapshot();
@@ -242,8 +243,13 @@ TEST(Document, FieldsAreSculptedPaintedAndUndone) {
   stroke(BrushAction::Paint, hit.position + DVec3(0.0, 0.0, 9.0));
   EXPECT_EQ(field().material({60, 18, 77}), 2);
   stroke(BrushAction::Smooth, hit.position);
-  stroke(BrushAction::Flatten, hit.position + DVec3(3.0, 0.0, 0.0));
-  EXPECT_EQ(document.history().steps(), 5U);
+  // What was dug is filled with the ground's material, not the brush's.
+  for (int i = 0; i < 12; ++i) stroke(BrushAction::Flatten, hit.position + DVec3(3.0, 0.0, 0.0));
+  EXPECT_LT(field().density_at({60.0, 19.0, 60.0}), 0.0F);
+  const DVec3 filled{60.0, 18.0, 54.0};
+  EXPECT_LT(field().density_at(filled), 0.0F);
+  EXPECT_EQ(field().material(IVec3(filled)), 1);
+  EXPECT_GT(document.history().steps(), 5U);
   const DensityGrid after = field().snapshot();
   const auto expect_same = [&](const DensityGrid& wanted) {
     ASSERT_EQ(field().chunks(), wanted.chunks());

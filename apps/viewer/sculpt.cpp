@@ -45,6 +45,7 @@ std::optional<SurfacePlace> SurfacePlace::of(const SceneHit& hit, const Instance
   if (!ray) return std::nullopt;
   SurfacePlace place;
   place.point = ray->origin;
+  place.material = hit.type;
   const double length = glm::length(ray->direction);
   if (length > 0.0) place.normal = ray->direction / length;
   return place;
@@ -85,7 +86,7 @@ std::int64_t sculpt(const Brush& brush, DVec3 centre, const SurfacePlace& first,
     case BrushAction::Smooth:
       return field.smooth(centre, 2.0 * radius, kStrength);
     case BrushAction::Flatten:
-      return field.flatten(centre, 2.0 * radius, {first.point, first.normal, kStrength, brush.type});
+      return field.flatten(centre, 2.0 * radius, {first.point, first.normal, kStrength, first.material});
   }
   return 0;
 }

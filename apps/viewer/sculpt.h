@@ -14,6 +14,7 @@ namespace quoin::viewer {
 struct SurfacePlace {
   DVec3 point{0.0};
   DVec3 normal{0.0, 1.0, 0.0};  ///< unit, into the air
+  VoxelType material = kAir;    ///< what is there
 
   /// Nothing when the hit is not of a field, or the instance has no place.
   [[nodiscard]] static std::optional<SurfacePlace> of(const SceneHit& hit, const Instance& instance,
@@ -30,7 +31,8 @@ struct SurfacePlace {
 [[nodiscard]] IBox reach_of(const Brush& brush, DVec3 centre, const DensityGrid& field);
 
 /// A touch of a brush: adds a ball or a box of its type, takes one away, gives what is solid its type, smooths, or
-/// flattens towards the plane of `first`, where the stroke began. Returns how many samples changed.
+/// flattens towards the plane of `first`, where the stroke began, hollows filled with what is there. Returns how many
+/// samples changed.
 std::int64_t sculpt(const Brush& brush, DVec3 centre, const SurfacePlace& first, DensityGrid& field);
 
 }  // namespace quoin::viewer

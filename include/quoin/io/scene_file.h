@@ -96,7 +96,8 @@ struct SceneFile {
 /// one that there is in everything become that.
 ///
 /// Errors: those of `parse_scene_file` and of reading the files (with their paths); Unsupported when one of them is a
-///         scene file itself or a volume; LimitExceeded when all files together have more types than a registry holds.
+///         scene file that names files itself; LimitExceeded when all files together have more types than a registry
+///         holds.
 [[nodiscard]] Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options = {},
                                                   Threads threads = {}, const Progress& progress = {});
 /// The same of bytes. Errors: Unsupported where they name files, which only a path finds.

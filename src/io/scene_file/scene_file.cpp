@@ -52,6 +52,7 @@ struct Body {
   };
   std::vector<Group> groups;  ///< parents first
   std::vector<Instance> instances;
+  std::vector<Lamp> lamps;
 };
 
 /// Moves the types and grids of a file's scene into `into`; returns what the grids are there.
@@ -101,6 +102,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
     instance.layer = layer_of(instance.layer);
     body.instances.push_back(std::move(instance));
   }
+  body.lamps = std::move(from.lamps);
   return body;
 }
 
@@ -114,6 +116,17 @@ void put(const SceneFile::Placement& outer, Placed& placed) {
   const DQuat q = placed.rotation;
   placed.rotation = outer.rotation * DQuat(q.w, q.x, side * q.y, side * q.z);
   placed.mirrored = placed.mirrored != outer.mirrored;
+}
+
+/// A lamp of a body: at a distance that is scaled as it is, it is as bright as before.
+Lamp placed(const Lamp& inner, const SceneFile::Placement& outer) {
+  const DVec3 side(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0);
+  Lamp lamp = inner;
+  lamp.position = outer.position + outer.rotation * (inner.position * side * outer.scale);
+  lamp.direction = outer.rotation * (inner.direction * side);
+  lamp.intensity *= outer.scale * outer.scale;
+  lamp.range *= outer.scale;
+  return lamp;
 }
 
 /// An instance of a body, where a placement puts the body.
@@ -133,8 +146,10 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
                                 const Progress& progress) {
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (*format == FileFormat::Scene) {
-    return make_error(ErrorCode::Unsupported, "a scene file within a scene file", path.string());
+  // These may name each other in a circle.
+  if (*format == FileFormat::Scene && !files_named_in_scene(path).empty()) {
+    return make_error(ErrorCode::Unsupported,
+                      "a scene file that names others, within a scene file: save it whole first", path.string());
   }
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
@@ -215,6 +230,9 @@ class Placer {
   }
 
   void place_body(const SceneFile::Placement& placement, const Body& body) {
+    if (placement.visible) {
+      for (const Lamp& lamp : body.lamps) scene_.lamps.push_back(placed(lamp, placement));
+    }
     const GroupHandle outer = named(groups_, placement.group);
     const LayerHandle layer = named(layers_, placement.layer);
     if (body.instances.size() == 1) {

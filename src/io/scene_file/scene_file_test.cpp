@@ -308,6 +308,42 @@ TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
   EXPECT_LT(glm::length(world_from_grid(second, scene.grids()[second.grid], DVec3(3, 1, 0)) - expected), 1e-12);
 }
 
+// A smooth world with a lamp, saved whole, under a house of blocks.
+TEST_F(SceneFiles, PlaceSceneFilesThatHoldAllThemselves) {
+  Scene world;
+  VoxelProperties grass;
+  grass.colour = {10, 180, 20, 255};
+  ASSERT_TRUE(world.types.add(grass));
+  SceneGrid ground;
+  ground.field.add_sphere({0, 0, 0}, 20.0, 1);
+  world.add_instance({"ground", world.add_grid(std::move(ground)), {1, 2, 3}});
+  Lamp lamp;
+  lamp.position = {5, 0, 0};
+  lamp.direction = {1, 0, 0};
+  lamp.intensity = 3.0;
+  lamp.range = 10.0;
+  world.lamps.push_back(lamp);
+  ASSERT_TRUE(save_scene(world, folder_ / "world.json"));
+  const auto loaded = load_scene(write_text(R"({"quoin_scene": 1,
+      "files": [{"id": "w", "path": "world.json"}, {"id": "house", "path": "red.vox"}],
+      "instances": [{"file": "w", "position": [100, 0, 0], "scale": 2, "mirrored": true}, {"file": "house"},
+                    {"file": "w", "visible": false}]})"));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const Scene& scene = loaded->scene;
+  ASSERT_EQ(scene.instances().size(), 3U);
+  const Instance& placed = scene.instances()[scene.instances().handles()[0]];
+  EXPECT_EQ(placed.position, DVec3(98, 4, 6));
+  EXPECT_TRUE(placed.mirrored);
+  const DensityGrid& field = scene.grids()[placed.grid].field;
+  EXPECT_EQ(field.solid_count(), world.grids()[world.grids().handles()[0]].field.solid_count());
+  EXPECT_EQ(scene.types[field.material({0, 0, 0})].colour, grass.colour);
+  ASSERT_EQ(scene.lamps.size(), 1U) << "of what is shown";
+  EXPECT_EQ(scene.lamps[0].position, DVec3(90, 0, 0));
+  EXPECT_EQ(scene.lamps[0].direction, DVec3(-1, 0, 0));
+  EXPECT_EQ(scene.lamps[0].intensity, 12.0);
+  EXPECT_EQ(scene.lamps[0].range, 20.0);
+}
+
 TEST_F(SceneFiles, SayWhichFileIsWrong) {
   const auto with_path = [&](const std::string& name) {
     const auto loaded = load_scene(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ")" + name +
@@ -316,7 +352,8 @@ TEST_F(SceneFiles, SayWhichFileIsWrong) {
   };
   EXPECT_EQ(with_path("red.vox"), "none");
   EXPECT_NE(with_path("absent.vox").find("absent.vox"), std::string::npos);
-  EXPECT_NE(with_path("scene.json").find("a scene file within a scene file"), std::string::npos);
+  // Itself.
+  EXPECT_NE(with_path("scene.json").find("a scene file that names others, within a scene file"), std::string::npos);
   std::ofstream(folder_ / "noise.vox") << "not voxels";
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
 }

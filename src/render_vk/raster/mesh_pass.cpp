@@ -305,6 +305,12 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     draw_far(commands, data, step);
     bind_corners(commands);
   }
+  draw_chunks(commands, data, step, values);
+  if (!(step.is_glass() || step.is_backwards)) draw_far(commands, data, step);
+}
+
+void MeshPass::draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, const Step& step,
+                           ShaderMeshPush values) const {
   VkPipeline bound = VK_NULL_HANDLE;
   const bool is_backwards = step.is_glass() || step.is_backwards;
   for (std::size_t i = 0; i < data.draws.size(); ++i) {
@@ -313,7 +319,7 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     if (!step.draws(draw)) continue;
     const VkPipeline wanted = is_smooth ? step.smooth[draw.mirrored ? 1 : 0] : step.blocky;
     if (wanted != bound) {
-      api.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
+      device_->api().vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, wanted);
       if (!is_smooth) bind_corners(commands);
       bound = wanted;
     }
@@ -327,7 +333,6 @@ void MeshPass::record_step(VkCommandBuffer commands, const MeshFrameData& data, 
     push(commands, values);
     draw_mesh(commands, draw, step);
   }
-  if (!is_backwards) draw_far(commands, data, step);
 }
 
 void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const {

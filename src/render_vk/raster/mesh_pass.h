@@ -42,6 +42,8 @@ class MeshPass {
   void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
               const Buffer& colours) const;
   void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
+  // Those of the step's draws, with what pushes have in common.
+  void draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, const Step& step, ShaderMeshPush values) const;
   void draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
   void draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const;
   void draw_quads(VkCommandBuffer commands, std::uint32_t first, std::uint32_t end) const;
