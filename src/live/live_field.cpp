@@ -289,7 +289,7 @@ void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
 }
 
 std::shared_ptr<LiveField::Group> LiveField::begin_group(const Members& members) {
-  const auto group = std::make_shared<Group>();
+  auto group = std::make_shared<Group>();
   group->chunks = members;
   group->unfinished = members.size();
   for (const IVec3 chunk : members) {
@@ -312,7 +312,7 @@ std::shared_ptr<LiveField::Group> LiveField::begin_group(const Members& members)
 }
 
 std::shared_ptr<const FieldBodies> LiveField::bodies_around(const Members& members, const DensityGrid& field) {
-  const auto around = std::make_shared<FieldBodies>();
+  auto around = std::make_shared<FieldBodies>();
   for (const IVec3 chunk : members) {
     for (int i = 0; i < 27; ++i) {
       const IVec3 at = chunk + Neighbourhood::offset(i);
