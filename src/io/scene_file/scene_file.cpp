@@ -106,12 +106,19 @@ Result<Body> take_over(Scene& from, Scene& into) {
   return body;
 }
 
+/// Where a placement puts a direction, and a point, of a body.
+DVec3 placed_direction(DVec3 direction, const SceneFile::Placement& outer) {
+  return outer.rotation * (direction * DVec3(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0));
+}
+DVec3 placed_point(DVec3 point, const SceneFile::Placement& outer) {
+  return outer.position + placed_direction(point * outer.scale, outer);
+}
+
 /// Puts an instance or a group of a body where a placement puts the body.
 template <class Placed>
 void put(const SceneFile::Placement& outer, Placed& placed) {
   const double side = outer.mirrored ? -1.0 : 1.0;
-  const DVec3 position = placed.position * DVec3(side, 1.0, 1.0);
-  placed.position = outer.position + outer.rotation * (position * outer.scale);
+  placed.position = placed_point(placed.position, outer);
   // A mirror before a rotation is the mirrored rotation before the mirror.
   const DQuat q = placed.rotation;
   placed.rotation = outer.rotation * DQuat(q.w, q.x, side * q.y, side * q.z);
@@ -120,10 +127,9 @@ void put(const SceneFile::Placement& outer, Placed& placed) {
 
 /// A lamp of a body: at a distance that is scaled as it is, it is as bright as before.
 Lamp placed(const Lamp& inner, const SceneFile::Placement& outer) {
-  const DVec3 side(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0);
   Lamp lamp = inner;
-  lamp.position = outer.position + outer.rotation * (inner.position * side * outer.scale);
-  lamp.direction = outer.rotation * (inner.direction * side);
+  lamp.position = placed_point(inner.position, outer);
+  lamp.direction = placed_direction(inner.direction, outer);
   lamp.intensity *= outer.scale * outer.scale;
   lamp.range *= outer.scale;
   return lamp;
@@ -142,17 +148,25 @@ Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool i
   return instance;
 }
 
+Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& folder, const LoadOptions& options,
+                                 Threads threads, const Progress& progress);
+
 Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                 const Progress& progress) {
   const auto format = detect_format(path);
   if (!format) return format.error();
-  // These may name each other in a circle.
-  if (*format == FileFormat::Scene && !files_named_in_scene(path).empty()) {
-    return make_error(ErrorCode::Unsupported,
-                      "a scene file that names others, within a scene file: save it whole first", path.string());
-  }
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
+  if (*format == FileFormat::Scene) {
+    auto file = read_whole(path, [&](std::span<const std::byte> bytes) { return parse_scene_file(bytes, threads); });
+    if (!file) return file.error();
+    // These may name each other in a circle.
+    if (!file->sources.empty()) {
+      return make_error(ErrorCode::Unsupported,
+                        "a scene file that names others, within a scene file: save it whole first", path.string());
+    }
+    return with_path(put_together(*file, {}, taken_over, threads, progress), path);
+  }
   return load_scene(path, taken_over, threads, progress);
 }
 

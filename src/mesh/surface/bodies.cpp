@@ -57,15 +57,16 @@ std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vect
 }
 
 std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const DensityGrid& field) {
-  std::vector<std::uint32_t> bodies{0};
-  if (!types.has_transparent()) return bodies;
-  for (const IVec3 place : field.chunks()) {
-    for (const VoxelType material : field.find_chunk(place)->materials().types()) {
-      if (types.is_transparent(material)) bodies.push_back(body_of(types, material));
+  std::vector<VoxelType> transparent;
+  if (types.has_transparent()) {
+    for (const IVec3 place : field.chunks()) {
+      for (const VoxelType material : field.find_chunk(place)->materials().types()) {
+        if (types.is_transparent(material)) transparent.push_back(material);
+      }
     }
   }
-  std::sort(bodies.begin(), bodies.end());
-  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  std::vector<std::uint32_t> bodies = bodies_of(types, transparent);
+  bodies.insert(bodies.begin(), 0);
   return bodies;
 }
 
