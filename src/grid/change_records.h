@@ -58,6 +58,7 @@ struct VoxelRecord {
   IVec3 chunk{0};
   std::uint32_t neighbours = 0;
   PackedBox box;
+  std::uint64_t bricks = 0;  // as ChunkChange::bricks
 
   /// Counts voxels of a row that changed.
   void add(int y, int z, std::uint64_t changed) {
@@ -70,22 +71,44 @@ struct VoxelRecord {
       }
     }
     box.unite(PackedBox::of_row(y, z, changed));
+    const auto has_any = [changed](unsigned part) {
+      return std::uint64_t{(changed >> (16 * part) & 0xFFFFU) != 0} << part;
+    };
+    bricks |= (has_any(0) | has_any(1) | has_any(2) | has_any(3)) << brick_of(0, y, z);
+  }
+  /// Counts one voxel that is on no side of the chunk.
+  void add_inner(int x, int y, int z) {
+    neighbours |= kCentreOnly;
+    box.unite(PackedBox::of(x, y, z));
+    bricks |= std::uint64_t{1} << brick_of(x, y, z);
+  }
+  /// Counts all voxels of a box that is not empty.
+  void add_box(const IBox& all) {
+    neighbours = kEverywhere;
+    box.unite(PackedBox::of(all.min.x, all.min.y, all.min.z));
+    box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));
+    for (int z = all.min.z & ~15; z < all.max.z; z += 16) {
+      for (int y = all.min.y & ~15; y < all.max.y; y += 16) {
+        for (int x = all.min.x & ~15; x < all.max.x; x += 16) bricks |= std::uint64_t{1} << brick_of(x, y, z);
+      }
+    }
   }
   /// For an edit that was broken off: anything may have changed.
-  void add_all() {
-    neighbours = (std::uint32_t{1} << 27) - 1;
-    box = PackedBox::of_chunk();
-  }
+  void add_all() { add_box(kWholeChunk); }
   void merge(const VoxelRecord& other) {
     neighbours |= other.neighbours;
     box.unite(other.box);
+    bricks |= other.bricks;
   }
-  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours}; }
+  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, bricks}; }
 
  private:
+  static constexpr std::uint32_t kEverywhere = (std::uint32_t{1} << 27) - 1;
+
   static unsigned sides(int local) {
     return 0b010U | static_cast<unsigned>(local == 0) | static_cast<unsigned>(local == kChunkEdge - 1) << 2;
   }
+  static unsigned brick_of(int x, int y, int z) { return static_cast<unsigned>(x >> 4 | y >> 4 << 2 | z >> 4 << 4); }
 };
 
 /// What an edit did to one chunk of voxels.

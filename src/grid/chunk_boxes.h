@@ -55,6 +55,11 @@ class ChunkBoxes {
     return around;
   }
 
+  /// Of a chunk; null where there is none, until the next `put`.
+  [[nodiscard]] const IBox* find(IVec3 chunk) const {
+    const auto found = boxes_.find(chunk);
+    return found == boxes_.end() ? nullptr : &found->second;
+  }
   [[nodiscard]] std::size_t size() const { return boxes_.size(); }
   [[nodiscard]] auto begin() const { return boxes_.begin(); }
   [[nodiscard]] auto end() const { return boxes_.end(); }

@@ -50,7 +50,8 @@ struct Grid::Impl {
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
   // not there are created where `create`, left out otherwise.
   template <class Change>
-  std::int64_t edit_box(const LongBox& wanted, bool create, EditNotice& notice, Change&& change);
+  std::int64_t edit_box(const LongBox& wanted, bool create, EditNotice& notice, const Progress& progress,
+                        Change&& change);
   template <class Change>
   std::int64_t edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
                           Change& change);
@@ -73,17 +74,22 @@ std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, c
 }
 
 template <class Change>
-std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice& notice, Change&& change) {
+std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice& notice, const Progress& progress,
+                                  Change&& change) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
   std::int64_t changed = 0;
+  double done = 0.0;
+  const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
   if (create) {
+    const DVec3 size(chunks.size());
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
           changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+          if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }
     }
@@ -92,7 +98,10 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice
   std::vector<IVec3> present;
   entries.for_each_in(chunks, [&](IVec3 at, const ChunkEntry&) { present.push_back(at); });
   std::sort(present.begin(), present.end(), by_zyx);
-  for (const IVec3 at : present) changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), notice, change);
+  for (const IVec3 at : present) {
+    changed += edit_chunk(at, entries.find_to_edit(at), part_of(box, at), notice, change);
+    if (!goes_on(static_cast<double>(present.size()))) return changed;
+  }
   return changed;
 }
 
@@ -130,8 +139,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   edit.voxels = 1;
   const auto is_inner = [](int i) { return i != 0 && i != kChunkEdge - 1; };
   if (is_inner(local.x) && is_inner(local.y) && is_inner(local.z)) {
-    edit.record.neighbours = VoxelRecord::kCentreOnly;
-    edit.record.box = PackedBox::of(local.x, local.y, local.z);
+    edit.record.add_inner(local.x, local.y, local.z);
   } else {
     edit.record.add(local.y, local.z, std::uint64_t{1} << local.x);
   }
@@ -156,17 +164,39 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
   return edit.voxels;
 }
 
-std::int64_t Grid::fill_box(const IBox& box, VoxelType type) {
+std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
+  std::int64_t changed = 0;
+  for (auto next = voxels.begin(); next != voxels.end();) {
+    const IVec3 at = chunk_of(next->voxel);
+    const auto is_elsewhere = [at](const PlacedVoxel& each) { return chunk_of(each.voxel) != at; };
+    const auto end = std::find_if(next, voxels.end(), is_elsewhere);
+    const auto set_all = [&](IVec3, Chunk& chunk, const IBox&, VoxelEdit& edit) {
+      for (; next != end; ++next) {
+        const IVec3 local = local_of(next->voxel);
+        edit.add(local.y, local.z, chunk.fill_row(local.y, local.z, std::uint64_t{1} << local.x, next->type));
+      }
+    };
+    const bool is_air = std::all_of(next, end, [](const PlacedVoxel& each) { return each.type == kAir; });
+    if (!is_inside_world(at) || (is_air && impl_->entries.find(at) == nullptr)) {
+      next = end;
+      continue;
+    }
+    changed += impl_->edit_chunk(at, impl_->entries.find_or_create(at), kWholeChunk, notice_, set_all);
+  }
+  return changed;
+}
+
+std::int64_t Grid::fill_box(const IBox& box, VoxelType type, const Progress& progress) {
   const auto fill = [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   };
-  return impl_->edit_box(box_from(box), type != kAir, notice_, fill);
+  return impl_->edit_box(box_from(box), type != kAir, notice_, progress, fill);
 }
 
-std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
+std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type, const Progress& progress) {
   if (!(radius >= 0.0) || !std::isfinite(radius) || !is_finite(centre)) return 0;
   const LongBox box = box_around(centre - radius, centre + radius);
-  return impl_->edit_box(box, type != kAir, notice_, [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+  const auto fill = [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     const DVec3 local_centre = centre - DVec3(at) * double{kChunkEdge} - 0.5;
     for (int z = part.min.z; z < part.max.z; ++z) {
       for (int y = part.min.y; y < part.max.y; ++y) {
@@ -181,10 +211,12 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type) {
         edit.add(y, z, changed);
       }
     }
-  });
+  };
+  return impl_->edit_box(box, type != kAir, notice_, progress, fill);
 }
 
-std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change) {
+std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
+                             const Progress& progress) {
   const auto change_part = [&](IVec3 at, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     std::array<VoxelType, kChunkEdge> row{};
     const auto first = static_cast<std::size_t>(part.min.x);
@@ -197,7 +229,7 @@ std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, s
       }
     }
   };
-  return impl_->edit_box(box_from(wanted), true, notice_, change_part);
+  return impl_->edit_box(box_from(wanted), true, notice_, progress, change_part);
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
@@ -220,9 +252,7 @@ void Grid::clear() {
     const IBox box = entry.chunk.bounds();
     VoxelRecord record;
     record.chunk = at;
-    record.add_all();
-    record.box = PackedBox::of(box.min.x, box.min.y, box.min.z);
-    record.box.unite(PackedBox::of(box.max.x - 1, box.max.y - 1, box.max.z - 1));
+    record.add_box(box);
     std::uint64_t serial = entry.serial;
     impl_->journal.note(serial, record, impl_->entries.size());
   });
@@ -253,7 +283,10 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
-        result.chunks[Neighbourhood::index(dx, dy, dz)] = find_chunk(chunk + IVec3{dx, dy, dz});
+        const IVec3 offset{dx, dy, dz};
+        if (has_neighbour(chunk, offset)) {
+          result.chunks[Neighbourhood::index(dx, dy, dz)] = find_chunk(chunk + offset);
+        }
       }
     }
   }
@@ -285,6 +318,42 @@ std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) 
   }
   sort_and_unite(chunks);
   return chunks;
+}
+
+namespace {
+
+// Null: all air.
+void visit_chunk_changes(const Chunk* before, const Chunk* now, IVec3 chunk, const IBox& box,
+                         FunctionRef<void(const RowChange&)> visit) {
+  if (before == now || (before != nullptr && now != nullptr && before->shares_storage_with(*now))) return;
+  std::array<VoxelType, kChunkEdge> rows[2] = {};
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      if (before != nullptr) before->read_row(y, z, rows[0]);
+      if (now != nullptr) now->read_row(y, z, rows[1]);
+      std::uint64_t changed = 0;
+      for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{rows[0][x] != rows[1][x]} << x;
+      if (changed != 0) visit({chunk * kChunkEdge + IVec3{0, y, z}, changed, rows[0], rows[1]});
+    }
+  }
+}
+
+}  // namespace
+
+void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
+                   FunctionRef<void(const RowChange&)> visit) {
+  const auto compare = [&](IVec3 chunk, const IBox& box) {
+    visit_chunk_changes(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, visit);
+  };
+  if (!changes.all) {
+    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box);
+    return;
+  }
+  std::vector<IVec3> chunks = before.chunks();
+  const std::vector<IVec3> present = now.chunks();
+  chunks.insert(chunks.end(), present.begin(), present.end());
+  sort_and_unite(chunks);
+  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk);
 }
 
 IBox Grid::bounds() const {

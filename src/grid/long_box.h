@@ -20,6 +20,15 @@ inline bool is_inside_world(IVec3 chunk) {
   return fits(chunk.x) && fits(chunk.y) && fits(chunk.z);
 }
 
+/// Whether a chunk beside another has coordinates: those at the ends of the int32 range have none beyond.
+inline bool has_neighbour(IVec3 chunk, IVec3 offset) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t at = std::int64_t{chunk[axis]} + offset[axis];
+    if (at != static_cast<int>(at)) return false;
+  }
+  return true;
+}
+
 /// [min, max) in int64, so that corners at the ends of the int32 range do not overflow.
 struct LongBox {
   std::array<std::int64_t, 3> min{};

@@ -1,6 +1,7 @@
 #include <quoin/grid/voxel_registry.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -15,6 +16,18 @@ std::uint64_t hash_of(const VoxelProperties& p) {
                                (std::uint64_t{p.colour.b} << 8) | p.colour.a;
   return std::hash<std::string>{}(p.name) * 0x9E37'79B9'7F4A'7C15U + colour * 4 +
          static_cast<std::uint64_t>(p.visibility);
+}
+
+// As ==, but that what is no number equals itself: else each look for it would add a type.
+bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
+  if (a == b) return true;
+  VoxelProperties left = a;
+  VoxelProperties right = b;
+  for (float VoxelProperties::*const number :
+       {&VoxelProperties::roughness, &VoxelProperties::metalness, &VoxelProperties::emission, &VoxelProperties::ior}) {
+    if (std::isnan(left.*number) && std::isnan(right.*number)) left.*number = right.*number = 0.0F;
+  }
+  return left == right;
 }
 
 template <class T>
@@ -83,6 +96,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   c.by_hash.emplace(hash_of(properties), type);
   c.serials.push_back(0);
   c.visibility.push_back(visibility);
+  if (!properties.collides) ++c.passable_count;
   c.properties.push_back(std::move(properties));
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   note({type, visibility != Visibility::Opaque, true});
@@ -92,7 +106,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
 Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) {
   const auto [first, last] = std::as_const(content_->by_hash).equal_range(hash_of(properties));
   for (auto it = first; it != last; ++it) {
-    if ((*this)[it->second] == properties) return it->second;
+    if (is_same((*this)[it->second], properties)) return it->second;
   }
   return add(properties);
 }
@@ -110,6 +124,8 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   const Visibility was = std::exchange(c.visibility[type], properties.visibility);
   if (was == Visibility::Transparent) --c.transparent_count;
   if (properties.visibility == Visibility::Transparent) ++c.transparent_count;
+  if (!c.properties[type].collides) --c.passable_count;
+  if (!properties.collides) ++c.passable_count;
   const TypeChange change{type, was != properties.visibility, !(c.properties[type].colour == properties.colour)};
   c.properties[type] = std::move(properties);
   note(change);

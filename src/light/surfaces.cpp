@@ -46,13 +46,18 @@ Surface surface_of(const VoxelProperties& properties) {
 
 }  // namespace
 
-Surfaces::Surfaces(const VoxelRegistry& types) {
-  for (std::size_t type = 0; type < types.size(); ++type) {
-    surfaces_.push_back(surface_of(types[static_cast<VoxelType>(type)]));
-  }
-  Surface unknown;
-  unknown.colour = {1.0F, 0.0F, 1.0F};
-  surfaces_.push_back(unknown);
+void Surfaces::update(const VoxelRegistry& types) {
+  if (!types.has_changed_since(followed_)) return;
+  ChangeCursor now = followed_;
+  const TypeChanges changes = types.changes_since(now);
+  followed_ = {};  // stays so when memory runs out
+  const auto put = [&](std::size_t type) { surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)]); };
+  surfaces_.resize(types.size() + 1);
+  surfaces_.back() = {};
+  surfaces_.back().colour = {1.0F, 0.0F, 1.0F};
+  for (std::size_t type = 0; changes.all && type < types.size(); ++type) put(type);
+  for (const TypeChange& change : changes.items) put(change.type);
+  followed_ = now;
 }
 
 }  // namespace quoin

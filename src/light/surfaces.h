@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -32,13 +33,16 @@ void set_absorption(float alpha, Surface& surface);
 /// Surfaces by type; an id that is not registered gives a magenta that shows.
 class Surfaces {
  public:
-  explicit Surfaces(const VoxelRegistry& types);
+  explicit Surfaces(const VoxelRegistry& types) { update(types); }
+  /// Takes over the types that changed. Cost: O(these).
+  void update(const VoxelRegistry& types);
   [[nodiscard]] const Surface& operator[](VoxelType type) const {
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }
 
  private:
-  std::vector<Surface> surfaces_;
+  std::vector<Surface> surfaces_;  // that of unregistered types comes last
+  ChangeCursor followed_;
 };
 
 }  // namespace quoin

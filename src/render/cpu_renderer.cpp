@@ -113,7 +113,7 @@ const SceneTracer& CpuRenderer::tracer() const {
 
 void CpuRenderer::update(Threads threads) {
   impl_->tracer.update(threads);
-  impl_->surfaces = Surfaces(impl_->scene->types);
+  impl_->surfaces.update(impl_->scene->types);
   impl_->detail.update_types(impl_->scene->types);
   impl_->lamps.update();
 }

@@ -40,6 +40,12 @@ DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_wor
   return glm::inverse(world_axes(instance)) * direction_in_world / instance.voxel_size;
 }
 
+DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_in_world) {
+  if (!has_place(before) || !has_place(after)) return point_in_world;
+  const DVec3 in_grid = glm::inverse(world_axes(before)) * (point_in_world - before.position) / before.voxel_size;
+  return after.position + world_axes(after) * (in_grid * after.voxel_size);
+}
+
 std::optional<IVec3> voxel_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world) {
   const DVec3 voxel = glm::floor(grid_from_world(instance, grid, point_in_world));
   for (int axis = 0; axis < 3; ++axis) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <type_traits>
@@ -141,14 +142,26 @@ struct Scene::Book {
   }
 };
 
-Scene::Scene() : book_(std::make_unique<Book>()) {}
+namespace {
+
+// Scenes begin with other generations each, so that a handle of one names nothing in another.
+std::uint32_t next_family() {
+  static std::atomic<std::uint32_t> scenes{0};
+  return scenes.fetch_add(1, std::memory_order_relaxed) * 2'654'435'761U;
+}
+
+}  // namespace
+
+Scene::Scene() : Scene(next_family()) {}
+Scene::Scene(std::uint32_t family)
+    : grids_(family), instances_(family), groups_(family), layers_(family), book_(std::make_unique<Book>()) {}
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;
 
 Scene Scene::snapshot() const {
   Scene copy;
-  const std::lock_guard lock(book_->mutex);
+  const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   copy.types = types;
   copy.lamps = lamps;
@@ -167,27 +180,32 @@ std::size_t Scene::keys() const {
   return grids_.size() + instances_.size() + groups_.size() + layers_.size();
 }
 
+Scene::Book& Scene::book() const {
+  QUOIN_ASSERT(book_ != nullptr, "a scene that was not moved from");
+  return *book_;
+}
+
 GridHandle Scene::add_grid(SceneGrid grid) {
-  book_->notices.make_room(grids_.next_index());
-  const GridHandle handle = book_->insert(grids_, std::move(grid), keys());
+  book().notices.make_room(grids_.next_index());
+  const GridHandle handle = book().insert(grids_, std::move(grid), keys());
   book_->follow(grids_[handle], handle.index);
   return handle;
 }
 
 InstanceHandle Scene::add_instance(Instance instance) {
-  return book_->insert(instances_, std::move(instance), keys());
+  return book().insert(instances_, std::move(instance), keys());
 }
 
 GroupHandle Scene::add_group(SceneGroup group) {
-  return book_->insert(groups_, std::move(group), keys());
+  return book().insert(groups_, std::move(group), keys());
 }
 
 LayerHandle Scene::add_layer(SceneLayer layer) {
-  return book_->insert(layers_, std::move(layer), keys());
+  return book().insert(layers_, std::move(layer), keys());
 }
 
 bool Scene::remove_grid(GridHandle handle) {
-  if (!book_->remove(grids_, handle, keys())) return false;
+  if (!book().remove(grids_, handle, keys())) return false;
   for (const InstanceHandle instance : instances_.handles()) {
     if (instances_[instance].grid == handle) remove_instance(instance);
   }
@@ -195,7 +213,7 @@ bool Scene::remove_grid(GridHandle handle) {
 }
 
 bool Scene::remove_instance(InstanceHandle handle) {
-  return book_->remove(instances_, handle, keys());
+  return book().remove(instances_, handle, keys());
 }
 
 bool Scene::remove_group(GroupHandle handle) {
@@ -208,7 +226,7 @@ bool Scene::remove_group(GroupHandle handle) {
   for (const InstanceHandle each : instances_.handles()) {
     if (instances_[each].group == handle) edit(each).group = parent;
   }
-  return book_->remove(groups_, handle, keys());
+  return book().remove(groups_, handle, keys());
 }
 
 bool Scene::remove_layer(LayerHandle handle) {
@@ -219,25 +237,25 @@ bool Scene::remove_layer(LayerHandle handle) {
   for (const InstanceHandle each : instances_.handles()) {
     if (instances_[each].layer == handle) edit(each).layer = {};
   }
-  return book_->remove(layers_, handle, keys());
+  return book().remove(layers_, handle, keys());
 }
 
 SceneGrid& Scene::edit(GridHandle handle) {
-  return book_->edit(grids_, handle, keys());
+  return book().edit(grids_, handle, keys());
 }
 Instance& Scene::edit(InstanceHandle handle) {
-  return book_->edit(instances_, handle, keys());
+  return book().edit(instances_, handle, keys());
 }
 SceneGroup& Scene::edit(GroupHandle handle) {
-  return book_->edit(groups_, handle, keys());
+  return book().edit(groups_, handle, keys());
 }
 SceneLayer& Scene::edit(LayerHandle handle) {
-  return book_->edit(layers_, handle, keys());
+  return book().edit(layers_, handle, keys());
 }
 
 SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
   SceneChanges changes;
-  const std::lock_guard lock(book_->mutex);
+  const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   changes.all = !book_->journal.visit_since(cursor, [&](const SceneRecord& record) {
     switch (record.kind) {
@@ -264,7 +282,7 @@ SceneChanges Scene::changes_since(ChangeCursor& cursor) const {
 }
 
 bool Scene::has_changed_since(const ChangeCursor& cursor) const {
-  const std::lock_guard lock(book_->mutex);
+  const std::lock_guard lock(book().mutex);
   book_->collect(grids_, keys());
   return book_->journal.has_changed_since(cursor);
 }

@@ -72,13 +72,23 @@ Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
   return slab_of(rows);
 }
 
-UniformBlocks uniform_blocks(const Chunk& chunk, const VoxelRegistry& types) {
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::uint64_t wanted, UniformBlocks& blocks) {
   constexpr int kCell = 64;
-  UniformBlocks blocks;
-  for (const VoxelType type : chunk.types()) {
-    if (types.is_transparent(type) && chunk.count(type) >= kCell) add_uniform(ChunkRows(chunk, type), blocks);
+  std::uint64_t rows = 0;
+  for (int row = 0; row < 16; ++row) {
+    if ((wanted >> (4 * row) & 15U) != 0) rows |= std::uint64_t{15} << (4 * row);
   }
-  return blocks;
+  for (std::size_t i = 0; i < 64; ++i) {
+    if ((rows >> i & 1U) != 0) blocks.cells[i] = 0;
+  }
+  blocks.bricks &= ~rows;
+  blocks.is_whole = false;
+  for (const VoxelType type : chunk.types()) {
+    if (!types.is_transparent(type)) continue;
+    const int count = chunk.count(type);
+    if (count >= kCell) add_uniform(ChunkRows(chunk, type), rows, blocks);
+    blocks.is_whole |= count == static_cast<int>(kChunkVoxels);
+  }
 }
 
 void transpose_nibbles(SlabRows& w) {

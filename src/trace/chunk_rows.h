@@ -69,6 +69,22 @@ class RowsBox {
     y_ |= std::uint64_t{15} << y;
     z_ |= std::uint64_t{15} << z;
   }
+  /// A cell of 4^3 voxels, as nodes have it, at a multiple of 4.
+  void add_cell(IVec3 at, std::uint64_t cell) {
+    std::uint64_t plane = (cell | cell >> 32);
+    plane = (plane | plane >> 16) & 0xFFFFU;
+    std::uint64_t row = plane | plane >> 8;
+    row = (row | row >> 4) & 15U;
+    x_ |= row << at.x;
+    for (int i = 0; i < 4; ++i) {
+      y_ |= std::uint64_t{(plane >> (4 * i) & 15U) != 0} << (at.y + i);
+      z_ |= std::uint64_t{(cell >> (16 * i) & 0xFFFFU) != 0} << (at.z + i);
+    }
+  }
+  /// Whether nothing within the 16^3 voxels from `at` on could change it.
+  [[nodiscard]] bool covers_brick(IVec3 at) const {
+    return (x_ >> at.x & y_ >> at.y & z_ >> at.z & 0xFFFFU) == 0xFFFFU;
+  }
   /// In chunk coordinates.
   [[nodiscard]] IBox box() const {
     if (x_ == 0) return {};
@@ -82,9 +98,10 @@ class RowsBox {
   std::uint64_t z_ = 0;
 };
 
-/// Which blocks of a chunk are full of one transparent type.
+/// Finds which blocks of a chunk are full of one transparent type: in the rows of four bricks that hold any of the
+/// `wanted` ones; of the other rows `blocks` is as it was.
 /// Cost: as that of a node of the tree for each such type of which there are voxels enough to fill a cell.
-[[nodiscard]] UniformBlocks uniform_blocks(const Chunk& chunk, const VoxelRegistry& types);
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::uint64_t wanted, UniformBlocks& blocks);
 
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
@@ -125,14 +142,16 @@ bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
   return empty != 16 && full != 16;
 }
 
-/// Adds the blocks that are full in some rows, of one type.
+/// Adds the blocks that are full in rows of one type, of the rows of four bricks that hold any of the `wanted` ones.
+/// Returns which bricks are.
 template <class Rows>
-void add_uniform(const Rows& rows, UniformBlocks& blocks) {
+std::uint64_t add_uniform(const Rows& rows, std::uint64_t wanted, UniformBlocks& blocks) {
   constexpr std::uint64_t kAll = ~std::uint64_t{0};
   std::uint64_t bricks = 0;
   RowsBox unused;
   BrickRow four;
   for (std::size_t row = 0; row < 16; ++row) {
+    if ((wanted >> (4 * row) & 15U) == 0) continue;
     const bool is_mixed = four.read(rows, static_cast<int>(row & 3) * 16, static_cast<int>(row >> 2) * 16, unused);
     for (std::size_t x = 0; x < 4; ++x) {
       std::uint64_t cells = is_mixed || !four.is_full ? 0 : kAll;
@@ -142,7 +161,7 @@ void add_uniform(const Rows& rows, UniformBlocks& blocks) {
     }
   }
   blocks.bricks |= bricks;
-  blocks.is_whole |= bricks == kAll;
+  return bricks;
 }
 
 }  // namespace quoin::trace

@@ -103,7 +103,8 @@ UniformBlocks uniform_glass(const DensityGrid& field, const VoxelRegistry& types
   for (const VoxelType type : samples->materials().types()) {
     if (!types.is_transparent(type) || samples->materials().count(type) < kCell) continue;
     const SolidRows solid(field, type, chunk);
-    if (!solid.none()) add_uniform(FullRows(solid), blocks);
+    constexpr std::uint64_t kAll = ~std::uint64_t{0};
+    if (!solid.none()) blocks.is_whole |= add_uniform(FullRows(solid), kAll, blocks) == kAll;
   }
   return blocks;
 }

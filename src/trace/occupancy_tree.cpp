@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
+#include <glm/common.hpp>
 #include <tsl/robin_map.h>
+#include <quoin/core/assert.h>
 
 #include "grid/chunk_boxes.h"
 #include "grid/chunk_order.h"
@@ -16,7 +19,7 @@
 namespace quoin {
 namespace {
 
-using trace::ChunkNode, trace::Node, trace::RegionNode;
+using trace::ChunkBricks, trace::ChunkNode, trace::Node, trace::RegionNode;
 
 // Two tables over the box of chunks around everything: what kernels of many rays read instead of regions and chunk
 // nodes, since an address is then a sum of products.
@@ -51,15 +54,39 @@ unsigned bit_of(IVec3 unit) {
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
 
-// The chunks whose cells end in what an edit of a field changed.
-std::vector<IVec3> cells_reached(const DensityChanges& changes) {
-  std::vector<IVec3> reached;
-  for (const DensityChange& each : changes.items) {
-    for (const IVec3 offset : kBelow) {
-      if (each.affects(offset, 1)) reached.push_back(each.chunk + offset);
+// The bricks of a chunk that a box in its coordinates reaches.
+std::uint64_t bricks_of(const IBox& box) {
+  std::uint64_t bricks = 0;
+  for (int z = box.min.z >> 4; z << 4 < box.max.z; ++z) {
+    for (int y = box.min.y >> 4; y << 4 < box.max.y; ++y) {
+      for (int x = box.min.x >> 4; x << 4 < box.max.x; ++x) bricks |= std::uint64_t{1} << (x + 4 * y + 16 * z);
     }
   }
-  sort_and_unite(reached);
+  return bricks;
+}
+
+// The bricks whose cells end in what an edit of a field changed.
+std::vector<ChunkBricks> cells_reached(const DensityChanges& changes) {
+  std::vector<ChunkBricks> reached;
+  for (const DensityChange& each : changes.items) {
+    for (const IVec3 offset : kBelow) {
+      // A cell begins a sample before each of its ends.
+      const IBox cells{each.box.min - 1 - offset * kChunkEdge, each.box.max - offset * kChunkEdge};
+      const IBox own = intersect(cells, kWholeChunk);
+      if (!own.empty()) reached.push_back({each.chunk + offset, bricks_of(own)});
+    }
+  }
+  std::sort(reached.begin(), reached.end(),
+            [](const ChunkBricks& a, const ChunkBricks& b) { return by_zyx(a.chunk, b.chunk); });
+  std::size_t kept = 0;
+  for (const ChunkBricks& each : reached) {
+    if (kept != 0 && reached[kept - 1].chunk == each.chunk) {
+      reached[kept - 1].bricks |= each.bricks;
+    } else {
+      reached[kept++] = each;
+    }
+  }
+  reached.resize(kept);
   return reached;
 }
 
@@ -106,12 +133,6 @@ trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chun
 }  // namespace
 
 struct OccupancyTree::Impl {
-  // Bricks of a chunk that an update changed.
-  struct Changed {
-    IVec3 chunk;
-    std::uint64_t bricks;
-  };
-
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
   std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // 0: none
@@ -208,13 +229,15 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Returns which bricks changed; `box` becomes that of the chunk's occupied voxels, in chunk coordinates.
+  // Returns which bricks changed of those that are `wanted`, and of others in their rows; `box` is united with that of
+  // the occupied voxels of what was read, in chunk coordinates.
   template <class Rows>
-  std::uint64_t fill(ChunkNode& node, const Rows& rows, IBox& box) {
+  std::uint64_t fill(ChunkNode& node, const Rows& rows, std::uint64_t wanted, IBox& box) {
     std::uint64_t changed = 0;
     trace::RowsBox rows_box;
     trace::BrickRow four;
     for (int row = 0; row < 16; ++row) {
+      if ((wanted >> (4 * row) & 15U) == 0) continue;
       const bool is_mixed = four.read(rows, (row & 3) * 16, (row >> 2) * 16, rows_box);
       for (std::size_t x = 0; x < 4; ++x) {
         const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
@@ -223,8 +246,23 @@ struct OccupancyTree::Impl {
         changed |= std::uint64_t{is_other} << brick;
       }
     }
-    box = rows_box.box();
+    box = unite(box, rows_box.box());
     return changed;
+  }
+
+  // The box of a node's occupied voxels, in chunk coordinates.
+  [[nodiscard]] IBox box_of(const ChunkNode& node) const {
+    trace::RowsBox box;
+    for (int i = 0; i < 64; ++i) {
+      const std::uint32_t brick = node.bricks[static_cast<std::size_t>(i)];
+      const IVec3 at = 16 * IVec3{i & 3, i >> 2 & 3, i >> 4};
+      if (brick == 0 || box.covers_brick(at)) continue;
+      for (std::uint64_t cells = node.cells[static_cast<std::size_t>(i)]; cells != 0; cells &= cells - 1) {
+        const int cell = std::countr_zero(cells);
+        box.add_cell(at + 4 * IVec3{cell & 3, cell >> 2 & 3, cell >> 4}, bricks[brick][static_cast<std::size_t>(cell)]);
+      }
+    }
+    return box.box();
   }
 
   std::uint64_t drop(IVec3 chunk) {
@@ -233,28 +271,50 @@ struct OccupancyTree::Impl {
     return kAll;
   }
 
-  // Returns which bricks changed.
+  // Puts the bricks of a chunk that are `wanted`; the others are as they were. Returns which changed.
   template <class Rows>
-  std::uint64_t put(const Rows& rows, IVec3 chunk) {
+  std::uint64_t put(const Rows& rows, IVec3 chunk, std::uint64_t wanted = kAll) {
     if (rows.none()) return drop(chunk);
+    const IBox* const known = chunk_boxes.find(chunk);
+    if (known == nullptr) wanted = kAll;
+    IBox before = known == nullptr ? IBox{} : *known;
+    before = {before.min - chunk * kChunkEdge, before.max - chunk * kChunkEdge};
+    ChunkNode& node = find_or_create(chunk);
     IBox box;
-    const std::uint64_t changed = fill(find_or_create(chunk), rows, box);
+    const std::uint64_t changed = fill(node, rows, wanted, box);
+    if (wanted != kAll && changed == 0) return 0;
+    // Where nothing ended at a side of the box before, that side is where it was.
+    if (wanted != kAll) box = is_inside(changed, before) ? unite(before, box) : box_of(node);
     if (box.empty()) return drop(chunk);
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
   }
-  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk) {
+  // Whether none of some bricks reaches to a side of a box in their chunk.
+  static bool is_inside(std::uint64_t bricks, const IBox& box) {
+    const IBox inner{(box.min >> 4) + 1, (box.max - 1) >> 4};  // bricks
+    for (; bricks != 0; bricks &= bricks - 1) {
+      const int i = std::countr_zero(bricks);
+      if (!inner.contains(IVec3{i & 3, i >> 2 & 3, i >> 4})) return false;
+    }
+    return true;
+  }
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk, std::uint64_t wanted = kAll) {
     if (voxels == nullptr) return drop(chunk);
-    const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk);
+    const bool was_there = chunk_boxes.find(chunk) != nullptr;
+    const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk, wanted);
+    // Another type may have come where there was one before: then no brick is another.
     if (which == Occupancy::Transparent) {
-      set_uniform_blocks(chunk, [&] { return trace::uniform_blocks(*voxels, types); });
+      const std::uint64_t part = was_there ? wanted : kAll;
+      set_uniform_blocks(
+          chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, part, blocks); });
     }
     return changed;
   }
 
   std::uint64_t put_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
     const std::uint64_t changed = put(trace::GlassRows(field, types, chunk), chunk);
-    set_uniform_blocks(chunk, [&] { return trace::uniform_glass(field, types, chunk); });
+    set_uniform_blocks(chunk,
+                       [&](trace::UniformBlocks& blocks) { blocks = trace::uniform_glass(field, types, chunk); });
     return changed;
   }
 
@@ -262,7 +322,7 @@ struct OccupancyTree::Impl {
   void set_uniform_blocks(IVec3 chunk, const Find& find_blocks) {
     uniform.resize(chunk_nodes.size());
     const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
-    if (index != 0) uniform[index] = find_blocks();
+    if (index != 0) find_blocks(uniform[index]);
   }
 
   // Puts 4 bits in place of those at `bit`.
@@ -332,31 +392,93 @@ struct OccupancyTree::Impl {
     return static_cast<double>(cells) * (16.0 * chunks_along_z + 2.0);
   }
 
-  void make_flat(const IBox& chunks) {
+  // Tables of nothing.
+  void clear_tables(const IBox& chunks) {
     flat = {};
     const IVec3 size = flat.chunks = chunks.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
     flat.origin = chunks.min * kChunkEdge;
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
-    flat.bricks.assign(
-        64 * static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z), 0);
-    flat_nodes.assign(
-        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z),
-        {0, chunk_nodes.data()});
-    known_nodes = chunk_nodes.data();
+    flat.bricks.assign(64 * volume(size), 0);
+    flat_nodes.assign(volume(size), {0, chunk_nodes.data()});
     flat_chunks = chunks;
+  }
+  static std::size_t volume(IVec3 size) {
+    return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+  }
+
+  void make_flat(const IBox& chunks) {
+    clear_tables(chunks);
+    known_nodes = chunk_nodes.data();
     for (const auto& [chunk, box] : chunk_boxes) flatten(chunk, kAll);
   }
 
+  // Puts the bits of one table's row into another's, where they are 0.
+  static void copy_bits(const std::vector<std::uint32_t>& from, std::size_t from_bit, std::vector<std::uint32_t>& to,
+                        std::size_t to_bit, std::size_t count) {
+    for (std::size_t i = 0; i < count; i += 32) {
+      const std::size_t a = from_bit + i;
+      const std::size_t b = to_bit + i;
+      std::uint64_t bits = (from[a / 32] | std::uint64_t{from[a / 32 + 1]} << 32) >> (a % 32) & 0xFFFF'FFFFU;
+      if (count - i < 32) bits &= (std::uint64_t{1} << (count - i)) - 1;
+      bits <<= b % 32;
+      to[b / 32] |= static_cast<std::uint32_t>(bits);
+      to[b / 32 + 1] |= static_cast<std::uint32_t>(bits >> 32);
+    }
+  }
+
+  // Tables of another box of chunks that holds all there is in these, by copying rows.
+  void move_flat(const IBox& chunks) {
+    const FlatTables old = std::move(flat);
+    const std::vector<trace::FlatChunk> old_nodes = std::move(flat_nodes);
+    const IBox old_chunks = flat_chunks;
+    clear_tables(chunks);
+    const IBox kept = intersect(old_chunks, chunks);
+    const IVec3 from = kept.min - old_chunks.min;
+    const IVec3 to = kept.min - chunks.min;
+    const IVec3 size = kept.size();
+    const auto at = [](IVec3 p, IVec3 strides) {
+      return static_cast<std::size_t>(p.x) + static_cast<std::size_t>(p.y) * static_cast<std::size_t>(strides.y) +
+             static_cast<std::size_t>(p.z) * static_cast<std::size_t>(strides.z);
+    };
+    const auto for_each_row = [&](int edge, const auto& visit) {
+      for (int z = 0; z < size.z * edge; ++z) {
+        for (int y = 0; y < size.y * edge; ++y) visit(from * edge + IVec3{0, y, z}, to * edge + IVec3{0, y, z});
+      }
+    };
+    const IVec3 old_rows{1, old.chunks.x, old.chunks.x * old.chunks.y};
+    const IVec3 rows{1, flat.chunks.x, flat.chunks.x * flat.chunks.y};
+    for_each_row(1,
+                 [&](IVec3 a, IVec3 b) { std::copy_n(&old_nodes[at(a, old_rows)], size.x, &flat_nodes[at(b, rows)]); });
+    for_each_row(4, [&](IVec3 a, IVec3 b) {
+      std::copy_n(&old.bricks[at(a, old.brick_strides())], 4 * size.x, &flat.bricks[at(b, flat.brick_strides())]);
+    });
+    for_each_row(16, [&](IVec3 a, IVec3 b) {
+      copy_bits(old.cells, at(a + 1, old.cell_strides()), flat.cells, at(b + 1, flat.cell_strides()),
+                16 * static_cast<std::size_t>(size.x));
+    });
+  }
+
+  // A box of chunks that is to be in the tables, with room on the sides on which it is not yet.
+  [[nodiscard]] IBox with_room(const IBox& chunks) const {
+    IBox grown = chunks;
+    const IVec3 room = glm::max(IVec3(1), chunks.size() / 8);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (chunks.min[axis] < flat_chunks.min[axis]) grown.min[axis] -= room[axis];
+      if (chunks.max[axis] > flat_chunks.max[axis]) grown.max[axis] += room[axis];
+    }
+    return can_be_flat(grown) ? grown : chunks;
+  }
+
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
-  void finish(std::span<const Changed> changed) {
+  void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
     if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 
   [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
 
-  void renew_tables(std::span<const Changed> changed) {
+  void renew_tables(std::span<const ChunkBricks> changed) {
     bounds = chunk_boxes.bounds();
     const IBox chunks = bounds.empty() ? IBox{} : IBox{chunk_of(bounds.min), chunk_of(bounds.max - 1) + 1};
     // As a tree built from scratch would have it.
@@ -366,7 +488,9 @@ struct OccupancyTree::Impl {
       flat_chunks = {};
       return;
     }
-    if (!(chunks == flat_chunks)) return make_flat(chunks);
+    const bool is_little = !flat_chunks.empty() && volume(chunks.size()) < volume(flat_chunks.size()) / 4;
+    if (flat_chunks.empty() || is_little) return make_flat(chunks);
+    if (!(intersect(chunks, flat_chunks) == chunks)) move_flat(with_room(chunks));
     if (chunk_nodes.data() != known_nodes) {
       known_nodes = chunk_nodes.data();
       for (const auto& [chunk, box] : chunk_boxes) name_node(chunk);
@@ -380,8 +504,13 @@ struct OccupancyTree::Impl {
 OccupancyTree::OccupancyTree(Occupancy which) : impl_(std::make_unique<Impl>()) {
   impl_->which = which;
 }
-OccupancyTree::OccupancyTree(OccupancyTree&&) noexcept = default;
-OccupancyTree& OccupancyTree::operator=(OccupancyTree&&) noexcept = default;
+OccupancyTree::OccupancyTree(OccupancyTree&& other) noexcept
+    : impl_(std::move(other.impl_)), view_(std::exchange(other.view_, nullptr)) {}
+OccupancyTree& OccupancyTree::operator=(OccupancyTree&& other) noexcept {
+  impl_ = std::move(other.impl_);
+  view_ = std::exchange(other.view_, nullptr);
+  return *this;
+}
 OccupancyTree::~OccupancyTree() = default;
 
 OccupancyTree OccupancyTree::build(const Grid& grid, const VoxelRegistry& types, Occupancy which) {
@@ -407,11 +536,30 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field, const VoxelRegistry
   return tree;
 }
 
+namespace {
+
+// Leaves a little room where there is much: pages that nothing was written to take no memory, and the first edit then
+// copies nothing.
+template <class T>
+void trim(std::vector<T>& all) {
+  std::vector<T> exact;
+  exact.reserve(all.size() + (all.size() < 1024 ? 0 : all.size() / 32));
+  exact.assign(all.begin(), all.end());
+  all.swap(exact);
+}
+
+}  // namespace
+
 void OccupancyTree::finish_build() {
-  impl_->chunk_nodes.shrink_to_fit();
-  impl_->bricks.shrink_to_fit();
-  impl_->uniform.shrink_to_fit();
+  trim(impl_->chunk_nodes);
+  trim(impl_->bricks);
+  trim(impl_->uniform);
   impl_->finish({});
+  view_ = impl_->kernel_view();
+}
+
+void OccupancyTree::finish_update(std::span<const trace::ChunkBricks> changed) {
+  impl_->finish(changed);
   view_ = impl_->kernel_view();
 }
 
@@ -420,13 +568,12 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const G
     *this = build(grid, types, impl_->which);
     return;
   }
-  std::vector<Impl::Changed> changed;
+  std::vector<ChunkBricks> changed;
   changed.reserve(changes.items.size());
   for (const ChunkChange& each : changes.items) {
-    changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk)});
+    changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk, each.bricks)});
   }
-  impl_->finish(changed);
-  view_ = impl_->kernel_view();
+  finish_update(changed);
 }
 
 void OccupancyTree::update(const DensityGrid& field, const DensityChanges& changes) {
@@ -434,12 +581,10 @@ void OccupancyTree::update(const DensityGrid& field, const DensityChanges& chang
     *this = build(field);
     return;
   }
-  std::vector<Impl::Changed> changed;
-  for (const IVec3 chunk : cells_reached(changes)) {
-    changed.push_back({chunk, impl_->put(trace::CellRows(field, chunk), chunk)});
-  }
-  impl_->finish(changed);
-  view_ = impl_->kernel_view();
+  std::vector<ChunkBricks> changed = cells_reached(changes);
+  for (ChunkBricks& each : changed)
+    each.bricks = impl_->put(trace::CellRows(field, each.chunk), each.chunk, each.bricks);
+  finish_update(changed);
 }
 
 void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
@@ -447,19 +592,18 @@ void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types,
     *this = build(field, types);
     return;
   }
-  std::vector<Impl::Changed> changed;
-  for (const IVec3 chunk : cells_reached(changes)) {
-    changed.push_back({chunk, impl_->put_glass(field, types, chunk)});
-  }
-  impl_->finish(changed);
-  view_ = impl_->kernel_view();
+  std::vector<ChunkBricks> changed = cells_reached(changes);
+  for (ChunkBricks& each : changed) each.bricks = impl_->put_glass(field, types, each.chunk);
+  finish_update(changed);
 }
 
 IBox OccupancyTree::bounds() const {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   return impl_->bounds;
 }
 
 bool OccupancyTree::is_occupied(IVec3 voxel) const {
+  QUOIN_ASSERT(impl_ != nullptr, "a tree that was not moved from");
   const RegionNode* region = impl_->find({voxel.x >> 10, voxel.y >> 10, voxel.z >> 10});
   if (region == nullptr) return false;
   const IVec3 chunk = (voxel >> kChunkShift) & 15;
@@ -479,7 +623,7 @@ std::size_t OccupancyTree::bytes() const {
 }
 
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
-    : tree_(tree.impl_.get()),
+    : tree_((QUOIN_ASSERT(tree.impl_ != nullptr, "a tree that was not moved from"), tree.impl_.get())),
       chunks_(tree_->chunk_nodes.data()),
       bricks_(tree_->bricks.data()),
       uniform_(tree_->uniform.data()) {}

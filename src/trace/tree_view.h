@@ -33,6 +33,12 @@ struct UniformBlocks {
   bool is_whole = false;
 };
 
+/// Some bricks of a chunk.
+struct ChunkBricks {
+  IVec3 chunk{0};
+  std::uint64_t bricks = 0;  ///< x + 4 y + 16 z
+};
+
 /// Of 16^3 chunks.
 struct RegionNode {
   Node chunks{};                            ///< which chunks hold any voxel

@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <limits>
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
+
+// glm is part of Quoin's interface: whoever includes it with other settings would hand over other bytes.
+#if defined(GLM_FORCE_QUAT_DATA_WXYZ) || defined(GLM_FORCE_QUAT_CTOR_XYZW)
+#error "Quoin needs glm's quaternions as they are by default: stored as x, y, z, w and made of (w, x, y, z)"
+#endif
 
 namespace quoin {
 
@@ -18,6 +24,25 @@ using Vec3 = glm::vec3;
 using DVec3 = glm::dvec3;
 /// Rotations. Constructor order is glm's: (w, x, y, z).
 using DQuat = glm::dquat;
+
+static_assert(sizeof(IVec3) == 12 && sizeof(Vec3) == 12 && sizeof(DVec3) == 24 && alignof(DVec3) == alignof(double) &&
+                  sizeof(DQuat) == 32 && alignof(DQuat) == alignof(double),
+              "Quoin needs glm's types packed, without GLM_FORCE_DEFAULT_ALIGNED_GENTYPES");
+
+/// A point, which is no voxel. What takes a voxel takes none: `voxel_of` says in which voxel it lies.
+template <std::floating_point T>
+using Point = glm::vec<3, T, glm::defaultp>;
+
+/// The voxel in which a point of a grid lies; of a point between two the greater one, along each axis. What is beyond
+/// the int32 range counts as its end, NaN as 0.
+[[nodiscard]] inline IVec3 voxel_of(DVec3 point) {
+  const auto whole = [](double x) {
+    constexpr double kLeast = std::numeric_limits<int>::min();
+    constexpr double kGreatest = std::numeric_limits<int>::max();
+    return std::isnan(x) ? 0 : static_cast<int>(std::clamp(std::floor(x), kLeast, kGreatest));
+  };
+  return {whole(point.x), whole(point.y), whole(point.z)};
+}
 
 /// Neither infinite nor NaN in any component.
 [[nodiscard]] inline bool is_finite(DVec3 v) {

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <quoin/core/changes.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -18,6 +22,8 @@ struct ChunkChange {
   IBox box;  ///< the smallest around them, in the chunk's coordinates
   /// Bit Neighbourhood::index(dx, dy, dz): the chunk at that offset holds one of their 26 neighbours.
   std::uint32_t neighbours = 0;
+  /// Bit x / 16 + 4 (y / 16) + 16 (z / 16): that part of 16^3 voxels holds one of them.
+  std::uint64_t bricks = 0;
 
   /// Whether the mesh of the chunk at an offset of -1 to 1 on each axis may have changed.
   [[nodiscard]] bool affects(IVec3 offset) const {
@@ -30,6 +36,31 @@ using GridChanges = Changes<ChunkChange>;
 /// and are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
 /// has changed. `changes` are those up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
+
+/// A row of 64 voxels along x in one chunk, some of which changed; valid during the call that tells of it.
+struct RowChange {
+  IVec3 first{0};                          ///< the voxel of `before[0]`
+  std::uint64_t changed = 0;               ///< bit i: voxel `first` + (i, 0, 0)
+  std::span<const VoxelType> before, now;  ///< 64 types each
+
+  /// Calls `visit(IVec3 voxel, VoxelType before, VoxelType now)` for the voxels that changed, x ascending.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::uint64_t left = changed; left != 0; left &= left - 1) {
+      const int i = std::countr_zero(left);
+      visit(first + IVec3{i, 0, 0}, before[static_cast<std::size_t>(i)], now[static_cast<std::size_t>(i)]);
+    }
+  }
+};
+
+/// What edits did to single voxels: calls `visit` for every row of voxels that differs between two states of a grid,
+/// chunks by z, y, x, in each the rows by z, then y. `before` is a snapshot of the time when the cursor was read for
+/// the last time, `changes` what `now.changes_since` told since then; when all has changed, all of both is compared.
+/// For rules that follow edits, whoever makes them: falling sand, water, wires.
+///
+/// Cost: O(rows of the boxes that changed); chunks that the two share cost nothing.
+void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
+                   FunctionRef<void(const RowChange&)> visit);
 
 /// Samples of one chunk that changed, in density or in material.
 struct DensityChange {

@@ -22,10 +22,14 @@ inline constexpr std::size_t kChunkVoxels = std::size_t{1} << (3 * kChunkShift);
 [[nodiscard]] inline IVec3 chunk_of(IVec3 voxel) {
   return {voxel.x >> kChunkShift, voxel.y >> kChunkShift, voxel.z >> kChunkShift};
 }
+template <std::floating_point T>
+IVec3 chunk_of(Point<T> point) = delete;  // chunk_of(voxel_of(point))
 /// Position of a voxel inside its chunk, 0..63 on each axis.
 [[nodiscard]] inline IVec3 local_of(IVec3 voxel) {
   return {voxel.x & (kChunkEdge - 1), voxel.y & (kChunkEdge - 1), voxel.z & (kChunkEdge - 1)};
 }
+template <std::floating_point T>
+IVec3 local_of(Point<T> point) = delete;
 
 struct ChunkStorage;
 

@@ -54,6 +54,10 @@ class DensityGrid {
   /// What is stored at a sample: `band` and kAir where nothing was set.
   [[nodiscard]] float density(IVec3 sample) const;
   [[nodiscard]] VoxelType material(IVec3 sample) const;
+  template <std::floating_point T>
+  float density(Point<T> point) const = delete;  // density_at(point)
+  template <std::floating_point T>
+  VoxelType material(Point<T> point) const = delete;
   /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, and at NaN, far
   /// air.
   [[nodiscard]] float density_at(DVec3 point) const;
@@ -63,6 +67,8 @@ class DensityGrid {
 
   /// Returns true when density or material was another before.
   bool set(IVec3 sample, DensitySample value);
+  template <std::floating_point T>
+  bool set(Point<T> point, DensitySample value) = delete;
 
   /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges, at most until its shortest side is
   /// round): the least of both distances; or takes it away: the greater of the density and minus the distance. Samples

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/function_ref.h>
+#include <quoin/core/progress.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
@@ -15,13 +16,20 @@
 
 namespace quoin {
 
+/// A voxel and what it is to be.
+struct PlacedVoxel {
+  IVec3 voxel{0};
+  VoxelType type = kAir;
+};
+
 /// A sparse, unbounded field of voxels in chunks of 64^3. What was never set is air.
 ///
 /// Space:    voxel (i, j, k) fills the unit cube from (i, j, k) to (i + 1, j + 1, k + 1). Any int32 coordinates, except
 ///           the outermost chunk on each side, which stays air.
 /// Edits:    setting a voxel to what it is changes nothing. A chunk that is all air is dropped. When an edit throws
-///           (bad_alloc, or what a callback threw), what it did until then stays done and booked. `changes_since` tells
-///           any number of consumers what edits changed.
+///           (bad_alloc, or what a callback threw), or is cancelled by its `progress`, what it did until then stays
+///           done and booked. `changes_since` tells any number of consumers what edits changed, `visit_changes` from
+///           which type to which.
 /// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
 ///           chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
@@ -44,37 +52,48 @@ class Grid {
   // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
   [[nodiscard]] VoxelType get(IVec3 voxel) const { return get(voxel.x, voxel.y, voxel.z); }
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
+  template <std::floating_point T>
+  VoxelType get(Point<T> point) const = delete;  // get(voxel_of(point))
 
   /// Sets one voxel. Returns true when it had another type before. Of many, `edit` or a GridWriter is faster.
   bool set(IVec3 voxel, VoxelType type) { return set(voxel.x, voxel.y, voxel.z, type); }
   bool set(int x, int y, int z, VoxelType type);
+  template <std::floating_point T>
+  bool set(Point<T> point, VoxelType type) = delete;  // set(voxel_of(point), type)
+  /// Sets many voxels wherever they lie; of several for one place the last counts. Returns how many changed.
+  /// Cost: of those that lie in one chunk one after the other a third of `set`.
+  std::int64_t set(std::span<const PlacedVoxel> voxels);
   /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
   /// one edit. Returns how many changed.
   std::int64_t write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
   /// Sets all voxels of a box (half open: `max` excluded; an empty one changes nothing). Returns how many changed.
-  /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel. It cannot be
-  /// cancelled: a box of millions of chunks is better filled piece by piece.
-  std::int64_t fill_box(const IBox& box, VoxelType type);
+  /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel, but each some
+  /// hundred bytes: where a box is a user's own choice, say how much is too much by `progress`.
+  std::int64_t fill_box(const IBox& box, VoxelType type, const Progress& progress = {});
   /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
   /// A radius that is negative or not finite, or a centre that is not finite, changes nothing.
   /// Cost: O(voxels of the box around the sphere); of air, of those in chunks that there are.
-  std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type);
+  std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type, const Progress& progress = {});
   /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max`
   /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many changed.
   /// Requires: `pick` changes nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was
   /// picked for earlier rows, of 64 voxels along x, but not its own.
   template <class Pick>
-  std::int64_t edit(const IBox& box, Pick&& pick) {
-    return edit_rows(box, [&pick](IVec3 first, std::span<VoxelType> row) {
-      for (VoxelType& type : row) {
-        type = pick(first, type);
-        ++first.x;
-      }
-    });
+  std::int64_t edit(const IBox& box, Pick&& pick, const Progress& progress = {}) {
+    return edit_rows(
+        box,
+        [&pick](IVec3 first, std::span<VoxelType> row) {
+          for (VoxelType& type : row) {
+            type = pick(first, type);
+            ++first.x;
+          }
+        },
+        progress);
   }
   /// `edit`, a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
   /// box along x in one chunk, from `first` on, and changes them in place. Returns how many changed.
-  std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change);
+  std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
+                         const Progress& progress = {});
   /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many voxels changed. The outermost
   /// chunks are ignored.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);

@@ -103,6 +103,8 @@ class VoxelRegistry {
   [[nodiscard]] bool is_transparent(VoxelType type) const { return visibility(type) == Visibility::Transparent; }
   /// Whether any registered type is transparent.
   [[nodiscard]] bool has_transparent() const { return content_->transparent_count > 0; }
+  /// Whether any registered type besides air stops no moving body (VoxelProperties::collides).
+  [[nodiscard]] bool has_passable() const { return content_->passable_count > 0; }
 
   /// The types that were added or replaced since the cursor's last time, in the order of their ids; moves the cursor to
   /// the present. Cost: O(types that changed). See ChangeCursor.
@@ -119,6 +121,7 @@ class VoxelRegistry {
     std::vector<std::uint64_t> serials;  // of the types' last records in the journal
     std::multimap<std::uint64_t, VoxelType> by_hash;
     std::size_t transparent_count = 0;
+    std::size_t passable_count = 0;
   };
   struct Journal;
   void note(TypeChange change);

@@ -38,6 +38,8 @@ struct SceneFile {
     bool visible = true;
     std::optional<std::size_t> group = {};  ///< an index into `groups`
     std::optional<std::size_t> layer = {};  ///< an index into `layers`
+    /// As Instance::categories; nothing: 1, and of a source its own.
+    std::optional<std::uint32_t> categories = {};
   };
   /// As SceneGroup.
   struct Group {

@@ -58,6 +58,8 @@ struct Instance {
   bool visible = true;      ///< its own switch; `is_shown` says whether its groups and layers show it too
   GroupHandle group = {};   ///< that it belongs to; one that names nothing: it stands at the top
   LayerHandle layer = {};   ///< that it lies on; one that names nothing: on none
+  /// Bits of a game's own meaning (terrain, ships, what the player owns), by which queries select: QueryFilter.
+  std::uint32_t categories = 1;
 };
 
 using InstanceHandle = Handle<Instance>;
@@ -178,6 +180,8 @@ class Scene {
 
  private:
   struct Book;
+  explicit Scene(std::uint32_t family);
+  [[nodiscard]] Book& book() const;
   [[nodiscard]] std::size_t keys() const;
   SlotMap<SceneGrid> grids_;
   SlotMap<Instance> instances_;
@@ -227,6 +231,9 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 /// moved; and its inverse, NaN where the instance has no place.
 [[nodiscard]] DVec3 world_from_grid_direction(const Instance& instance, DVec3 direction_in_grid);
 [[nodiscard]] DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world);
+/// Where a point that is fixed to an instance goes when the instance goes from one placement to another: so what stands
+/// on a lift or a turning ship is carried, frame by frame. The point itself where either is no place.
+[[nodiscard]] DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_in_world);
 /// The voxel that fills the place of a point of the world, whether it is air or not; of a point between two voxels the
 /// greater one on each axis. Nothing where the instance has no place, the point is not finite, or the voxel's
 /// coordinates are no int32.

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <quoin/core/direction.h>
@@ -12,6 +14,22 @@
 #include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
+
+/// Which voxels a query meets, and which solid of fields. Unregistered types, and solid without a material, count as
+/// opaque and colliding.
+enum class QueryTypes : std::uint8_t {
+  All,        ///< whatever is not air
+  Colliding,  ///< what stops a moving body (VoxelProperties::collides)
+  Opaque,     ///< what blocks sight
+};
+
+/// What of a scene a query looks at; by default all of it.
+/// Lifetime: what `ignored` looks at must outlive the query.
+struct QueryFilter {
+  std::span<const InstanceHandle> ignored = {};    ///< passed through: a body that moves ignores itself
+  std::uint32_t categories = ~std::uint32_t{0};    ///< instances without any of these bits are passed through
+  std::optional<QueryTypes> types = std::nullopt;  ///< nothing: All for rays, Colliding for shapes
+};
 
 /// Where a ray meets a scene.
 struct SceneHit {
@@ -34,33 +52,39 @@ struct SceneHit {
 ///
 /// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
 ///            itself.
-/// Cost:      O(log instances + grids on the ray).
+/// Filters:   what is passed through is nowhere; a ray that starts inside of it starts in air.
+/// Cost:      O(log instances + grids on the ray); in grids that hold types which the filter passes through, besides
+///            O(such voxels, and a field's cells, on the ray).
 [[nodiscard]] std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world,
-                                                double max_t = std::numeric_limits<double>::infinity());
+                                                double max_t = std::numeric_limits<double>::infinity(),
+                                                const QueryFilter& filter = {});
 
 /// Whether anything meets a ray in the world from 0 up to and including `max_t`, transparent ones too: as `first_hit`,
 /// without asking what is nearest, so it is done with the first that is found. For lines of sight.
 [[nodiscard]] bool any_hit(const SceneTracer& tracer, const Ray& ray_in_world,
-                           double max_t = std::numeric_limits<double>::infinity());
+                           double max_t = std::numeric_limits<double>::infinity(), const QueryFilter& filter = {});
 
 /// What is seen at a point of a picture. Requires: width and height are positive.
-[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point);
+[[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+                                           const QueryFilter& filter = {});
 
 /// The voxel that a pixel of a depth picture shows: the first one no nearer than `depth`, which is a float's rounding
 /// off at most. Nothing when there is none at that distance.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
-                                                     const PicturePoint& point, float depth);
+                                                     const PicturePoint& point, float depth,
+                                                     const QueryFilter& filter = {});
 
-/// A voxel that collides (VoxelProperties::collides) and meets a shape, or a cell of a field whose solid does.
+/// A voxel that meets a shape, or a cell of a field whose solid does; of the types that the query's filter says, by
+/// default those that collide.
 struct SceneOverlap {
   InstanceHandle instance;
   IVec3 voxel{0};         ///< of a field the cell, as in DensityHit
-  VoxelType type = kAir;  ///< of a field the material, of the nearest sample whose material collides
+  VoxelType type = kAir;  ///< of a field the material, of the nearest sample whose material counts
   bool in_field = false;
   DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
 };
 
-/// For each instance that has a colliding voxel within a sphere or a box, the first of these (z, then y, then x), in
+/// For each instance that has such a voxel within a sphere or a box, the first of these (z, then y, then x), in
 /// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
 /// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
 /// nothing, nor does a sphere of radius 0; a box of size 0 is a plate, a rod or a point.
@@ -68,7 +92,9 @@ struct SceneOverlap {
 /// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
 /// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
 /// Threads: any number may ask at once, while the tracer is not updated.
-[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius);
-[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box);
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius,
+                                                 const QueryFilter& filter = {});
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box,
+                                                 const QueryFilter& filter = {});
 
 }  // namespace quoin

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <quoin/scene/scene_query.h>
 
@@ -20,8 +22,8 @@ struct SweepHit {
   bool in_field = false;
 };
 
-/// The first colliding voxel (VoxelProperties::collides) that a box meets on its way, or the first point at which the
-/// field of an instance is negative, however fast it is.
+/// The first voxel that a box meets on its way, or the first point at which the field of an instance is negative,
+/// however fast it is; of types that collide (VoxelProperties::collides), unless `filter` says others.
 ///
 /// The box keeps its rotation; grids stand still, in any rotation. Touching is not meeting: a box may slide along a
 /// face. Of voxels met at once the one with an exposed face counts. Numbers that are not finite meet nothing. Sizes of
@@ -38,7 +40,8 @@ struct SweepHit {
 /// Source: the separating axes of two boxes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996), each with the times
 ///         at which they begin and cease to part them; in a field of the box and what lies below planes under the
 ///         trilinear field, halved until these are near enough to it.
-[[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement);
+[[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
+                                                const QueryFilter& filter = {});
 
 /// How far a box has to be moved to meet nothing, in the world: 0 where it meets nothing; nothing where there is no
 /// such place within `max_distance`, world units.
@@ -51,7 +54,7 @@ struct SweepHit {
 ///         twice that distance.
 /// Errors: sizes, places and distances that are not finite, or below 0, have none.
 [[nodiscard]] std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box,
-                                                      double max_distance);
+                                                      double max_distance, const QueryFilter& filter = {});
 
 /// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {
@@ -76,6 +79,19 @@ struct SlideOptions {
   /// How far that may be, world units; nothing: the longest edge of the box, and the way out of what it is in.
   std::optional<double> max_push_out = std::nullopt;
   std::optional<FloorOptions> floor = std::nullopt;  ///< nothing: a body that slides, whatever it lies on
+  QueryFilter filter;                                ///< what the body meets at all
+};
+
+/// What a moving body met.
+struct SlideContact {
+  enum class Kind : std::uint8_t {
+    Floor,    ///< with `SlideOptions::floor`: no steeper than that says
+    Wall,     ///< anything else
+    Ceiling,  ///< with `SlideOptions::floor`: what would be a floor from the other side
+    Inside,   ///< it started in there, and was moved out if it could be
+  };
+  Kind kind = Kind::Wall;
+  SweepHit hit;  ///< `fraction` is of the part of the way that was left then
 };
 
 struct SlideResult {
@@ -85,6 +101,10 @@ struct SlideResult {
   DVec3 normal{0.0};         ///< of the last such contact
   bool is_on_floor = false;  ///< at the end, with `SlideOptions::floor`
   DVec3 floor_normal{0.0};   ///< of that floor
+  SweepHit floor;            ///< what it stands on then: the instance, which may carry it (`carried_point`), the voxel
+  /// Whatever it met on its way, in that order; a floor that it stood on from the start and still does is not among
+  /// them.
+  std::vector<SlideContact> contacts;
 };
 
 /// Moves a box and lets it slide along what it meets: the part of the displacement that goes into a face is dropped, in

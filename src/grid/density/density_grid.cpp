@@ -63,7 +63,10 @@ DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
   std::size_t i = 0;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) result.chunks[i++] = find_chunk(chunk + IVec3{dx, dy, dz});
+      for (int dx = -1; dx <= 1; ++dx, ++i) {
+        const IVec3 offset{dx, dy, dz};
+        if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);
+      }
     }
   }
   return result;

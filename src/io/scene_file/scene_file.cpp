@@ -240,7 +240,7 @@ class Placer {
   void place_grid(const SceneFile::Placement& placement) {
     scene_.add_instance({placement.name, grids_[*placement.grid], placement.position, placement.rotation,
                          placement.scale, placement.mirrored, placement.visible, named(groups_, placement.group),
-                         named(layers_, placement.layer)});
+                         named(layers_, placement.layer), placement.categories.value_or(Instance().categories)});
   }
 
   void place_body(const SceneFile::Placement& placement, const Body& body) {
@@ -254,6 +254,7 @@ class Placer {
       instance.visible = instance.visible && placement.visible;
       instance.group = outer;
       if (placement.layer) instance.layer = layer;
+      instance.categories = placement.categories.value_or(instance.categories);
       scene_.add_instance(std::move(instance));
       return;
     }
@@ -273,6 +274,7 @@ class Placer {
     for (const Instance& inner : body.instances) {
       Instance instance = placed(inner, placement, false);
       instance.group = group_of(inner.group);
+      instance.categories = placement.categories.value_or(inner.categories);
       scene_.add_instance(std::move(instance));
     }
   }

@@ -62,9 +62,21 @@ std::optional<std::size_t> place_in(const Object& object, std::string_view key, 
   return 0;
 }
 
+// Bits of 32.
+std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
+  const Json* json = object.find(key);
+  if (json == nullptr) return std::nullopt;
+  if (json->is_number_unsigned() && json->get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max()) {
+    return json->get<std::uint32_t>();
+  }
+  object.faults().add(object.place_of(key), "must be a whole number from 0 to 4294967295");
+  return std::nullopt;
+}
+
 SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
   const Object instance(
-      json, place, {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer"},
+      json, place,
+      {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer", "categories"},
       faults);
   SceneFile::Placement placement;
   placement.grid = place_in(instance, "grid", "grids");
@@ -76,6 +88,7 @@ SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& 
   instance.read("scale", placement.scale);
   instance.read("mirrored", placement.mirrored);
   instance.read("visible", placement.visible);
+  placement.categories = bits_in(instance, "categories");
   if (const Json* rotation = instance.find("rotation")) {
     placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
   }

@@ -120,6 +120,7 @@ class SceneText {
     if (!placement.visible) json["visible"] = false;
     if (placement.group) json["group"] = *placement.group;
     if (placement.layer) json["layer"] = *placement.layer;
+    if (placement.categories) json["categories"] = *placement.categories;
     return json;
   }
 
@@ -336,7 +337,10 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
                                .mirrored = instance.mirrored,
                                .visible = instance.visible,
                                .group = place_of(groups, instance.group),
-                               .layer = place_of(layers, instance.layer)});
+                               .layer = place_of(layers, instance.layer),
+                               .categories = instance.categories == Instance().categories
+                                                 ? std::nullopt
+                                                 : std::optional<std::uint32_t>(instance.categories)});
   }
   return file;
 }

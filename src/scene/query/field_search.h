@@ -8,32 +8,32 @@
 #include <vector>
 
 #include <quoin/core/half.h>
-#include <quoin/grid/voxel_registry.h>
 #include <quoin/trace/density_ray.h>
 
 #include "scene/query/field_piece.h"
 #include "scene/query/field_shapes.h"
+#include "scene/query/query_in_grid.h"
 
 namespace quoin {
 
-/// The cells of a field that hold solid that collides.
+/// The cells of a field that hold solid of the types that count.
 class FieldCells {
  public:
-  FieldCells(const DensityTree& tree, const VoxelRegistry& types) : tree_(tree), types_(types) {}
+  FieldCells(const DensityTree& tree, const TypesMet& types) : tree_(tree), types_(types) {}
   [[nodiscard]] IBox bounds() const { return tree_.cells().bounds(); }
   [[nodiscard]] const DensityGrid& field() const { return tree_.field(); }
-  /// Whether a solid corner of the cell collides; the corners' densities.
+  /// Whether a solid corner of the cell counts; the corners' densities.
   bool read(IVec3 cell, CellCorners& corners);
-  /// Of the nearest solid corner that collides; of several, the least of (z, y, x). `point` is relative to the cell.
+  /// Of the nearest solid corner that counts; of several, the least of (z, y, x). `point` is relative to the cell.
   [[nodiscard]] VoxelType material(IVec3 cell, const DVec3& point);
 
  private:
   const DensityChunk* chunk_of_sample(IVec3 sample);
-  [[nodiscard]] bool collides_at(IVec3 sample);
+  [[nodiscard]] bool counts_at(IVec3 sample);
   [[nodiscard]] float density(IVec3 sample);
 
   const DensityTree& tree_;
-  const VoxelRegistry& types_;
+  const TypesMet& types_;
   const DensityChunk* chunk_ = nullptr;
   IVec3 chunk_at_{0};
   bool knows_chunk_ = false;
@@ -182,7 +182,7 @@ class FieldSearch {
   std::vector<FieldPiece> pieces_;  // a heap, the soonest first
 };
 
-/// The first cell (z, then y, then x) whose colliding solid a shape at rest meets, deeper than kFieldTouch.
+/// The first cell (z, then y, then x) whose solid of types that count a shape at rest meets, deeper than kFieldTouch.
 template <class Shape>
 std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shape& shape) {
   const IBox box = voxels_within(shape.bounds(IVec3{0}, 0.0, 0.0), cells.bounds());

@@ -14,13 +14,11 @@ const DensityChunk* FieldCells::chunk_of_sample(IVec3 sample) {
   return chunk_;
 }
 
-bool FieldCells::collides_at(IVec3 sample) {
+bool FieldCells::counts_at(IVec3 sample) {
   const DensityChunk* const chunk = chunk_of_sample(sample);
   if (chunk == nullptr) return false;
   const IVec3 local = local_of(sample);
-  const VoxelType type = chunk->materials().get(local.x, local.y, local.z);
-  // Solid that was given no material is solid all the same.
-  return type == kAir || collides(types_, type);
+  return types_.are_all() || types_.holds_solid(chunk->materials().get(local.x, local.y, local.z));
 }
 
 float FieldCells::density(IVec3 sample) {
@@ -47,7 +45,7 @@ bool FieldCells::read(IVec3 cell, CellCorners& corners) {
     }
   }
   for (int i = 0; i < 8; ++i) {
-    if (corners[static_cast<std::size_t>(i)] < 0.0 && collides_at(cell + IVec3{i & 1, i >> 1 & 1, i >> 2})) return true;
+    if (corners[static_cast<std::size_t>(i)] < 0.0 && counts_at(cell + IVec3{i & 1, i >> 1 & 1, i >> 2})) return true;
   }
   return false;
 }
@@ -59,7 +57,7 @@ VoxelType FieldCells::material(IVec3 cell, const DVec3& point) {
     const IVec3 corner{i & 1, i >> 1 & 1, i >> 2};
     const DVec3 away = DVec3(corner) - point;
     const double square = glm::dot(away, away);
-    if (!(square < least) || !(field().density(cell + corner) < 0.0F) || !collides_at(cell + corner)) continue;
+    if (!(square < least) || !(field().density(cell + corner) < 0.0F) || !counts_at(cell + corner)) continue;
     least = square;
     nearest = cell + corner;
   }
@@ -97,7 +95,7 @@ struct Deepest {
   double density = 0.0;
 };
 
-Deepest deepest_in(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box) {
+Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const MovingBox& box) {
   FieldCells cells(tree, types);
   const DBox bounds = bounds_between(box, reach_of_axes(box.half_axes), 0.0, 0.0);
   const IBox near = voxels_within(bounds, cells.bounds());
@@ -125,8 +123,8 @@ Deepest deepest_in(const DensityTree& tree, const VoxelRegistry& types, const Mo
 }
 
 // How far a box has to go along a direction until it is out, at most `most`; infinity where it is not out by then.
-double depth_along(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box, DVec3 direction,
-                   double guess, double most) {
+double depth_along(const DensityTree& tree, const TypesMet& types, const MovingBox& box, DVec3 direction, double guess,
+                   double most) {
   for (double length = guess;; length *= 2.0) {
     MovingBox back = box;
     back.centre += direction * std::min(length, most);
@@ -153,7 +151,7 @@ DVec3 direction_out(const DensityGrid& field, DVec3 point) {
 
 }  // namespace
 
-WayOut way_out(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box, const FieldContact& contact) {
+WayOut way_out(const DensityTree& tree, const TypesMet& types, const MovingBox& box, const FieldContact& contact) {
   const DVec3 reach = reach_of_axes(box.half_axes);
   const double most = 2.0 * glm::length(reach) + 2.0;
   Deepest deepest = deepest_in(tree, types, box);

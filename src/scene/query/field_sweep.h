@@ -1,6 +1,5 @@
 #pragma once
 
-#include <quoin/grid/voxel_registry.h>
 #include <quoin/trace/density_ray.h>
 
 #include "scene/query/field_search.h"
@@ -11,7 +10,7 @@ namespace quoin {
 /// The first contact of a moving box with a field; for `follow_way`.
 class FieldSweep {
  public:
-  FieldSweep(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box, double most)
+  FieldSweep(const DensityTree& tree, const TypesMet& types, const MovingBox& box, double most)
       : cells_(tree, types), box_(box), most_(most) {}
 
   [[nodiscard]] IBox bounds() const { return cells_.bounds(); }
@@ -39,7 +38,7 @@ struct WayOut {
 /// soonest where there is none. Where neither leads out within twice the box's size, it leads a voxel along the first.
 ///
 /// Cost: some sweeps about as long as the box.
-[[nodiscard]] WayOut way_out(const DensityTree& tree, const VoxelRegistry& types, const MovingBox& box,
+[[nodiscard]] WayOut way_out(const DensityTree& tree, const TypesMet& types, const MovingBox& box,
                              const FieldContact& contact);
 
 }  // namespace quoin

@@ -28,8 +28,12 @@ namespace {
 
 class FreePlace {
  public:
-  FreePlace(const SceneTracer& tracer, const OrientedBox& box, double max_distance)
-      : tracer_(tracer), box_(box), axes_(glm::mat3_cast(unit_rotation(box.rotation))), max_distance_(max_distance) {}
+  FreePlace(const SceneTracer& tracer, const OrientedBox& box, double max_distance, const QueryFilter& filter)
+      : tracer_(tracer),
+        box_(box),
+        axes_(glm::mat3_cast(unit_rotation(box.rotation))),
+        max_distance_(max_distance),
+        filter_(filter) {}
 
   [[nodiscard]] std::optional<DVec3> find() {
     if (is_free(DVec3(0.0))) return DVec3(0.0);
@@ -42,14 +46,14 @@ class FreePlace {
   [[nodiscard]] OrientedBox at(DVec3 displacement) const {
     return {box_.centre + in_world(displacement), box_.half_size, box_.rotation};
   }
-  [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement)).empty(); }
+  [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement), filter_).empty(); }
 
   // Whether all that may be in the way are voxels whose axes are the box's. Collects where it touches their faces.
   [[nodiscard]] bool has_own_axes() {
     const DVec3 reach = reach_of_axes(half_axes_of(box_)) + max_distance_;
     bool are_own = true;
-    SceneQuery::instances(tracer_).visit_box({box_.centre - reach, box_.centre + reach}, [&](std::size_t i) {
-      const PlacedGrid& placed = tracer_.placed()[i];
+    const Seen seen(tracer_, filter_, QueryTypes::Colliding);
+    seen.visit_near({box_.centre - reach, box_.centre + reach}, [&](const PlacedGrid& placed) {
       are_own = are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed));
     });
     return are_own;
@@ -132,13 +136,14 @@ class FreePlace {
   [[nodiscard]] bool is_blocked(const Cube& cube) const {
     OrientedBox common = at(cube.middle);
     common.half_size -= cube.half;
-    return is_box(common) && !overlaps(tracer_, common).empty();
+    return is_box(common) && !overlaps(tracer_, common, filter_).empty();
   }
 
   // From a free place back towards where it was, sliding along what it meets.
   [[nodiscard]] DVec3 nearer(DVec3 free) const {
     SlideOptions options;
     options.pushes_out = false;
+    options.filter = filter_;
     options.max_contacts = 8;
     options.skin = std::min(options.skin, 0.01 * max_distance_);
     const DVec3 back = move_and_slide(tracer_, at(free), -in_world(free), options).centre - box_.centre;
@@ -174,14 +179,16 @@ class FreePlace {
   const OrientedBox& box_;
   const glm::dmat3 axes_;
   const double max_distance_;
+  const QueryFilter& filter_;
   std::array<std::vector<double>, 3> places_;  // along each of the box's axes
 };
 
 }  // namespace
 
-std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance) {
+std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
+                                        const QueryFilter& filter) {
   if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
-  return FreePlace(tracer, box, max_distance).find();
+  return FreePlace(tracer, box, max_distance, filter).find();
 }
 
 }  // namespace quoin

@@ -3,6 +3,7 @@
 // A box on its way through the space of a grid, and the voxels or cells that are near it on that way.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -37,6 +38,26 @@ inline double length_of(DVec3 v) {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (largest == 0.0) return 0.0;
   return std::min(largest * glm::length(v / largest), std::numeric_limits<double>::max());
+}
+
+/// Calls `visit(box)` for a box, until that returns false. One without thickness across its way may lie between two
+/// voxels, within what both are together and in neither: it is visited on each side of where it is, and meets only what
+/// it meets on all of them.
+template <class Visit>
+void visit_sides(const MovingBox& box, const Visit& visit) {
+  std::array<int, 3> thin{};
+  unsigned count = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double along = std::abs(glm::dot(box.displacement, box.axes[axis]));
+    if (box.half_size[axis] < kTouch && along <= 1e-12 * length_of(box.displacement)) thin.at(count++) = axis;
+  }
+  for (unsigned sides = 0; sides < 1U << count; ++sides) {
+    MovingBox beside = box;
+    for (unsigned i = 0; i < count; ++i) {
+      beside.centre += box.axes[thin.at(i)] * ((sides >> i & 1U) != 0 ? 2.0 * kTouch : -2.0 * kTouch);
+    }
+    if (!visit(beside)) return;
+  }
 }
 
 /// The fractions of the way at which the box's bounds are within `tight`.

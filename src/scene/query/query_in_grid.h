@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -65,10 +67,58 @@ inline glm::dmat3 half_axes_of(const OrientedBox& box) {
   return half_axes;
 }
 
-/// Whether a moving body is stopped by voxels of a type; one that is not registered counts.
-inline bool collides(const VoxelRegistry& types, VoxelType type) {
-  return type != kAir && (type >= types.size() || types[type].collides);
-}
+/// Which types a query meets; those that are not registered count as colliding and opaque.
+class TypesMet {
+ public:
+  TypesMet(const VoxelRegistry& types, QueryTypes which) : types_(&types), which_(which) {
+    // Where all do, there is nothing to ask.
+    if (which == QueryTypes::Colliding && !types.has_passable()) which_ = QueryTypes::All;
+    if (which == QueryTypes::Opaque && !types.has_transparent()) which_ = QueryTypes::All;
+  }
+  [[nodiscard]] bool are_all() const { return which_ == QueryTypes::All; }
+  [[nodiscard]] bool are_opaque() const { return which_ == QueryTypes::Opaque; }
+  [[nodiscard]] bool holds(VoxelType type) const { return type != kAir && holds_solid(type); }
+  /// Of a field's solid, which without a material is solid all the same.
+  [[nodiscard]] bool holds_solid(VoxelType material) const {
+    if (which_ == QueryTypes::All || material == kAir || material >= types_->size()) return true;
+    return which_ == QueryTypes::Opaque ? types_->is_opaque(material) : (*types_)[material].collides;
+  }
+
+ private:
+  const VoxelRegistry* types_;
+  QueryTypes which_;
+};
+
+/// What a filter lets a query see.
+class Seen {
+ public:
+  Seen(const SceneTracer& tracer, const QueryFilter& filter, QueryTypes by_default)
+      : types(tracer.scene().types, filter.types.value_or(by_default)), tracer_(tracer), filter_(filter) {}
+
+  [[nodiscard]] bool includes(const PlacedGrid& placed) const {
+    if (std::find(filter_.ignored.begin(), filter_.ignored.end(), placed.instance) != filter_.ignored.end())
+      return false;
+    if (filter_.categories == ~std::uint32_t{0}) return true;
+    const Instance* const instance = tracer_.scene().instances().find(placed.instance);
+    return instance == nullptr || (instance->categories & filter_.categories) != 0;
+  }
+  /// Calls `visit(placed)` for those near a box in the world, in their order.
+  template <class Visit>
+  void visit_near(const DBox& box, const Visit& visit) const {
+    std::vector<std::size_t> near;
+    SceneQuery::instances(tracer_).visit_box(box, [&](std::size_t i) { near.push_back(i); });
+    std::sort(near.begin(), near.end());
+    for (const std::size_t i : near) {
+      if (includes(tracer_.placed()[i])) visit(tracer_.placed()[i]);
+    }
+  }
+
+  const TypesMet types;
+
+ private:
+  const SceneTracer& tracer_;
+  const QueryFilter& filter_;
+};
 
 /// The directions that can part a box from a voxel: the voxel's three, then the box's three and the nine products of
 /// both; those of parallel edges are 0.

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "scene/query/field_search.h"
+#include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
 #include "scene/query/query_in_grid.h"
 
@@ -24,21 +26,77 @@ struct GridHit {
   DVec3 normal{0.0};
 };
 
-std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
+// The first voxel of a tree of types that count.
+std::optional<RayHit> first_of_tree(const OccupancyTree& tree, const PlacedGrid& placed, const TypesMet& types,
+                                    const Ray& ray, double max_t) {
+  std::optional<RayHit> hit = first_hit(tree, ray, max_t);
+  if (!hit || types.are_all() || types.holds(placed.voxels->get(hit->voxel))) return hit;
+  hit.reset();
+  visit_hits(tree, ray, max_t, [&](const VoxelSpan& span) {
+    if (!types.holds(placed.voxels->get(span.voxel))) return true;
+    hit = RayHit{span.voxel, span.face, span.t_enter, span.starts_inside};
+    return false;
+  });
+  return hit;
+}
+
+// As far as a ray can meet a box, from its start.
+double leaves_at(const IBox& box, const Ray& ray) {
+  double last = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double d = ray.direction[axis];
+    if (d == 0.0) continue;
+    last = std::min(last, ((d > 0.0 ? box.max[axis] : box.min[axis]) - ray.origin[axis]) / d);
+  }
+  return last;
+}
+
+// Where a ray comes into the solid of a field that counts, past what does not: the way of a point.
+std::optional<DensityHit> first_beyond(const DensityTree& field, const TypesMet& types, const Ray& ray, double max_t) {
+  MovingBox point;
+  point.centre = ray.origin;
+  point.half_axes = glm::dmat3(0.0);
+  const double until = std::min(max_t, leaves_at(field.cells().bounds(), ray));
+  if (!(until >= 0.0)) return std::nullopt;
+  point.displacement = ray.direction * until;
+  FieldSweep sweep(field, types, point, 1.0);
+  follow_way(point, 1.0, sweep);
+  const FieldContact& met = sweep.best();
+  if (!(met.fraction <= 1.0)) return std::nullopt;
+  const DVec3 gradient = met.piece.gradient(met.point);
+  const double steepness = glm::length(gradient);
+  return DensityHit{met.fraction * until, met.starts_inside, met.piece.cell, sweep.material(),
+                    steepness > 0.0 ? gradient / steepness : DVec3(0.0)};
+}
+
+std::optional<DensityHit> first_of_field(const PlacedGrid& placed, const TypesMet& types, const Ray& ray,
+                                         double max_t) {
+  const DensityTree* const field = types.are_opaque() ? placed.opaque_field : placed.field;
+  if (field == nullptr) return std::nullopt;
+  const std::optional<DensityHit> hit = first_hit(*field, ray, max_t);
+  if (!hit || types.are_all() || types.are_opaque() || types.holds_solid(hit->material)) return hit;
+  return first_beyond(*field, types, ray, max_t);
+}
+
+std::optional<GridHit> first_of_grid(const PlacedGrid& placed, const TypesMet& types, const Ray& ray, double max_t) {
   std::optional<GridHit> best;
-  for (const OccupancyTree* const tree : {placed.opaque, placed.transparent}) {
+  for (const OccupancyTree* const tree : {placed.opaque, types.are_opaque() ? nullptr : placed.transparent}) {
     if (tree == nullptr) continue;
-    const std::optional<RayHit> hit = first_hit(*tree, ray, best ? best->hit.t : max_t);
+    const std::optional<RayHit> hit = first_of_tree(*tree, placed, types, ray, best ? best->hit.t : max_t);
     if (hit && (!best || hit->t < best->hit.t)) best = GridHit{*hit, false, kAir, DVec3(normal_of(hit->face))};
   }
-  if (placed.field == nullptr) return best;
-  const std::optional<DensityHit> hit = first_hit(*placed.field, ray, best ? best->hit.t : max_t);
+  const std::optional<DensityHit> hit = first_of_field(placed, types, ray, best ? best->hit.t : max_t);
   if (!hit || (best && hit->t >= best->hit.t)) return best;
   return GridHit{
       {hit->cell, nearest_direction(hit->normal), hit->t, hit->starts_inside}, true, hit->material, hit->normal};
 }
 
-bool is_any_in_grid(const PlacedGrid& placed, const Ray& ray, double max_t) {
+bool is_any_in_grid(const PlacedGrid& placed, const TypesMet& types, const Ray& ray, double max_t) {
+  if (types.are_opaque()) {
+    return any_hit(*placed.opaque, ray, max_t) ||
+           (placed.opaque_field != nullptr && any_hit(*placed.opaque_field, ray, max_t));
+  }
+  if (!types.are_all()) return first_of_grid(placed, types, ray, max_t).has_value();
   return any_hit(*placed.opaque, ray, max_t) ||
          (placed.transparent != nullptr && any_hit(*placed.transparent, ray, max_t)) ||
          (placed.field != nullptr && any_hit(*placed.field, ray, max_t));
@@ -81,6 +139,7 @@ class BoxInGrid {
     });
   }
   [[nodiscard]] BoxInField in_field() const { return {box_, 0.0}; }
+  [[nodiscard]] const MovingBox& box() const { return box_; }
 
  private:
   MovingBox box_;
@@ -88,7 +147,7 @@ class BoxInGrid {
 };
 
 template <class Shape>
-std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const VoxelRegistry& types, const Shape& shape) {
+std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
   const Grid& grid = *placed.voxels;
   const IBox box = voxels_within(shape.bounds(), grid.bounds());
   GridReader reader(grid);
@@ -97,15 +156,29 @@ std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const Voxe
       for (int x = box.min.x; x < box.max.x; ++x) {
         const IVec3 voxel(x, y, z);
         const VoxelType type = reader.get(voxel);
-        if (collides(types, type) && shape.meets(voxel)) return SceneOverlap{placed.instance, voxel, type};
+        if (types.holds(type) && shape.meets(voxel)) return SceneOverlap{placed.instance, voxel, type};
       }
     }
   }
   return std::nullopt;
 }
 
+std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types,
+                                            const SphereInGrid& sphere) {
+  return first_of_shape(placed, types, sphere);
+}
+std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const BoxInGrid& box) {
+  std::optional<SceneOverlap> first;
+  visit_sides(box.box(), [&](const MovingBox& side) {
+    const auto found = first_of_shape(placed, types, BoxInGrid(side));
+    if (!found || !first) first = found;
+    return found.has_value();
+  });
+  return first;
+}
+
 template <class Shape>
-std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const VoxelRegistry& types, const Shape& shape) {
+std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
   if (placed.field == nullptr) return std::nullopt;
   FieldCells cells(*placed.field, types);
   const auto in_field = shape.in_field();
@@ -120,31 +193,30 @@ std::optional<SceneOverlap> first_of_field(const PlacedGrid& placed, const Voxel
 
 // `shape_of(placed)` is the shape in that grid's space.
 template <class ShapeOf>
-std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const DBox& bounds, ShapeOf shape_of) {
-  const VoxelRegistry& types = tracer.scene().types;
-  std::vector<std::size_t> near;
-  SceneQuery::instances(tracer).visit_box(bounds, [&](std::size_t i) { near.push_back(i); });
-  std::sort(near.begin(), near.end());
+std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const DBox& bounds, const QueryFilter& filter,
+                                      ShapeOf shape_of) {
+  const Seen seen(tracer, filter, QueryTypes::Colliding);
   std::vector<SceneOverlap> found;
-  for (const std::size_t i : near) {
-    const PlacedGrid& placed = tracer.placed()[i];
+  seen.visit_near(bounds, [&](const PlacedGrid& placed) {
     const auto shape = shape_of(placed);
-    auto overlap = first_of_voxels(placed, types, shape);
-    if (!overlap) overlap = first_of_field(placed, types, shape);
+    auto overlap = first_of_voxels(placed, seen.types, shape);
+    if (!overlap) overlap = first_of_field(placed, seen.types, shape);
     if (overlap) found.push_back(*overlap);
-  }
+  });
   return found;
 }
 
 }  // namespace
 
-std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, double max_t) {
+std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const QueryFilter& filter) {
   if (!can_meet_anything(ray, max_t)) return std::nullopt;
+  const Seen seen(tracer, filter, QueryTypes::All);
   std::optional<GridHit> best;
   std::size_t best_placed = 0;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = tracer.placed()[i];
-    const auto hit = first_of_grid(placed, ray_in_grid(placed, ray), max_t);
+    if (!seen.includes(placed)) return true;
+    const auto hit = first_of_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     if (hit && (!best || hit->hit.t < best->hit.t || (hit->hit.t == best->hit.t && i < best_placed))) {
       best = hit;
       best_placed = i;
@@ -160,46 +232,48 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
                   hit.starts_inside, best->in_field, placed.world_axes * best->normal};
 }
 
-bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t) {
+bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const QueryFilter& filter) {
   if (!can_meet_anything(ray, max_t)) return false;
+  const Seen seen(tracer, filter, QueryTypes::All);
   bool is_hit = false;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
     const PlacedGrid& placed = tracer.placed()[i];
-    is_hit = is_any_in_grid(placed, ray_in_grid(placed, ray), max_t);
+    is_hit = seen.includes(placed) && is_any_in_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     return !is_hit;
   });
   return is_hit;
 }
 
-std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point) {
-  return first_hit(tracer, ray_through(camera, point));
+std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
+                             const QueryFilter& filter) {
+  return first_hit(tracer, ray_through(camera, point), std::numeric_limits<double>::infinity(), filter);
 }
 
 std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
-                                       float depth) {
+                                       float depth, const QueryFilter& filter) {
   if (!(depth >= 0.0F) || std::isinf(depth)) return std::nullopt;
   // Half a unit in a float's last place, twice over.
   const double room = double{depth} * 0x1p-23 + 1e-6;
   Ray ray = ray_through(camera, point);
   const double begin = std::max(double{depth} - room, 0.0);
   ray.origin += begin * ray.direction;
-  auto hit = first_hit(tracer, ray, double{depth} + room - begin);
+  auto hit = first_hit(tracer, ray, double{depth} + room - begin, filter);
   if (hit) hit->t += begin;
   return hit;
 }
 
-std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius) {
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius, const QueryFilter& filter) {
   if (!is_finite(centre) || !std::isfinite(radius) || radius <= 0.0) return {};
-  return overlaps_of(tracer, {centre - radius, centre + radius}, [&](const PlacedGrid& placed) {
+  return overlaps_of(tracer, {centre - radius, centre + radius}, filter, [&](const PlacedGrid& placed) {
     return SphereInGrid(ToGrid(placed).point(centre), radius / placed.voxel_size);
   });
 }
 
-std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box) {
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box, const QueryFilter& filter) {
   if (!is_box(box)) return {};
   const glm::dmat3 half_axes = half_axes_of(box);
   const DVec3 reach = reach_of_axes(half_axes);
-  return overlaps_of(tracer, {box.centre - reach, box.centre + reach}, [&](const PlacedGrid& placed) {
+  return overlaps_of(tracer, {box.centre - reach, box.centre + reach}, filter, [&](const PlacedGrid& placed) {
     return BoxInGrid(moving_in_grid(placed, box, half_axes, DVec3(0.0)));
   });
 }

@@ -41,7 +41,9 @@ struct Body {
   const SlideOptions& options;
   OrientedBox box;
 
-  [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const { return sweep_box(tracer, box, displacement); }
+  [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
+    return sweep_box(tracer, box, displacement, options.filter);
+  }
   // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
   // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
   double move_to(const SweepHit& hit, DVec3 displacement) {
@@ -65,19 +67,19 @@ struct Body {
     if (hit.in_field && glm::length(along_normal) <= furthest) {
       OrientedBox moved = box;
       moved.centre += along_normal;
-      if (overlaps(tracer, moved).empty()) {
+      if (overlaps(tracer, moved, options.filter).empty()) {
         box.centre = moved.centre;
         return true;
       }
     }
-    const auto away = nearest_free_place(tracer, box, furthest);
+    const auto away = nearest_free_place(tracer, box, furthest, options.filter);
     if (!away) return false;
     box.centre += *away;
     // And on by the skin where there is room.
     const double length = glm::length(*away);
     OrientedBox further = box;
     if (length > 0.0) further.centre += *away * (options.skin / length);
-    if (overlaps(tracer, further).empty()) box = further;
+    if (overlaps(tracer, further, options.filter).empty()) box = further;
     return true;
   }
   // Moves it as far as it goes; returns what it met.
@@ -92,8 +94,18 @@ struct Body {
   }
 };
 
+// What was met, which a floor is no obstacle among.
+void note(SlideResult& result, SlideContact::Kind kind, const SweepHit& hit) {
+  result.contacts.push_back({kind, hit});
+  if (kind == SlideContact::Kind::Floor) return;
+  result.is_blocked = true;
+  result.normal = hit.normal;
+}
+
 SlideResult slide(Body body, DVec3 displacement) {
-  SlideResult result{body.box.centre, displacement};
+  SlideResult result;
+  result.centre = body.box.centre;
+  result.displacement = displacement;
   DVec3 left = displacement;
   std::vector<DVec3> normals;
   for (int contact = 0; contact < body.options.max_contacts; ++contact) {
@@ -102,8 +114,7 @@ SlideResult slide(Body body, DVec3 displacement) {
       if (is_finite(left)) body.box.centre += left;
       break;
     }
-    result.is_blocked = true;
-    result.normal = hit->normal;
+    note(result, hit->depth > 0.0 ? SlideContact::Kind::Inside : SlideContact::Kind::Wall, *hit);
     if (hit->depth > 0.0) {
       if (!body.move_out(*hit)) break;
       continue;
@@ -157,7 +168,10 @@ class Walk {
     result_.centre = body_.box.centre;
     result_.displacement = displacement_;
     result_.is_on_floor = is_on_floor_;
-    if (!is_on_floor_) result_.floor_normal = DVec3(0.0);
+    if (!is_on_floor_) {
+      result_.floor_normal = DVec3(0.0);
+      result_.floor = {};
+    }
     return result_;
   }
 
@@ -170,21 +184,21 @@ class Walk {
       if (!hit) return true;
       if (hit->depth == 0.0) {
         is_supported_ = !(glm::dot(displacement, up_) > 0.0);
-        if (is_supported_ && is_floor(hit->normal)) land(hit->normal);
+        if (is_supported_ && is_floor(hit->normal)) land(*hit);
         return true;
       }
-      result_.is_blocked = true;
-      result_.normal = hit->normal;
+      note(result_, SlideContact::Kind::Inside, *hit);
       if (!body_.move_out(*hit)) return false;
     }
     return true;
   }
 
-  void land(DVec3 normal) {
+  void land(const SweepHit& floor) {
     // Walls that were met in the air, as it meets them on foot.
     if (!is_on_floor_) make_walls_upright();
     is_on_floor_ = true;
-    result_.floor_normal = normal;
+    result_.floor = floor;
+    result_.floor_normal = floor.normal;
   }
 
   [[nodiscard]] bool make_upright(DVec3& wall) const {
@@ -206,21 +220,20 @@ class Walk {
   // Goes to a contact and turns what is left of the way; false where it is over.
   bool meet(const SweepHit& hit, DVec3 way) {
     if (hit.depth > 0.0) {
-      result_.is_blocked = true;
-      result_.normal = hit.normal;
+      note(result_, SlideContact::Kind::Inside, hit);
       return body_.move_out(hit);
     }
     left_ *= 1.0 - body_.move_to(hit, way);
     if (is_floor(hit.normal) && !(glm::dot(displacement_, up_) > 0.0)) {
-      land(hit.normal);
+      note(result_, SlideContact::Kind::Floor, hit);
+      land(hit);
       displacement_ = along_contacts(level(displacement_), walls_);
       left_ = along_contacts(level(left_), walls_);
       meets_floor_ = true;
       return true;
     }
     if ((is_supported_ || is_on_floor_) && floor_.step_height > 0.0 && steps(level(left_), hit.normal)) return false;
-    result_.is_blocked = true;
-    result_.normal = hit.normal;
+    note(result_, is_floor(-hit.normal) ? SlideContact::Kind::Ceiling : SlideContact::Kind::Wall, hit);
     is_on_floor_ ? turn_aside(hit.normal) : turn(hit.normal);
     return true;
   }
@@ -269,8 +282,7 @@ class Walk {
     const DVec3 down = -up_ * (rise + 2.0 * body_.options.skin);
     auto ground = landed.advance(down);
     if (!ground || ground->depth > 0.0) return false;
-    DVec3 floor_normal = ground->normal;
-    if (!is_floor(floor_normal)) {
+    if (!is_floor(ground->normal)) {
       // On the edge of the step: the floor may begin a little further on.
       Body further = raised;
       const DVec3 half = glm::abs(body_.box.half_size);
@@ -278,13 +290,13 @@ class Walk {
       ground = further.advance(down);
       if (!ground || ground->depth > 0.0 || !is_floor(ground->normal)) return false;
       if (glm::dot(further.box.centre - body_.box.centre, up_) < body_.options.skin) return false;
-      floor_normal = ground->normal;
     }
     body_.box.centre = landed.box.centre;
     displacement_ = level(displacement_);
     left_ = DVec3(0.0);
     meets_floor_ = true;
-    land(floor_normal);
+    note(result_, SlideContact::Kind::Floor, *ground);
+    land(*ground);
     return true;
   }
 
@@ -296,7 +308,7 @@ class Walk {
     const auto hit = body_.sweep(down);
     if (hit && hit->depth == 0.0 && is_floor(hit->normal)) {
       body_.move_to(*hit, down);
-      land(hit->normal);
+      land(*hit);
       return;
     }
     // On the edge of a step, or between a floor and what is steeper.

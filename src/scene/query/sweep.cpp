@@ -87,7 +87,7 @@ Contact meet(const Moving& box, IVec3 voxel) {
 // The voxels of one grid, and the best contact with them so far; for `follow_way`.
 class BlockSweep {
  public:
-  BlockSweep(const Grid& grid, const VoxelRegistry& types, const MovingBox& box)
+  BlockSweep(const Grid& grid, const TypesMet& types, const MovingBox& box)
       : reader_(grid), types_(types), box_(box), bounds_(grid.bounds()) {}
 
   [[nodiscard]] const IBox& bounds() const { return bounds_; }
@@ -106,7 +106,7 @@ class BlockSweep {
 
  private:
   void check_voxel(IVec3 voxel) {
-    if (!collides(types_, reader_.get(voxel))) return;
+    if (!types_.holds(reader_.get(voxel))) return;
     const Contact contact = meet(box_, voxel);
     if (contact.fraction > best_.fraction + kAtOnce || contact.axis < 0) return;
     const bool is_exposed = faces_air(voxel, contact);
@@ -118,16 +118,16 @@ class BlockSweep {
     best_is_exposed_ = is_exposed;
   }
 
-  // Whether the face that was met has no colliding voxel before it; of edges that cross it is not known.
+  // Whether the face that was met has no voxel that counts before it; of edges that cross it is not known.
   [[nodiscard]] bool faces_air(IVec3 voxel, const Contact& contact) {
     if (contact.axis >= 3) return true;
     IVec3 before = voxel;
     before[contact.axis] += contact.normal[contact.axis] > 0.0 ? 1 : -1;
-    return !collides(types_, reader_.get(before));
+    return !types_.holds(reader_.get(before));
   }
 
   GridReader reader_;
-  const VoxelRegistry& types_;
+  const TypesMet& types_;
   Moving box_;
   IBox bounds_;
   Contact best_;
@@ -136,22 +136,28 @@ class BlockSweep {
 };
 
 // The first contact with what an instance places, up to the fraction `most`.
-std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const VoxelRegistry& types, const MovingBox& box,
+std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box,
                                         double most) {
   if (placed.voxels->bounds().empty()) return std::nullopt;
-  BlockSweep sweep(*placed.voxels, types, box);
-  follow_way(box, most, sweep);
-  const Contact& best = sweep.best();
-  if (best.axis < 0) return std::nullopt;
-  return SweepHit{best.fraction,
-                  glm::normalize(placed.world_axes * best.normal),
-                  placed.instance,
-                  sweep.voxel(),
-                  best.depth * placed.voxel_size,
-                  sweep.type()};
+  std::optional<SweepHit> last;
+  visit_sides(box, [&](const MovingBox& side) {
+    BlockSweep sweep(*placed.voxels, types, side);
+    follow_way(side, most, sweep);
+    const Contact& best = sweep.best();
+    const bool is_met = best.axis >= 0;
+    if (!is_met) {
+      last.reset();
+    } else if (!last || best.fraction > last->fraction) {
+      const DVec3 normal = glm::normalize(placed.world_axes * best.normal);
+      const double depth = best.depth * placed.voxel_size;
+      last = SweepHit{best.fraction, normal, placed.instance, sweep.voxel(), depth, sweep.type()};
+    }
+    return is_met;
+  });
+  return last;
 }
 
-std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const VoxelRegistry& types, const MovingBox& box,
+std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box,
                                        double most) {
   FieldSweep sweep(*placed.field, types, box, most);
   follow_way(box, most, sweep);
@@ -173,26 +179,23 @@ bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
 
 }  // namespace
 
-std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement) {
-  const VoxelRegistry& types = tracer.scene().types;
+std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
+                                  const QueryFilter& filter) {
   if (!is_box(box) || !is_finite(displacement)) return std::nullopt;
   const glm::dmat3 half_axes = half_axes_of(box);
   const DVec3 reach = reach_of_axes(half_axes);
   const DVec3 end = box.centre + displacement;
-  std::vector<std::size_t> near;
-  SceneQuery::instances(tracer).visit_box({glm::min(box.centre, end) - reach, glm::max(box.centre, end) + reach},
-                                          [&](std::size_t i) { near.push_back(i); });
-  std::sort(near.begin(), near.end());
+  const Seen seen(tracer, filter, QueryTypes::Colliding);
   std::optional<SweepHit> first;
-  for (const std::size_t i : near) {
-    const PlacedGrid& placed = tracer.placed()[i];
+  const DBox way{glm::min(box.centre, end) - reach, glm::max(box.centre, end) + reach};
+  seen.visit_near(way, [&](const PlacedGrid& placed) {
     const MovingBox moving = moving_in_grid(placed, box, half_axes, displacement);
-    const auto of_voxels = first_of_voxels(placed, types, moving, first ? first->fraction : 1.0);
+    const auto of_voxels = first_of_voxels(placed, seen.types, moving, first ? first->fraction : 1.0);
     if (of_voxels && is_sooner(*of_voxels, first)) first = of_voxels;
-    if (placed.field == nullptr) continue;
-    const auto of_field = first_of_field(placed, types, moving, first ? first->fraction : 1.0);
+    if (placed.field == nullptr) return;
+    const auto of_field = first_of_field(placed, seen.types, moving, first ? first->fraction : 1.0);
     if (of_field && is_sooner(*of_field, first)) first = of_field;
-  }
+  });
   return first;
 }
 

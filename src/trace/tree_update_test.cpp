@@ -1,0 +1,184 @@
+// Trees that follow edits, beside trees that are built anew.
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/trace/density_ray.h>
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/ray.h>
+
+#include "trace/tree_view.h"
+
+namespace quoin {
+namespace {
+
+VoxelRegistry two_of_each() {
+  VoxelRegistry types;
+  VoxelProperties properties;
+  for (int i = 0; i < 4; ++i) {
+    properties.name = std::to_string(i);
+    properties.visibility = i % 2 == 0 ? Visibility::Opaque : Visibility::Transparent;
+    EXPECT_TRUE(types.add(properties).has_value());
+  }
+  return types;
+}
+
+struct Random {
+  std::mt19937 engine;
+  explicit Random(unsigned seed) : engine(seed) {}
+  int below(int end) { return std::uniform_int_distribution<int>(0, end - 1)(engine); }
+  int between(int low, int high) { return low + below(high - low + 1); }
+  DVec3 direction() {
+    std::normal_distribution<double> share;
+    return {share(engine), share(engine), share(engine)};
+  }
+};
+
+// Everything that is asked of a tree, of one that followed edits and of one that was built.
+void expect_equal(const OccupancyTree& followed, const OccupancyTree& built, Random& random, bool has_blocks) {
+  ASSERT_EQ(followed.bounds(), built.bounds());
+  ASSERT_EQ(trace::TreeView::of(followed) == nullptr, trace::TreeView::of(built) == nullptr);
+  const trace::TreeNodes a(followed);
+  const trace::TreeNodes b(built);
+  const IBox box = built.bounds();
+  if (box.empty()) return;
+  for (int z = box.min.z >> kChunkShift; z <= (box.max.z - 1) >> kChunkShift; ++z) {
+    for (int y = box.min.y >> kChunkShift; y <= (box.max.y - 1) >> kChunkShift; ++y) {
+      for (int x = box.min.x >> kChunkShift; x <= (box.max.x - 1) >> kChunkShift; ++x) {
+        const trace::ChunkNode* const own = a.find_chunk({x, y, z});
+        const trace::ChunkNode* const other = b.find_chunk({x, y, z});
+        ASSERT_EQ(own == nullptr, other == nullptr) << x << " " << y << " " << z;
+        if (own == nullptr) continue;
+        ASSERT_EQ(own->cells, other->cells) << x << " " << y << " " << z;
+        for (std::size_t i = 0; i < 64; ++i) ASSERT_EQ(a.brick(own->bricks[i]), b.brick(other->bricks[i]));
+        if (!has_blocks) continue;
+        ASSERT_EQ(a.uniform_blocks(*own).cells, b.uniform_blocks(*other).cells);
+        ASSERT_EQ(a.uniform_blocks(*own).bricks, b.uniform_blocks(*other).bricks);
+        ASSERT_EQ(a.uniform_blocks(*own).is_whole, b.uniform_blocks(*other).is_whole);
+      }
+    }
+  }
+  for (int i = 0; i < 200; ++i) {
+    const DVec3 size(box.size());
+    const DVec3 at = DVec3(box.min) + size * DVec3(random.below(1000), random.below(1000), random.below(1000)) / 1000.0;
+    const DVec3 way = random.direction();
+    const Ray ray{at - way * double(random.below(200)), way};
+    const auto own = first_hit(followed, ray);
+    const auto other = first_hit(built, ray);
+    ASSERT_EQ(own.has_value(), other.has_value());
+    if (!own) continue;
+    EXPECT_EQ(own->voxel, other->voxel);
+    EXPECT_EQ(own->t, other->t);
+  }
+}
+
+IVec3 anywhere(Random& random, int chunks) {
+  const auto along = [&] { return random.between(-64 * chunks, 64 * chunks + 63); };
+  return {along(), along(), along()};
+}
+
+void edit(Grid& grid, Random& random, int chunks) {
+  const VoxelType type = random.below(5) < 2 ? kAir : static_cast<VoxelType>(random.between(1, 4));
+  const IVec3 at = anywhere(random, chunks);
+  switch (random.below(8)) {
+    case 0: {  // whole chunks and parts of them
+      const IVec3 corner = at & ~(random.below(2) == 0 ? 63 : 15);
+      grid.fill_box({corner, corner + (random.below(2) == 0 ? 64 : 16)}, type);
+      break;
+    }
+    case 1:
+      grid.fill_sphere(DVec3(at), random.between(1, 24), type);
+      break;
+    case 2:  // scattered over a chunk
+      for (int i = 0; i < 5; ++i)
+        grid.set((at & ~63) + IVec3(random.below(64), random.below(64), random.below(64)), type);
+      break;
+    default:
+      grid.set(at, type);
+  }
+}
+
+TEST(TreeUpdate, EqualsATreeBuiltAnew) {
+  const VoxelRegistry types = two_of_each();
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Random random(seed);
+    const int chunks = static_cast<int>(seed % 3);
+    Grid grid;
+    for (int i = 0; i < 20; ++i) edit(grid, random, chunks);
+    ChangeCursor cursor = grid.cursor();
+    const std::vector<Occupancy> kinds = {Occupancy::NonAir, Occupancy::Opaque, Occupancy::Transparent};
+    std::vector<OccupancyTree> trees;
+    for (const Occupancy kind : kinds) trees.push_back(OccupancyTree::build(grid, types, kind));
+    for (int step = 0; step < 60; ++step) {
+      const int edits = random.below(4) == 0 ? 12 : 1;
+      for (int i = 0; i < edits; ++i) edit(grid, random, chunks);
+      if (step == 40) grid.clear();
+      const GridChanges changes = grid.changes_since(cursor);
+      for (std::size_t i = 0; i < kinds.size(); ++i) {
+        trees[i].update(grid, types, changes);
+        expect_equal(trees[i], OccupancyTree::build(grid, types, kinds[i]), random, kinds[i] == Occupancy::Transparent);
+        if (HasFatalFailure()) FAIL() << "seed " << seed << " step " << step << " kind " << i;
+      }
+    }
+  }
+}
+
+// One voxel after another, each outside of what there was, and then away again.
+TEST(TreeUpdate, WorldsThatGrowAndShrink) {
+  const VoxelRegistry types = two_of_each();
+  Random random(5);
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {200, 90, 200}}, 1);
+  ChangeCursor cursor = grid.cursor();
+  OccupancyTree tree = OccupancyTree::build(grid, types);
+  std::vector<IVec3> added;
+  for (int step = 0; step < 24; ++step) {
+    IVec3 at = anywhere(random, 1);
+    at[step % 3] = (step % 2 == 0 ? 230 : -20) + (step % 2 == 0 ? 1 : -1) * 45 * step;
+    grid.set(at, 1);
+    added.push_back(at);
+    tree.update(grid, types, grid.changes_since(cursor));
+    expect_equal(tree, OccupancyTree::build(grid, types), random, false);
+    if (HasFatalFailure()) FAIL() << step;
+  }
+  std::shuffle(added.begin(), added.end(), random.engine);
+  for (const IVec3 at : added) {
+    grid.set(at, kAir);
+    tree.update(grid, types, grid.changes_since(cursor));
+    expect_equal(tree, OccupancyTree::build(grid, types), random, false);
+    if (HasFatalFailure()) FAIL() << at.x;
+  }
+  // What is left of a great world is small again.
+  grid.fill_box({{10, 0, 0}, {200, 90, 200}}, kAir);
+  grid.fill_box({{0, 0, 10}, {10, 90, 200}}, kAir);
+  tree.update(grid, types, grid.changes_since(cursor));
+  expect_equal(tree, OccupancyTree::build(grid, types), random, false);
+}
+
+TEST(TreeUpdate, FieldsLikewise) {
+  Random random(11);
+  DensityGrid field;
+  const auto dig = [&](int chunks) {
+    const DVec3 at = DVec3(anywhere(random, chunks));
+    random.below(2) == 0 ? field.add_sphere(at, random.between(1, 12), 1)
+                         : field.remove_sphere(at, random.between(1, 20));
+  };
+  for (int i = 0; i < 12; ++i) dig(1);
+  DensityTree tree(field);
+  ChangeCursor cursor = field.cursor();
+  for (int step = 0; step < 50; ++step) {
+    for (int i = random.below(3); i >= 0; --i) {
+      dig(1);
+      field.set(anywhere(random, 1), {random.below(2) == 0 ? -0.4F : 0.7F, 1});
+    }
+    tree.update(field.changes_since(cursor));
+    expect_equal(tree.cells(), OccupancyTree::build(field), random, false);
+    if (HasFatalFailure()) FAIL() << step;
+  }
+}
+
+}  // namespace
+}  // namespace quoin
