@@ -320,40 +320,20 @@ std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) 
   return chunks;
 }
 
-namespace {
-
-// Null: all air.
-void visit_chunk_changes(const Chunk* before, const Chunk* now, IVec3 chunk, const IBox& box,
-                         FunctionRef<void(const RowChange&)> visit) {
-  if (before == now || (before != nullptr && now != nullptr && before->shares_storage_with(*now))) return;
-  std::array<VoxelType, kChunkEdge> rows[2] = {};
-  for (int z = box.min.z; z < box.max.z; ++z) {
-    for (int y = box.min.y; y < box.max.y; ++y) {
-      if (before != nullptr) before->read_row(y, z, rows[0]);
-      if (now != nullptr) now->read_row(y, z, rows[1]);
-      std::uint64_t changed = 0;
-      for (std::size_t x = 0; x < kChunkEdge; ++x) changed |= std::uint64_t{rows[0][x] != rows[1][x]} << x;
-      if (changed != 0) visit({chunk * kChunkEdge + IVec3{0, y, z}, changed, rows[0], rows[1]});
-    }
-  }
-}
-
-}  // namespace
-
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit) {
-  const auto compare = [&](IVec3 chunk, const IBox& box) {
-    visit_chunk_changes(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, visit);
+  const auto compare = [&](IVec3 chunk, const IBox& box, std::uint64_t bricks) {
+    visit_other_rows(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, bricks, visit);
   };
   if (!changes.all) {
-    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box);
+    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box, change.bricks);
     return;
   }
   std::vector<IVec3> chunks = before.chunks();
   const std::vector<IVec3> present = now.chunks();
   chunks.insert(chunks.end(), present.begin(), present.end());
   sort_and_unite(chunks);
-  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk);
+  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk, ~std::uint64_t{0});
 }
 
 IBox Grid::bounds() const {

@@ -172,11 +172,11 @@ void Game::slide() {
   std::vector<quoin::PlacedVoxel> voxels;
   const int wide = size_.x / quoin::kChunkEdge;
   for (int i = 0; i < options_.slide_chunks; ++i) {
-    const int chunk = int(random(0.0, 1.0) * wide) + wide * (i % wide);
+    const int chunk = i % (wide * wide);
     for (int n = 0; n < 3; ++n) {
       const int x = chunk % wide * quoin::kChunkEdge + int(random(0.0, 64.0));
       const int z = chunk / wide * quoin::kChunkEdge + int(random(0.0, 64.0));
-      voxels.push_back({{x, surface_at(x, z) + 2 + 60 * (i % 2), z}, sand_});
+      voxels.push_back({{x, surface_at(x, z) + 4 + 60 * (i / (wide * wide)), z}, sand_});
     }
   }
   land().set(voxels);

@@ -1,5 +1,6 @@
 #include "grid/chunk/chunk_difference.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -8,9 +9,13 @@
 namespace quoin {
 namespace {
 
-// Whether the indices of two chunks mean the same types.
+constexpr std::uint64_t kAllBricks = ~std::uint64_t{0};
+
+// Whether the indices of two chunks mean the same types, those that only one of them has apart.
 bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
-  return a != nullptr && b != nullptr && a->bits == b->bits && a->palette == b->palette;
+  if (a == nullptr || b == nullptr || a->bits != b->bits) return false;
+  const std::size_t both = std::min(a->palette.size(), b->palette.size());
+  return std::equal(a->palette.begin(), a->palette.begin() + static_cast<std::ptrdiff_t>(both), b->palette.begin());
 }
 
 // Whether a row is stored alike in both. Requires: they share a palette.
@@ -22,15 +27,22 @@ bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z)
   return std::memcmp(a.row(in_a, row), b.row(in_b, row), static_cast<std::size_t>(a.bits) * sizeof(std::uint64_t)) == 0;
 }
 
+const Chunk& or_air(const Chunk* chunk) {
+  static const Chunk all_air;
+  return chunk == nullptr ? all_air : *chunk;
+}
+
 // Calls `compare(y, z, old row, new row)` for the rows that may differ.
 template <class Compare>
-void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, Compare&& compare) {
+void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, std::uint64_t bricks,
+                        Compare&& compare) {
   if (before.shares_storage_with(after)) return;
   const bool share = share_palette(ChunkStorage::of(before), ChunkStorage::of(after));
   std::array<VoxelType, kChunkEdge> old_row;
   std::array<VoxelType, kChunkEdge> new_row;
   for (int z = within.min.z; z < within.max.z; ++z) {
     for (int y = within.min.y; y < within.max.y; ++y) {
+      if ((bricks >> (4 * (y >> 4) + 16 * (z >> 4)) & 15U) == 0) continue;
       if (share && is_stored_alike(*ChunkStorage::of(before), *ChunkStorage::of(after), y, z)) continue;
       before.read_row(y, z, old_row);
       after.read_row(y, z, new_row);
@@ -58,24 +70,31 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
     }
     return;
   }
-  for_each_other_row(before, after, kWholeChunk, [&](int y, int z, const auto& old_row, const auto& new_row) {
-    edit.add(y, z, other_types(old_row, new_row));
-  });
+  for_each_other_row(
+      before, after, kWholeChunk, kAllBricks,
+      [&](int y, int z, const auto& old_row, const auto& new_row) { edit.add(y, z, other_types(old_row, new_row)); });
+}
+
+void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, std::uint64_t bricks,
+                      FunctionRef<void(const RowChange&)> visit) {
+  for_each_other_row(or_air(before), or_air(after), within, bricks,
+                     [&](int y, int z, const auto& old_row, const auto& new_row) {
+                       const std::uint64_t changed = other_types(old_row, new_row);
+                       if (changed != 0) visit({chunk * kChunkEdge + IVec3{0, y, z}, changed, old_row, new_row});
+                     });
 }
 
 ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
-  static const Chunk all_air;
-  const Chunk& a = before == nullptr ? all_air : *before;
-  const Chunk& b = after == nullptr ? all_air : *after;
   ChunkDifference found;
-  for_each_other_row(a, b, within, [&](int y, int z, const auto& old_row, const auto& new_row) {
-    std::uint64_t solid = 0;
-    for (std::size_t x = 0; x < kChunkEdge; ++x) {
-      solid |= std::uint64_t{(old_row[x] == kAir) != (new_row[x] == kAir)} << x;
-    }
-    found.types.add(y, z, other_types(old_row, new_row));
-    found.solid.add(y, z, solid);
-  });
+  for_each_other_row(or_air(before), or_air(after), within, kAllBricks,
+                     [&](int y, int z, const auto& old_row, const auto& new_row) {
+                       std::uint64_t solid = 0;
+                       for (std::size_t x = 0; x < kChunkEdge; ++x) {
+                         solid |= std::uint64_t{(old_row[x] == kAir) != (new_row[x] == kAir)} << x;
+                       }
+                       found.types.add(y, z, other_types(old_row, new_row));
+                       found.solid.add(y, z, solid);
+                     });
   return found;
 }
 

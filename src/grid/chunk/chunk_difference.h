@@ -15,6 +15,11 @@ struct ChunkDifference {
 /// Of types alone: books in `edit` which voxels of a chunk are to change.
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit);
 
+/// Calls `visit` for the rows that differ between two states of a chunk, by z, then y; null is all air. They differ
+/// nowhere but within the box, and in those parts of 16^3 (ChunkChange::bricks). `chunk`: its coordinates.
+void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, std::uint64_t bricks,
+                      FunctionRef<void(const RowChange&)> visit);
+
 /// They differ nowhere but within the box. Cost: O(rows of 64 voxels of the box); about 20 microseconds for a chunk
 /// where the storage of both is alike, as after a few edits.
 [[nodiscard]] ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within = kWholeChunk);
