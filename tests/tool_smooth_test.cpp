@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -307,8 +307,8 @@ TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
   for (const double value : {nan, infinity}) {
     write("none.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::Float32));
     const std::string raw = " --raw-size 10x10x10 --raw-type float32";
-    for (const std::string command : {"convert none.raw out.glb", "convert none.raw out.json",
-                                      "render none.raw -o out.png --size 16x16"}) {
+    for (const std::string command :
+         {"convert none.raw out.glb", "convert none.raw out.json", "render none.raw -o out.png --size 16x16"}) {
       const ToolRun result = run(command + raw);
       EXPECT_EQ(result.status, 1) << command;
       expect_one_error_line(result);

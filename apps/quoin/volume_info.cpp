@@ -71,8 +71,9 @@ std::string volume_text(const std::string& name, const Volume& volume) {
   const std::string units = volume.units.empty() ? "" : " " + volume.units;
   return name + ": " + volume.format + " volume\n" + "Values: " + std::to_string(volume.size.x) + " x " +
          std::to_string(volume.size.y) + " x " + std::to_string(volume.size.z) + " = " + with_thousands(count) +
-         " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + range_text(volume) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
-         "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + units + "\n";
+         " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + range_text(volume) + "\n" +
+         "Spacing: " + three(volume.spacing, " x ") + units + "\n" + "Bounds: " + three(bounds.min, ", ") + "  to  " +
+         three(bounds.max, ", ") + units + "\n";
 }
 
 }  // namespace

@@ -169,9 +169,9 @@ std::string stem_of_file(const std::filesystem::path& path) {
   if (lower_case_extension(name) == ".gz") {
     name = name.stem();
     const std::string packed = lower_case_extension(name);
-    const bool is_known = packed == ".img" || packed == ".hdr" ||
-                          std::any_of(kFormats.begin(), kFormats.end(),
-                                      [&](const FormatInfo& info) { return info.extension == packed; });
+    const bool is_known =
+        packed == ".img" || packed == ".hdr" ||
+        std::any_of(kFormats.begin(), kFormats.end(), [&](const FormatInfo& info) { return info.extension == packed; });
     if (!is_known) return name.string();
   }
   return name.stem().string();

@@ -64,9 +64,15 @@ TEST(Formats, NamesDecideWhatIsWritten) {
 }
 
 TEST(Formats, StemsLeaveOutWhatIsWithinGzip) {
-  for (const auto& [name, stem] : {std::pair("a/castle.vox", "castle"), {"scan.nii.gz", "scan"}, {"SCAN.NII.GZ", "SCAN"},
-                                   {"b.c/scan.nrrd.gz", "scan"}, {"v1.2.gz", "v1.2"}, {"v1.2.vox", "v1.2"}, {"ab", "ab"},
-                                   {"hand.img.gz", "hand"}, {"", ""}}) {
+  for (const auto& [name, stem] : {std::pair("a/castle.vox", "castle"),
+                                   {"scan.nii.gz", "scan"},
+                                   {"SCAN.NII.GZ", "SCAN"},
+                                   {"b.c/scan.nrrd.gz", "scan"},
+                                   {"v1.2.gz", "v1.2"},
+                                   {"v1.2.vox", "v1.2"},
+                                   {"ab", "ab"},
+                                   {"hand.img.gz", "hand"},
+                                   {"", ""}}) {
     EXPECT_EQ(stem_of_file(name), stem) << name;
   }
 }

@@ -61,8 +61,8 @@ struct Seconds {
 /// What came of it.
 struct Outcome {
   bool is_volume = false;
-  SceneContent content;     ///< of a volume its solid samples alone
-  std::string mesher;       ///< empty: nothing was meshed
+  SceneContent content;  ///< of a volume its solid samples alone
+  std::string mesher;    ///< empty: nothing was meshed
   MeshStats meshes;
   FaceCounts faces;           ///< of blocks
   std::optional<double> iso;  ///< of volumes
