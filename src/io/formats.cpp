@@ -166,14 +166,7 @@ std::string writable_extensions() {
 
 std::string stem_of_file(const std::filesystem::path& path) {
   std::filesystem::path name = path.filename();
-  if (lower_case_extension(name) == ".gz") {
-    name = name.stem();
-    const std::string packed = lower_case_extension(name);
-    const bool is_known =
-        packed == ".img" || packed == ".hdr" ||
-        std::any_of(kFormats.begin(), kFormats.end(), [&](const FormatInfo& info) { return info.extension == packed; });
-    if (!is_known) return name.string();
-  }
+  if (lower_case_extension(name) == ".gz") name = name.stem();
   return name.stem().string();
 }
 

@@ -68,7 +68,7 @@ TEST(Formats, StemsLeaveOutWhatIsWithinGzip) {
                                    {"scan.nii.gz", "scan"},
                                    {"SCAN.NII.GZ", "SCAN"},
                                    {"b.c/scan.nrrd.gz", "scan"},
-                                   {"v1.2.gz", "v1.2"},
+                                   {"scan.dat.gz", "scan"},
                                    {"v1.2.vox", "v1.2"},
                                    {"ab", "ab"},
                                    {"hand.img.gz", "hand"},
