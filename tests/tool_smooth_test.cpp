@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -298,6 +299,89 @@ TEST_F(ToolSmooth, VolumesWithoutASurfaceAreEmptyFiles) {
   const Json solid = converted("flat.raw out.glb --raw-size 10x10x10 --iso 100");
   EXPECT_EQ(solid["warnings"], Json::array()) << "a solid block has the faces of the volume";
   EXPECT_GT(read("out.glb").volume(), 0.0);
+}
+
+TEST_F(ToolSmooth, VolumesWithoutAFiniteValueAreErrors) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  for (const double value : {nan, infinity}) {
+    write("none.raw", volume_test::encode(std::vector<double>(1000, value), ScalarType::Float32));
+    const std::string raw = " --raw-size 10x10x10 --raw-type float32";
+    for (const std::string command :
+         {"convert none.raw out.glb", "convert none.raw out.json", "render none.raw -o out.png --size 16x16"}) {
+      const ToolRun result = run(command + raw);
+      EXPECT_EQ(result.status, 1) << command;
+      expect_one_error_line(result);
+      EXPECT_NE(result.err.find(std::isnan(value) ? "no value is a number" : "no value is finite"), std::string::npos)
+          << result.err;
+      EXPECT_NE(result.err.find("none.raw"), std::string::npos) << result.err;
+    }
+    EXPECT_FALSE(exists("out.glb") || exists("out.json") || exists("out.png"));
+    const ToolRun told = run("info none.raw" + raw);
+    EXPECT_EQ(told.status, 0) << "what is in it can still be told";
+    EXPECT_NE(told.out.find("Range: none"), std::string::npos) << told.out;
+    EXPECT_EQ(run("convert none.raw out.glb --iso 3" + raw).status, std::isnan(value) ? 1 : 0);
+  }
+}
+
+TEST_F(ToolSmooth, RawVolumesAreToldDrawnAndKeptAsFields) {
+  write("ball.raw", volume_test::encode(ball({20, 18, 16}, DVec3(9.0), 6.0), ScalarType::Float32));
+  const std::string raw = " --raw-size 20x18x16 --raw-type float32";
+  const ToolRun told = run("info ball.raw --json" + raw);
+  ASSERT_EQ(told.status, 0) << told.err;
+  const Json info = Json::parse(told.out);
+  EXPECT_EQ(info["format"], "raw");
+  EXPECT_EQ(info["size"], Json({20, 18, 16}));
+  EXPECT_EQ(info["name"], "ball");
+  const ToolRun drawn = run("render ball.raw -o out.png --size 64x64 --iso 0 --json" + raw);
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_GT(Json::parse(drawn.out)["pixels_hit"], 500);
+  ASSERT_EQ(run("convert ball.raw ball.json --iso 0" + raw).status, 0);
+  ASSERT_EQ(run("render ball.json -o again.png --size 64x64").status, 0);
+  EXPECT_EQ(text_of(folder_.file("out.png")), text_of(folder_.file("again.png"))) << "the field is the volume's";
+  for (const std::string command : {"info ball.raw", "render ball.raw -o no.png"}) {
+    EXPECT_EQ(run(command).status, 1) << "nothing says what is in it: " << command;
+    EXPECT_EQ(run(command + " --raw-type int8").status, 2) << command;
+    EXPECT_EQ(run(command + " --raw-size 20x18").status, 2) << command;
+    EXPECT_EQ(run(command + " --raw-size 20x18x15 --raw-type float32").status, 1) << command;
+  }
+  EXPECT_FALSE(exists("no.png"));
+  EXPECT_NE(run("view --raw-size 2x2x2").err.find("--raw-size needs a file"), std::string::npos);
+}
+
+TEST_F(ToolSmooth, SurfaceValuesThatNoFloatHoldsAreRefusedForThat) {
+  write("ball.raw", volume_test::encode(ball({8, 8, 8}, DVec3(4.0), 3.0), ScalarType::Float32));
+  for (const std::string command : {"convert ball.raw out.glb", "render ball.raw -o out.png", "view ball.raw"}) {
+    const std::string raw = command + " --raw-size 8x8x8 --raw-type float32 --iso ";
+    const ToolRun large = run(raw + "1e300");
+    EXPECT_EQ(large.status, 2) << command;
+    EXPECT_NE(large.err.find("3.4e38"), std::string::npos) << large.err;
+    const ToolRun word = run(raw + "much");
+    EXPECT_EQ(word.status, 2) << command;
+    EXPECT_NE(word.err.find("must be a number"), std::string::npos) << word.err;
+  }
+}
+
+TEST_F(ToolSmooth, FieldsAreToldByTheirSamplesAndAreSmoothInAnyCase) {
+  ASSERT_EQ(run("generate smooth-terrain cliffs.json --chunks 1x1x1 --seed 4").status, 0);
+  const Json info = Json::parse(run("info cliffs.json --json").out);
+  EXPECT_EQ(info["voxels"], 0);
+  EXPECT_GT(info["solid_samples"], 1000);
+  EXPECT_GT(info["types"], 1) << "materials of what is solid";
+  const std::string text = run("info cliffs.json").out;
+  EXPECT_NE(text.find("Solid samples: "), std::string::npos) << text;
+  EXPECT_EQ(text.find("Voxels: "), std::string::npos) << text;
+  EXPECT_EQ(text.find("Faces: "), std::string::npos) << text;
+  const Json whole = converted("cliffs.json whole.glb");
+  EXPECT_EQ(whole["mesher"], "smooth");
+  EXPECT_EQ(whole["solid_samples"], info["solid_samples"]);
+  EXPECT_EQ(run("convert cliffs.json open.glb --ao-form weighted").status, 0);
+  EXPECT_EQ(run("convert cliffs.json no.glb --mesher greedy --simplify 0.1").status, 2);
+  EXPECT_EQ(run("convert tiny.vox no.glb --simplify 0.1").status, 2) << "blocks are no surface to simplify";
+  EXPECT_FALSE(exists("no.glb"));
+  if (!can_simplify()) GTEST_SKIP() << "this build has no meshoptimizer";
+  EXPECT_LT(converted("cliffs.json simple.glb --simplify 0.1")["triangles"].get<int>(),
+            whole["triangles"].get<int>() / 2);
 }
 
 TEST_F(ToolSmooth, SimplifyingSaysHowFarItWent) {

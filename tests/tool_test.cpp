@@ -630,7 +630,7 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
       {"convert tiny.vox out.glb --simplify -1", "quoin: --simplify: must be 0 or more, not \"-1\""},
       {"convert tiny.vox out.glb --simplify nan", "quoin: --simplify: must be 0 or more, not \"nan\""},
       {"convert tiny.vox out.glb --iso nan", "quoin: --iso: must be a number, not \"nan\""},
-      {"convert tiny.vox out.glb --iso 1e39", "quoin: --iso: must be a number, not \"1e39\""},
+      {"convert tiny.vox out.glb --iso 1e39", "quoin: --iso: must be from -3.4e38"},
       {"convert tiny.vox out.glb --iso 1", "quoin: --iso is for volumes, and the input holds voxels"},
       {"convert tiny.vox out.glb --raw-size 1x2", "quoin: --raw-size: must be like 256x256x128, not \"1x2\""},
       {"convert tiny.vox out.glb --raw-size 0x2x2", "quoin: --raw-size: must be like 256x256x128, not \"0x2x2\""},

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <map>
 #include <memory>
 #include <set>
@@ -12,7 +13,9 @@
 #include "interrupt.h"
 #include "output.h"
 #include "progress_bar.h"
+#include "scene_content.h"
 #include "volume_info.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -38,10 +41,31 @@ std::vector<GridReport> report_grids(const Scene& scene) {
   return list;
 }
 
+/// The materials of what is solid.
+std::set<VoxelType> solid_types(const DensityGrid& field) {
+  std::set<VoxelType> used;
+  for (const IVec3 place : field.chunks()) {
+    const DensityChunk& chunk = *field.find_chunk(place);
+    const std::vector<VoxelType> types = chunk.materials().types();
+    if (std::all_of(types.begin(), types.end(), [&](VoxelType type) { return used.contains(type); })) continue;
+    for (int row = 0; row < kChunkEdge * kChunkEdge; ++row) {
+      const int y = row % kChunkEdge;
+      const int z = row / kChunkEdge;
+      for (std::uint64_t solid = chunk.solid_row(y, z); solid != 0; solid &= solid - 1) {
+        used.insert(chunk.materials().get(std::countr_zero(solid), y, z));
+      }
+    }
+  }
+  return used;
+}
+
+/// Of voxels, and of what is solid of fields.
 std::size_t distinct_types(const Scene& scene) {
   std::set<VoxelType> used;
   for (const GridHandle handle : scene.grids().handles()) {
-    for (const VoxelType type : scene.grids()[handle].grid.types()) used.insert(type);
+    const SceneGrid& grid = scene.grids()[handle];
+    for (const VoxelType type : grid.grid.types()) used.insert(type);
+    used.merge(solid_types(grid.field));
   }
   used.erase(kAir);
   return used.size();
@@ -155,6 +179,7 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
   const Hierarchy hierarchy(loaded.scene);
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
+                 {"solid_samples", solid_samples(loaded.scene)},
                  {"types", distinct_types(loaded.scene)},
                  {"faces_visible", faces.visible},
                  {"faces_total", faces.total},
@@ -239,9 +264,9 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
   std::string text = name + ": " + loaded.format + ", " +
                      count_of(static_cast<std::int64_t>(scene.grids().size()), "grid") + ", " +
                      count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
-  text += "Voxels: " + with_thousands(scene.voxel_count()) + " of " +
+  text += content_text({scene.voxel_count(), solid_samples(scene)}) + " of " +
           count_of(static_cast<std::int64_t>(distinct_types(scene)), "type") + "\n";
-  text += to_string(faces) + "\n";
+  if (scene.voxel_count() > 0 || solid_samples(scene) == 0) text += to_string(faces) + "\n";
   const DBox bounds = scene.bounds(options.instances());
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
   if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
@@ -255,7 +280,7 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
 }
 
 Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
-  if (holds_volume(options.input)) return run_volume_info(options, streams);
+  if (holds_volume(options).value_or(false)) return run_volume_info(options, streams);
   const auto loaded = [&] {
     ProgressBar bar;
     return load_scene(options.input, options.load, options.threads, bar.listener("reading"));
@@ -285,12 +310,23 @@ void add_info_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand(
       "info", "Say what is in a file: grids, sizes, voxels, faces, types, transforms; of volumes their values");
   const auto options = std::make_shared<CommonOptions>();
+  const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, *options);
+  add_raw_options(*command, *texts);
   command->footer("Reads " + readable_extensions() +
                   "; - is standard input.\n"
                   "Faces are those of the models that are placed and not hidden, each model's once.\n"
                   "Example: quoin info castle.vox");
-  command->callback([options, &status] { status = run_info(*options); });
+  command->callback([command, options, texts, &status] {
+    VolumeArguments volume;
+    if (const std::string fault = read_volume_options(*command, *texts, volume); !fault.empty()) {
+      print_error(fault + " (try --help)");
+      status = kWrongUsage;
+      return;
+    }
+    options->load.raw = volume.raw;
+    status = run_info(*options);
+  });
 }
 
 }  // namespace quoin::tool

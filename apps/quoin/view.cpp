@@ -1,3 +1,5 @@
+#include <cstdio>
+#include <cstdlib>
 #include <memory>
 
 #include <quoin/io/formats.h>
@@ -7,6 +9,7 @@
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
+#include "volume_options.h"
 #ifdef QUOIN_HAVE_VIEWER
 #include "viewer/window/viewer.h"
 #endif
@@ -25,16 +28,17 @@ struct ViewArguments {
   std::string backend = "auto";
   std::string drawn;
   std::string device;
+  VolumeTexts volume_texts;
 };
 
 #ifdef QUOIN_HAVE_VIEWER
 
 /// Fails before a window opens where it is clear that the file cannot be shown.
-Status check_input(const std::filesystem::path& path) {
+Status check_input(const std::filesystem::path& path, bool is_raw) {
   if (path.empty()) return {};
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (!*format) {
+  if (!*format && !is_raw) {
     return make_error(ErrorCode::Unsupported, "of no format that is known; there are " + readable_extensions(),
                       path.string());
   }
@@ -51,13 +55,18 @@ int run_view(const ViewArguments& arguments) {
   options.is_bare = arguments.is_bare;
   options.screenshot = arguments.screenshot;
   options.device = arguments.device;
+  options.leave_at_once = [] {
+    die_if_interrupted();
+    std::fflush(nullptr);
+    std::_Exit(kDone);
+  };
   if (arguments.drawn == "rays") options.mode = viewer::DrawMode::Rays;
   if (arguments.drawn == "blocks") options.mode = viewer::DrawMode::Blocks;
   if (arguments.drawn == "smooth") options.mode = viewer::DrawMode::Smooth;
   if (arguments.drawn == "density") options.mode = viewer::DrawMode::Density;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
-  Status status = check_input(arguments.input);
+  Status status = check_input(arguments.input, arguments.load.raw.has_value());
   if (status) status = check_outputs({arguments.screenshot});
   if (status) {
     catch_interrupts();
@@ -94,6 +103,11 @@ std::string settle(const CLI::App& command, ViewArguments& arguments) {
     }
     arguments.size = *size;
   }
+  VolumeArguments volume;
+  if (std::string fault = read_volume_options(command, arguments.volume_texts, volume); !fault.empty()) return fault;
+  arguments.load.raw = volume.raw;
+  if (volume.iso) arguments.load.iso = static_cast<float>(*volume.iso);
+  if (volume.raw && arguments.input.empty()) return "--raw-size needs a file to show";
   if (!arguments.screenshot.empty() && arguments.screenshot.extension() != ".png") {
     return "--screenshot: the picture's name must end in .png, not \"" + arguments.screenshot.string() + "\"";
   }
@@ -111,8 +125,7 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
   command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole());
-  command->add_option("--iso", arguments->load.iso,
-                      "Surface value of a volume; what is above is solid (default: between its two groups of values)");
+  add_volume_options(*command, arguments->volume_texts);
   command->add_option("--size", "Of the window, 320x240 to 16384 a side (default: as it was last)")->type_name("WxH");
   command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")

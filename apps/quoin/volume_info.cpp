@@ -1,10 +1,10 @@
 #include "volume_info.h"
 
-#include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 
 #include "output.h"
 #include "progress_bar.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -60,28 +60,28 @@ std::string three(const DVec3& v, const char* between) {
   return digits_for_people(v.x) + between + digits_for_people(v.y) + between + digits_for_people(v.z);
 }
 
+std::string range_text(const Volume& volume) {
+  const bool has_finite = volume.nan_count + volume.infinite_count < static_cast<std::int64_t>(volume.values.size());
+  return has_finite ? digits_for_people(volume.min) + " to " + digits_for_people(volume.max) : "none";
+}
+
 std::string volume_text(const std::string& name, const Volume& volume) {
   const std::int64_t count = static_cast<std::int64_t>(volume.size.x) * volume.size.y * volume.size.z;
   const DBox bounds = bounds_of(volume);
   const std::string units = volume.units.empty() ? "" : " " + volume.units;
   return name + ": " + volume.format + " volume\n" + "Values: " + std::to_string(volume.size.x) + " x " +
          std::to_string(volume.size.y) + " x " + std::to_string(volume.size.z) + " = " + with_thousands(count) +
-         " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + digits_for_people(volume.min) + " to " +
-         digits_for_people(volume.max) + "\n" + "Spacing: " + three(volume.spacing, " x ") + units + "\n" +
-         "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + units + "\n";
+         " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + range_text(volume) + "\n" +
+         "Spacing: " + three(volume.spacing, " x ") + units + "\n" + "Bounds: " + three(bounds.min, ", ") + "  to  " +
+         three(bounds.max, ", ") + units + "\n";
 }
 
 }  // namespace
 
-bool holds_volume(const std::filesystem::path& path) {
-  const auto format = detect_format(path);
-  return format && *format && format_info(**format).is_volume;
-}
-
 Result<int> run_volume_info(const CommonOptions& options, const StandardStreams& streams) {
   const auto volume = [&] {
     ProgressBar bar;
-    return read_volume(options.input, {}, bar.listener("reading"));
+    return read_input_volume(options, bar.listener("reading"));
   }();
   if (!volume) return volume.error();
   if (options.json) return print_json(volume_json(*volume));

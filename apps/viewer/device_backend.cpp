@@ -1,5 +1,6 @@
 #include "device_backend.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 #include <new>
@@ -11,6 +12,12 @@
 
 namespace quoin::viewer {
 
+namespace {
+
+constexpr int kSamplesAtRest = 4;  // as meshes have them
+
+}  // namespace
+
 struct DeviceBackend::Impl {
   /// What a thread that draws says of itself, since nobody else may look at what it draws with.
   struct Told {
@@ -18,11 +25,12 @@ struct DeviceBackend::Impl {
     std::string activity;
     std::vector<std::pair<std::string, std::string>> stats;
     bool traces_light = false;
+    bool is_processor = false;  // that acts as a device
     std::array<bool, 4> is_slow{};
   };
 
   Impl(const Scene& of_scene, const DeviceBackendOptions& given, OpenDevice opener, std::function<void()> listener)
-      : options(given), on_frame(std::move(listener)), cpu(of_scene, given.cpu, on_frame) {
+      : scene(of_scene), options(given), on_frame(std::move(listener)), cpu(of_scene, given.cpu, on_frame) {
     std::function<void()> on_surfaces = on_frame;
     if (has_thread()) on_surfaces = [this] { note_surfaces(); };
     drawer = std::make_unique<DeviceDrawer>(of_scene, given, std::move(opener), std::move(on_surfaces));
@@ -45,6 +53,18 @@ struct DeviceBackend::Impl {
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
   }
+  // Whether marched rays show what meshes do, but for what these round: blocks, and fields.
+  [[nodiscard]] bool is_marched_alike(DrawMode mode) const {
+    return mode == DrawMode::Blocks || (mode == DrawMode::Smooth && is_all_fields);
+  }
+  // Whether light by rays is added at rest, which a processor that acts as a device has no time for.
+  [[nodiscard]] bool is_lit_at_rest() const {
+    const LightOptions& light = request->light;
+    const bool wants_rays = light.shadows || light.lamps > 0 || light.glass_surfaces;
+    return told.is_processor && is_marched_alike(request->mode) && request->wireframe == Wireframe::Off &&
+           light.shading == Shading::Lit && wants_rays;
+  }
+  [[nodiscard]] ViewRequest request_of_light() const;
   [[nodiscard]] std::optional<ViewFrame> draw_here();
   void show_by_processor();
   void give_up_device();
@@ -61,6 +81,7 @@ struct DeviceBackend::Impl {
   [[nodiscard]] Result<std::optional<ViewFrame>> draw_apart(std::unique_lock<std::mutex>& lock);
   void publish(Result<std::optional<ViewFrame>> drawn, DrawMode mode, std::uint64_t number);
 
+  const Scene& scene;
   DeviceBackendOptions options;
   std::function<void()> on_frame;
   CpuBackend cpu;
@@ -77,9 +98,12 @@ struct DeviceBackend::Impl {
   bool has_surfaces = false;
   bool is_paused = false;
   bool is_reading = false;  // the scene
+  bool is_busy = false;     // the device opens, takes over what is new, or draws
   bool is_stopped = false;
   bool is_device_gone = false;
   bool is_drawn = false;  // something of the mode that is wanted
+  bool rests = false;     // the device has drawn all that it draws of it
+  bool is_all_fields = false;
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
   Told told;
@@ -143,6 +167,7 @@ void DeviceBackend::Impl::work() {
 }
 
 void DeviceBackend::Impl::step(std::unique_lock<std::mutex>& lock) {
+  is_busy = true;
   if (std::exchange(is_request_new, false)) drawer->want(*request);
   if (std::exchange(is_edited, false)) drawer->note_edit();
   has_surfaces = false;
@@ -158,7 +183,7 @@ void DeviceBackend::Impl::step(std::unique_lock<std::mutex>& lock) {
     }
   }();
   if (!lock.owns_lock()) lock.lock();
-  is_reading = false;
+  is_reading = is_busy = false;
   publish(std::move(drawn), mode, number);
   idle.notify_all();
 }
@@ -205,13 +230,16 @@ void DeviceBackend::Impl::publish(Result<std::optional<ViewFrame>> drawn, DrawMo
   frame = std::move(**drawn);
   if (request_number != number) frame->is_settled = false;
   is_drawn = true;
+  rests = frame->is_settled && is_lit_at_rest();
+  if (rests) frame->is_settled = false;
 }
 
 DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
   Told now;
   if (drawer->renderer() != nullptr) now.name = drawer->renderer()->device().name;
   now.stats = drawer->stats();
-  now.traces_light = drawer->renderer() != nullptr && !drawer->is_processor();
+  now.is_processor = drawer->is_processor();
+  now.traces_light = drawer->renderer() != nullptr && !now.is_processor;
   for (std::size_t mode = 0; mode < now.is_slow.size(); ++mode) {
     now.is_slow.at(mode) = drawer->is_slow(static_cast<DrawMode>(mode));
   }
@@ -220,10 +248,21 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
   return now;
 }
 
-// It rests while the device draws, but for the time until that has something to show.
+// The same picture by rays, in all its light, with the occlusion that meshes have.
+ViewRequest DeviceBackend::Impl::request_of_light() const {
+  ViewRequest of_cpu = *request;
+  of_cpu.mode = DrawMode::Rays;
+  of_cpu.samples = std::min(request->samples, kSamplesAtRest);
+  if (of_cpu.light.occlusion_mode != OcclusionMode::Off) of_cpu.light.occlusion_mode = OcclusionMode::Smooth;
+  return of_cpu;
+}
+
+// It rests while the device draws, but for the time until that has something to show, and the light that it has not.
 void DeviceBackend::Impl::show_by_processor() {
   ViewRequest of_cpu = *request;
-  if (uses_device() && !is_device_gone) {
+  if (uses_device() && !is_device_gone && rests) {
+    of_cpu = request_of_light();
+  } else if (uses_device() && !is_device_gone) {
     const bool stands_in = has_thread() && !is_drawn;
     of_cpu.mode = DrawMode::Rays;
     of_cpu.samples = 1;
@@ -261,8 +300,10 @@ std::string DeviceBackend::name() const {
 
 bool DeviceBackend::traces_light(DrawMode mode) const {
   if (!has_meshes(mode)) return mode == DrawMode::Rays;
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->has_thread() || !impl_->drawer ? impl_->told.traces_light : impl_->tell().traces_light;
+  const Impl& me = *impl_;
+  const std::lock_guard lock(me.mutex);
+  if (!me.has_thread() && me.drawer) return me.tell().traces_light;
+  return me.told.traces_light || (me.told.is_processor && me.is_marched_alike(mode));
 }
 
 bool DeviceBackend::can_draw(DrawMode mode) const {
@@ -280,6 +321,8 @@ void DeviceBackend::show(const ViewRequest& request) {
       me.frame.reset();
     }
     me.request = request;
+    me.rests = false;
+    me.is_all_fields = has_meshes(request.mode) && me.scene.voxel_count() == 0;
     me.is_request_new = true;
     ++me.request_number;
     if (me.frame) me.frame->is_settled = false;
@@ -302,6 +345,11 @@ std::optional<ViewFrame> DeviceBackend::take() {
   if (me.frame) {
     me.show_by_processor();
     return std::exchange(me.frame, std::nullopt);
+  }
+  if (me.rests) {
+    // Coarser than what is there it is not shown.
+    auto lit = me.cpu.take();
+    return lit && lit->is_whole ? lit : std::nullopt;
   }
   auto stand_in = me.is_drawn ? std::nullopt : me.cpu.take();
   if (stand_in) stand_in->is_settled = false;
@@ -334,6 +382,11 @@ bool DeviceBackend::is_slow(DrawMode mode) const {
   return me.has_thread() ? me.told.is_slow.at(static_cast<std::size_t>(mode)) : me.drawer->is_slow(mode);
 }
 
+bool DeviceBackend::ends_late() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->is_busy;
+}
+
 std::optional<Error> DeviceBackend::fault() {
   const std::lock_guard lock(impl_->mutex);
   return impl_->error ? impl_->error : impl_->cpu.fault();
@@ -355,6 +408,11 @@ void DeviceBackend::resume(bool changed) {
     const std::lock_guard lock(impl_->mutex);
     impl_->is_paused = false;
     if (changed) {
+      impl_->rests = false;
+      if (impl_->request) {
+        impl_->is_all_fields = has_meshes(impl_->request->mode) && impl_->scene.voxel_count() == 0;
+        impl_->show_by_processor();
+      }
       impl_->is_edited = true;
       if (!impl_->has_thread() && impl_->drawer) impl_->drawer->note_edit();
       if (impl_->frame) impl_->frame->is_settled = false;

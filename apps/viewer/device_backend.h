@@ -26,7 +26,8 @@ struct DeviceBackendOptions {
 
 /// Pictures by a graphics device: ray-marched ones get better sample by sample, meshes follow edits as workers finish
 /// them. What is pointed at is found by the processor, which also draws where the device cannot, and rays until the
-/// device has its first picture of meshes.
+/// device has its first picture of meshes. Where a processor acts as the device, meshes have no light that takes rays;
+/// once the view rests the processor draws, by rays, those that rays show alike: blocks, and scenes of fields alone.
 ///
 /// After a fault of the device it is not used again.
 class DeviceBackend final : public ViewBackend {
@@ -46,6 +47,7 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const override;
   [[nodiscard]] std::string activity() const override;
   [[nodiscard]] bool is_slow(DrawMode mode) const override;
+  [[nodiscard]] bool ends_late() const override;
   [[nodiscard]] std::optional<Error> fault() override;
   double pause() override;
   void resume(bool changed) override;

@@ -73,6 +73,9 @@ class DeviceBackendTest : public ::testing::Test {
     return {};
   }
 
+  /// Whether it is one that acts as a device.
+  [[nodiscard]] bool is_processor() const { return renderer_->device().kind == "cpu"; }
+
   std::shared_ptr<VulkanRenderer> renderer_;
   std::vector<std::string> messages_;
 };
@@ -330,7 +333,12 @@ TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
       const auto same = settle(*at_once);
       ASSERT_FALSE(pictures.empty());
       ASSERT_FALSE(same.empty());
-      EXPECT_EQ(pictures.back().rgb, same.back().rgb);
+      // Light by rays is what the processor adds to blocks in the end, where it acts as a device.
+      const bool is_lit_after = is_processor() && mode == DrawMode::Blocks;
+      const auto drawn = is_lit_after ? std::ranges::find(pictures, same.back().rgb, &Image::rgb) : pictures.end() - 1;
+      ASSERT_NE(drawn, pictures.end());
+      EXPECT_EQ(drawn->rgb, same.back().rgb);
+      EXPECT_EQ(drawn + 1 == pictures.end(), !is_lit_after);
       EXPECT_FALSE(apart->wants_frames()) << "they come by themselves";
       EXPECT_EQ(apart->activity(), "");
       EXPECT_EQ(apart->name(), renderer_->device().name);
@@ -340,6 +348,44 @@ TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
     const ScenePause pause_at_once(*at_once);
     ASSERT_TRUE(document.undo());
   }
+}
+
+TEST_F(DeviceBackendTest, BlocksHaveAllLightAtRestWhereAProcessorActsAsTheDevice) {
+  if (!is_processor()) GTEST_SKIP() << "a graphics card draws all light itself";
+  Document document = small_document();
+  const auto backend = backend_of(document, false);
+  ViewRequest request = request_for(document, DrawMode::Blocks);
+  request.light = natural_light();
+  const auto wanted = [&] {
+    ViewRequest marched = request;
+    marched.light.occlusion_mode = OcclusionMode::Vertex;
+    return by_processor(document, marched);
+  };
+  for (int round = 0; round < 3; ++round) {
+    SCOPED_TRACE(round);
+    if (round == 1) edit(document, *backend, {30, 12, 20});
+    if (round == 2) request.camera.position.x += 3.0;
+    backend->show(request);
+    const auto pictures = settle(*backend);
+    ASSERT_GE(pictures.size(), 2U);
+    EXPECT_EQ(pictures.back().rgb, wanted().rgb);
+    const auto whole = std::ranges::find(pictures, request.width, &Image::width);
+    ASSERT_NE(whole, pictures.end());
+    EXPECT_GT(differing(*whole, pictures.back(), 8), 0.02) << "the device's is without shadows";
+    EXPECT_TRUE(backend->traces_light(DrawMode::Blocks));
+    EXPECT_FALSE(backend->take());
+  }
+  // What has nothing of it stays the device's: values, and edges.
+  request.light.shading = Shading::Normals;
+  backend->show(request);
+  ASSERT_FALSE(settle(*backend).empty());
+  request.light = natural_light();
+  request.wireframe = Wireframe::Over;
+  backend->show(request);
+  const auto edges = settle(*backend);
+  ASSERT_FALSE(edges.empty());
+  EXPECT_GT(differing(edges.back(), wanted(), 8), 0.02);
+  EXPECT_FALSE(backend->traces_light(DrawMode::Smooth)) << "of voxels only a card shows those lit";
 }
 
 TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
@@ -354,8 +400,10 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
                         },
                         {});
   ViewRequest request = request_for(document, DrawMode::Blocks);
+  request.light.shadows = false;
   backend.show(request);
   EXPECT_TRUE(comes([&] { return backend.activity() == "opening a device"; }));
+  EXPECT_TRUE(backend.ends_late());
   for (int i = 0; i < 5; ++i) {
     request.camera.position.x += 0.5;
     backend.show(request);
@@ -370,6 +418,7 @@ TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {
   go_on.set_value();
   const auto pictures = settle(backend);
   ASSERT_FALSE(pictures.empty());
+  EXPECT_TRUE(comes([&] { return !backend.ends_late(); }));
   const auto fresh = backend_of(document);
   fresh->show(request);
   const auto same = settle(*fresh);

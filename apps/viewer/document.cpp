@@ -83,10 +83,8 @@ std::filesystem::path Document::proposed_path() const {
       [&](GridHandle, const SceneGrid& grid) { has_field = has_field || grid.field.chunk_count() > 0; });
   const auto own = format_to_write(path_);
   if (own && !(has_field && *own == FileFormat::Vox)) return path_;
-  // NAME of NAME.nii.gz too.
-  std::filesystem::path proposed = path_;
-  if (proposed.extension() == ".gz") proposed.replace_extension();
-  return proposed.replace_extension(has_field || loaded_.format == "scene" ? ".json" : ".vox");
+  const std::string stem = stem_of_file(path_);
+  return path_.parent_path() / (stem + (has_field || loaded_.format == "scene" ? ".json" : ".vox"));
 }
 
 std::string Document::name() const {

@@ -145,6 +145,7 @@ TEST(Document, TheNameThatIsProposedIsOfAFormatThatHoldsIt) {
   EXPECT_EQ(proposed("a/hills.json", "scene", true), "a/hills.json");
   EXPECT_EQ(proposed("a/scan.nii.gz", "nifti", true), "a/scan.json");
   EXPECT_EQ(proposed("a/scan.nrrd", "nrrd", true), "a/scan.json");
+  EXPECT_EQ(proposed("a/SCAN.NII.GZ", "nifti", true), "a/SCAN.json");
   EXPECT_EQ(proposed("a/dug.vox", "vox", true), "a/dug.json");
   EXPECT_EQ(proposed("a/model.qb", "qubicle", false), "a/model.vox");
 }

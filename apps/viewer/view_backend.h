@@ -109,6 +109,9 @@ class ViewBackend {
   /// Whether pictures of the mode turned out to take too long for anybody to want to start with them.
   [[nodiscard]] virtual bool is_slow(DrawMode /*mode*/) const { return false; }
 
+  /// Whether its end would wait for what cannot be stopped: a device that is being opened, or that draws.
+  [[nodiscard]] virtual bool ends_late() const { return false; }
+
   /// What went wrong with the last request, if anything.
   [[nodiscard]] virtual std::optional<Error> fault() = 0;
 

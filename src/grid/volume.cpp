@@ -88,6 +88,18 @@ float volume_threshold(const Volume& volume) {
   return std::min(threshold, std::nextafter(volume.max, volume.min));
 }
 
+Result<float> surface_value(const Volume& volume, std::optional<float> iso) {
+  const auto all = static_cast<std::int64_t>(volume.values.size());
+  if (all > 0 && volume.nan_count == all) {
+    return make_error(ErrorCode::InvalidArgument, "no value is a number: there is no surface");
+  }
+  if (iso) return *iso;
+  if (all > 0 && volume.nan_count + volume.infinite_count == all) {
+    return make_error(ErrorCode::InvalidArgument, "no value is finite: nothing says where its surface is");
+  }
+  return volume_threshold(volume);
+}
+
 std::optional<double> metres_of_unit(std::string_view unit) {
   struct Unit {
     std::string_view symbol, name, plural;

@@ -73,10 +73,14 @@ bool is_volume(const std::optional<FileFormat>& format) {
 template <class Source>
 Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, Threads threads,
                                          const Progress& progress) {
-  const auto volume = read_volume(source, {}, part_of(progress, 0.0, 0.5));
+  const Progress reading = part_of(progress, 0.0, 0.5);
+  const auto volume =
+      options.raw ? read_raw_volume(source, *options.raw, {}, reading) : read_volume(source, {}, reading);
   if (!volume) return volume.error();
+  const auto iso = surface_value(*volume, options.iso);
+  if (!iso) return iso.error();
   VolumeSceneOptions wanted;
-  wanted.iso = options.iso ? *options.iso : volume_threshold(*volume);
+  wanted.iso = *iso;
   auto scene = scene_from_volume(*volume, wanted, threads, part_of(progress, 0.5, 1.0));
   if (!scene) return scene.error();
   LoadedScene loaded;
@@ -88,6 +92,7 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
 
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                const LoadOptions& options, Threads threads, const Progress& progress) {
+  if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes, options, threads, progress);
@@ -159,6 +164,12 @@ std::string writable_extensions() {
   return extensions_with(&FormatInfo::writable);
 }
 
+std::string stem_of_file(const std::filesystem::path& path) {
+  std::filesystem::path name = path.filename();
+  if (lower_case_extension(name) == ".gz") name = name.stem();
+  return name.stem().string();
+}
+
 const FormatInfo& format_info(FileFormat format) {
   return *std::find_if(kFormats.begin(), kFormats.end(), [&](const FormatInfo& info) { return info.format == format; });
 }
@@ -221,6 +232,7 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   // A volume's reader is given the path, which may lead to what lies beside it.
+  if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);

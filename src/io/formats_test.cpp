@@ -63,6 +63,38 @@ TEST(Formats, NamesDecideWhatIsWritten) {
   }
 }
 
+TEST(Formats, StemsLeaveOutWhatIsWithinGzip) {
+  for (const auto& [name, stem] : {std::pair("a/castle.vox", "castle"),
+                                   {"scan.nii.gz", "scan"},
+                                   {"SCAN.NII.GZ", "SCAN"},
+                                   {"b.c/scan.nrrd.gz", "scan"},
+                                   {"scan.dat.gz", "scan"},
+                                   {"v1.2.vox", "v1.2"},
+                                   {"ab", "ab"},
+                                   {"hand.img.gz", "hand"},
+                                   {"", ""}}) {
+    EXPECT_EQ(stem_of_file(name), stem) << name;
+  }
+}
+
+TEST(Formats, RawValuesAreAVolumeWhereOptionsSayHowMany) {
+  std::string values(4 * 4 * 4, '\0');
+  values[21] = values[22] = '\x50';
+  LoadOptions options;
+  options.raw = RawVolume{IVec3(4)};
+  const auto loaded = load_scene(bytes_of(values), options);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->format, "raw");
+  EXPECT_EQ(loaded->scene.grids()[loaded->scene.grids().handles()[0]].field.solid_count(), 2);
+  const TestFolder folder("formats");
+  ASSERT_TRUE(write_file(folder.file("four.dat"), bytes_of(values)));
+  EXPECT_TRUE(load_scene(folder.file("four.dat"), options));
+  options.raw->size.x = 5;
+  const auto short_of_values = load_scene(folder.file("four.dat"), options);
+  ASSERT_FALSE(short_of_values);
+  EXPECT_EQ(short_of_values.error().path, folder.file("four.dat").string());
+}
+
 TEST(Formats, FilesOfNoKnownFormatAreRefusedWithTheReason) {
   const TestFolder folder("formats");
   EXPECT_EQ(error_of(folder, "a.txt", "hello").code, ErrorCode::BadFormat);

@@ -18,7 +18,9 @@ namespace quoin {
 ///
 ///   alpha         makes the least error of both, summed in squares over the channels, where nothing else is known;
 ///   transmission  gives the body's own share exactly;
-///   attenuation   gives, with these, what passes, where it can: it is at most 1 and no less than a hundredth.
+///   attenuation   gives, with these, what passes, where it can: it is at most 1, and no less than `passed` and a
+///                 hundredth. Blender's Cycles attenuates what is not covered too: of a pale pane the difference that
+///                 is left over is small, and would make it violet there.
 struct GlassMaterial {
   float thickness = 1.0F;  ///< voxels
   float alpha = 1.0F;

@@ -1,8 +1,6 @@
 #include "convert/convert.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <memory>
 
 #include <quoin/io/mesh_file.h>
@@ -17,6 +15,7 @@
 #include "scene_warnings.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -27,7 +26,7 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
                         Outcome& outcome) {
   Stopwatch watch;
   ProgressBar bar(!options.is_one_of_many);
-  outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
+  outcome.mesher = options.mesher;
   const InstanceFilter filter = options.common.instances();
   const BlockyMeshOptions mesh{outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
   auto meshes =
@@ -102,7 +101,22 @@ Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& option
   return convert(options.animate ? animation.scene() : loaded.scene, animation, options, outcome);
 }
 
-Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format) {
+/// What contradicts meshing blocks; empty when nothing does.
+std::string fault_of_blocks(const ConvertOptions& options) {
+  if (options.has_field_occlusion) return "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth";
+  if (options.simplify) return "--simplify needs --mesher smooth";
+  const bool is_of_smooth = options.smoothness || options.colours || options.apart;
+  return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
+}
+
+/// How the scene is meshed where nobody said it: as blocks, but for fields alone, which are smooth in any case.
+std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
+  if (!options.mesher.empty()) return options.mesher;
+  const bool is_smooth = scene.voxel_count() == 0 && solid_samples(scene) > 0 && options.texture != "atlas";
+  return is_smooth ? "smooth" : "greedy";
+}
+
+Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.keep_source = !format.is_mesh || options.animate;
@@ -112,12 +126,16 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   }();
   if (!loaded) return loaded.error();
   Outcome outcome;
-  outcome.voxels = loaded->scene.voxel_count();
+  outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.warnings = std::move(loaded->warnings);
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   if (format.is_mesh) {
-    if (auto done = convert_to_meshes(*loaded, options, watch, outcome); !done) return done.error();
+    ConvertOptions settled = options;
+    settled.mesher = mesher_for(loaded->scene, options);
+    fault = settled.mesher == "smooth" ? "" : fault_of_blocks(settled);
+    if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
+    if (auto done = convert_to_meshes(*loaded, settled, watch, outcome); !done) return done.error();
     return outcome;
   }
   keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
@@ -140,7 +158,9 @@ std::string mesh_text(const Outcome& outcome) {
 }
 
 std::string outcome_text(const Outcome& outcome) {
-  std::string text = (outcome.is_volume ? "Solid samples: " : "Voxels: ") + with_thousands(outcome.voxels) + "\n";
+  std::string text = (outcome.is_volume ? "Solid samples: " + with_thousands(outcome.content.solid_samples)
+                                        : content_text(outcome.content)) +
+                     "\n";
   if (outcome.faces.total > 0) text += to_string(outcome.faces) + "\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
@@ -179,35 +199,21 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   const LoadOptions& load = options.common.load;
   if (is_volume)
     return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
-  if (options.iso) return "--iso is for volumes, and the input holds voxels";
-  if (options.mesher == "smooth") return "";
-  if (options.has_field_occlusion) return "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth";
-  if (options.simplify) return "--simplify needs --mesher smooth";
-  const bool is_of_smooth = options.smoothness || options.colours || options.apart;
-  return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
+  return options.iso ? "--iso is for volumes, and the input holds voxels" : "";
 }
 
-/// Whether the input is read by read_volume. Errors: CannotRead.
-Result<bool> holds_volume(const ConvertOptions& options) {
-  if (options.raw) return true;
-  const auto format = detect_format(options.common.input);
-  if (!format) return format.error();
-  return *format && format_info(**format).is_volume;
-}
-
-Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume) {
-  if (is_volume && (format.format == FileFormat::Vox || (options.raw && !format.is_mesh))) {
-    return make_error(
-        ErrorCode::Unsupported,
-        "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply), not " + std::string(format.extension),
-        options.common.input.string());
+Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
+  if (is_volume && format.format == FileFormat::Vox) {
+    return make_error(ErrorCode::Unsupported,
+                      "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply) or a field (.json), not .vox",
+                      options.common.input.string());
   }
   if (is_volume && !format.is_mesh) {
     ConvertOptions as_scene = options;
     if (options.iso) as_scene.common.load.iso = static_cast<float>(*options.iso);
-    return convert_scene(as_scene, format);
+    return convert_scene(as_scene, format, fault);
   }
-  return is_volume ? convert_volume(options, format) : convert_scene(options, format);
+  return is_volume ? convert_volume(options, format) : convert_scene(options, format, fault);
 }
 
 /// Makes files of what is named "-". Returns what is wrong with that, or "".
@@ -349,24 +355,6 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
                    "glTF with integers as vertices, for clients with KHR_mesh_quantization (blocks lose nothing)");
 }
 
-/// Texts to CLI11, which are read once all are there.
-struct VolumeTexts {
-  std::string iso;
-  std::string raw_size;
-  std::string raw_type = "uint8";
-  std::string raw_order = "little";
-};
-
-void add_volume_options(CLI::App& command, VolumeTexts& texts) {
-  command.add_option("--iso", texts.iso,
-                     "Surface value of a volume; what is above is solid (default: between its two groups of values)");
-  command.add_option("--raw-size", texts.raw_size,
-                     "XxYxZ: IN is a file of values alone, x fastest, that many along each axis");
-  command.add_option("--raw-type", texts.raw_type, "Of its values: uint8 to int64, float32 or float64 (default uint8)");
-  command.add_option("--raw-order", texts.raw_order, "Byte order of its values: little or big (default little)")
-      ->check(CLI::IsMember({"little", "big"}));
-}
-
 /// Reads the options of smooth occlusion; returns what is wrong with them, or with others beside them, or "".
 std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
   if (options.occlusion_off) {
@@ -378,13 +366,6 @@ std::string read_occlusion(const CLI::App& command, ConvertOptions& options) {
   if (fault.empty() && has_none && options.occlusion_apart)
     fault = "--ao-attribute: --ao-form none leaves occlusion out";
   return fault;
-}
-
-std::optional<ScalarType> scalar_type(const std::string& name) {
-  for (int i = 0; i <= static_cast<int>(ScalarType::Float64); ++i) {
-    if (name_of(static_cast<ScalarType>(i)) == name) return static_cast<ScalarType>(i);
-  }
-  return std::nullopt;
 }
 
 /// "vox, scene, nifti, nrrd".
@@ -419,26 +400,11 @@ std::string read_files(const std::vector<std::filesystem::path>& rest, ConvertOp
 
 /// Reads the options of volumes; returns what is wrong with them, or "".
 std::string read_texts(const CLI::App& command, const VolumeTexts& texts, ConvertOptions& options) {
-  if (command.count("--iso") > 0) {
-    options.iso = parse_number(texts.iso);
-    const bool is_float = options.iso && std::isfinite(static_cast<float>(*options.iso));
-    if (!is_float) return "--iso: must be a number, not \"" + texts.iso + "\"";
-  }
-  if (command.count("--raw-size") == 0) {
-    const bool is_lone = command.count("--raw-type") + command.count("--raw-order") > 0;
-    return is_lone ? "--raw-type and --raw-order need --raw-size" : "";
-  }
-  const auto size = parse_box_size(texts.raw_size);
-  if (!size || size->x < 1 || size->y < 1 || size->z < 1) {
-    return "--raw-size: must be like 256x256x128, not \"" + texts.raw_size + "\"";
-  }
-  const auto type = scalar_type(texts.raw_type);
-  if (!type) {
-    return "--raw-type: must be uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, not \"" +
-           texts.raw_type + "\"";
-  }
-  options.raw = RawVolume{*size, *type, texts.raw_order == "big" ? std::endian::big : std::endian::little};
-  return "";
+  VolumeArguments volume;
+  std::string fault = read_volume_options(command, texts, volume);
+  options.iso = volume.iso;
+  options.common.load.raw = volume.raw;
+  return fault;
 }
 
 }  // namespace
@@ -447,7 +413,8 @@ Json outcome_json(const Outcome& outcome) {
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
   return {
-      {"voxels", outcome.voxels},
+      {"voxels", outcome.is_volume ? outcome.content.solid_samples : outcome.content.voxels},
+      {"solid_samples", outcome.content.solid_samples},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
       {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
@@ -464,7 +431,7 @@ Json outcome_json(const Outcome& outcome) {
 
 std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
-    return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --iso, --simplify, "
+    return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
            "--scale, --up, --texture, --animate, --compress and --quantize are for mesh formats; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
   }
@@ -487,7 +454,7 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
 
 Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
   if (Status sound = check_input(options); !sound) return sound.error();
-  const auto is_volume = holds_volume(options);
+  const auto is_volume = holds_volume(options.common);
   if (!is_volume) return is_volume.error();
   fault = fault_of_usage(options, *is_volume);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
@@ -496,7 +463,7 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
     if (auto made = make_folder_of(options.output); !made) return made.error();
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
-  return convert(options, format, *is_volume);
+  return convert(options, format, *is_volume, fault);
 }
 
 Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
@@ -570,7 +537,7 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts,
                          const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   std::size_t given = 0;
   for (const char* name :
-       {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite", "--iso",
+       {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite",
         "--simplify", "--scale", "--up", "--texture", "--compress", "--quantize", "--animate", "--fps"}) {
     given += command.count(name);
   }

@@ -17,6 +17,7 @@
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
+#include "scene_content.h"
 #include "watch.h"
 
 namespace quoin::tool {
@@ -43,7 +44,6 @@ struct ConvertOptions {
   bool animate = false;             ///< all frames, as an animation of glTF
   double frames_per_second = 10.0;  ///< of `animate`
   bool apart = false;               ///< instances are not united
-  std::optional<RawVolume> raw;     ///< the input is a file of values alone
   std::optional<double> scale;
   std::string up;          ///< "y", "z"; empty: z for .ply, else y
   bool compress = false;   ///< of glTF, as MeshFileOptions has it
@@ -61,8 +61,8 @@ struct Seconds {
 /// What came of it.
 struct Outcome {
   bool is_volume = false;
-  std::int64_t voxels = 0;  ///< of a volume: solid samples
-  std::string mesher;       ///< empty: nothing was meshed
+  SceneContent content;  ///< of a volume its solid samples alone
+  std::string mesher;    ///< empty: nothing was meshed
   MeshStats meshes;
   FaceCounts faces;           ///< of blocks
   std::optional<double> iso;  ///< of volumes

@@ -64,19 +64,12 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
   return found;
 }
 
-/// NAME of NAME.nii.gz and of NAME.vox.
-std::string stem_of(const fs::path& file) {
-  fs::path name = file.filename();
-  if (name.extension() == ".gz") name = name.stem();
-  return name.stem().string();
-}
-
 /// All that is to be done. `errors` gets what cannot be looked at.
 std::vector<Task> plan(const ManyOptions& many, const std::string& extension, std::vector<Error>& errors) {
   std::vector<Task> tasks;
   const auto add = [&](const fs::path& input, const fs::path& beside, const fs::path& below) {
     const fs::path folder = !many.folder ? beside : below == "." ? *many.folder : *many.folder / below;
-    tasks.push_back({input, folder / (stem_of(input) + extension), {}, {}});
+    tasks.push_back({input, folder / (stem_of_file(input) + extension), {}, {}});
   };
   for (const fs::path& input : many.inputs) {
     std::error_code unknown;

@@ -9,6 +9,7 @@
 #include "progress_bar.h"
 #include "scene_warnings.h"
 #include "stopwatch.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -59,13 +60,6 @@ void warn_of_looks(const Scene& scene, InstanceFilter filter, const std::filesys
   if (is_lost) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
-Result<Volume> read_input(const ConvertOptions& options) {
-  ProgressBar bar(!options.is_one_of_many);
-  const Progress progress = bar.listener("reading");
-  if (options.raw) return read_raw_volume(options.common.input, *options.raw, {}, progress);
-  return read_volume(options.common.input, {}, progress);
-}
-
 /// Puts a volume into the file's unit: glTF's is the metre, the others have none.
 void scale_to(const FormatInfo& format, const std::string& unit, SceneMeshes& meshes) {
   if (format.format != FileFormat::Glb && format.format != FileFormat::Gltf) return;
@@ -96,7 +90,10 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
 
 Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format) {
   Stopwatch watch;
-  auto volume = read_input(options);
+  auto volume = [&] {
+    ProgressBar bar(!options.is_one_of_many);
+    return read_input_volume(options.common, bar.listener("reading"));
+  }();
   if (!volume) return volume.error();
   Outcome outcome;
   outcome.is_volume = true;
@@ -105,15 +102,17 @@ Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& 
   outcome.seconds.read = watch.lap();
   catch_interrupts();
   ProgressBar bar(!options.is_one_of_many);
+  const auto iso = surface_value(*volume, options.iso ? std::optional(static_cast<float>(*options.iso)) : std::nullopt);
+  if (!iso) return make_error(iso.error().code, iso.error().message, options.common.input.string());
   outcome.is_iso_found = !options.iso && volume->min < volume->max;
-  outcome.iso = options.iso ? *options.iso : static_cast<double>(volume_threshold(*volume));
+  outcome.iso = options.iso ? *options.iso : static_cast<double>(*iso);
   VolumeMeshOptions wanted;
-  wanted.iso = static_cast<float>(*outcome.iso);
+  wanted.iso = *iso;
   wanted.mesh = mesh_options(options);
   wanted.simplify_error = simplify_error(options);
   auto meshes = mesh_volume(*volume, wanted, options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
-  outcome.voxels = meshes->stats.solid_samples;
+  outcome.content.solid_samples = meshes->stats.solid_samples;
   outcome.seconds.mesh = watch.lap();
   scale_to(format, volume->units, *meshes);
   volume->values = {};

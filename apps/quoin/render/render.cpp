@@ -18,7 +18,7 @@
 #include "scene_warnings.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
-#include "volume_info.h"
+#include "volume_options.h"
 #include "watch.h"
 
 namespace quoin::tool {
@@ -125,10 +125,9 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   LoadOptions options = arguments.common.load;
   options.frame = frame;
   options.keep_source = false;
-  if (arguments.iso) options.iso = static_cast<float>(*arguments.iso);
   ProgressBar bar;
   auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
-  if (loaded && arguments.iso && !is_volume) {
+  if (loaded && arguments.volume.iso && !is_volume) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
   }
   return loaded;
@@ -248,7 +247,7 @@ Result<Outcome> render(const RenderArguments& arguments) {
   std::vector<std::filesystem::path> outputs = pictures_of(arguments);
   outputs.push_back(arguments.depth);
   if (auto writable = check_outputs(outputs); !writable) return writable.error();
-  const bool is_volume = holds_volume(arguments.common.input);
+  const bool is_volume = holds_volume(arguments.common).value_or(false);
   if (is_volume && arguments.frames) {
     return make_error(ErrorCode::InvalidArgument, "--frames is for voxels, and the input is a volume");
   }

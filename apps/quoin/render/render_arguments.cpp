@@ -12,6 +12,7 @@
 #include "field_occlusion.h"
 #include "parse.h"
 #include "standard_streams.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -120,11 +121,6 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--ao-distance", "VOXELS", "How far the rays of --ao rays reach (default 6)");
   add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
   add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
-}
-
-std::optional<double> read_float(const std::string& text) {
-  const auto number = parse_number(text);
-  return number && std::isfinite(static_cast<float>(*number)) ? number : std::nullopt;
 }
 
 void add_detail_options(CLI::App& command, RenderArguments& arguments) {
@@ -342,7 +338,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth_occlusion),
-      read_option(command, "--iso", read_float, "a number", arguments.iso)};
+      read_volume_options(command, arguments.volume_texts, arguments.volume)};
   arguments.position = camera.position;
   arguments.file_camera = camera.number;
   arguments.slice.axis = slice.axis;
@@ -373,8 +369,7 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges and even light (default 4)")
       ->check(CLI::Range(1, kMaxSamples));
-  add_text_option(command, "--iso", "VALUE",
-                  "Surface value of a volume; what is above is solid (default: between its two groups of values)");
+  add_volume_options(command, arguments.volume_texts);
   add_text_option(command, "--slice", "AXIS:PLACE",
                   "Of --preset density: where it cuts, x, y or z, from 0 to 1 of the fields' bounds (default y:0.5)");
   command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
@@ -395,6 +390,9 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
     arguments.render.detail.policy.emplace().rule =
         arguments.detail == "radius" ? DetailPolicy::Rule::ByRadius : DetailPolicy::Rule::ByPixels;
   }
+  LoadOptions& load = arguments.common.load;
+  load.raw = arguments.volume.raw;
+  if (arguments.volume.iso) load.iso = static_cast<float>(*arguments.volume.iso);
   arguments.view = view_of_name(arguments.view_name).value_or(View::Iso);
   arguments.has_view = command.count("--view") > 0 || arguments.azimuth || arguments.elevation || arguments.turns > 1;
   arguments.has_sun = command.count("--sun") > 0;

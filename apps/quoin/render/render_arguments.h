@@ -9,6 +9,7 @@
 #include <quoin/scene/camera.h>
 
 #include "commands.h"
+#include "volume_options.h"
 
 namespace quoin::tool {
 
@@ -45,7 +46,8 @@ struct RenderArguments {
   std::string backend = "cpu";
   std::string device;  ///< as VulkanOptions::device
   std::string detail = "near";
-  std::optional<double> iso;  ///< of a volume
+  VolumeTexts volume_texts;
+  VolumeArguments volume;
   DensitySliceOptions slice;  ///< of the preset density
 
   /// Where the camera of views and films looks first.

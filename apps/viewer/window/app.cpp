@@ -84,9 +84,19 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
 }
 
 App::~App() {
-  // The window goes first to the user's eye; threads may take a moment to end.
+  close();
+}
+
+// The window goes first to the user's eye; threads may take a moment to end.
+void App::close() {
   SDL_HideWindow(screen_->window());
   state_.saver.reset();
+}
+
+bool App::ends_late() {
+  close();
+  const bool reads = state_.loader != nullptr || !abandoned_.empty();
+  return reads || (state_.open.backend && state_.open.backend->ends_late());
 }
 
 Status App::run(const std::function<bool()>& is_interrupted) {

@@ -25,8 +25,13 @@ class App {
   /// Until the user quits, or `is_interrupted`.
   [[nodiscard]] Status run(const std::function<bool()>& is_interrupted);
   [[nodiscard]] const Settings& settings() const { return state_.settings; }
+  /// Closes the window. Whether the destructor would wait for what cannot be stopped: a device that draws, or a file
+  /// that is read.
+  [[nodiscard]] bool ends_late();
 
  private:
+  void close();
+
   using Clock = std::chrono::steady_clock;
   /// What to do once unsaved changes are saved or given up.
   struct Leaving {

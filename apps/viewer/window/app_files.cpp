@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <quoin/io/formats.h>
 #include <quoin/io/picture_files.h>
 
 #include "viewer/device_backend.h"
@@ -84,7 +85,10 @@ void App::load(const std::filesystem::path& path) {
     return std::make_unique<DeviceBackend>(
         document.scene(), backend, [this] { return open_device(); }, wake_window);
   };
-  state_.loader = std::make_unique<Loader>(path, options_.load, make, wake_window);
+  LoadOptions wanted = options_.load;
+  // It says what that one file holds.
+  if (path != options_.file) wanted.raw.reset();
+  state_.loader = std::make_unique<Loader>(path, wanted, make, wake_window);
 }
 
 void App::take_loaded() {
@@ -191,8 +195,8 @@ void App::save_wanted_pictures() {
 }
 
 void App::save_picture(const Result<Image>& picture) {
-  const std::filesystem::path name = state_.open.document->path().stem();
-  const std::filesystem::path path = free_name(name.empty() ? "quoin" : name.string());
+  const std::string name = stem_of_file(state_.open.document->path());
+  const std::filesystem::path path = free_name(name.empty() ? "quoin" : name);
   const auto written = picture ? write_png(*picture, path) : picture.error();
   if (!written) return state_.tell(written.error());
   std::error_code ignored;

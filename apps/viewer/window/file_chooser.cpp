@@ -37,10 +37,13 @@ std::string lower(std::string text) {
   return text;
 }
 
+// Packed volumes too: NAME.nii.gz.
 bool is_readable_name(const std::string& name) {
-  const std::string ending = lower(std::filesystem::path(name).extension().string());
+  std::filesystem::path file = lower(name);
+  const bool is_packed = file.extension() == ".gz";
+  if (is_packed) file = file.stem();
   return std::any_of(file_formats().begin(), file_formats().end(), [&](const FormatInfo& format) {
-    return format.readable && !format.is_volume && format.extension == ending;
+    return format.readable && format.is_volume >= is_packed && format.extension == file.extension();
   });
 }
 
@@ -148,7 +151,7 @@ std::optional<std::filesystem::path> FileChooser::accept() {
   }
   if (path.extension().empty()) path += ".vox";
   if (!can_write(path)) {
-    problem_ = "the name must end in .vox or .glb";
+    problem_ = "the name must end in .vox, .json or .glb";
     return std::nullopt;
   }
   if (std::filesystem::exists(path, error) && asked_about_ != path.string()) {
@@ -182,6 +185,8 @@ std::optional<std::filesystem::path> FileChooser::draw(float scale) {
   ImGui::SameLine();
   ImGui::Checkbox("all files", &shows_all_);
   if (is_accepted) chosen = accept();
+  // So that Enter answers again.
+  if (is_accepted && !chosen) is_new_ = true;
   if (chosen) is_shown_ = false;
   if (!is_shown_) ImGui::CloseCurrentPopup();
   ImGui::EndPopup();

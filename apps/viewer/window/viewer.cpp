@@ -49,8 +49,9 @@ Status run_viewer(const ViewerOptions& options, const std::function<bool()>& is_
   if (!screen) return screen.error();
   App app(options, std::move(settings), std::move(*screen));
   if (Status status = app.run(is_interrupted); !status) return status;
-  if (path.empty()) return {};
-  return write_settings(app.settings(), path);
+  Status written = path.empty() ? Status() : write_settings(app.settings(), path);
+  if (written && options.leave_at_once && app.ends_late()) options.leave_at_once();
+  return written;
 }
 
 }  // namespace quoin::viewer

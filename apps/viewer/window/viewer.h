@@ -31,6 +31,9 @@ struct ViewerOptions {
   int height = 0;
   bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
   std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer
+  /// Called instead of coming back where that would take long, since something draws that cannot be stopped: all is
+  /// written, and the window is gone. It should end the process, without destructors. Empty: that is waited for.
+  std::function<void()> leave_at_once;
 
   [[nodiscard]] InstanceFilter instances() const {
     return load.show_hidden ? InstanceFilter::All : InstanceFilter::Visible;

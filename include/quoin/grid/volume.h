@@ -69,6 +69,12 @@ struct Volume {
 /// Source: N. Otsu, "A Threshold Selection Method from Gray-Level Histograms" (1979).
 [[nodiscard]] float volume_threshold(const Volume& volume);
 
+/// The value whose surface a volume is to show: `iso`, or without it volume_threshold.
+///
+/// Errors: InvalidArgument where there can be none: no value is a number, or none is finite and `iso` is not given. It
+///         goes by the counts that the volume has of them.
+[[nodiscard]] Result<float> surface_value(const Volume& volume, std::optional<float> iso = {});
+
 struct VolumeFieldOptions {
   float iso = 0.0F;        ///< what has a greater value is solid
   VoxelType material = 1;  ///< of all that is solid

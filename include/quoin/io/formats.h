@@ -37,6 +37,10 @@ struct FormatInfo {
 [[nodiscard]] std::string readable_extensions();
 [[nodiscard]] std::string writable_extensions();
 
+/// The name of a file without its folder and its ending, nor that of what is within gzip: NAME of NAME.vox and of
+/// NAME.nii.gz.
+[[nodiscard]] std::string stem_of_file(const std::filesystem::path& path);
+
 /// What is known of a format.
 [[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
@@ -54,9 +58,10 @@ struct FormatInfo {
 // was read, and of what was written where its format may not hold all. Options, Threads (where several are used) and
 // Progress (of what may take long) come last, in this order, and may be left out.
 
-/// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it.
+/// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it, at surface_value.
 ///
-/// The content decides; the name only helps to say what is wrong with a file that is of no known format.
+/// The content decides, unless `LoadOptions::raw` does; the name only helps to say what is wrong with a file that is of
+/// no known format.
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of
 ///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
 ///         set in all.

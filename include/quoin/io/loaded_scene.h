@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
+#include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
@@ -43,6 +44,8 @@ struct LoadOptions {
   bool keep_source = true;
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
   std::optional<float> iso = std::nullopt;
+  /// The file holds values alone, as many as this says: a volume.
+  std::optional<RawVolume> raw = std::nullopt;
 };
 
 /// What saving a scene gave.

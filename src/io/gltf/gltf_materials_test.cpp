@@ -165,6 +165,22 @@ TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToPictures) {
   EXPECT_EQ(seen, 2);
 }
 
+TEST(GlassMaterial, AttenuationIsNoDarkerThanTheBody) {
+  Surface pane;
+  pane.colour = {0.79F, 0.87F, 1.0F};
+  for (const float absorption : {0.05F, 0.1F, 0.3F}) {
+    set_absorption(absorption, pane);
+    for (const float thickness : {1.0F, 3.0F, 12.0F}) {
+      const GlassMaterial glass = glass_material(pane, thickness);
+      for (int channel = 0; channel < 3; ++channel) {
+        const float passed = std::exp(pane.log_transmittance[channel] * thickness);
+        EXPECT_GE(glass.attenuation[channel], 0.999F * passed) << absorption << " " << thickness;
+        EXPECT_LE(glass.attenuation[channel], 1.0F);
+      }
+    }
+  }
+}
+
 TEST(GlassMaterial, IsClearOrClosedAtTheEnds) {
   Surface clear;
   clear.colour = {0.5F, 0.2F, 1.0F};

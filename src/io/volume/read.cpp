@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <quoin/io/formats.h>
+
 #include "io/read_beside.h"
 #include "io/text.h"
 #include "io/volume/header.h"
@@ -128,9 +130,8 @@ Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::p
   return make_error(ErrorCode::Unsupported, "the header of a pair, whose values are in a file of their own (.img)");
 }
 
-std::string name_from(std::filesystem::path path) {
-  if (path.extension() == ".gz") path.replace_extension();
-  return printable(path.stem().string());
+std::string name_from(const std::filesystem::path& path) {
+  return printable(stem_of_file(path));
 }
 
 }  // namespace

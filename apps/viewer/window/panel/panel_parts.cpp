@@ -150,7 +150,8 @@ void draw_file_cameras(const std::vector<FileCamera>& cameras, MenuChoice& choic
 void tell_of_plain_light(const ViewState& state) {
   if (!state.open.backend || state.open.backend->stats().empty()) return;
   if (state.open.backend->traces_light(state.settings.mode)) return;
-  ImGui::TextWrapped("Without a graphics card meshes have no shadows, lamps and depth of glass. F5 has them.");
+  ImGui::TextWrapped(
+      "Without a graphics card smooth meshes have no shadows, lamps and depth of glass. F5 and F6 have them.");
 }
 
 }  // namespace
@@ -333,7 +334,8 @@ void draw_light_part(ViewState& state) {
   if (ImGui::Checkbox("shadows", &shows_shadows)) light.shadows = shows_shadows;
   ImGui::EndDisabled();
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
-    ImGui::SetTooltip("meshes have shadows where there is a graphics card; marched rays do everywhere (F5)");
+    ImGui::SetTooltip(
+        "smooth meshes have shadows where there is a graphics card; marched rays (F5) and blocks (F6) do everywhere");
   }
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   if (ImGui::Checkbox("occlusion of all light", &is_all)) {

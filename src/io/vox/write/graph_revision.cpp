@@ -173,7 +173,7 @@ class GraphRevision {
   [[nodiscard]] Result<Motion> place(const Instance& instance, const GridPlan& plan);
   [[nodiscard]] Motion place(const SceneGroup& group, const Motion& parent);
   [[nodiscard]] Result<NodeContent> transform_for(const Wanted& wanted, std::int32_t child);
-  void add_models(NodeContent& transform, NodeContent& shape, const Motion& world) const;
+  void add_models(NodeContent& transform, NodeContent& shape, const Motion& world, const Motion& box) const;
   [[nodiscard]] NodeContent shape_of(std::int32_t id, std::uint32_t model) const;
 
   const Scene& scene_;
@@ -522,13 +522,15 @@ Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int3
 }
 
 /// Without a scene graph each model was a frame: they stay so. Requires: it is the instance that was read.
-void GraphRevision::add_models(NodeContent& transform, NodeContent& shape, const Motion& world) const {
+/// `world`: of the model that is shown; `box`: likewise, of the box that it had in the source.
+void GraphRevision::add_models(NodeContent& transform, NodeContent& shape, const Motion& world,
+                               const Motion& box) const {
   const auto lone = [&](std::size_t model) {
     Motion motion;
     motion.translation[2] = source_.document.models[model].size.z / 2;
     return motion;
   };
-  const Motion moved = world * inverse(lone(static_cast<std::size_t>(source_.frame)));
+  const Motion moved = box * inverse(lone(static_cast<std::size_t>(source_.frame)));
   transform.frames.clear();
   shape.models.clear();
   for (std::size_t i = 0; i < source_.document.models.size(); ++i) {
@@ -553,7 +555,14 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
   const bool was_frame = source_.document.nodes.empty() && source_.document.models.size() > 1 &&
                          source_.scene.instances().find(handle) != nullptr &&
                          plan.source_model == static_cast<std::size_t>(source_.frame);
-  if (was_frame) add_models(*transform, shape, inverse(wanted.parent.world) * *world);
+  if (was_frame) {
+    // Where the other frames' models go does not depend on whether this one outgrew its box.
+    GridPlan boxes = plan;
+    const IBox before = canvas_of(source_.document.models[plan.source_model].size);
+    boxes.pieces.push_back({before.min, before.size(), 0});
+    const Motion shown = inverse(wanted.parent.world) * *world;
+    add_models(*transform, shape, shown, shown * from_first_piece(boxes, 1));
+  }
   children_[wanted.parent].added.push_back(id);
   out_.added.push_back(std::move(*transform));
   const std::size_t at = out_.added.size();

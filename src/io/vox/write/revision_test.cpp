@@ -365,6 +365,37 @@ TEST(VoxRevision, FilesWithoutASceneGraphKeepTheirFrames) {
   }
 }
 
+TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
+  FileBuilder file;
+  file.model(4, 4, 4, {{0, 0, 0, 1}}).model(3, 5, 3, {{1, 0, 0, 2}}).model(1, 1, 1, {{0, 0, 0, 3}});
+  const auto bytes = file.file();
+  const auto shown = [](const LoadedScene& at_frame) {
+    std::set<std::string> voxels;
+    for (const InstanceHandle handle : at_frame.scene.instances().handles()) {
+      const Instance& instance = at_frame.scene.instances()[handle];
+      const SceneGrid& grid = at_frame.scene.grids()[instance.grid];
+      visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
+        const DVec3 at = world_from_grid(instance, grid, DVec3(voxel) + 0.5);
+        voxels.insert(std::to_string(at.x) + " " + std::to_string(at.y) + " " + std::to_string(at.z) + " " +
+                      std::to_string(type));
+      });
+    }
+    return voxels;
+  };
+  for (const int edited : {0, 1}) {
+    // Beyond each side, and beyond two at once.
+    for (const IVec3 voxel : {IVec3(-1, 0, 0), IVec3(0, -2, 0), IVec3(0, 0, -1), IVec3(5, 0, 0), IVec3(0, 6, 9)}) {
+      LoadedScene loaded = load(bytes, edited);
+      loaded.scene.edit(loaded.scene.grids().handles()[static_cast<std::size_t>(edited)]).grid.set(voxel, 9);
+      const auto saved = save(loaded);
+      for (const int frame : {0, 1, 2}) {
+        const auto before = frame == edited ? shown(loaded) : shown(load(bytes, frame));
+        EXPECT_EQ(shown(load(saved, frame)), before) << frame;
+      }
+    }
+  }
+}
+
 TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
