@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-/// Names an element of a SlotMap<T>, in a scene those of that scene and its snapshots alone; stays invalid for ever once that element is removed. The default names nothing.
+/// Names an element of one SlotMap<T> (of a scene and its snapshots) until it is removed. The default names nothing.
 template <class T>
 struct Handle {
   std::uint32_t index = 0xFFFFFFFFu;
