@@ -1,6 +1,7 @@
 // What functions of scenes and cameras require.
 
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -9,6 +10,8 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/terrain/noise.h>
+#include <quoin/trace/occupancy_tree.h>
+#include <quoin/trace/ray.h>
 
 #include "core/death_for_tests.h"
 
@@ -21,6 +24,30 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   scene.remove_grid(gone);
   QUOIN_EXPECT_MISTAKE(scene.edit(gone).name = "x", "the handle names an element");
   QUOIN_EXPECT_MISTAKE((void)scene.instances()[InstanceHandle{}], "the handle names an element");
+}
+
+TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistake) {
+  Scene scene;
+  Scene other;
+  const GridHandle own = scene.add_grid({});
+  const InstanceHandle placed = scene.add_instance({"", own});
+  (void)other.add_grid({});
+  (void)other.add_instance({"", own});
+  QUOIN_EXPECT_MISTAKE(other.edit(own).name = "x", "the handle names an element");
+  QUOIN_EXPECT_MISTAKE(other.edit(placed).name = "x", "the handle names an element");
+}
+
+TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
+  Scene scene;
+  const Scene moved = std::move(scene);
+  QUOIN_EXPECT_MISTAKE(scene.add_grid({}), "a scene that was not moved from");  // NOLINT(bugprone-use-after-move)
+  QUOIN_EXPECT_MISTAKE((void)scene.cursor(), "a scene that was not moved from");
+  QUOIN_EXPECT_MISTAKE((void)scene.snapshot(), "a scene that was not moved from");
+  OccupancyTree tree;
+  const OccupancyTree moved_tree = std::move(tree);
+  QUOIN_EXPECT_MISTAKE((void)tree.bounds(), "a tree that was not moved from");  // NOLINT(bugprone-use-after-move)
+  QUOIN_EXPECT_MISTAKE((void)tree.is_occupied(IVec3(0)), "a tree that was not moved from");
+  QUOIN_EXPECT_MISTAKE((void)first_hit(tree, Ray{}), "a tree that was not moved from");
 }
 
 TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {

@@ -543,7 +543,7 @@ namespace {
 template <class T>
 void trim(std::vector<T>& all) {
   std::vector<T> exact;
-  exact.reserve(all.size() + (all.size() < 1024 ? 0 : all.size() / 32));
+  exact.reserve(all.size() + (all.size() < 4096 ? 0 : all.size() / 64));
   exact.assign(all.begin(), all.end());
   all.swap(exact);
 }

@@ -66,6 +66,7 @@ TEST(SceneFile, WhatIsWrittenReadsAsItWas) {
       if (random() % 2 == 0) placement.scale = std::abs(number(random)) + 1e-9;
       placement.mirrored = random() % 2 == 0;
       placement.visible = random() % 2 == 0;
+      if (random() % 2 == 0) placement.categories = static_cast<std::uint32_t>(random());
       scene.placements.push_back(placement);
     }
     if (seed % 2 == 0) scene.sun = glm::normalize(DVec3(number(random), number(random), number(random)));
@@ -91,6 +92,7 @@ TEST(SceneFile, WhatIsWrittenReadsAsItWas) {
       EXPECT_EQ(b.scale, a.scale);
       EXPECT_EQ(b.mirrored, a.mirrored);
       EXPECT_EQ(b.visible, a.visible);
+      EXPECT_EQ(b.categories, a.categories);
     }
     ASSERT_EQ(read->sun.has_value(), scene.sun.has_value());
     if (scene.sun) {
@@ -198,6 +200,10 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "scale": 0})")), "instances[0].scale: must be more than 0");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "position": [1, "2", 3]})")),
             "instances[0].position[1]: must be a number");
+  for (const char* wrong : {"-1", "4294967296", "1.5", "\"1\""}) {
+    EXPECT_EQ(fault_of(file_with(std::string(R"({"file": "a", "categories": )") + wrong + "}")),
+              "instances[0].categories: must be a whole number from 0 to 4294967295");
+  }
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 5, "files": [], "instances": []})"),

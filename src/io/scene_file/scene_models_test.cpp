@@ -136,6 +136,7 @@ class RandomScene {
     if (!is_rare()) made.voxel_size = std::abs(number()) + 1e-300;
     made.mirrored = is_rare();
     made.visible = !is_rare();
+    if (is_rare()) made.categories = static_cast<std::uint32_t>(random_());
     return made;
   }
 
@@ -220,6 +221,7 @@ void expect_equal(const Scene& a, const Scene& b) {
     EXPECT_EQ(bits(instance.voxel_size), bits(other.voxel_size));
     EXPECT_EQ(instance.mirrored, other.mirrored);
     EXPECT_EQ(instance.visible, other.visible);
+    EXPECT_EQ(instance.categories, other.categories);
     EXPECT_EQ(place_of(groups_from_top(a), instance.group), place_of(groups_from_top(b), other.group));
     EXPECT_EQ(place_of(a.layers().handles(), instance.layer), place_of(b.layers().handles(), other.layer));
   }

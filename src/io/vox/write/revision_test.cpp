@@ -416,6 +416,19 @@ TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {
   EXPECT_EQ(losses_of_vox(loaded).value(), warnings) << "said before it is written";
 }
 
+TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
+  FileBuilder file;
+  file.model(2, 2, 2, {{0, 0, 0, 1}});
+  LoadedScene loaded = load(file.file());
+  EXPECT_TRUE(losses_of_vox(loaded).value().empty());
+  loaded.scene.edit(loaded.scene.instances().handles()[0]).categories = 6;
+  std::vector<std::string> warnings;
+  (void)save(loaded, &warnings);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("categories are left out"), std::string::npos);
+  EXPECT_EQ(losses_of_vox(loaded).value(), warnings);
+}
+
 /// A walk of three frames, whose topmost node is what the arguments say, with what nobody knows on every node.
 std::vector<std::byte> lone_walk(bool has_hidden_group) {
   FileBuilder file;

@@ -262,6 +262,11 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   count("colours of the palette that no voxel has gave way to new ones", types_.replaced);
   count("lamps left out, which .vox does not hold (a .json keeps them)",
         static_cast<std::int64_t>(scene_.lamps.size()));
+  std::int64_t categories = 0;
+  scene_.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    categories += instance.categories == Instance().categories ? 0 : 1;
+  });
+  count("instances whose categories are left out, which .vox does not hold (a .json keeps them)", categories);
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }
 
