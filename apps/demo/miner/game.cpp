@@ -254,7 +254,6 @@ void Game::fly() {
 }
 
 void Game::walk(const Input& input) {
-  static const quoin::SlideOptions kOnFoot = on_foot();
   // What it stood on may have moved meanwhile.
   if (moved_.is_on_floor) {
     const quoin::Instance* now = scene_.instances().find(moved_.floor.instance);
@@ -262,7 +261,7 @@ void Game::walk(const Input& input) {
   }
   falling_ -= kUp * (9.81 * 2.0 * kFrame);
   if (input.jumps && moved_.is_on_floor) falling_ = kUp * 8.0;
-  moved_ = move_and_slide(*tracer_, player_, (input.walk * 5.0 + falling_) * kFrame, kOnFoot);
+  moved_ = move_and_slide(*tracer_, player_, (input.walk * 5.0 + falling_) * kFrame, on_foot());
   player_.centre = moved_.centre;
   falling_ = kUp * (glm::dot(moved_.displacement, kUp) / kFrame);
   if (moved_.is_on_floor) floor_ = scene_.instances()[moved_.floor.instance];

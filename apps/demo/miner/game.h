@@ -31,7 +31,8 @@ struct Input {
 
 /// What a frame took of the caller's thread, in milliseconds.
 struct FrameTimes {
-  enum Part : std::uint8_t { Edits, Sand, Tracer, Ships, Player, Meshes, kParts };
+  enum Part : std::uint8_t { Edits, Sand, Tracer, Ships, Player, Meshes };
+  static constexpr std::size_t kParts = 6;
   static constexpr std::array<const char*, kParts> kNames = {"edits", "sand", "tracer", "ships", "player", "meshes"};
   std::array<double, kParts> parts{};
   double total = 0.0;

@@ -18,7 +18,7 @@ namespace {
 double percentile(std::vector<double> all, double share) {
   if (all.empty()) return 0.0;
   std::sort(all.begin(), all.end());
-  const auto i = static_cast<std::size_t>(share * static_cast<double>(all.size() - 1) + 0.5);
+  const auto i = static_cast<std::size_t>(std::lround(share * static_cast<double>(all.size() - 1)));
   return all[i];
 }
 
