@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <type_traits>
@@ -142,17 +141,9 @@ struct Scene::Book {
   }
 };
 
-namespace {
-
-// Scenes begin with other generations each, so that a handle of one names nothing in another.
-std::uint32_t next_family() {
-  static std::atomic<std::uint32_t> scenes{0};
-  return scenes.fetch_add(1, std::memory_order_relaxed) * 2'654'435'761U;
-}
-
-}  // namespace
-
-Scene::Scene() : Scene(next_family()) {}
+// All of one family: the frames of a .vox file, and what it held when it was read, are scenes of their own that go by the
+// handles of the scene.
+Scene::Scene() : Scene(0) {}
 Scene::Scene(std::uint32_t family)
     : grids_(family), instances_(family), groups_(family), layers_(family), book_(std::make_unique<Book>()) {}
 Scene::Scene(Scene&&) noexcept = default;

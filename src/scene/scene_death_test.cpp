@@ -26,17 +26,6 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)scene.instances()[InstanceHandle{}], "the handle names an element");
 }
 
-TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistake) {
-  Scene scene;
-  Scene other;
-  const GridHandle own = scene.add_grid({});
-  const InstanceHandle placed = scene.add_instance({"", own});
-  (void)other.add_grid({});
-  (void)other.add_instance({"", own});
-  QUOIN_EXPECT_MISTAKE(other.edit(own).name = "x", "the handle names an element");
-  QUOIN_EXPECT_MISTAKE(other.edit(placed).name = "x", "the handle names an element");
-}
-
 TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
   Scene scene;
   const Scene moved = std::move(scene);

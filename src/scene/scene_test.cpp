@@ -55,29 +55,6 @@ TEST(Scene, RemovingAGridRemovesItsInstances) {
   EXPECT_EQ(scene.voxel_count(), 8);
 }
 
-// The same slots, and all the same.
-TEST(Scene, AHandleOfAnotherSceneNamesNothing) {
-  Scene scene;
-  Scene other;
-  const GridHandle grid = scene.add_grid(box_grid({0, 0, 0}, {1, 1, 1}));
-  const InstanceHandle instance = scene.add_instance({"a", grid});
-  (void)other.add_grid(box_grid({0, 0, 0}, {1, 1, 1}));
-  (void)other.add_instance({"b", other.grids().handles()[0]});
-  EXPECT_EQ(other.grids().find(grid), nullptr);
-  EXPECT_EQ(other.instances().find(instance), nullptr);
-  EXPECT_FALSE(other.remove_grid(grid));
-  EXPECT_FALSE(other.remove_instance(instance));
-  // Of a snapshot they are those of the scene.
-  Scene snapshot = scene.snapshot();
-  EXPECT_NE(snapshot.grids().find(grid), nullptr);
-  EXPECT_NE(snapshot.instances().find(instance), nullptr);
-  const InstanceHandle later = snapshot.add_instance({"c", grid});
-  EXPECT_EQ(snapshot.instances()[later].name, "c");
-  // And they go with a scene that is moved.
-  const Scene moved = std::move(scene);
-  EXPECT_NE(moved.grids().find(grid), nullptr);
-}
-
 TEST(Scene, TheDeclaredBoxHoldsCanvasAndVoxels) {
   SceneGrid grid = box_grid({5, 5, 5}, {5, 5, 5});
   EXPECT_EQ(grid.declared_box(), (IBox{{5, 5, 5}, {6, 6, 6}}));
