@@ -141,8 +141,8 @@ struct Scene::Book {
   }
 };
 
-// All of one family: the frames of a .vox file, and what it held when it was read, are scenes of their own that go by the
-// handles of the scene.
+// All of one family: the frames of a .vox file, and what it held when it was read, are scenes of their own that go by
+// the handles of the scene.
 Scene::Scene() : Scene(0) {}
 Scene::Scene(std::uint32_t family)
     : grids_(family), instances_(family), groups_(family), layers_(family), book_(std::make_unique<Book>()) {}
