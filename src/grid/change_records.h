@@ -50,6 +50,17 @@ class PackedBox {
   std::uint64_t bytes_ = ~std::uint64_t{0};
 };
 
+/// The bricks of 16^3 that a box in a chunk's coordinates reaches, a bit each, as in ChunkChange::bricks.
+inline std::uint64_t bricks_of(const IBox& box) {
+  std::uint64_t bricks = 0;
+  for (int z = box.min.z >> 4; z << 4 < box.max.z; ++z) {
+    for (int y = box.min.y >> 4; y << 4 < box.max.y; ++y) {
+      for (int x = box.min.x >> 4; x << 4 < box.max.x; ++x) bricks |= std::uint64_t{1} << (x + 4 * y + 16 * z);
+    }
+  }
+  return bricks;
+}
+
 /// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets, as
 /// in Neighbourhood; and where those voxels are.
 struct VoxelRecord {
@@ -87,11 +98,7 @@ struct VoxelRecord {
     neighbours = kEverywhere;
     box.unite(PackedBox::of(all.min.x, all.min.y, all.min.z));
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));
-    for (int z = all.min.z & ~15; z < all.max.z; z += 16) {
-      for (int y = all.min.y & ~15; y < all.max.y; y += 16) {
-        for (int x = all.min.x & ~15; x < all.max.x; x += 16) bricks |= std::uint64_t{1} << brick_of(x, y, z);
-      }
-    }
+    bricks |= bricks_of(all);
   }
   /// For an edit that was broken off: anything may have changed.
   void add_all() { add_box(kWholeChunk); }

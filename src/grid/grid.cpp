@@ -280,15 +280,9 @@ std::size_t Grid::chunk_count() const {
 
 Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
   Neighbourhood result;
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const IVec3 offset{dx, dy, dz};
-        if (has_neighbour(chunk, offset)) {
-          result.chunks[Neighbourhood::index(dx, dy, dz)] = find_chunk(chunk + offset);
-        }
-      }
-    }
+  for (std::size_t i = 0; i < result.chunks.size(); ++i) {
+    const IVec3 offset = Neighbourhood::offset(static_cast<int>(i));
+    if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);
   }
   return result;
 }

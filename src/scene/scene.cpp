@@ -141,11 +141,7 @@ struct Scene::Book {
   }
 };
 
-// All of one family: the frames of a .vox file, and what it held when it was read, are scenes of their own that go by
-// the handles of the scene.
-Scene::Scene() : Scene(0) {}
-Scene::Scene(std::uint32_t family)
-    : grids_(family), instances_(family), groups_(family), layers_(family), book_(std::make_unique<Book>()) {}
+Scene::Scene() : book_(std::make_unique<Book>()) {}
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
 Scene::~Scene() = default;

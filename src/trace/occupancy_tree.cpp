@@ -8,6 +8,7 @@
 #include <tsl/robin_map.h>
 #include <quoin/core/assert.h>
 
+#include "grid/change_records.h"
 #include "grid/chunk_boxes.h"
 #include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
@@ -31,8 +32,15 @@ struct FlatTables {
 
   // Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
   [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
+  [[nodiscard]] IVec3 chunk_strides() const { return {1, chunks.x, chunks.x * chunks.y}; }
   [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
 };
+
+// Where a unit stands in a table with these strides.
+std::size_t place_in(IVec3 strides, IVec3 unit) {
+  return static_cast<std::size_t>(unit.x) + static_cast<std::size_t>(unit.y) * static_cast<std::size_t>(strides.y) +
+         static_cast<std::size_t>(unit.z) * static_cast<std::size_t>(strides.z);
+}
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
@@ -53,17 +61,6 @@ unsigned bit_of(IVec3 unit) {
 // A chunk and those below it, some of whose cells end in it.
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
-
-// The bricks of a chunk that a box in its coordinates reaches.
-std::uint64_t bricks_of(const IBox& box) {
-  std::uint64_t bricks = 0;
-  for (int z = box.min.z >> 4; z << 4 < box.max.z; ++z) {
-    for (int y = box.min.y >> 4; y << 4 < box.max.y; ++y) {
-      for (int x = box.min.x >> 4; x << 4 < box.max.x; ++x) bricks |= std::uint64_t{1} << (x + 4 * y + 16 * z);
-    }
-  }
-  return bricks;
-}
 
 // The bricks whose cells end in what an edit of a field changed.
 std::vector<ChunkBricks> cells_reached(const DensityChanges& changes) {
@@ -345,8 +342,7 @@ struct OccupancyTree::Impl {
     const ChunkNode& node = node_of(chunk);
     std::uint64_t bricks_there = 0;
     for (std::size_t i = 0; i < 64; ++i) bricks_there |= std::uint64_t{node.cells[i] != 0} << i;
-    const IVec3 at = chunk - flat_chunks.min;
-    flat_nodes[static_cast<std::size_t>(at.x + flat.chunks.x * (at.y + flat.chunks.y * at.z))] = {bricks_there, &node};
+    flat_nodes[place_in(flat.chunk_strides(), chunk - flat_chunks.min)] = {bricks_there, &node};
   }
 
   // Copies some of a chunk's bricks and their cells into the flat tables.
@@ -359,14 +355,10 @@ struct OccupancyTree::Impl {
     for (; changed != 0; changed &= changed - 1) {
       const int i = std::countr_zero(changed);
       const IVec3 brick = (chunk - flat_chunks.min) * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
-      const auto to = static_cast<std::size_t>(brick.x) + static_cast<std::size_t>(brick.y) * bricks_at.y +
-                      static_cast<std::size_t>(brick.z) * bricks_at.z;
-      flat.bricks[to] = node.bricks[static_cast<std::size_t>(i)];
+      flat.bricks[place_in(bricks_at, brick)] = node.bricks[static_cast<std::size_t>(i)];
       for (int row = 0; row < 16; ++row) {
         const IVec3 cell = brick * 4 + IVec3{1, (row & 3) + 1, (row >> 2) + 1};
-        const auto bit = static_cast<std::size_t>(cell.x) + static_cast<std::size_t>(cell.y) * cells.y +
-                         static_cast<std::size_t>(cell.z) * cells.z;
-        put_bits(flat.cells, bit, node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
+        put_bits(flat.cells, place_in(cells, cell), node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
       }
     }
   }
@@ -437,24 +429,22 @@ struct OccupancyTree::Impl {
     const IVec3 from = kept.min - old_chunks.min;
     const IVec3 to = kept.min - chunks.min;
     const IVec3 size = kept.size();
-    const auto at = [](IVec3 p, IVec3 strides) {
-      return static_cast<std::size_t>(p.x) + static_cast<std::size_t>(p.y) * static_cast<std::size_t>(strides.y) +
-             static_cast<std::size_t>(p.z) * static_cast<std::size_t>(strides.z);
-    };
     const auto for_each_row = [&](int edge, const auto& visit) {
       for (int z = 0; z < size.z * edge; ++z) {
         for (int y = 0; y < size.y * edge; ++y) visit(from * edge + IVec3{0, y, z}, to * edge + IVec3{0, y, z});
       }
     };
-    const IVec3 old_rows{1, old.chunks.x, old.chunks.x * old.chunks.y};
-    const IVec3 rows{1, flat.chunks.x, flat.chunks.x * flat.chunks.y};
-    for_each_row(1,
-                 [&](IVec3 a, IVec3 b) { std::copy_n(&old_nodes[at(a, old_rows)], size.x, &flat_nodes[at(b, rows)]); });
+    const IVec3 old_rows = old.chunk_strides();
+    const IVec3 rows = flat.chunk_strides();
+    for_each_row(1, [&](IVec3 a, IVec3 b) {
+      std::copy_n(&old_nodes[place_in(old_rows, a)], size.x, &flat_nodes[place_in(rows, b)]);
+    });
     for_each_row(4, [&](IVec3 a, IVec3 b) {
-      std::copy_n(&old.bricks[at(a, old.brick_strides())], 4 * size.x, &flat.bricks[at(b, flat.brick_strides())]);
+      std::copy_n(&old.bricks[place_in(old.brick_strides(), a)], 4 * size.x,
+                  &flat.bricks[place_in(flat.brick_strides(), b)]);
     });
     for_each_row(16, [&](IVec3 a, IVec3 b) {
-      copy_bits(old.cells, at(a + 1, old.cell_strides()), flat.cells, at(b + 1, flat.cell_strides()),
+      copy_bits(old.cells, place_in(old.cell_strides(), a + 1), flat.cells, place_in(flat.cell_strides(), b + 1),
                 16 * static_cast<std::size_t>(size.x));
     });
   }

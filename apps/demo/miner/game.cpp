@@ -46,7 +46,7 @@ quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
 quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   std::unique_ptr<Game> game(new Game(options));
   if (const auto made = game->make_land(); !made) return made.error();
-  game->add_ships();
+  if (const auto made = game->add_ships(); !made) return made.error();
   game->tracer_.emplace(game->scene_);
   game->place_player();
   quoin::Grid& land = game->land();
@@ -85,17 +85,17 @@ quoin::Status Game::make_land() {
   land_ = scene_.add_grid(std::move(land));
   quoin::Instance instance{"land", land_};
   instance.categories = kLand;
-  placed_land_ = scene_.add_instance(instance);
+  scene_.add_instance(instance);
   return {};
 }
 
-void Game::add_ships() {
+quoin::Status Game::add_ships() {
   quoin::VoxelProperties hull;
   for (int kind = 0; kind < 4; ++kind) {
     hull.name = "hull " + std::to_string(kind);
     hull.colour = {static_cast<std::uint8_t>(90 + 40 * kind), 100, static_cast<std::uint8_t>(200 - 40 * kind), 255};
     const auto type = scene_.types.add(hull);
-    if (!type) return;
+    if (!type) return type.error();
     const quoin::GridHandle grid = scene_.add_grid(ship_of(*type, torch_));
     for (int i = kind; i < options_.ships; i += 4) {
       quoin::Instance ship{"ship", grid};
@@ -110,6 +110,7 @@ void Game::add_ships() {
       ships_.push_back({scene_.add_instance(ship), box, velocity});
     }
   }
+  return {};
 }
 
 void Game::place_player() {
@@ -149,10 +150,9 @@ FrameTimes Game::step(const Input& input) {
   walk(input);
   done(FrameTimes::Player);
   meshes_.update(scene_, eye());
-  surfaces_ = meshes_.take();
+  (void)meshes_.take();  // a renderer would upload them
   done(FrameTimes::Meshes);
   for (const double part : times.parts) times.total += part;
-  for (const quoin::SurfaceUpdate& each : surfaces_) surface_bytes_ += each.surface ? each.surface->bytes() : 0;
   return times;
 }
 
@@ -220,7 +220,7 @@ void Game::act(const Input& input) {
   if (!hit) return;
   if (input.digs) land().fill_sphere(hit->position - 0.5 * hit->normal, 2.0, kAir);
   if (!input.lights) return;
-  const IVec3 before(glm::floor(hit->position + 0.5 * hit->normal));
+  const IVec3 before = quoin::voxel_of(hit->position + 0.5 * hit->normal);
   land().set(before, torch_);
   quoin::Lamp lamp;
   lamp.position = DVec3(before) + 0.5;
@@ -268,7 +268,7 @@ void Game::walk(const Input& input) {
 }
 
 Game::Memory Game::memory() const {
-  Memory all{known_.bytes(), 0, surface_bytes_};
+  Memory all{known_.bytes(), 0};
   std::vector<const quoin::OccupancyTree*> seen;
   for (const quoin::PlacedGrid& placed : tracer_->placed()) {
     for (const quoin::OccupancyTree* tree : {placed.opaque, placed.transparent}) {

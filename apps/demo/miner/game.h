@@ -50,17 +50,13 @@ class Game {
   FrameTimes step(const Input& input);
 
   [[nodiscard]] const quoin::Scene& scene() const { return scene_; }
-  [[nodiscard]] const quoin::SceneTracer& tracer() const { return *tracer_; }
   [[nodiscard]] quoin::LiveMeshes& meshes() { return meshes_; }
   [[nodiscard]] quoin::DVec3 eye() const { return player_.centre + quoin::DVec3(0.0, 0.7, 0.0); }
   [[nodiscard]] const quoin::SlideResult& player() const { return moved_; }
-  /// The surfaces that came with the last step.
-  [[nodiscard]] const std::vector<quoin::SurfaceUpdate>& surfaces() const { return surfaces_; }
   [[nodiscard]] std::int64_t sand_fallen() const { return sand_fallen_; }
-  [[nodiscard]] std::size_t torches() const { return scene_.lamps.size(); }
-  /// Bytes of trees, voxels and surfaces.
+  /// Bytes of the land's voxels and of all trees.
   struct Memory {
-    std::size_t voxels = 0, trees = 0, surfaces = 0;
+    std::size_t voxels = 0, trees = 0;
   };
   [[nodiscard]] Memory memory() const;
 
@@ -73,7 +69,7 @@ class Game {
 
   explicit Game(const GameOptions& options) : options_(options), state_(options.seed) {}
   [[nodiscard]] quoin::Status make_land();
-  void add_ships();
+  [[nodiscard]] quoin::Status add_ships();
   void place_player();
   double random(double low, double high);
   [[nodiscard]] quoin::Grid& land() { return scene_.edit(land_).grid; }
@@ -90,7 +86,6 @@ class Game {
   std::uint64_t state_;
   quoin::Scene scene_;
   quoin::GridHandle land_;
-  quoin::InstanceHandle placed_land_;
   quoin::VoxelType sand_ = 0, torch_ = 0, stone_ = 0;
   quoin::IVec3 size_{0};
   std::vector<std::int16_t> heights_;  // as generated, by x and z
@@ -105,8 +100,6 @@ class Game {
   quoin::Grid known_;                // the land when `changes_` was read
   std::vector<quoin::IVec3> loose_;  // voxels whose support has to be looked at
   std::int64_t sand_fallen_ = 0;
-  std::vector<quoin::SurfaceUpdate> surfaces_;
-  std::size_t surface_bytes_ = 0;
 };
 
 }  // namespace miner

@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-/// Names an element of one SlotMap<T> (of a scene and its snapshots) until it is removed. The default names nothing.
+/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
 template <class T>
 struct Handle {
   std::uint32_t index = 0xFFFFFFFFu;
@@ -31,22 +31,18 @@ template <class T>
 class SlotMap {
  public:
   SlotMap() = default;
-  /// `first_generation`: that of every slot's first element; handles of maps that begin with others are others.
-  explicit SlotMap(std::uint32_t first_generation) : first_generation_(first_generation) {}
   /// Leaves the other empty; its handles name the elements here.
   SlotMap(SlotMap&& other) noexcept
       : pages_(std::exchange(other.pages_, {})),
         free_(std::exchange(other.free_, {})),
         count_(std::exchange(other.count_, 0)),
-        size_(std::exchange(other.size_, 0)),
-        first_generation_(other.first_generation_) {}
+        size_(std::exchange(other.size_, 0)) {}
   SlotMap& operator=(SlotMap&& other) noexcept {
     SlotMap taken(std::move(other));
     std::swap(pages_, taken.pages_);
     std::swap(free_, taken.free_);
     std::swap(count_, taken.count_);
     std::swap(size_, taken.size_);
-    std::swap(first_generation_, taken.first_generation_);
     return *this;
   }
   ~SlotMap() = default;
@@ -55,10 +51,7 @@ class SlotMap {
   /// Errors: bad_alloc, and what moving a T throws; the map is then as it was.
   Handle<T> insert(T value) {
     const std::uint32_t index = next_index();
-    if (index / kPage == pages_.size()) {
-      pages_.push_back(std::make_unique<Page>());
-      for (Slot& slot : *pages_.back()) slot.generation = first_generation_;
-    }
+    if (index / kPage == pages_.size()) pages_.push_back(std::make_unique<Page>());
     Slot& slot = slot_at(index);
     slot.value.emplace(std::move(value));
     if (index == count_) {
@@ -142,7 +135,6 @@ class SlotMap {
     made.free_ = free_;
     made.count_ = count_;
     made.size_ = size_;
-    made.first_generation_ = first_generation_;
     return made;
   }
 
@@ -161,7 +153,6 @@ class SlotMap {
   std::vector<std::uint32_t> free_;
   std::uint32_t count_ = 0;  // slots that were ever used
   std::size_t size_ = 0;
-  std::uint32_t first_generation_ = 0;
 };
 
 }  // namespace quoin

@@ -180,7 +180,6 @@ class Scene {
 
  private:
   struct Book;
-  explicit Scene(std::uint32_t family);
   [[nodiscard]] Book& book() const;
   [[nodiscard]] std::size_t keys() const;
   SlotMap<SceneGrid> grids_;

@@ -60,14 +60,9 @@ std::size_t DensityGrid::chunk_count() const {
 DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
   DensityNeighbourhood result;
   result.outside = impl_->store.far();
-  std::size_t i = 0;
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx, ++i) {
-        const IVec3 offset{dx, dy, dz};
-        if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);
-      }
-    }
+  for (std::size_t i = 0; i < result.chunks.size(); ++i) {
+    const IVec3 offset = Neighbourhood::offset(static_cast<int>(i));
+    if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);
   }
   return result;
 }

@@ -1,3 +1,6 @@
+// The scene graph that is written: one class, since each of its steps goes over what the last left in the same members.
+// That is why it is longer than 800 lines.
+
 #include "io/vox/write/graph_revision.h"
 
 #include <algorithm>
