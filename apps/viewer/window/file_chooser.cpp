@@ -43,7 +43,7 @@ bool is_readable_name(const std::string& name) {
   const bool is_packed = file.extension() == ".gz";
   if (is_packed) file = file.stem();
   return std::any_of(file_formats().begin(), file_formats().end(), [&](const FormatInfo& format) {
-    return format.readable && format.is_volume >= is_packed && format.extension == file.extension();
+    return format.readable && (format.is_volume || !is_packed) && format.extension == file.extension();
   });
 }
 
