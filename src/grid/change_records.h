@@ -9,6 +9,8 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
 
+#include "grid/chunk_boxes.h"
+
 namespace quoin {
 
 /// A box of voxels of one chunk in eight bytes, so that it grows by one comparison of all: the least x, y, z, and 255
@@ -49,17 +51,6 @@ class PackedBox {
 
   std::uint64_t bytes_ = ~std::uint64_t{0};
 };
-
-/// The bricks of 16^3 that a box in a chunk's coordinates reaches, a bit each, as in ChunkChange::bricks.
-inline std::uint64_t bricks_of(const IBox& box) {
-  std::uint64_t bricks = 0;
-  for (int z = box.min.z >> 4; z << 4 < box.max.z; ++z) {
-    for (int y = box.min.y >> 4; y << 4 < box.max.y; ++y) {
-      for (int x = box.min.x >> 4; x << 4 < box.max.x; ++x) bricks |= std::uint64_t{1} << (x + 4 * y + 16 * z);
-    }
-  }
-  return bricks;
-}
 
 /// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets, as
 /// in Neighbourhood; and where those voxels are.

@@ -8,7 +8,6 @@
 #include <tsl/robin_map.h>
 #include <quoin/core/assert.h>
 
-#include "grid/change_records.h"
 #include "grid/chunk_boxes.h"
 #include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
