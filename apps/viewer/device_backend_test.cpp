@@ -15,19 +15,24 @@
 namespace quoin::viewer {
 namespace {
 
-/// Skipped where there is no device; fails on every message of the validation layer.
+/// Skipped where there is no device; fails on every message of the validation layer. One renderer draws for all that run
+/// in one process.
 class DeviceBackendTest : public ::testing::Test {
  protected:
+  static void TearDownTestSuite() { shared_.reset(); }
   void SetUp() override {
-    VulkanOptions options;
-    options.on_validation_message = [this](const std::string& text) { messages_.push_back(text); };
-    auto made = VulkanRenderer::create(options);
-    if (!made) made = VulkanRenderer::create();
-    if (!made) GTEST_SKIP() << made.error().message;
-    renderer_ = std::make_shared<VulkanRenderer>(std::move(*made));
+    messages_.clear();
+    if (!shared_) {
+      VulkanOptions options;
+      options.on_validation_message = [](const std::string& text) { messages_.push_back(text); };
+      auto made = VulkanRenderer::create(options);
+      if (!made) made = VulkanRenderer::create();
+      if (!made) GTEST_SKIP() << made.error().message;
+      shared_ = std::make_shared<VulkanRenderer>(std::move(*made));
+    }
+    renderer_ = shared_;
   }
   void TearDown() override {
-    renderer_.reset();
     for (const std::string& message : messages_) ADD_FAILURE() << message;
   }
 
@@ -77,7 +82,10 @@ class DeviceBackendTest : public ::testing::Test {
   [[nodiscard]] bool is_processor() const { return renderer_->device().kind == "cpu"; }
 
   std::shared_ptr<VulkanRenderer> renderer_;
-  std::vector<std::string> messages_;
+
+ private:
+  static inline std::shared_ptr<VulkanRenderer> shared_;
+  static inline std::vector<std::string> messages_;
 };
 
 Image by_processor(const Document& document, const ViewRequest& request) {

@@ -130,7 +130,7 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   const auto format = format_for_saving(path);
   if (!format) return format.error();
   if (*format == FileFormat::Vox) {
-    return saved.loaded != nullptr ? write_vox(*saved.loaded, path) : write_vox(saved.scene, path);
+    return saved.loaded != nullptr ? write_vox(*saved.loaded, path, progress) : write_vox(saved.scene, path, progress);
   }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();

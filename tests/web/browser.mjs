@@ -42,19 +42,32 @@ function serve(models, truth) {
   return new Promise((resolve) => server.listen(0, '127.0.0.1', () => resolve(server)));
 }
 
-/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes everything; `truth` is a .vox
- *  file that the page may ask for. */
-export async function withViewer(models, size, use, truth) {
-  const { chromium, launcher } = await requirements();
-  const server = await serve(models, truth);
-  const browser = await launcher.launch({
-    executablePath: chromium,
+let launched;
+
+async function browserFor(launcher, executablePath) {
+  launched ??= await launcher.launch({
+    executablePath,
     headless: true,
     args: ['--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
            '--disable-background-networking', '--no-first-run'],
   });
+  return launched;
+}
+
+/** Ends the browser, which all calls of withViewer share. */
+export async function closeBrowser() {
+  await launched?.close();
+  launched = undefined;
+}
+
+/** Calls use(page) with the viewer showing the models (paths of GLB files), then closes the page; `truth` is a .vox
+ *  file that the page may ask for. */
+export async function withViewer(models, size, use, truth) {
+  const { chromium, launcher } = await requirements();
+  const server = await serve(models, truth);
+  const browser = await browserFor(launcher, chromium);
+  const page = await browser.newPage({ viewport: { width: size[0], height: size[1] } });
   try {
-    const page = await browser.newPage({ viewport: { width: size[0], height: size[1] } });
     page.on('pageerror', (error) => console.error(`page: ${error}`));
     page.on('console', (message) => message.type() === 'error' && console.error(`page: ${message.text()}`));
     await page.goto(`http://127.0.0.1:${server.address().port}/viewer.html`);
@@ -62,7 +75,7 @@ export async function withViewer(models, size, use, truth) {
     await page.evaluate((urls) => window.viewer.load(urls), models.map((_, index) => `/model/${index}.glb`));
     return await use(page);
   } finally {
-    await browser.close();
+    await page.close();
     server.close();
   }
 }

@@ -1,27 +1,25 @@
 // Loads GLB files in three.js in a headless Chromium, unlit, and checks that sampled pixels are the palette's colour
-// times the vertices' (the occlusion of blocks; the whole colour of smooth surfaces, which have no palette): node pixels.mjs [--vox FOLDER] [--occluded] FILE.glb...
+// times the vertices' (the occlusion of blocks; the whole colour of smooth surfaces, which have no palette):
+// node pixels.mjs [--occluded] FILE.glb[=FILE.vox]...
 //
-// With --vox, a GLB whose .vox of the same name lies in FOLDER and is a single plain model is compared with colours and
-// occlusion computed anew from those voxels, instead of with what the GLB says itself.
+// Where a .vox file is named that is a single plain model, the GLB is compared with colours and occlusion computed anew
+// from those voxels, instead of with what it says itself.
 // With --occluded it is a failure when no sampled pixel is darkened by occlusion.
 // Exit status: 0 all right, 1 not, 77 when the browser or the packages are not installed.
-import { existsSync } from 'node:fs';
-import { basename, join } from 'node:path';
 import { parseArgs } from 'node:util';
 
-import { withViewer } from './browser.mjs';
+import { closeBrowser, withViewer } from './browser.mjs';
 
 const views = ['front', 'back', 'left', 'right', 'top', 'bottom', 'iso', 'iso2', 'iso3', 'iso4'];
 const pixelsPerView = 60;
 
-const { values: options, positionals: files } = parseArgs({ allowPositionals: true, options: {
-  vox: { type: 'string' }, occluded: { type: 'boolean', default: false },
+const { values: options, positionals: pairs } = parseArgs({ allowPositionals: true, options: {
+  occluded: { type: 'boolean', default: false },
 } });
 
 let failed = false;
-for (const file of files) {
-  const vox = options.vox && join(options.vox, `${basename(file, '.glb')}.vox`);
-  const served = vox && existsSync(vox) ? [file, vox] : [file];
+for (const pair of pairs) {
+  const [file, vox] = pair.split(/=(.*)/s);
   const totals = await withViewer([file], [800, 800], (page) => page.evaluate(async ([list, count, truth]) => {
     window.viewer.unlit();
     const from_voxels = truth && (await window.viewer.compareWith(truth));
@@ -33,7 +31,7 @@ for (const file of files) {
       sums.wrong.push(...result.wrong.map((pixel) => ({ view, ...pixel })));
     });
     return sums;
-  }, [views, pixelsPerView, served[1] && '/truth.vox']), served[1]);
+  }, [views, pixelsPerView, vox && '/truth.vox']), vox);
   const good = totals.checked > 0 && totals.wrong.length === 0 && totals.inside_out === 0 &&
     (totals.darkened > 0 || !options.occluded);
   failed ||= !good;
@@ -41,5 +39,6 @@ for (const file of files) {
               `${totals.wrong.length} wrong, ${totals.inside_out} inside out${totals.from_voxels ? ', against the voxels' : ''}`);
   totals.wrong.slice(0, 5).forEach((pixel) => console.log(`  ${JSON.stringify(pixel)}`));
 }
-if (files.length === 0) console.error('pixels.mjs: which files?');
-process.exit(failed || files.length === 0 ? 1 : 0);
+await closeBrowser();
+if (pairs.length === 0) console.error('pixels.mjs: which files?');
+process.exit(failed || pairs.length === 0 ? 1 : 0);

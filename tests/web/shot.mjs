@@ -4,7 +4,7 @@
 // A view is the direction from the model towards the camera (--view=-1,0.5,1 when it begins with a minus). Exit status: 0 done, 77 when the browser is not installed.
 import { parseArgs } from 'node:util';
 
-import { withViewer } from './browser.mjs';
+import { closeBrowser, withViewer } from './browser.mjs';
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -24,3 +24,4 @@ await withViewer(positionals, values.size.split('x').map(Number), async (page) =
   }, [view, Number(values.zoom), values.unlit]);
   await page.screenshot({ path: values.output });
 });
+await closeBrowser();

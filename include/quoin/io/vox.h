@@ -71,9 +71,11 @@ struct VoxBytes {
 /// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or
 ///           a grid holds a field of densities;
 ///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
-[[nodiscard]] Result<VoxBytes> write_vox(const Scene& scene);
+/// Progress: told after the voxels of every grid.
+[[nodiscard]] Result<VoxBytes> write_vox(const Scene& scene, const Progress& progress = {});
 /// The same as a file, which appears whole or not at all. Errors: also CannotWrite; they name the file.
-[[nodiscard]] Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path);
+[[nodiscard]] Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path,
+                                           const Progress& progress = {});
 
 /// A scene that was read from a .vox file, with what was changed since, as a .vox file that keeps all else of the first
 /// one: chunks that no change concerns are the same bytes in the same order, so that a scene without a change is the
@@ -88,8 +90,9 @@ struct VoxBytes {
 /// Lost:     also, with a warning each: colours of the palette that no voxel uses, when new ones need their entries;
 ///           animation, attributes of nodes that Quoin does not know and nodes apart from the graph, where nodes of
 ///           the scene graph have several parents and one of them has to change.
-[[nodiscard]] Result<VoxBytes> write_vox(const LoadedScene& loaded);
-[[nodiscard]] Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path);
+[[nodiscard]] Result<VoxBytes> write_vox(const LoadedScene& loaded, const Progress& progress = {});
+[[nodiscard]] Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
+                                           const Progress& progress = {});
 
 /// What write_vox would warn of. Errors: those of write_vox, but for files of more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);

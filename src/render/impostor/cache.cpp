@@ -40,6 +40,7 @@ struct Entry {
   Origin origin;
   std::optional<Job> waiting;
   std::optional<Origin> building;
+  bool is_replaced = false;  // the grid that is being built: nobody will see it
   std::uint64_t last_use = 0;
   std::size_t refused_bytes = 0;  // of the last one, for which there was no room
 
@@ -60,6 +61,7 @@ struct ImpostorCache::Impl {
 
   void look_at(const VoxelRegistry& types);
   void ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge);
+  GridChanges changes_of(Entry& entry, const Job& job);
   void start_workers();
   void work();
   [[nodiscard]] Entries::iterator next_to_build();
@@ -115,19 +117,31 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
   job.grid.field = grid.field.snapshot();
   job.origin = {grid.grid.cursor(), grid.field.cursor(), types_changed, edge};
   job.types = types;
-  const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
-  if (base != nullptr && base->types == types_changed && base->edge == edge) {
-    ChangeCursor cursor = base->grid;
-    job.changes = job.grid.grid.changes_since(cursor);
-    // What has, or had, a field is built anew.
-    job.changes.all |= grid.field.chunk_count() != 0 || grid.field.has_changed_since(base->field);
-  } else {
-    job.changes.all = true;
-  }
+  job.changes = changes_of(entry, job);
   const bool is_new = !entry.waiting.has_value();
   if (is_new) queue.push_back(handle);
   entry.waiting = std::move(job);
   if (is_new) wake.notify_one();
+}
+
+// What changed since the impostor that the job will find. That of another grid, which this one replaced or which another
+// scene has by the same handle, is not to be seen again.
+GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
+  GridChanges changes{true, {}};
+  const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
+  if (base == nullptr) return changes;
+  ChangeCursor of_grid = base->grid;
+  ChangeCursor of_field = base->field;
+  GridChanges since = job.grid.grid.changes_since(of_grid);
+  const DensityChanges of_samples = job.grid.field.changes_since(of_field);
+  if (since.all || of_samples.all) {
+    release(entry);
+    entry.is_replaced = entry.building.has_value();
+  }
+  // What has, or had, a field is built anew.
+  const bool has_field = job.grid.field.chunk_count() != 0 || !of_samples.empty();
+  if (base->types == types_changed && base->edge == job.origin.edge && !has_field) changes = std::move(since);
+  return changes;
 }
 
 void ImpostorCache::Impl::start_workers() {
@@ -188,14 +202,18 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   job.reset();  // what only the snapshot holds goes without the lock
   lock.lock();
   --building;
-  if (made != nullptr) {
+  Entry& built = entry->second;
+  if (std::exchange(built.is_replaced, false)) {
+    built.building.reset();
+    if (made != nullptr) replaced.push_back(std::move(made));
+    has_unused = true;
+  } else if (made != nullptr) {
     stats.rebuilt += static_cast<std::uint64_t>(is_again);
     put(handle, origin, std::move(made));
   } else {
     ++stats.out_of_memory;
-    Entry& failed = entries.find(handle)->second;
-    failed.building.reset();
-    if (failed.waiting) failed.waiting->changes = {true, {}};
+    built.building.reset();
+    if (built.waiting) built.waiting->changes = {true, {}};
   }
   ready.notify_all();
   wake.notify_all();

@@ -88,6 +88,25 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   EXPECT_TRUE(ready()->is_empty());
 }
 
+TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
+  const World first(2);
+  const World second(2);
+  ASSERT_EQ(first.grids, second.grids) << "else this tests nothing";
+  ImpostorCache cache;
+  static_cast<void>(cache.find(first.scene, first.grids[0]));
+  EXPECT_EQ(cache.wait(first.scene), 0U);
+  ASSERT_NE(cache.find(first.scene, first.grids[0]), nullptr);
+  EXPECT_EQ(cache.find(second.scene, second.grids[0]), nullptr);
+  // That of the first scene, which is asked for and not waited for, may be under way.
+  static_cast<void>(cache.find(first.scene, first.grids[0]));
+  EXPECT_EQ(cache.find(second.scene, second.grids[0]), nullptr);
+  EXPECT_EQ(cache.wait(second.scene), 0U);
+  EXPECT_NE(cache.find(second.scene, second.grids[0]), nullptr);
+  const ImpostorCacheStats stats = cache.stats();
+  EXPECT_EQ(stats.held, 1U);
+  EXPECT_EQ(stats.bytes, cache.find(second.scene, second.grids[0])->bytes());
+}
+
 TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
   World world(1);
   const auto type = static_cast<VoxelType>(world.scene.types.size());

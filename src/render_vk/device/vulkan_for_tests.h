@@ -19,26 +19,34 @@
 
 namespace quoin::vulkan_test {
 
-/// Tests are skipped where there is no device, and fail on every message of the validation layer.
+/// Tests are skipped where there is no device, and fail on every message of the validation layer. Those of a suite that
+/// run in one process draw by one renderer, whose pipelines take longer to compile than most pictures to draw: what one
+/// test leaves in it, the next one's `update` replaces.
 class VulkanTest : public ::testing::Test {
  protected:
+  static void TearDownTestSuite() { shared_.reset(); }
+
   void SetUp() override {
-    VulkanOptions options = test_options();
-    auto made = VulkanRenderer::create(options);
-    if (!made && made.error().message.find("validation") != std::string::npos) {
-      is_validated_ = false;
-      options.on_validation_message = {};
-      made = VulkanRenderer::create(options);
+    messages_->clear();
+    is_validated_ = true;
+    if (!shared_) {
+      VulkanOptions options = test_options();
+      auto made = VulkanRenderer::create(options);
+      if (!made && made.error().message.find("validation") != std::string::npos) {
+        options.on_validation_message = {};
+        made = VulkanRenderer::create(options);
+      }
+      if (!made) GTEST_SKIP() << made.error().message;
+      shared_ = std::make_unique<Shared>(Shared{std::move(*made), options.on_validation_message != nullptr});
     }
-    if (!made) GTEST_SKIP() << made.error().message;
-    renderer_ = std::make_unique<VulkanRenderer>(std::move(*made));
+    is_validated_ = shared_->is_validated;
+    renderer_ = &shared_->renderer;
   }
   void TearDown() override {
-    renderer_.reset();
     for (const std::string& message : *messages_) ADD_FAILURE() << message;
   }
 
-  [[nodiscard]] VulkanOptions test_options() const {
+  [[nodiscard]] static VulkanOptions test_options() {
     VulkanOptions options;
     options.on_validation_message = [messages = messages_](const std::string& message) {
       messages->push_back(message);
@@ -58,9 +66,16 @@ class VulkanTest : public ::testing::Test {
     return picture ? std::move(*picture) : Picture{};
   }
 
-  std::unique_ptr<VulkanRenderer> renderer_;
-  std::shared_ptr<std::vector<std::string>> messages_ = std::make_shared<std::vector<std::string>>();
+  VulkanRenderer* renderer_ = nullptr;
   bool is_validated_ = true;
+  static inline const auto messages_ = std::make_shared<std::vector<std::string>>();
+
+ private:
+  struct Shared {
+    VulkanRenderer renderer;
+    bool is_validated;
+  };
+  static inline std::unique_ptr<Shared> shared_;
 };
 
 /// A pixel is at a silhouette where the distances around it jump, or where nothing is beside something.

@@ -29,7 +29,7 @@ void DeviceDetail::clear() {
   for (auto& [key, level] : levels_) level.voxels.release(*memory_);
   levels_.clear();
   coarse_.forget([](GridHandle) { return true; });
-  impostors_.forget([](GridHandle) { return true; });
+  impostors_.clear();
   memory_->release(table_place_);
   table_.clear();
 }
@@ -37,10 +37,10 @@ void DeviceDetail::clear() {
 void DeviceDetail::look_at(const Scene& scene) {
   if (has_other_visibility(scene.types.changes_since(followed_types_))) clear();
   const SceneChanges changes = scene.changes_since(followed_scene_);
+  if (changes.all || !changes.grids.empty()) impostors_.follow(scene);
   const auto is_gone = [&](GridHandle handle) { return scene.grids().find(handle) == nullptr; };
   if (!changes.all && std::none_of(changes.grids.begin(), changes.grids.end(), is_gone)) return;
   coarse_.forget(is_gone);
-  impostors_.forget(is_gone);
   for (auto level = levels_.begin(); level != levels_.end();) {
     const auto each = level++;
     if (!is_gone(each->first.grid)) continue;

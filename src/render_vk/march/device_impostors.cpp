@@ -138,6 +138,24 @@ void DeviceImpostors::release(Entry& entry) {
   memory_->release(entry.next.place);
 }
 
+void DeviceImpostors::clear() {
+  for (auto& [grid, entry] : entries_) release(entry);
+  entries_.clear();
+}
+
+void DeviceImpostors::follow(const Scene& scene) {
+  for (auto next = entries_.begin(); next != entries_.end();) {
+    const auto each = next++;
+    Entry& entry = each->second;
+    const SceneGrid* grid = scene.grids().find(each->first);
+    if (grid != nullptr && !grid->grid.changes_since(entry.grid).all && !grid->field.changes_since(entry.field).all) {
+      continue;
+    }
+    release(entry);
+    entries_.erase(each);
+  }
+}
+
 Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, Sent& sent) {
   memory_->release(sent.place);
   sent = {};
@@ -212,7 +230,12 @@ Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const
   // Those that are not there at all come first, or one that is edited all the time would keep them waiting.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {
-      Entry& entry = entries_[grid];
+      const auto [found, is_new] = entries_.try_emplace(grid);
+      Entry& entry = found->second;
+      if (is_new) {
+        entry.grid = scene.grids()[grid].grid.cursor();
+        entry.field = scene.grids()[grid].field.cursor();
+      }
       if ((entry.whole.impostor == nullptr) != is_first) continue;
       if (Status done = put(impostor, entry, faces_left); !done) return done.error();
     }

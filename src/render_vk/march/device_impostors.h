@@ -43,16 +43,9 @@ class DeviceImpostors {
   /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
   void drop_unused(std::uint64_t max_bytes);
 
-  /// What was made of a grid goes when `is_gone(handle)`.
-  template <class IsGone>
-  void forget(IsGone&& is_gone) {
-    for (auto entry = entries_.begin(); entry != entries_.end();) {
-      const auto each = entry++;
-      if (!is_gone(each->first)) continue;
-      release(each->second);
-      entries_.erase(each);
-    }
-  }
+  /// What was made of grids goes that are gone, or that others replaced.
+  void follow(const Scene& scene);
+  void clear();
 
   /// Of device memory.
   [[nodiscard]] std::uint64_t bytes() const;
@@ -72,6 +65,8 @@ class DeviceImpostors {
   struct Entry {
     Sent whole;
     Sent next;
+    ChangeCursor grid;
+    ChangeCursor field;
     std::uint64_t last_use = 0;
   };
   void release(Entry& entry);

@@ -281,6 +281,29 @@ TEST_F(VulkanImpostors, WhatIsNotReadyInTimeIsTraced) {
   EXPECT_EQ(impostor_bytes(), 0U);
 }
 
+TEST_F(VulkanImpostors, ThoseOfAnotherSceneWithTheSameHandlesAreNotShown) {
+  const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
+  RenderOptions options = in_detail(128, 96, 128);
+  add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
+  compare(camera, options, "far_of_the_first");
+  EXPECT_GT(impostor_bytes(), 0U);
+  scene_ = Scene();
+  add_crowd(scene_, {add_blobs(scene_, 77, 9)}, 3, 300.0);
+  // Each frame shows the second scene: traced, until its impostors are there as a whole.
+  const Picture far = render_test::taken(scene_, camera, options);
+  const Picture near = render_test::taken(scene_, camera, render_test::sized(128, 96));
+  options.detail.impostor_seconds = 0.0;
+  ASSERT_TRUE(renderer_->update(scene_));
+  const auto like = [](const Picture& a, const Picture& b) {
+    return vulkan_test::differences(a, b).pixels * 1000 <= 128 * 96;
+  };
+  ASSERT_FALSE(like(near, far)) << "else this tests nothing";
+  for (int frame = 0; frame < 20; ++frame) {
+    const Picture shown = taken_as_is(camera, options);
+    EXPECT_TRUE(like(shown, near) || like(shown, far)) << frame;
+  }
+}
+
 TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   ASSERT_TRUE(renderer_->update(scene_));

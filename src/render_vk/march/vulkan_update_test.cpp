@@ -124,7 +124,7 @@ TEST_F(VulkanUpdate, WorldsLargerThanABlock) {
   options.block_bytes = 64 << 10;
   auto small = VulkanRenderer::create(options);
   if (!small) GTEST_SKIP() << small.error().message;
-  renderer_ = std::make_unique<VulkanRenderer>(std::move(*small));
+  renderer_ = &*small;
   Scene scene;
   const VoxelType ground = add_type(scene, {90, 160, 70});
   const VoxelType stone = add_type(scene, {140, 140, 150});

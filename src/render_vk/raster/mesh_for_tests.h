@@ -103,16 +103,21 @@ inline RenderOptions without_shadows(RenderOptions options) {
 
 class VulkanMeshTest : public VulkanTest {
  protected:
+  static void TearDownTestSuite() {
+    shared_.reset();
+    VulkanTest::TearDownTestSuite();
+  }
+
   void SetUp() override {
     VulkanTest::SetUp();
     if (IsSkipped()) return;
-    auto made = VulkanMeshRenderer::create(*renderer_);
-    if (!made) GTEST_SKIP() << made.error().message;
-    meshes_ = std::make_unique<VulkanMeshRenderer>(std::move(*made));
-  }
-  void TearDown() override {
-    meshes_.reset();
-    VulkanTest::TearDown();
+    if (!shared_) {
+      auto made = VulkanMeshRenderer::create(*renderer_);
+      if (!made) GTEST_SKIP() << made.error().message;
+      shared_ = std::make_unique<VulkanMeshRenderer>(std::move(*made));
+    }
+    meshes_ = shared_.get();
+    meshes_->clear();
   }
 
   void put(const Scene& scene, const std::vector<SurfaceUpdate>& surfaces) {
@@ -159,7 +164,10 @@ class VulkanMeshTest : public VulkanTest {
     }
   }
 
-  std::unique_ptr<VulkanMeshRenderer> meshes_;
+  VulkanMeshRenderer* meshes_ = nullptr;
+
+ private:
+  static inline std::unique_ptr<VulkanMeshRenderer> shared_;
 };
 
 /// Of the bytes of two pictures of one size, those that differ by more than `tolerance`.

@@ -91,7 +91,8 @@ struct Chunk {
 /// Writes a file again with what a scene changed; of a scene without a file all is new.
 class Writer {
  public:
-  Writer(const Scene& scene, const VoxSource& source) : scene_(scene), source_(source) {}
+  Writer(const Scene& scene, const VoxSource& source, const Progress& progress = {})
+      : scene_(scene), source_(source), progress_(progress) {}
 
   Result<VoxBytes> run();
   /// Only what `run` would warn of. Errors: those of `run`, but for the size.
@@ -127,6 +128,7 @@ class Writer {
   [[nodiscard]] bool has_changed_material(std::size_t index) const;
   [[nodiscard]] bool has_changed_colour() const;
 
+  void note_model();
   void write_new_models();
   void write_new_nodes();
   void write_new_layers();
@@ -135,6 +137,8 @@ class Writer {
 
   const Scene& scene_;
   const VoxSource& source_;
+  const Progress progress_;
+  std::size_t done_ = 0;  // of the grids
   vox::RevisedTypes types_;
   vox::ModelPlan models_;
   vox::RevisedGraph graph_;
@@ -460,6 +464,8 @@ std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
 void Writer::write_chunk(const vox::ChunkPlace& place) {
   if (is_removed(place)) return;
   const std::optional<Chunk> now = revised(place);
+  const bool has_voxels = place.kind == vox::ChunkKind::Voxels || place.kind == vox::ChunkKind::PackedVoxels;
+  if (has_voxels && plan_of_[place.number] != nullptr) note_model();
   const std::span<const std::byte> file = source_.bytes;
   const std::size_t header_and_content = vox::kChunkHeaderBytes + place.content_bytes;
   if (!now) {
@@ -486,9 +492,16 @@ std::size_t Writer::bytes_of_new_models() const {
   return bytes;
 }
 
+void Writer::note_model() {
+  ++done_;
+  const double share = static_cast<double>(done_) / static_cast<double>(models_.grids.size());
+  if (failure_ && progress_ && !progress_(share)) failure_ = make_error(ErrorCode::Cancelled, "cancelled");
+}
+
 void Writer::write_new_models() {
   for (const vox::GridPlan& plan : models_.grids) {
     if (plan.source_model != vox::kNone) continue;
+    if (!failure_) return;
     std::vector<std::size_t> starts;
     for (const vox::Piece& piece : plan.pieces) {
       const std::size_t size_chunk = out_.begin_chunk("SIZE");
@@ -503,6 +516,7 @@ void Writer::write_new_models() {
       out_.end_chunk(voxel_chunk);
     }
     vox::write_voxels(scene_.grids()[plan.grid].grid, types_.table.index_of_type, plan.pieces, starts, out_.bytes());
+    note_model();
   }
   if (!graph_.has_empty_model) return;
   const std::size_t size_chunk = out_.begin_chunk("SIZE");
@@ -573,7 +587,7 @@ void Writer::write_after(std::size_t chunk) {
 
 void Writer::write_chunks() {
   write_after(vox::kNone);
-  for (std::size_t i = 0; i < source_.document.chunks.size(); ++i) {
+  for (std::size_t i = 0; i < source_.document.chunks.size() && failure_; ++i) {
     write_chunk(source_.document.chunks[i]);
     write_after(i);
   }
@@ -626,20 +640,20 @@ const VoxSource& source_of(const LoadedScene& loaded) {
 
 }  // namespace
 
-Result<VoxBytes> write_vox(const Scene& scene) {
-  return Writer(scene, no_source()).run();
+Result<VoxBytes> write_vox(const Scene& scene, const Progress& progress) {
+  return Writer(scene, no_source(), progress).run();
 }
 
-Result<VoxBytes> write_vox(const LoadedScene& loaded) {
-  return Writer(loaded.scene, source_of(loaded)).run();
+Result<VoxBytes> write_vox(const LoadedScene& loaded, const Progress& progress) {
+  return Writer(loaded.scene, source_of(loaded), progress).run();
 }
 
-Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path) {
-  return save(write_vox(scene), path);
+Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path, const Progress& progress) {
+  return save(write_vox(scene, progress), path);
 }
 
-Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path) {
-  return save(write_vox(loaded), path);
+Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path, const Progress& progress) {
+  return save(write_vox(loaded, progress), path);
 }
 
 Result<std::vector<std::string>> losses_of_vox(const Scene& scene) {
