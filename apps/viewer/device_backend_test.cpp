@@ -15,8 +15,8 @@
 namespace quoin::viewer {
 namespace {
 
-/// Skipped where there is no device; fails on every message of the validation layer. One renderer draws for all that run
-/// in one process.
+/// Skipped where there is no device; fails on every message of the validation layer. One renderer draws for all that
+/// run in one process.
 class DeviceBackendTest : public ::testing::Test {
  protected:
   static void TearDownTestSuite() { shared_.reset(); }

@@ -33,9 +33,10 @@ struct ImpostorCacheStats {
 ///   cache.wait(scene, 0.0);  // once a frame, at its end
 ///
 /// Workers read snapshots of the grids, so edits never wait for them. After an edit only what it can have changed is
-/// looked at again (Impostor::rebuilt), and the old impostor is returned until the new one is ready; that of a grid which
-/// another replaced, or of another scene's, is not. When there is no room, the ones that were asked for longest ago are dropped. What is asked for within one round, up to the end of a
-/// `wait`, is never dropped for something else of that round, which then has none.
+/// looked at again (Impostor::rebuilt), and the old impostor is returned until the new one is ready; that of a grid
+/// which another replaced, or of another scene's, is not. When there is no room, the ones that were asked for longest
+/// ago are dropped. What is asked for within one round, up to the end of a `wait`, is never dropped for something else
+/// of that round, which then has none.
 ///
 /// Lifetime: shares impostors with whoever was given one; the scene is only read within calls.
 /// Threads:  any number may call at once, as long as nobody edits the scene meanwhile.

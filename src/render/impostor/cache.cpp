@@ -124,8 +124,8 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
   if (is_new) wake.notify_one();
 }
 
-// What changed since the impostor that the job will find. That of another grid, which this one replaced or which another
-// scene has by the same handle, is not to be seen again.
+// What changed since the impostor that the job will find. That of another grid, which this one replaced or which
+// another scene has by the same handle, is not to be seen again.
 GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
   GridChanges changes{true, {}};
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
