@@ -457,7 +457,7 @@ void LiveField::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
     if (state.is_ready) {
       state.is_ready = false;
       state.is_shown = state.surface != nullptr;
-      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Field});
+      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Field, ~std::uint64_t{0}});
       state.surface.reset();
     }
   }

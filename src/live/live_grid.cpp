@@ -271,6 +271,26 @@ void LiveGrid::collect(LiveJob& job) {
   if (state.surface != nullptr || state.is_shown) make_ready(job.chunk, state);
 }
 
+// Which regions differ from those that were taken last.
+std::uint64_t LiveGrid::note_regions(LiveChunk& state) const {
+  constexpr std::uint64_t kAll = ~std::uint64_t{0};
+  const int across = kChunkEdge / options_.region_edge;
+  if (across == 1 || options_.style != SurfaceStyle::Blocky) return kAll;
+  std::vector<std::uint64_t> before = std::exchange(state.region_hashes, {});
+  if (state.surface == nullptr) return kAll;
+  state.region_hashes.resize(static_cast<std::size_t>(across * across * across));
+  for (const SurfaceRegion& each : state.surface->regions) {
+    const IVec3 at = each.region;
+    state.region_hashes[static_cast<std::size_t>(at.x + across * (at.y + across * at.z))] = each.hash;
+  }
+  if (before.empty()) return kAll;
+  std::uint64_t changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    changed |= std::uint64_t{before[i] != state.region_hashes[i]} << i;
+  }
+  return changed;
+}
+
 void LiveGrid::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
   const auto found = chunks_.find(chunk);
   if (found == chunks_.end()) return;
@@ -281,7 +301,8 @@ void LiveGrid::take(IVec3 chunk, std::vector<SurfaceUpdate>& out) {
     if (state.is_ready) {
       state.is_ready = false;
       state.is_shown = state.surface != nullptr;
-      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Voxels});
+      const std::uint64_t changed = note_regions(state);
+      out.push_back({handle_, chunk, std::move(state.surface), SurfaceContent::Voxels, changed});
       state.surface.reset();
     }
   }

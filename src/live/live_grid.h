@@ -29,6 +29,7 @@ struct LiveChunk {
   bool is_shown = false;        ///< what was taken last is not null
   bool is_gone = false;         ///< not to be seen any more
   std::shared_ptr<const ChunkSurface> surface;
+  std::vector<std::uint64_t> region_hashes;    ///< of what was taken last, where there are several; 0 without quads
   std::unique_ptr<DensityStamps> last_stamps;  ///< smooth: of what was collected last
   std::uint64_t type_generation = 0;           ///< likewise
 
@@ -76,6 +77,7 @@ class LiveGrid final : public LiveSource {
   void keep_densities(const LiveJob& job);
   void keep_stamps(const LiveJob& job, LiveChunk& state);
   void make_ready(IVec3 chunk, LiveChunk& state);
+  [[nodiscard]] std::uint64_t note_regions(LiveChunk& state) const;
 
   GridHandle handle_;
   const LiveMeshOptions& options_;

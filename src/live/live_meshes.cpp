@@ -1,5 +1,7 @@
 #include <quoin/live/live_meshes.h>
 
+#include <quoin/core/assert.h>
+
 #include "live/mesh_scheduler.h"
 
 namespace quoin {
@@ -12,7 +14,8 @@ std::size_t ChunkSurface::bytes() const {
   return sizeof(ChunkSurface) + quads.capacity() * sizeof(Quad) + smooth.positions.capacity() * sizeof(Vec3) +
          smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
          smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
-         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType);
+         albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
+         regions.capacity() * sizeof(SurfaceRegion);
 }
 
 struct LiveMeshes::Impl {
@@ -22,14 +25,21 @@ struct LiveMeshes::Impl {
   MeshScheduler scheduler;
 };
 
-LiveMeshes::LiveMeshes(const LiveMeshOptions& options) : impl_(std::make_unique<Impl>(options)) {}
-LiveMeshes::~LiveMeshes() = default;
+LiveMeshes::LiveMeshes(const LiveMeshOptions& options) {
+  QUOIN_ASSERT(options.region_edge == 16 || options.region_edge == 32 || options.region_edge == 64,
+               "regions are 16, 32 or 64 voxels wide");
+  impl_ = std::make_unique<Impl>(options);
+}
+// Workers may call what is there until they have ended.
+LiveMeshes::~LiveMeshes() {
+  impl_->scheduler.stop();
+}
 
 void LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
   impl_->scheduler.update(scene, eye, other_eyes);
 }
-std::vector<SurfaceUpdate> LiveMeshes::take() {
-  return impl_->scheduler.take();
+std::vector<SurfaceUpdate> LiveMeshes::take(std::size_t max_bytes) {
+  return impl_->scheduler.take(max_bytes);
 }
 std::size_t LiveMeshes::pending() const {
   return impl_->scheduler.pending();

@@ -1,11 +1,18 @@
 #include <quoin/live/live_meshes.h>
 
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <limits>
+#include <map>
+#include <mutex>
+#include <set>
+#include <span>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "live/live_test_support.h"
 
 namespace quoin {
@@ -175,6 +182,226 @@ TEST_P(LiveMeshesOf, AnEyeThatIsNowhereHarmsNothing) {
 
 INSTANTIATE_TEST_SUITE_P(Styles, LiveMeshesOf, testing::Values(SurfaceStyle::Blocky, SurfaceStyle::Smooth),
                          [](const auto& style) { return style.param == SurfaceStyle::Blocky ? "Blocky" : "Smooth"; });
+
+// The unit faces of quads with all that they carry.
+std::multiset<std::uint64_t> faces_of(std::span<const Quad> quads) {
+  std::multiset<std::uint64_t> faces;
+  constexpr std::uint64_t kSizes = std::uint64_t{63} << Quad::kSizeUShift | std::uint64_t{63} << Quad::kSizeVShift;
+  for (const Quad quad : quads) {
+    const FaceFrame& frame = frame_of(quad.direction());
+    for (int u = 0; u < quad.size_u(); ++u) {
+      for (int v = 0; v < quad.size_v(); ++v) {
+        const std::uint64_t moved = static_cast<std::uint64_t>(u) << (6 * frame.u) | static_cast<std::uint64_t>(v)
+                                                                                         << (6 * frame.v);
+        faces.insert((quad.bits & ~kSizes) + moved);
+      }
+    }
+  }
+  return faces;
+}
+
+std::vector<Quad> quads_of(const ChunkSurface& surface, IVec3 region) {
+  std::vector<Quad> quads;
+  for (const SurfaceRegion& each : surface.regions) {
+    if (each.region != region) continue;
+    for (const auto& range : {each.opaque, each.transparent}) {
+      quads.insert(quads.end(), surface.quads.begin() + range[0], surface.quads.begin() + range[6]);
+    }
+  }
+  return quads;
+}
+
+void expect_regions(const ChunkSurface& surface, const ChunkSurface& whole, int edge, const VoxelRegistry& types) {
+  ASSERT_EQ(faces_of(surface.quads), faces_of(whole.quads));
+  std::size_t listed = 0;
+  for (const SurfaceRegion& region : surface.regions) {
+    for (std::size_t d = 0; d < 6; ++d) {
+      for (const bool transparent : {false, true}) {
+        const auto& range = transparent ? region.transparent : region.opaque;
+        for (std::uint32_t i = range[d]; i < range[d + 1]; ++i, ++listed) {
+          const Quad quad = surface.quads[i];
+          ASSERT_EQ(static_cast<std::size_t>(quad.direction()), d);
+          ASSERT_EQ(types.is_transparent(quad.type()), transparent);
+          ASSERT_EQ(i < surface.opaque_quads, !transparent);
+          const FaceFrame& frame = frame_of(quad.direction());
+          IVec3 last = quad.voxel();
+          last[frame.u] += quad.size_u() - 1;
+          last[frame.v] += quad.size_v() - 1;
+          ASSERT_EQ(quad.voxel() / edge, region.region);
+          ASSERT_EQ(last / edge, region.region);
+        }
+      }
+    }
+  }
+  EXPECT_EQ(listed, surface.quads.size()) << "each once";
+}
+
+TEST(LiveRegions, HoldTheSameFacesAndSayWhichChanged) {
+  for (const int edge : {16, 32, 64}) {
+    SceneEditor editor(static_cast<std::uint32_t>(edge));
+    LiveMeshOptions wanted;
+    LiveMeshes whole(wanted);
+    wanted.region_edge = edge;
+    LiveMeshes meshes(wanted);
+    ShownSurfaces shown;
+    ShownSurfaces shown_whole;
+    const int across = 64 / edge;
+    int kept = 0;
+    for (int step = 0; step < 60; ++step) {
+      editor.edit();
+      meshes.finish(editor.scene, {});
+      whole.finish(editor.scene, {});
+      const std::vector<SurfaceUpdate> updates = meshes.take();
+      for (const SurfaceUpdate& update : updates) {
+        const ChunkSurface* before = shown.find(update.grid, update.chunk);
+        for (int i = 0; i < across * across * across; ++i) {
+          const IVec3 region{i % across, i / across % across, i / across / across};
+          const bool is_same = before != nullptr && update.surface != nullptr && across > 1 &&
+                               quads_of(*before, region) == quads_of(*update.surface, region);
+          ASSERT_EQ((update.changed_regions >> i & 1U) == 0, is_same);
+          kept += static_cast<int>(is_same);
+        }
+      }
+      shown.apply(updates);
+      shown_whole.apply(whole.take());
+      for (const SurfaceUpdate& each : shown.all()) {
+        const ChunkSurface* other = shown_whole.find(each.grid, each.chunk);
+        ASSERT_NE(other, nullptr);
+        expect_regions(*each.surface, *other, edge, editor.scene.types);
+        ASSERT_TRUE(edge != 64 || each.surface->quads == other->quads);
+        if (HasFatalFailure()) return;
+      }
+    }
+    EXPECT_EQ(kept > 0, edge < 64);
+  }
+}
+
+TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
+  SceneEditor editor(5);
+  LiveMeshOptions wanted;
+  wanted.workers = {3};
+  wanted.convert = [](const SurfaceUpdate& update) {
+    return std::make_shared<const std::size_t>(update.surface->quads.size());
+  };
+  LiveMeshes* meshes = nullptr;
+  std::mutex mutex;
+  std::map<std::pair<GridHandle, std::array<int, 3>>, std::size_t> taken;
+  const auto take = [&] {
+    const std::lock_guard lock(mutex);  // what is taken first is kept first
+    for (const SurfaceUpdate& update : meshes->take()) {
+      const std::pair key{update.grid, std::array{update.chunk.x, update.chunk.y, update.chunk.z}};
+      if (update.surface == nullptr) {
+        taken.erase(key);
+        continue;
+      }
+      const auto& converted = update.surface->converted;
+      taken[key] = converted == nullptr ? 0 : *static_cast<const std::size_t*>(converted.get());
+      EXPECT_EQ(taken[key], update.surface->quads.size());
+    }
+  };
+  wanted.on_ready = [&] {
+    EXPECT_LT(meshes->pending(), 1'000'000U);
+    take();
+  };
+  LiveMeshes live(wanted);
+  meshes = &live;
+  for (int i = 0; i < 100; ++i) {
+    editor.edit();
+    live.update(editor.scene, editor.eye());
+  }
+  live.finish(editor.scene, {});
+  take();
+  EXPECT_EQ(live.pending(), 0U);
+  std::size_t with_quads = 0;
+  for (const GridHandle handle : drawn_grids(editor.scene, InstanceFilter::Visible)) {
+    const Grid& grid = editor.scene.grids()[handle].grid;
+    for (const IVec3 chunk : grid.chunks()) {
+      QuadBuffer quads;
+      BlockyMesher().mesh(grid.neighbourhood(chunk), editor.scene.types, {}, quads);
+      if (quads.empty()) continue;
+      ++with_quads;
+      EXPECT_EQ((taken[{handle, {chunk.x, chunk.y, chunk.z}}]), quads.size());
+    }
+  }
+  EXPECT_EQ(taken.size(), with_quads);
+}
+
+TEST(LiveCallbacks, WhatTheyThrowArrives) {
+  OneGrid one;
+  one.grid().fill_box({{0, 0, 0}, {200, 10, 10}}, 1);
+  for (const bool from_convert : {false, true}) {
+    LiveMeshOptions wanted;
+    std::atomic<int> calls{0};
+    const auto fail = [&] {
+      if (calls++ == 0) throw std::runtime_error("the disk is full");
+    };
+    if (from_convert) {
+      wanted.convert = [&](const SurfaceUpdate&) {
+        fail();
+        return std::make_shared<const int>(1);
+      };
+    } else {
+      wanted.on_ready = fail;
+    }
+    LiveMeshes meshes(wanted);
+    try {
+      meshes.finish(one.scene, {});
+      ADD_FAILURE() << "nothing arrived";
+    } catch (const std::runtime_error& why) {
+      EXPECT_STREQ(why.what(), "the disk is full");
+    }
+    meshes.finish(one.scene, {});
+    const std::vector<SurfaceUpdate> updates = meshes.take();
+    EXPECT_EQ(updates.size(), one.grid().chunk_count());
+    int without = 0;
+    for (const SurfaceUpdate& update : updates) without += update.surface->converted == nullptr ? 1 : 0;
+    EXPECT_EQ(without, from_convert ? 1 : static_cast<int>(updates.size()));
+    EXPECT_EQ(meshes.pending(), 0U);
+  }
+}
+
+TEST(LiveCallbacks, MayTakeWhileTheMeshesEnd) {
+  OneGrid one;
+  one.grid().fill_box({{0, 0, 0}, {600, 21, 301}}, 1);
+  for (int i = 0; i < 20; ++i) {
+    std::atomic<LiveMeshes*> meshes{nullptr};
+    LiveMeshOptions wanted;
+    wanted.workers = {2};
+    wanted.on_ready = [&] { static_cast<void>(meshes.load()->take()); };
+    LiveMeshes live(wanted);
+    meshes = &live;
+    live.update(one.scene, {});
+  }
+}
+
+TEST(LiveBudget, TheRestWaitsForTheNextCall) {
+  OneGrid one;
+  one.grid().fill_box({{0, 0, 0}, {640, 10, 10}}, 1);
+  LiveMeshes meshes;
+  meshes.finish(one.scene, {});
+  ShownSurfaces shown;
+  for (std::size_t left = 10; left > 0; --left) {
+    EXPECT_EQ(meshes.pending(), left);
+    const std::vector<SurfaceUpdate> one_more = meshes.take(1);
+    ASSERT_EQ(one_more.size(), 1U);
+    shown.apply(one_more);
+    if (left != 5) continue;
+    // What waits is replaced, and given once.
+    one.grid().fill_box({{0, 10, 0}, {640, 12, 10}}, 1);
+    meshes.finish(one.scene, {});
+    shown.apply(meshes.take());
+    break;
+  }
+  EXPECT_EQ(meshes.pending(), 0U);
+  expect_surfaces(shown, one.scene, {});
+  EXPECT_TRUE(meshes.take(0).empty());
+}
+
+TEST(LiveMistakes, RegionsOfAnotherSizeAreFound) {
+  LiveMeshOptions wanted;
+  wanted.region_edge = 24;
+  QUOIN_EXPECT_MISTAKE(LiveMeshes{wanted}, "16, 32 or 64");
+}
 
 }  // namespace
 }  // namespace quoin

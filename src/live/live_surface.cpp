@@ -16,6 +16,85 @@ void append(const Buffer<T>& from, Buffer<T>& to) {
   std::copy(from.begin(), from.end(), to.begin() + first);
 }
 
+Quad with_extent(Quad quad, int u, int v, int size_u, int size_v) {
+  const FaceFrame& frame = frame_of(quad.direction());
+  const auto put = [&](int shift, int value) {
+    quad.bits = (quad.bits & ~(std::uint64_t{63} << shift)) | static_cast<std::uint64_t>(value) << shift;
+  };
+  put(6 * frame.u, u);
+  put(6 * frame.v, v);
+  put(Quad::kSizeUShift, size_u - 1);
+  put(Quad::kSizeVShift, size_v - 1);
+  return quad;
+}
+
+// Bounds along one axis of a quad of `size` voxels from `first` on, cut at multiples of `edge`.
+template <class Visit>
+void cut(int first, int size, int edge, Visit&& visit) {
+  for (int at = first; at < first + size;) {
+    const int end = std::min(first + size, (at / edge + 1) * edge);
+    visit(at, end - at);
+    at = end;
+  }
+}
+
+std::uint64_t hash_of(const SurfaceRegion& region, const QuadBuffer& quads) {
+  std::uint64_t hash = 1;
+  const auto add = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0x9E37'79B9'7F4A'7C15U;
+    hash ^= hash >> 32;
+  };
+  for (const auto& range : {region.opaque, region.transparent}) {
+    add(range[6] - range[0]);
+    for (std::uint32_t i = range[0]; i < range[6]; ++i) add(quads[i].bits);
+  }
+  return hash;
+}
+
+// The quads in the order of ChunkSurface.
+void sort_into_regions(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+  const int across = kChunkEdge / edge;
+  const auto region_of = [&](IVec3 voxel) {
+    const IVec3 at = voxel / edge;
+    return static_cast<std::size_t>(at.x + across * (at.y + across * at.z));
+  };
+  const auto regions = static_cast<std::size_t>(across * across * across);
+  const auto place_of = [&](Quad quad) {
+    const std::size_t which = types.is_transparent(quad.type()) ? regions : 0;
+    return 6 * (which + region_of(quad.voxel())) + static_cast<std::size_t>(quad.direction());
+  };
+  std::vector<std::uint32_t> first(12 * regions + 1);
+  for (const Quad quad : quads) ++first[place_of(quad) + 1];
+  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+  for (std::size_t i = 0; i < regions; ++i) {
+    const auto opaque = first.begin() + static_cast<std::ptrdiff_t>(6 * i);
+    const auto transparent = opaque + static_cast<std::ptrdiff_t>(6 * regions);
+    if (opaque[0] == opaque[6] && transparent[0] == transparent[6]) continue;
+    const auto number = static_cast<int>(i);
+    SurfaceRegion region{{number % across, number / across % across, number / across / across}, {}, {}};
+    std::copy_n(opaque, 7, region.opaque.begin());
+    std::copy_n(transparent, 7, region.transparent.begin());
+    surface.regions.push_back(region);
+  }
+  surface.opaque_quads = first[6 * regions];
+  surface.quads.resize(quads.size());
+  for (const Quad quad : quads) surface.quads[first[place_of(quad)]++] = quad;
+  for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface.quads);
+}
+
+// Quads that reach over the border of a region become several of the same faces: where faces were merged all of them
+// are alike.
+void cut_at_regions(const QuadBuffer& quads, int edge, QuadBuffer& out) {
+  out.clear();
+  for (const Quad quad : quads) {
+    const FaceFrame& frame = frame_of(quad.direction());
+    cut(quad.voxel()[frame.u], quad.size_u(), edge, [&](int u, int size_u) {
+      cut(quad.voxel()[frame.v], quad.size_v(), edge,
+          [&](int v, int size_v) { out.push_back(with_extent(quad, u, v, size_u, size_v)); });
+    });
+  }
+}
+
 void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
   if (!workspace.blocky) workspace.blocky.emplace();
   QuadOptions wanted;
@@ -25,13 +104,9 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   if (workspace.quads.empty()) return;
   auto surface = std::make_shared<ChunkSurface>();
   surface->style = SurfaceStyle::Blocky;
-  surface->quads.reserve(workspace.quads.size());
-  for (const bool transparent : {false, true}) {
-    for (const Quad quad : workspace.quads) {
-      if (types.is_transparent(quad.type()) == transparent) surface->quads.push_back(quad);
-    }
-    if (!transparent) surface->opaque_quads = surface->quads.size();
-  }
+  const bool is_cut = options.region_edge < kChunkEdge;
+  if (is_cut) cut_at_regions(workspace.quads, options.region_edge, workspace.cut_quads);
+  sort_into_regions(is_cut ? workspace.cut_quads : workspace.quads, types, options.region_edge, *surface);
   job.surface = std::move(surface);
 }
 
@@ -220,6 +295,10 @@ void make_live_surface(const LiveMeshOptions& options, LiveJob& job, LiveWorkspa
     make_blocky(options, job, workspace);
   } else {
     make_smooth(options, job, workspace);
+  }
+  if (options.convert && job.surface != nullptr) {
+    job.surface->converted =
+        options.convert({job.source.grid, job.chunk, job.surface, job.source.content, ~std::uint64_t{0}});
   }
 }
 

@@ -35,7 +35,7 @@ MeshJobQueue::MeshJobQueue(unsigned workers, Work work, std::function<void()> on
   }
 }
 
-MeshJobQueue::~MeshJobQueue() {
+void MeshJobQueue::stop() {
   {
     const std::lock_guard lock(mutex_);
     is_stopping_ = true;
@@ -90,6 +90,11 @@ void MeshJobQueue::wait(std::size_t waiting) {
   progressed_.wait(lock, [&] { return queue_.size() <= waiting && (waiting != 0 || running_ == 0); });
 }
 
+std::exception_ptr MeshJobQueue::take_failure() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(failure_, nullptr);
+}
+
 LiveMeshes::Stats MeshJobQueue::stats() const {
   const std::lock_guard lock(mutex_);
   return stats_;
@@ -104,6 +109,17 @@ std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
   return job;
 }
 
+// Keeps what it throws for whoever asks next.
+template <class Call>
+void MeshJobQueue::guard(Call&& call) {
+  try {
+    call();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    if (failure_ == nullptr) failure_ = std::current_exception();
+  }
+}
+
 void MeshJobQueue::run() {
   LiveWorkspace workspace;
   std::unique_lock lock(mutex_);
@@ -114,18 +130,20 @@ void MeshJobQueue::run() {
     ++running_;
     lock.unlock();
     const LiveClock::time_point start = LiveClock::now();
-    try {
-      work_(*job, workspace);
-    } catch (const std::bad_alloc&) {
-      job->outcome = LiveJob::Outcome::OutOfMemory;
-      job->surface.reset();
-      workspace = {};
-    }
+    guard([&] {
+      try {
+        work_(*job, workspace);
+      } catch (const std::bad_alloc&) {
+        job->outcome = LiveJob::Outcome::OutOfMemory;
+        job->surface.reset();
+        workspace = {};
+      }
+    });
     drop_inputs(*job);
     // Nobody is told of failures: whoever tried again at once would fail again.
     const bool is_told = job->outcome != LiveJob::Outcome::OutOfMemory;
     finish(std::move(job), start);
-    if (is_told && on_ready_) on_ready_();
+    if (is_told && on_ready_) guard(on_ready_);
     lock.lock();
   }
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -64,7 +65,7 @@ struct LiveJob {
 
   enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
   Outcome outcome = Outcome::Meshed;
-  std::shared_ptr<const ChunkSurface> surface;  ///< null where there is nothing to see
+  std::shared_ptr<ChunkSurface> surface;  ///< null where there is nothing to see
 };
 
 /// What a worker keeps from chunk to chunk.
@@ -72,25 +73,29 @@ struct LiveWorkspace {
   std::optional<BlockyMesher> blocky;
   std::optional<SmoothMesher> smooth;
   QuadBuffer quads;
+  QuadBuffer cut_quads;
   SmoothChunkMesh mesh;
 };
 
 /// Workers, the jobs that wait for them, nearest first, and those that are done.
 ///
-/// Threads: all calls come from one thread.
+/// Threads: all calls come from one thread at a time.
 class MeshJobQueue {
  public:
-  /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory.
+  /// Sets a job's outcome and surface. That it throws bad_alloc counts as OutOfMemory; other exceptions are kept.
   using Work = std::function<void(LiveJob&, LiveWorkspace&)>;
 
   /// `on_ready`, if any, is called by a worker after each job that did not run out of memory.
   MeshJobQueue(unsigned workers, Work work, std::function<void()> on_ready);
-  /// Waits for jobs that were started; gives up the rest.
-  ~MeshJobQueue();
+  ~MeshJobQueue() { stop(); }
   MeshJobQueue(const MeshJobQueue&) = delete;
   MeshJobQueue& operator=(const MeshJobQueue&) = delete;
 
+  /// Waits for jobs that were started; gives up the rest, and whatever comes later.
+  void stop();
   void push(std::unique_ptr<LiveJob> job);
+  /// What a callback threw first since the last call; null: nothing.
+  [[nodiscard]] std::exception_ptr take_failure();
   /// Takes back what no worker has started of the jobs for which `is_unwanted`.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
   /// Gives the jobs that wait new distances; returns these, the least first.
@@ -103,6 +108,8 @@ class MeshJobQueue {
 
  private:
   void run();
+  template <class Call>
+  void guard(Call&& call);
   void finish(std::unique_ptr<LiveJob> job, LiveClock::time_point start);
   [[nodiscard]] std::unique_ptr<LiveJob> take_nearest();
 
@@ -116,6 +123,7 @@ class MeshJobQueue {
   std::vector<std::unique_ptr<LiveJob>> queue_;
   std::vector<std::unique_ptr<LiveJob>> done_;  // with room for all that wait and run
   LiveMeshes::Stats stats_;
+  std::exception_ptr failure_;
   std::vector<std::jthread> workers_;  // last: they end first
 };
 

@@ -41,7 +41,13 @@ MeshScheduler::MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work 
       max_ahead_(jobs_ahead(options.style, workers_)),
       queue_(workers_, std::move(work), options.on_ready) {}
 
+void MeshScheduler::throw_failure() {
+  if (const std::exception_ptr failure = queue_.take_failure()) std::rethrow_exception(failure);
+}
+
 void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
+  throw_failure();
+  const std::lock_guard lock(mutex_);
   try {
     std::vector<DVec3> eyes{eye};
     eyes.insert(eyes.end(), other_eyes.begin(), other_eyes.end());
@@ -255,19 +261,30 @@ void MeshScheduler::hand_over(const Scene& scene) {
   if (farthest != kNone) withdraw([&](const LiveJob& job) { return job.distance >= farthest; });
 }
 
-std::vector<SurfaceUpdate> MeshScheduler::take() {
+std::vector<SurfaceUpdate> MeshScheduler::take(std::size_t max_bytes) {
+  const std::lock_guard lock(mutex_);
   std::vector<SurfaceUpdate> taken;
+  std::vector<ReadyChunk> left;
   try {
     collect();
     taken.reserve(totals_.ready.size());
+    left.reserve(totals_.ready.size());
   } catch (...) {
     forget();
     throw;
   }
+  std::size_t bytes = 0;
   for (const ReadyChunk& ready : totals_.ready) {
+    if (ready.source.content == SurfaceContent::Voxels && bytes >= max_bytes) {
+      left.push_back(ready);
+      continue;
+    }
+    const std::size_t before = taken.size();
     if (LiveSource* live = find(ready.source)) live->take(ready.chunk, taken);
+    if (taken.size() == before || ready.source.content != SurfaceContent::Voxels) continue;
+    if (const auto& surface = taken.back().surface) bytes += surface->bytes();
   }
-  totals_.ready.clear();
+  totals_.ready = std::move(left);
   return taken;
 }
 
@@ -275,8 +292,13 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
   for (;;) {
     const LiveMeshes::Stats before = stats();
     update(scene, eye, other_eyes);
-    if (totals_.unfinished == 0) return queue_.wait(0);  // for what was removed while it was meshed
-    queue_.wait(has_waiting() ? max_ahead_ / 2 : 0);
+    std::unique_lock lock(mutex_);
+    const bool is_done = totals_.unfinished == 0;
+    const std::size_t left = !is_done && has_waiting() ? max_ahead_ / 2 : 0;
+    // A worker that is done may take.
+    lock.unlock();
+    queue_.wait(left);  // once all is done: for what was removed while it was meshed
+    if (is_done) return throw_failure();
     const LiveMeshes::Stats after = stats();
     // Nothing but failures: it will not do to try for ever.
     if (after.out_of_memory != before.out_of_memory && after.chunks_meshed == before.chunks_meshed) {

@@ -2,8 +2,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -23,10 +25,15 @@ class MeshScheduler {
   MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
   void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
-  [[nodiscard]] std::vector<SurfaceUpdate> take();
-  [[nodiscard]] std::size_t pending() const { return totals_.pending; }
+  [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
+  [[nodiscard]] std::size_t pending() const {
+    const std::lock_guard lock(mutex_);
+    return totals_.pending;
+  }
   void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
   [[nodiscard]] LiveMeshes::Stats stats() const;
+  /// Ends the workers; nothing may be called after it.
+  void stop() { queue_.stop(); }
 
  private:
   struct Candidate;
@@ -34,6 +41,7 @@ class MeshScheduler {
   using Sources = std::map<LiveKey, std::unique_ptr<LiveSource>>;
 
   void update_or_throw(const Scene& scene);
+  void throw_failure();
   [[nodiscard]] ChangedTypes follow_types(const VoxelRegistry& types);
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
@@ -52,6 +60,7 @@ class MeshScheduler {
   const LiveMeshOptions options_;
   const unsigned workers_;
   const std::size_t max_ahead_;  // jobs that wait for workers
+  mutable std::mutex mutex_;     // guards what follows, but the queue, which guards itself
   LiveTotals totals_;
   LiveTypes types_;
   ChangeCursor followed_types_;

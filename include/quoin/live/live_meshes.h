@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -24,13 +25,25 @@ enum class SurfaceContent : std::uint8_t {
   Field,   ///< its `field`; always smooth
 };
 
+/// The quads of one region of a chunk: [LiveMeshOptions::region_edge]^3 voxels from a multiple of that on.
+struct SurfaceRegion {
+  IVec3 region{0};  ///< it begins at voxel `region` * edge of the chunk
+  /// Of the surface's quads those that face Direction d are [opaque[d], opaque[d + 1]), of transparent types
+  /// [transparent[d], transparent[d + 1]): what the camera cannot see of a region need not be drawn.
+  std::array<std::uint32_t, 7> opaque{};
+  std::array<std::uint32_t, 7> transparent{};
+  std::uint64_t hash = 0;  ///< of its quads
+};
+
 /// The surface of one chunk as it is drawn; never changed once it was made.
 struct ChunkSurface {
   SurfaceStyle style = SurfaceStyle::Blocky;
   int level = 0;  ///< of a field: of detail, 0 to kMaxSmoothLevel; its cells are 2^level samples wide
-  /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last.
+  /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last, each by region, then
+  /// direction, layer, row, column. None reaches over the border of a region.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
+  std::vector<SurfaceRegion> regions;  ///< blocky: those with quads, sorted by z, then y, then x
   /// Smooth: point p of the mesh is point p + 64 * chunk of the grid, of voxels p + 0.5 + 64 * chunk (samples are their
   /// middles); a colour (linear) and a type a vertex. Each transparent type is a closed body of its own, and of voxels
   /// thin things are kept (SmoothMeshOptions::keep_thin), as mesh_scene_smoothly has it; instances are not united.
@@ -38,10 +51,12 @@ struct ChunkSurface {
   std::size_t glass_indices = 0;  ///< of its indices: those of transparent bodies, which come last
   std::vector<LinearRgba16> albedo;
   std::vector<VoxelType> types;
+  /// What LiveMeshOptions::convert made of it; null without.
+  std::shared_ptr<const void> converted;
 
   [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
   [[nodiscard]] std::int64_t triangles() const;
-  [[nodiscard]] std::size_t bytes() const;
+  [[nodiscard]] std::size_t bytes() const;  ///< without `converted`
 };
 
 /// What replaces the surface of a chunk.
@@ -50,11 +65,16 @@ struct SurfaceUpdate {
   IVec3 chunk{0};
   std::shared_ptr<const ChunkSurface> surface;  ///< null: nothing of the chunk is seen any more
   SurfaceContent content = SurfaceContent::Voxels;
+  /// Bit x + n (y + n z), n = 64 / region_edge: the quads of that region differ from those that were given before, or
+  /// there were none, or there are none now. What is not blocky has one region.
+  std::uint64_t changed_regions = ~std::uint64_t{0};
 };
 
 struct LiveMeshOptions {
-  SurfaceStyle style = SurfaceStyle::Blocky;       ///< of voxels
-  bool merge = true;                               ///< blocky: neighbouring faces become one quad
+  SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
+  bool merge = true;                          ///< blocky: neighbouring faces become one quad
+  /// Blocky: 16, 32 or 64. Smaller regions are more quads, and less that is new to a graphics card after an edit.
+  int region_edge = 64;
   SmoothOcclusionOptions occlusion;                ///< of smooth surfaces, those of fields too
   SurfaceColours colours = SurfaceColours::Sharp;  ///< of smooth surfaces of voxels; those of fields are blended
   /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
@@ -63,8 +83,11 @@ struct LiveMeshOptions {
   double detail_distance = std::numeric_limits<double>::infinity();
   InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
   Threads workers;  ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  /// Called by workers, several at once, for each surface that was made, before it can be taken: what it returns, say
+  /// vertices in a format of your own, is ChunkSurface::converted. May be empty.
+  std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert;
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
-  /// room for more chunks. May be empty. It must not throw or call the meshes.
+  /// room for more chunks. May be empty. It may call `take`, `pending` and `stats`, and nothing else of the meshes.
   std::function<void()> on_ready;
 };
 
@@ -75,11 +98,13 @@ struct LiveMeshOptions {
 /// removed meanwhile are dropped.
 /// Seams:   surfaces of a field fit each other at any time: what an edit, or a change of levels of detail, changes in
 ///          chunks beside each other is given by one `take`, once all of it is there.
+/// Callbacks: what `on_ready` or `convert` throws is thrown by the next `update` or `finish`, the first of several;
+///           the surface is there without `converted`. bad_alloc of `convert` counts as the worker's.
 /// Lifetime: the scene is only read within calls; surfaces belong to whoever took them.
-/// Threads:  all calls come from one thread.
+/// Threads:  `update` and `finish` come from one thread at a time, the others from any.
 class LiveMeshes {
  public:
-  /// Errors: std::system_error where the workers cannot be started.
+  /// Requires: `region_edge` is 16, 32 or 64. Errors: std::system_error where the workers cannot be started.
   explicit LiveMeshes(const LiveMeshOptions& options = {});
   /// Waits for the chunks that are being meshed; others are given up.
   ~LiveMeshes();
@@ -96,9 +121,10 @@ class LiveMeshes {
   void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
   /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
-  /// Of chunks of which nothing was, or is, to be seen, none is given.
+  /// Of chunks of which nothing was, or is, to be seen, none is given. Once those of voxels have `max_bytes`, as
+  /// ChunkSurface::bytes counts them, the rest waits for another call; those of fields, which fit each other, do not.
   /// Errors: bad_alloc, as `update`.
-  [[nodiscard]] std::vector<SurfaceUpdate> take();
+  [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 
   /// Chunks whose newest surface was not taken yet.
   [[nodiscard]] std::size_t pending() const;
