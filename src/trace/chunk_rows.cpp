@@ -29,7 +29,12 @@ ChunkRows::ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy w
   sort_types();
 }
 
-ChunkRows::ChunkRows(const Chunk& chunk, VoxelType only) : chunk_(&chunk), types_(nullptr), only_(only) {
+ChunkRows::ChunkRows(const Chunk& chunk, VoxelType only) : chunk_(&chunk), only_(only) {
+  sort_types();
+}
+
+ChunkRows::ChunkRows(const Chunk& chunk, const FunctionRef<bool(VoxelType)>& counts)
+    : chunk_(&chunk), counts_(&counts) {
   sort_types();
 }
 
@@ -44,6 +49,7 @@ void ChunkRows::sort_types() {
 }
 
 bool ChunkRows::belongs(VoxelType type) const {
+  if (counts_ != nullptr) return type != kAir && (*counts_)(type);
   return types_ == nullptr ? type == only_ : counts(*types_, type, which_);
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -33,6 +34,8 @@ class ChunkRows {
   ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which);
   /// Of one type only.
   ChunkRows(const Chunk& chunk, VoxelType only);
+  /// Of the types for which `counts`, which must outlive it; never asked for air.
+  ChunkRows(const Chunk& chunk, const FunctionRef<bool(VoxelType)>& counts);
 
   /// Whether no voxel counts.
   [[nodiscard]] bool none() const { return in_.empty(); }
@@ -45,7 +48,8 @@ class ChunkRows {
   [[nodiscard]] bool belongs(VoxelType type) const;
 
   const Chunk* chunk_;
-  const VoxelRegistry* types_;  // null: of one type only
+  const VoxelRegistry* types_ = nullptr;  // null: of one type only, or of those for which counts_
+  const FunctionRef<bool(VoxelType)>* counts_ = nullptr;
   Occupancy which_ = Occupancy::NonAir;
   VoxelType only_ = kAir;
   std::vector<VoxelType> in_;
