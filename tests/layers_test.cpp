@@ -27,11 +27,11 @@ constexpr int kAppsLevel = 7;
 // or a function where the data is. What core has is for all.
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_difference.h", {"live"}},
-    {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "trace"}},
-    {"grid/chunk/packed_row.h", {"mesh", "trace"}},
+    {"grid/chunk/chunk_storage.h", {"light", "live", "mesh", "render_vk", "trace"}},
+    {"grid/chunk/packed_row.h", {"light", "mesh", "trace"}},
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
-    {"grid/coordinate_hash.h", {"live", "mesh", "scene", "trace"}},
+    {"grid/coordinate_hash.h", {"light", "live", "mesh", "scene", "trace"}},
     {"grid/density/cell_corners.h", {"mesh", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
@@ -68,7 +68,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"scene/tracer/instance_tree.h", {"render_vk"}},
     {"scene/tracer/tree_cache.h", {"render", "render_vk"}},
     {"scene/tracer/scene_tracer_impl.h", {"render_vk"}},
-    {"trace/chunk_rows.h", {"scene"}},
+    {"trace/chunk_rows.h", {"light", "scene"}},
     {"trace/density/density_glass.h", {"light", "render_vk", "scene"}},
     {"trace/density/smooth_normal.h", {"render", "scene"}},
     {"trace/glass_rows.h", {"scene"}},

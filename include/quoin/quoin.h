@@ -42,6 +42,7 @@
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_options.h>
+#include <quoin/light/propagated_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>

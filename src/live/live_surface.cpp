@@ -16,18 +16,6 @@ void append(const Buffer<T>& from, Buffer<T>& to) {
   std::copy(from.begin(), from.end(), to.begin() + first);
 }
 
-Quad with_extent(Quad quad, int u, int v, int size_u, int size_v) {
-  const FaceFrame& frame = frame_of(quad.direction());
-  const auto put = [&](int shift, int value) {
-    quad.bits = (quad.bits & ~(std::uint64_t{63} << shift)) | static_cast<std::uint64_t>(value) << shift;
-  };
-  put(6 * frame.u, u);
-  put(6 * frame.v, v);
-  put(Quad::kSizeUShift, size_u - 1);
-  put(Quad::kSizeVShift, size_v - 1);
-  return quad;
-}
-
 // Bounds along one axis of a quad of `size` voxels from `first` on, cut at multiples of `edge`.
 template <class Visit>
 void cut(int first, int size, int edge, Visit&& visit) {

@@ -56,6 +56,12 @@ struct Quad {
 /// Quads of one chunk, in the order direction, layer, row, column. Reuse one between calls: it only grows.
 using QuadBuffer = std::vector<Quad>;
 
+/// The part of a quad from its voxel (u, v) on, counted along the direction's u and v. Where faces were merged all of
+/// them are alike, so that a part carries what the whole does.
+///
+/// Requires: it lies within the quad; its sizes are at least 1.
+[[nodiscard]] Quad quad_part(Quad quad, int u, int v, int size_u, int size_v);
+
 /// Unit faces that the quads cover.
 [[nodiscard]] std::int64_t face_count(const QuadBuffer& quads);
 

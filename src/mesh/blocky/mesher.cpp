@@ -220,6 +220,22 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
   out.resize(scratch_->quads);
 }
 
+Quad quad_part(Quad quad, int u, int v, int size_u, int size_v) {
+  QUOIN_ASSERT(
+      u >= 0 && v >= 0 && size_u >= 1 && size_v >= 1 && u + size_u <= quad.size_u() && v + size_v <= quad.size_v(),
+      "a part of the quad");
+  const FaceFrame& frame = frame_of(quad.direction());
+  const IVec3 voxel = quad.voxel();
+  const auto put = [&](int shift, int value) {
+    quad.bits = (quad.bits & ~(std::uint64_t{63} << shift)) | static_cast<std::uint64_t>(value) << shift;
+  };
+  put(6 * frame.u, voxel[frame.u] + u);
+  put(6 * frame.v, voxel[frame.v] + v);
+  put(Quad::kSizeUShift, size_u - 1);
+  put(Quad::kSizeVShift, size_v - 1);
+  return quad;
+}
+
 std::int64_t face_count(const QuadBuffer& quads) {
   std::int64_t faces = 0;
   for (const Quad& quad : quads) faces += std::int64_t{quad.size_u()} * quad.size_v();

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/quad.h>
+
+namespace quoin {
+
+/// Light at a voxel, 0 (dark) to 15: of the sky, and of lamps in three colours.
+struct LightLevels {
+  std::uint8_t sky = 0;
+  std::uint8_t red = 0;
+  std::uint8_t green = 0;
+  std::uint8_t blue = 0;
+
+  bool operator==(const LightLevels&) const = default;
+};
+
+/// In 16 bits, as meshes carry it: sky in the lowest four, then red, green and blue.
+[[nodiscard]] constexpr std::uint16_t packed(LightLevels levels) {
+  return static_cast<std::uint16_t>(levels.sky | levels.red << 4 | levels.green << 8 | levels.blue << 12);
+}
+[[nodiscard]] constexpr LightLevels unpacked_light(std::uint16_t word) {
+  return {static_cast<std::uint8_t>(word & 15), static_cast<std::uint8_t>(word >> 4 & 15),
+          static_cast<std::uint8_t>(word >> 8 & 15), static_cast<std::uint8_t>(word >> 12)};
+}
+
+/// What a type gives off by itself: 0 for most. `emission` of 1 and more is level 15 in the brightest channel of its
+/// colour, the others in proportion to their sRGB values; less is less in proportion. Its `sky` is 0.
+[[nodiscard]] LightLevels lamp_levels(const VoxelProperties& properties);
+
+struct PropagatedLightOptions {
+  /// What types give off, for games with levels of their own; empty: `lamp_levels`. `sky` counts as 0.
+  std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp;
+};
+
+/// Light in game time: that of the sky and of coloured lamps, spread through whatever is not opaque, one level less a
+/// step, kept up to date while a grid is edited. What block games light their faces with.
+///
+///   PropagatedLight light;
+///   light.update(grid, types);                                    // once, and after each edit
+///   for (const ChunkChange& change : light.changes_since(cursor).items) mesh_again(change);
+///   light.split(quads, chunk, lit_quads, levels);                 // a level a quad, merging kept where it is equal
+///
+/// Sky:     level 15 falls straight down without loss, until something opaque; it is 15 outside of the world. y is up.
+/// Lamps:   the level of a type is in its own voxel, and spreads from there, whatever its visibility.
+/// Colours: a transparent type lets a colour of lamps pass where that channel of its colour is at least half the
+///          greatest, the sky always.
+/// Exact:   equal to a search from every lamp and every column of sky (Dijkstra), whatever edits led there.
+/// Cost:    of an update O(rows of 64 voxels within 15 of what changed, and of columns of sky that it opens or closes),
+///          times 15. The first: some tenths of a millisecond a chunk.
+/// Memory:  as a Grid of that many kinds of light: where it is the same a slab takes nothing.
+/// Threads: any number may read at once; an update needs it to itself.
+/// Source:  levels as block games have them; spread by whole words instead of a queue.
+class PropagatedLight {
+ public:
+  explicit PropagatedLight(PropagatedLightOptions options = {});
+  PropagatedLight(PropagatedLight&&) noexcept;
+  PropagatedLight& operator=(PropagatedLight&&) noexcept;
+  ~PropagatedLight();
+
+  /// Takes over what was edited since the last update, or all of another grid or where types pass or give off another
+  /// light. When it throws (bad_alloc), the next update begins anew.
+  void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
+
+  /// As of the last update. Of an opaque voxel: what it gives off.
+  [[nodiscard]] LightLevels at(IVec3 voxel) const;
+  /// The 64 voxels along x in whose row `voxel` lies, packed.
+  void read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const;
+
+  /// Where light changed, exactly, as Grid::changes_since tells of voxels.
+  [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
+
+  /// Splits quads of a chunk where the light in front of their faces changes. `light` gets a level a quad of `out`, in
+  /// the order of the quads they come from; both are replaced.
+  void split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out, std::vector<std::uint16_t>& light) const;
+
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace quoin

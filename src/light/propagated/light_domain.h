@@ -1,0 +1,88 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/vec.h>
+
+#include "grid/coordinate_hash.h"
+
+namespace quoin::propagated {
+
+/// The chunks whose light is kept: those within one of a chunk with voxels, and what lies between these in a column.
+/// Everything above is open to the sky, and so are columns without such a chunk; what lies below is dark. Light from
+/// beyond, or that went out there, comes to no surface: a chunk is wider than light reaches.
+class LightDomain {
+ public:
+  struct Range {
+    int begin = 0;
+    int end = 0;
+    bool operator==(const Range&) const = default;
+  };
+  /// A column whose range of chunks is another than before.
+  struct Change {
+    int x, z;
+    Range before, now;
+  };
+
+  /// A chunk has voxels now, or has none any more. Appends the columns of which others are held.
+  void set(IVec3 chunk, bool has_voxels, std::vector<Change>& changed) {
+    std::set<int>& column = columns_[{chunk.x, 0, chunk.z}];
+    const bool is_news = has_voxels ? column.insert(chunk.y).second : column.erase(chunk.y) > 0;
+    if (column.empty()) columns_.erase({chunk.x, 0, chunk.z});
+    for (int z = chunk.z - 1; is_news && z <= chunk.z + 1; ++z) {
+      for (int x = chunk.x - 1; x <= chunk.x + 1; ++x) {
+        const Range before = range(x, z);
+        const Range now = found_range(x, z);
+        if (before == now) continue;
+        changed.push_back({x, z, before, now});
+        ranges_[{x, 0, z}] = now;
+        if (now == Range{}) ranges_.erase({x, 0, z});
+      }
+    }
+  }
+
+  /// y of the chunks of a column; empty for one that is open to the sky.
+  [[nodiscard]] Range range(int x, int z) const {
+    const auto found = ranges_.find({x, 0, z});
+    return found == ranges_.end() ? Range{} : found->second;
+  }
+  [[nodiscard]] bool holds(IVec3 chunk) const {
+    const Range found = range(chunk.x, chunk.z);
+    return chunk.y >= found.begin && chunk.y < found.end;
+  }
+  /// Packed light of a chunk that it does not hold.
+  [[nodiscard]] std::uint16_t beyond(IVec3 chunk) const {
+    const Range found = range(chunk.x, chunk.z);
+    const bool is_below = found.begin != found.end && chunk.y < found.begin;
+    return is_below ? 0 : 15;
+  }
+  void clear() {
+    columns_.clear();
+    ranges_.clear();
+  }
+
+ private:
+  [[nodiscard]] Range found_range(int x, int z) const {
+    std::optional<Range> all;
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto found = columns_.find({x + dx, 0, z + dz});
+        if (found == columns_.end()) continue;
+        const int begin = *found->second.begin() - 1;
+        const int end = *found->second.rbegin() + 2;
+        all = all ? Range{std::min(all->begin, begin), std::max(all->end, end)} : Range{begin, end};
+      }
+    }
+    return all.value_or(Range{});
+  }
+
+  std::unordered_map<IVec3, std::set<int>, CoordinateHash> columns_;  // [x, 0, z]: y of chunks with voxels
+  std::unordered_map<IVec3, Range, CoordinateHash> ranges_;           // [x, 0, z]: those that are not empty
+};
+
+}  // namespace quoin::propagated

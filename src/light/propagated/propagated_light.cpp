@@ -1,0 +1,481 @@
+// An update is a queue of boxes, a chunk's each, that are to be solved again: those around edits first. What a solution
+// changes at the side of its box puts what lies beyond into the queue, until nothing changes any more. Since light is one
+// level less with every step, there is one state in which nothing does.
+#include <quoin/light/propagated_light.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/grid/changes.h>
+
+#include "grid/chunk_order.h"
+#include "light/propagated/light_domain.h"
+#include "light/propagated/light_solver.h"
+
+namespace quoin {
+namespace {
+
+using propagated::LightBorder;
+using propagated::LightChange;
+using propagated::LightDomain;
+using propagated::LightSolver;
+using propagated::TypeLight;
+
+constexpr int kReach = 15;
+constexpr std::uint16_t kOpenSky = 15;
+
+std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
+  std::vector<TypeLight> lights(types.size());
+  for (std::size_t i = 1; i < lights.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    const VoxelProperties& properties = types[type];
+    LightLevels lamp = options.lamp ? options.lamp(type, properties) : lamp_levels(properties);
+    lamp.sky = 0;
+    lights[i].lamp = packed(lamp);
+    if (types.is_opaque(type)) {
+      lights[i].passes = 0;
+    } else {
+      const Rgba8 colour = properties.colour;
+      const int half = (std::max({colour.r, colour.g, colour.b}) + 1) / 2;
+      lights[i].passes =
+          static_cast<std::uint8_t>(1 | (colour.r >= half) << 1 | (colour.g >= half) << 2 | (colour.b >= half) << 3);
+    }
+  }
+  return lights;
+}
+
+IBox grown(const IBox& box, int by) {
+  return {box.min - by, box.max + by};
+}
+
+IBox clipped(const IBox& box, IVec3 low) {
+  return {glm::max(box.min, low), glm::min(box.max, low + kChunkEdge)};
+}
+
+}  // namespace
+
+LightLevels lamp_levels(const VoxelProperties& properties) {
+  const float strength = 15.0F * std::clamp(properties.emission, 0.0F, 1.0F);
+  const Rgba8& colour = properties.colour;
+  const float greatest = std::max({colour.r, colour.g, colour.b, std::uint8_t{1}});
+  const auto level = [&](std::uint8_t channel) {
+    return static_cast<std::uint8_t>(std::lround(strength * static_cast<float>(channel) / greatest));
+  };
+  return {0, level(colour.r), level(colour.g), level(colour.b)};
+}
+
+struct PropagatedLight::Impl {
+  using Queue = std::map<IVec3, IBox, bool (*)(IVec3, IVec3)>;
+  struct Job {
+    IVec3 chunk;
+    IBox box;  // of the chunk
+    LightChange change;
+    std::optional<std::uint16_t> uniform;  // what the whole chunk has become
+  };
+
+  [[nodiscard]] const Chunk* stored(IVec3 chunk) const { return levels.find_chunk(chunk); }
+  class WordReader;
+  void begin_anew(const Grid& grid);
+  void take_over(const Grid& grid, const GridChanges& changes);
+  void change_domain(const Grid& grid, const std::vector<IVec3>& chunks);
+  void take_in(IVec3 chunk);
+  void let_go(IVec3 chunk);
+  void add(const IBox& voxels);
+  [[nodiscard]] IBox reach_of(const Grid& grid, const IBox& voxels) const;
+  void run(const Grid& grid, Threads threads);
+  [[nodiscard]] std::vector<Job> next_jobs();
+  void solve(const Grid& grid, LightSolver& solver, Job& job) const;
+  [[nodiscard]] LightBorder border_of(IVec3 chunk) const;
+  [[nodiscard]] std::optional<std::uint16_t> uniform_light(const Grid& grid, IVec3 chunk,
+                                                           const LightBorder& border) const;
+  void put_rows(const Job& job);
+  void put(const Job& job);
+  void go_on(const Job& job, const IBox& changed);
+
+  PropagatedLightOptions options;
+  ChangeCursor followed_grid;
+  ChangeCursor followed_types;
+  std::vector<TypeLight> lights;
+  LightDomain domain;
+  Grid levels;  // of packed light, of the chunks of the domain
+  Queue queue{by_zyx};
+  std::vector<VoxelType> dense;  // of a chunk
+};
+
+/// Remembers the chunk that it read last.
+class PropagatedLight::Impl::WordReader {
+ public:
+  explicit WordReader(const Impl& of) : of_(of) {}
+  std::uint16_t at(IVec3 voxel) {
+    const IVec3 chunk = chunk_of(voxel);
+    if (!is_known_ || chunk != last_) look_at(chunk);
+    return stored_ == nullptr ? word_ : stored_->get(local_of(voxel));
+  }
+
+ private:
+  void look_at(IVec3 chunk) {
+    is_known_ = true;
+    last_ = chunk;
+    const bool is_held = of_.domain.holds(chunk);
+    stored_ = is_held ? of_.stored(chunk) : nullptr;
+    word_ = is_held ? std::uint16_t{0} : of_.domain.beyond(chunk);
+  }
+
+  const Impl& of_;
+  bool is_known_ = false;
+  IVec3 last_{0};
+  const Chunk* stored_ = nullptr;
+  std::uint16_t word_ = 0;
+};
+
+void PropagatedLight::Impl::begin_anew(const Grid& grid) {
+  queue.clear();
+  domain.clear();
+  levels.clear();
+  change_domain(grid, grid.chunks());
+}
+
+// Chunks that came or went, or may have: light of what the domain has now is found from nothing.
+void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks) {
+  std::vector<LightDomain::Change> changed;
+  for (const IVec3 chunk : chunks) domain.set(chunk, grid.find_chunk(chunk) != nullptr, changed);
+  for (const LightDomain::Change& column : changed) {
+    const LightDomain::Range old = column.before;
+    for (int y = old.begin; y < old.end; ++y) {
+      if (y < column.now.begin || y >= column.now.end) let_go({column.x, y, column.z});
+    }
+    for (int y = column.now.begin; y < column.now.end; ++y) {
+      if (y < old.begin || y >= old.end) take_in({column.x, y, column.z});
+    }
+  }
+  std::erase_if(queue, [&](const auto& each) { return !domain.holds(each.first); });
+}
+
+// It begins in the dark: light that grows comes to its end in fewer steps than light that dwindles. To those beside it
+// it was as the domain said.
+void PropagatedLight::Impl::take_in(IVec3 chunk) {
+  queue[chunk] = kWholeChunk;
+  for (const Direction direction : kDirections) queue[chunk + normal_of(direction)] = kWholeChunk;
+}
+
+void PropagatedLight::Impl::let_go(IVec3 chunk) {
+  levels.put_chunk(chunk, Chunk());
+  for (const Direction direction : kDirections) queue[chunk + normal_of(direction)] = kWholeChunk;
+}
+
+// Where light may differ for edits of these voxels: as far as it reaches, around columns that the sky falls down too.
+IBox PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const {
+  int low = voxels.min.y;
+  WordReader words(*this);
+  for (int z = voxels.min.z; z < voxels.max.z; ++z) {
+    for (int x = voxels.min.x; x < voxels.max.x; ++x) {
+      bool has_sky = (words.at({x, voxels.max.y, z}) & 15) == kOpenSky;
+      for (int y = voxels.min.y; y < voxels.max.y; ++y) has_sky |= (words.at({x, y, z}) & 15) == kOpenSky;
+      if (!has_sky) continue;
+      const LightDomain::Range range = domain.range(x >> kChunkShift, z >> kChunkShift);
+      int y = voxels.min.y;
+      const auto passes = [&] {
+        const VoxelType type = grid.get(x, y - 1, z);
+        return type < lights.size() && (type == kAir || (lights[type].passes & 1U) != 0);
+      };
+      while (y - 1 >= range.begin * kChunkEdge && passes()) --y;
+      low = std::min(low, y);
+    }
+  }
+  return grown({{voxels.min.x, low, voxels.min.z}, voxels.max}, kReach);
+}
+
+void PropagatedLight::Impl::add(const IBox& voxels) {
+  const IVec3 first = chunk_of(voxels.min);
+  const IVec3 last = chunk_of(voxels.max - 1);
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x) {
+        const IVec3 chunk{x, y, z};
+        if (!domain.holds(chunk)) continue;
+        const IVec3 low = chunk * kChunkEdge;
+        const IBox part = clipped(voxels, low);
+        IBox& box = queue[chunk];
+        box = unite(box, {part.min - low, part.max - low});
+      }
+    }
+  }
+}
+
+void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
+  std::vector<IVec3> chunks;
+  for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
+  change_domain(grid, chunks);
+  for (const ChunkChange& change : changes.items) {
+    const IVec3 low = change.chunk * kChunkEdge;
+    add(reach_of(grid, {change.box.min + low, change.box.max + low}));
+  }
+}
+
+LightBorder PropagatedLight::Impl::border_of(IVec3 chunk) const {
+  LightBorder border;
+  for (const Direction direction : kDirections) {
+    const IVec3 other = chunk + normal_of(direction);
+    const auto i = static_cast<std::size_t>(direction);
+    if (domain.holds(other)) {
+      border.chunk[i] = stored(other);  // dark where nothing is stored
+    } else {
+      border.beyond[i] = domain.beyond(other);
+    }
+  }
+  return border;
+}
+
+// Of chunks of air under the open sky, and in the dark.
+std::optional<std::uint16_t> PropagatedLight::Impl::uniform_light(const Grid& grid, IVec3 chunk,
+                                                                  const LightBorder& border) const {
+  if (grid.find_chunk(chunk) != nullptr) return std::nullopt;
+  std::array<std::uint16_t, 6> around{};
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    if (border.chunk[i] != nullptr && !border.chunk[i]->uniform()) return std::nullopt;
+    around[i] = border.chunk[i] != nullptr ? *border.chunk[i]->uniform() : border.beyond[i];
+    if (around[i] != 0 && around[i] != kOpenSky) return std::nullopt;
+  }
+  if (around[static_cast<std::size_t>(Direction::PosY)] == kOpenSky) return kOpenSky;
+  return std::all_of(around.begin(), around.end(), [](std::uint16_t word) { return word == 0; })
+             ? std::optional<std::uint16_t>(0)
+             : std::nullopt;
+}
+
+void PropagatedLight::Impl::solve(const Grid& grid, LightSolver& solver, Job& job) const {
+  const LightBorder border = border_of(job.chunk);
+  job.uniform = uniform_light(grid, job.chunk, border);
+  if (job.uniform) return;
+  job.change = solver.solve(grid.find_chunk(job.chunk), lights, stored(job.chunk), border, job.box);
+}
+
+// The highest chunks of the queue, since sky falls: what lies below is solved once with what comes from above.
+std::vector<PropagatedLight::Impl::Job> PropagatedLight::Impl::next_jobs() {
+  int highest = queue.begin()->first.y;
+  for (const auto& [chunk, box] : queue) highest = std::max(highest, chunk.y);
+  std::vector<Job> jobs;
+  for (auto next = queue.begin(); next != queue.end();) {
+    const auto each = next++;
+    if (each->first.y != highest) continue;
+    jobs.push_back({each->first, each->second, {}, std::nullopt});
+    queue.erase(each);
+  }
+  return jobs;
+}
+
+void PropagatedLight::Impl::put_rows(const Job& job) {
+  constexpr std::size_t kMany = 256;  // rows: storing all of a chunk anew takes less time
+  if (job.change.rows.size() < kMany) {
+    const IVec3 low = job.chunk * kChunkEdge;
+    for (const LightChange::Row& row : job.change.rows) {
+      levels.write_row(low + IVec3(0, row.y, row.z), row.changed, row.now);
+    }
+    return;
+  }
+  dense.resize(kChunkVoxels);
+  const auto row_of = [&](int y, int z) {
+    const std::size_t first = static_cast<std::size_t>(y + kChunkEdge * z) * kChunkEdge;
+    return std::span(dense).subspan(first).first<kChunkEdge>();
+  };
+  const Chunk* before = stored(job.chunk);
+  const Chunk dark;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) (before == nullptr ? dark : *before).read_row(y, z, row_of(y, z));
+  }
+  for (const LightChange::Row& row : job.change.rows) {
+    const std::span<VoxelType, kChunkEdge> now = row_of(row.y, row.z);
+    for (std::uint64_t left = row.changed; left != 0; left &= left - 1) {
+      const auto x = static_cast<std::size_t>(std::countr_zero(left));
+      now[x] = row.now[x];
+    }
+  }
+  levels.put_chunk(job.chunk, Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense)));
+}
+
+void PropagatedLight::Impl::put(const Job& job) {
+  IBox changed;
+  if (job.uniform) {
+    const Chunk* before = stored(job.chunk);
+    const VoxelType was = before == nullptr ? kAir : before->uniform().value_or(static_cast<VoxelType>(~*job.uniform));
+    if (was == *job.uniform) return;
+    levels.put_chunk(job.chunk, Chunk(*job.uniform));
+    changed = kWholeChunk;
+  } else {
+    changed = job.change.box;
+    put_rows(job);
+  }
+  if (!changed.empty()) go_on(job, changed);
+}
+
+// What changed at a side of the box may change what lies beyond it: as far as light reaches, and down the whole chunk.
+void PropagatedLight::Impl::go_on(const Job& job, const IBox& changed) {
+  const IVec3 low = job.chunk * kChunkEdge;
+  const IBox solved = job.uniform ? kWholeChunk : job.box;
+  const IBox world{changed.min + low, changed.max + low};
+  for (const Direction direction : kDirections) {
+    const FaceFrame& frame = frame_of(direction);
+    const bool is_up = frame.sign > 0;
+    const bool touches =
+        is_up ? changed.max[frame.axis] == solved.max[frame.axis] : changed.min[frame.axis] == solved.min[frame.axis];
+    if (!touches) continue;
+    IBox beyond = grown(world, kReach - 1);
+    (is_up ? beyond.min : beyond.max)[frame.axis] = is_up ? world.max[frame.axis] : world.min[frame.axis];
+    if (direction == Direction::NegY) beyond.min.y = std::min(beyond.min.y, (beyond.max.y - 1) & ~(kChunkEdge - 1));
+    // No farther than the chunk beside it, whose own changes go on from there.
+    const IVec3 next = solved.max[frame.axis] == kChunkEdge && is_up ? job.chunk + normal_of(direction)
+                       : solved.min[frame.axis] == 0 && !is_up       ? job.chunk + normal_of(direction)
+                                                                     : job.chunk;
+    if (!domain.holds(next)) continue;
+    const IVec3 next_low = next * kChunkEdge;
+    const IBox part = clipped(beyond, next_low);
+    if (part.empty()) continue;
+    IBox& box = queue[next];
+    box = unite(box, {part.min - next_low, part.max - next_low});
+  }
+}
+
+void PropagatedLight::Impl::run(const Grid& grid, Threads threads) {
+  while (!queue.empty()) {
+    std::vector<Job> jobs = next_jobs();
+    parallel_for(jobs.size(), threads, [&](std::size_t i) {
+      thread_local LightSolver solver;
+      solve(grid, solver, jobs[i]);
+    });
+    for (const Job& job : jobs) put(job);
+  }
+}
+
+PropagatedLight::PropagatedLight(PropagatedLightOptions options) : impl_(std::make_unique<Impl>()) {
+  impl_->options = std::move(options);
+}
+PropagatedLight::PropagatedLight(PropagatedLight&&) noexcept = default;
+PropagatedLight& PropagatedLight::operator=(PropagatedLight&&) noexcept = default;
+PropagatedLight::~PropagatedLight() = default;
+
+void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+  Impl& me = *impl_;
+  try {
+    GridChanges changes = grid.changes_since(me.followed_grid);
+    if (me.lights.empty() || types.has_changed_since(me.followed_types)) {
+      me.followed_types = types.cursor();
+      std::vector<TypeLight> lights = type_lights(types, me.options);
+      // A type that was not registered was opaque: those that are new are others than before.
+      changes.all |= lights != me.lights;
+      me.lights = std::move(lights);
+    }
+    changes.all ? me.begin_anew(grid) : me.take_over(grid, changes);
+    me.run(grid, threads);
+  } catch (...) {
+    me.followed_grid = {};
+    throw;
+  }
+}
+
+LightLevels PropagatedLight::at(IVec3 voxel) const {
+  return unpacked_light(Impl::WordReader(*impl_).at(voxel));
+}
+
+void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const {
+  const IVec3 chunk = chunk_of(voxel);
+  if (!impl_->domain.holds(chunk)) {
+    std::fill(out.begin(), out.end(), impl_->domain.beyond(chunk));
+    return;
+  }
+  const Chunk* stored = impl_->stored(chunk);
+  if (stored == nullptr) {
+    std::fill(out.begin(), out.end(), std::uint16_t{0});
+    return;
+  }
+  const IVec3 local = local_of(voxel);
+  stored->read_row(local.y, local.z, out);
+}
+
+GridChanges PropagatedLight::changes_since(ChangeCursor& cursor) const {
+  return impl_->levels.changes_since(cursor);
+}
+
+namespace {
+
+// The light in front of a quad's faces: [u + width * v].
+struct QuadLight {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint16_t> words;
+
+  [[nodiscard]] std::uint16_t& at(int u, int v) { return words[static_cast<std::size_t>(u + width * v)]; }
+  [[nodiscard]] bool is_uniform() const {
+    return std::all_of(words.begin(), words.end(), [&](std::uint16_t word) { return word == words.front(); });
+  }
+  // How far the light of a cell goes on along u, and then along v.
+  [[nodiscard]] std::pair<int, int> extent(int u, int v, const std::vector<bool>& done) {
+    const std::uint16_t word = at(u, v);
+    const auto is_free = [&](int x, int y) {
+      return !done[static_cast<std::size_t>(x + width * y)] && at(x, y) == word;
+    };
+    int right = u + 1;
+    while (right < width && is_free(right, v)) ++right;
+    int top = v + 1;
+    const auto is_row = [&](int y) {
+      for (int x = u; x < right; ++x) {
+        if (!is_free(x, y)) return false;
+      }
+      return true;
+    };
+    while (top < height && is_row(top)) ++top;
+    return {right - u, top - v};
+  }
+};
+
+}  // namespace
+
+void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
+                            std::vector<std::uint16_t>& light) const {
+  out.clear();
+  light.clear();
+  Impl::WordReader words(*impl_);
+  QuadLight of_quad;
+  std::vector<bool> done;
+  for (const Quad quad : quads) {
+    const FaceFrame& frame = frame_of(quad.direction());
+    const IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction());
+    of_quad.width = quad.size_u();
+    of_quad.height = quad.size_v();
+    of_quad.words.clear();
+    for (int v = 0; v < quad.size_v(); ++v) {
+      for (int u = 0; u < quad.size_u(); ++u) {
+        IVec3 at = first;
+        at[frame.u] += u;
+        at[frame.v] += v;
+        of_quad.words.push_back(words.at(at));
+      }
+    }
+    if (of_quad.is_uniform()) {
+      out.push_back(quad);
+      light.push_back(of_quad.words.front());
+      continue;
+    }
+    done.assign(of_quad.words.size(), false);
+    for (int v = 0; v < quad.size_v(); ++v) {
+      for (int u = 0; u < quad.size_u(); ++u) {
+        if (done[static_cast<std::size_t>(u + of_quad.width * v)]) continue;
+        const auto [along_u, along_v] = of_quad.extent(u, v, done);
+        for (int y = v; y < v + along_v; ++y) {
+          for (int x = u; x < u + along_u; ++x) done[static_cast<std::size_t>(x + of_quad.width * y)] = true;
+        }
+        out.push_back(quad_part(quad, u, v, along_u, along_v));
+        light.push_back(of_quad.at(u, v));
+      }
+    }
+  }
+}
+
+std::size_t PropagatedLight::bytes() const {
+  return impl_->levels.bytes() + impl_->lights.capacity() * sizeof(TypeLight);
+}
+
+}  // namespace quoin
