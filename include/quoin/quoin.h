@@ -77,6 +77,7 @@
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/smooth_scene.h>
 #include <quoin/scene/sweep.h>
 #include <quoin/scene/volume_scene.h>
 #include <quoin/terrain/noise.h>
