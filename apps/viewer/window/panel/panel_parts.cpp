@@ -130,8 +130,8 @@ void draw_sun(LightOptions& light, bool has_rays) {
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
   if (!has_rays && ImGui::IsItemHovered()) {
     ImGui::SetTooltip(
-        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror;\n"
-        "marched rays show all of it (F5)");
+        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror, until the view\n"
+        "rests; marched rays show all of it (F5)");
   }
 }
 
