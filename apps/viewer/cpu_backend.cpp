@@ -269,7 +269,7 @@ Status CpuBackend::Impl::prepare_smooth(const Progress& goes_on) {
     if (smooth_percent.exchange(percent) != percent) tell();
     return goes_on(share);
   };
-  const Status made = [&]() -> Status {
+  Status made = [&]() -> Status {
     try {
       if (!smooth) smooth = std::make_unique<SmoothPart>(options);
       if (Status updated = smooth->fields.update(scene, options.threads, tell_how_far); !updated) return updated;

@@ -17,17 +17,20 @@ struct SmoothFieldOptions {
   std::size_t max_bytes = std::size_t{1} << 30;
 };
 
-/// A scene as its smooth meshes show it, for rays: in the place of each grid's voxels stands the field that their smooth
-/// mesh is made from (`field_from_grid`), fields stay as they are. It holds the instances that are drawn, and no others.
+/// A scene as its smooth meshes show it, for rays: in the place of each grid's voxels stands the field that their
+/// smooth mesh is made from (`field_from_grid`), fields stay as they are. It holds the instances that are drawn, and no
+/// others.
 ///
 ///   quoin::SmoothScene smooth;
 ///   if (auto made = smooth.update(scene); !made) return made.error();
 ///   const quoin::CpuRenderer renderer(smooth.scene());
 ///
-/// Shape:   that of the field, but for two things that smooth meshes have by moving vertices: what is one or two voxels
-///          thick keeps its thickness, and where two bodies meet (water and its bed) they do so in the middle between
-///          voxels.
-/// Threads: one; several scenes may follow one.
+/// Space:   as the scene that it follows: instances keep their places, names and handles' order. A grid's samples are
+///          its voxels' centres.
+/// Shape:   that of the field, but for what smooth meshes have by moving vertices: what is thin keeps its thickness,
+///          voxels that touch by an edge are joined, and where two bodies meet (water and its bed) they do so in the
+///          middle between voxels. Flat glass and water are as thick as those of blocks.
+/// Threads: one at a time; several may follow one scene.
 class SmoothScene {
  public:
   explicit SmoothScene(const SmoothFieldOptions& options = {});
