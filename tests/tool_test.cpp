@@ -682,6 +682,9 @@ TEST_F(Tool, HelpHasAnExampleForEveryCommand) {
     const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_NE(help.out.find("Example: quoin " + command), std::string::npos) << help.out;
+    for (const std::string option : {"--raw-size", "--raw-type", "--raw-order"}) {
+      EXPECT_EQ(help.out.find(option) != std::string::npos, command != "generate") << command;
+    }
   }
   EXPECT_EQ(run("--version").out.substr(0, 6), "quoin ");
 }

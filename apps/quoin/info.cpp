@@ -316,7 +316,8 @@ void add_info_command(CLI::App& app, int& status) {
   command->footer("Reads " + readable_extensions() +
                   "; - is standard input.\n"
                   "Faces are those of the models that are placed and not hidden, each model's once.\n"
-                  "Example: quoin info castle.vox");
+                  "Example: quoin info castle.vox\n"
+                  "Example: quoin info scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, options, texts, &status] {
     VolumeArguments volume;
     if (const std::string fault = read_volume_options(*command, *texts, volume); !fault.empty()) {

@@ -140,7 +140,10 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_option("--device", arguments->device, "Device of Vulkan: its number or a part of its name");
   command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));
-  command->footer("F1 in the window says what keys and mouse do.\nExample: quoin view castle.vox");
+  command->footer(
+      "F1 in the window says what keys and mouse do.\n"
+      "Example: quoin view castle.vox\n"
+      "Example: quoin view scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, arguments, &status] {
     if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
       print_error(fault + " (try --help)");

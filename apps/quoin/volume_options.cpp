@@ -30,7 +30,9 @@ std::string read_iso(const std::string& text, std::optional<double>& iso) {
 void add_raw_options(CLI::App& command, VolumeTexts& texts) {
   command.add_option("--raw-size", texts.raw_size,
                      "XxYxZ: IN is a file of values alone, x fastest, that many along each axis");
-  command.add_option("--raw-type", texts.raw_type, "Of its values: uint8 to int64, float32 or float64 (default uint8)");
+  command.add_option("--raw-type", texts.raw_type,
+                     "Of its values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
+                     "(default uint8)");
   command.add_option("--raw-order", texts.raw_order, "Byte order of its values: little or big (default little)")
       ->check(CLI::IsMember({"little", "big"}));
 }

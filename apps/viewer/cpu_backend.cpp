@@ -13,6 +13,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
+#include <quoin/scene/smooth_scene.h>
 
 namespace quoin::viewer {
 
@@ -57,7 +58,7 @@ LightOptions draft_of(LightOptions light) {
 }
 
 bool has_drafts(const ViewRequest& request) {
-  return request.mode == DrawMode::Rays && draft_of(request.light) != request.light;
+  return request.mode != DrawMode::Density && !request.whole_only && draft_of(request.light) != request.light;
 }
 
 RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
@@ -89,6 +90,15 @@ Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, c
   return picture;
 }
 
+/// What pictures of smooth surfaces are marched through.
+struct SmoothPart {
+  explicit SmoothPart(const CpuBackendOptions& options) : fields({options.instances, options.max_density_bytes}) {}
+
+  SmoothScene fields;
+  std::optional<CpuRenderer> renderer;
+  std::map<int, DetailSelector> selectors;
+};
+
 }  // namespace
 
 struct CpuBackend::Impl {
@@ -114,6 +124,9 @@ struct CpuBackend::Impl {
   }
   void update(std::unique_lock<std::mutex>& lock);
   void draw(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] Result<Picture> picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
+  [[nodiscard]] Status prepare_smooth(const Progress& goes_on);
+  void refuse_smooth(Error why);
   void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
   [[nodiscard]] Stage first_stage() const;
   [[nodiscard]] std::optional<Stage> finest(bool is_draft, double patience) const;
@@ -127,8 +140,11 @@ struct CpuBackend::Impl {
   std::function<void()> on_frame;
   CpuRenderer renderer;
   std::map<int, DetailSelector> selectors;  // by divisor: pictures of another size are another view
+  std::unique_ptr<SmoothPart> smooth;       // the worker's
+  std::atomic<bool> is_smooth_stale{true};
+  std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
 
-  std::mutex mutex;  // guards what follows, but for the atomic ones
+  mutable std::mutex mutex;  // guards what follows, but for the atomic ones
   std::condition_variable wake;
   std::condition_variable idle;
   std::optional<ViewRequest> request;
@@ -142,6 +158,7 @@ struct CpuBackend::Impl {
   bool is_broken = false;  // there was not memory enough: nothing is done until the scene has changed again
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
+  std::optional<Error> refusal;               // of smooth pictures
   std::array<double, 2> seconds_per_pixel{};  // in full light and of drafts; 0: not known
   Stage first{kDivisors.front()};             // what the last request began with
 
@@ -193,6 +210,7 @@ std::optional<Stage> CpuBackend::Impl::finest(bool is_draft, double patience) co
 
 // As large as there is time for; a draft where a picture in full light would be smaller than a half.
 Stage CpuBackend::Impl::first_stage() const {
+  if (request->whole_only) return {};
   const double patience = options.first_frame_seconds * (is_camera_new ? 1.0 : kPatienceAfterEdits);
   const std::optional<Stage> full = finest(false, patience);
   if (!has_drafts(*request)) return full.value_or(Stage{kDivisors.front()});
@@ -203,6 +221,7 @@ Stage CpuBackend::Impl::first_stage() const {
 void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const bool is_first = !stage.has_value();
   if (is_first) stage = first = first_stage();
+  const bool is_kept_on = is_first && !request->whole_only;
   ViewRequest wanted = *request;
   const bool is_density = wanted.mode == DrawMode::Density;
   if (is_density) wanted.samples = 1;
@@ -210,14 +229,14 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t number = request_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
-  RenderOptions render = options_for(wanted, now);
-  render.detail.selector = &selectors[now.divisor];
-  const auto goes_on = [&](double) { return !halt && (is_first || request_number == number); };
-  auto picture = is_density ? draw_densities(scene, wanted, now, options)
-                            : renderer.render(wanted.camera, render, options.threads, goes_on);
+  auto picture = picture_of(wanted, now, [&](double) { return !halt && (is_kept_on || request_number == number); });
   const double seconds = seconds_since(start);
   lock.lock();
   if (!picture && picture.error().code == ErrorCode::Cancelled) return;
+  if (refusal && wanted.mode == DrawMode::Smooth) {
+    is_done = request_number == number;
+    return;
+  }
   publish(std::move(picture), wanted, now, seconds);
   if (request_number != number) {
     if (frame) frame->is_settled = false;
@@ -226,6 +245,57 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   is_done = error.has_value() || now.is_last(wanted);
   is_camera_new = false;
   stage = now.next(wanted);
+}
+
+Result<Picture> CpuBackend::Impl::picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on) {
+  if (wanted.mode == DrawMode::Density) return draw_densities(scene, wanted, now, options);
+  RenderOptions render = options_for(wanted, now);
+  if (wanted.mode != DrawMode::Smooth) {
+    smooth.reset();
+    is_smooth_stale = true;
+    render.detail.selector = &selectors[now.divisor];
+    return renderer.render(wanted.camera, render, options.threads, goes_on);
+  }
+  if (Status prepared = prepare_smooth(goes_on); !prepared) return prepared.error();
+  render.detail.selector = &smooth->selectors[now.divisor];
+  return smooth->renderer->render(wanted.camera, render, options.threads, goes_on);
+}
+
+// Makes the fields, or what of them changed.
+Status CpuBackend::Impl::prepare_smooth(const Progress& goes_on) {
+  if (!is_smooth_stale) return {};
+  const auto tell_how_far = [&](double share) {
+    const int percent = static_cast<int>(share * 100.0);
+    if (smooth_percent.exchange(percent) != percent) tell();
+    return goes_on(share);
+  };
+  Status made = [&]() -> Status {
+    try {
+      if (!smooth) smooth = std::make_unique<SmoothPart>(options);
+      if (Status updated = smooth->fields.update(scene, options.threads, tell_how_far); !updated) return updated;
+      if (smooth->renderer) {
+        smooth->renderer->update(options.threads);
+      } else {
+        smooth->renderer.emplace(smooth->fields.scene(), InstanceFilter::All, options.threads);
+      }
+      return {};
+    } catch (const std::bad_alloc&) {
+      smooth.reset();
+      return make_error(ErrorCode::LimitExceeded, "out of memory");
+    }
+  }();
+  smooth_percent = -1;
+  if (made) {
+    is_smooth_stale = false;
+  } else if (made.error().code != ErrorCode::Cancelled) {
+    refuse_smooth(made.error());
+  }
+  return made;
+}
+
+void CpuBackend::Impl::refuse_smooth(Error why) {
+  const std::lock_guard lock(mutex);
+  refusal = std::move(why);
 }
 
 void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, const Stage& drawn, double seconds) {
@@ -275,6 +345,16 @@ std::optional<ViewFrame> CpuBackend::take() {
   return std::exchange(impl_->frame, std::nullopt);
 }
 
+std::string CpuBackend::activity() const {
+  const int percent = impl_->smooth_percent;
+  return percent < 0 ? "" : "preparing light " + std::to_string(percent) + " %";
+}
+
+std::optional<Error> CpuBackend::smooth_refusal() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->refusal;
+}
+
 std::optional<Error> CpuBackend::fault() {
   const std::lock_guard lock(impl_->mutex);
   return impl_->error;
@@ -296,7 +376,9 @@ void CpuBackend::resume(bool changed) {
     impl_->halt = impl_->is_stopped;
     if (changed) {
       impl_->is_stale = true;
+      impl_->is_smooth_stale = true;
       impl_->is_broken = false;
+      impl_->refusal.reset();
       impl_->is_done = false;
       impl_->stage.reset();
       impl_->frame.reset();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 
 #include <quoin/core/parallel.h>
@@ -14,6 +15,8 @@ struct CpuBackendOptions {
   /// How long the first picture after a change of the camera may take, by the time that pixels have taken so far: it
   /// is as large as that allows, of a quarter of the width and height at least. 0: always that.
   double first_frame_seconds = 0.05;
+  /// Of the densities that stand for voxels in pictures of smooth surfaces.
+  std::size_t max_density_bytes = std::size_t{1} << 30;
 };
 
 /// Pictures by CpuRenderer on a thread of its own: a quarter of the size, or a third, half, whole; then of 4, 16 ...
@@ -21,6 +24,9 @@ struct CpuBackendOptions {
 /// would make the first picture smaller than a half it is a draft: with few lamps, and the occlusion of vertices.
 ///
 /// A new request ends what is under way, but for the coarsest picture: however fast requests come, some are seen.
+///
+/// DrawMode::Smooth is marched as well, through the fields of a SmoothScene: these are made before the first such
+/// picture, follow edits, and are let go of with the first picture of another mode.
 class CpuBackend final : public ViewBackend {
  public:
   /// `scene` must outlive it in its place. `on_frame` is called from the backend's thread when there is a frame to take
@@ -32,7 +38,11 @@ class CpuBackend final : public ViewBackend {
   [[nodiscard]] std::string name() const override;
   void show(const ViewRequest& request) override;
   [[nodiscard]] std::optional<ViewFrame> take() override;
+  [[nodiscard]] std::string activity() const override;
   [[nodiscard]] std::optional<Error> fault() override;
+  /// Why the scene cannot be marched as DrawMode::Smooth, if that was tried since the last edit: its densities take
+  /// too much memory.
+  [[nodiscard]] std::optional<Error> smooth_refusal() const;
   double pause() override;
   void resume(bool changed) override;
   [[nodiscard]] std::optional<SlideResult> slide(const OrientedBox& box, DVec3 displacement,

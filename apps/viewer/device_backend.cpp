@@ -53,9 +53,13 @@ struct DeviceBackend::Impl {
   [[nodiscard]] bool can_draw_now() const {
     return uses_device() && !is_paused && !is_device_gone && request->width > 0 && request->height > 0;
   }
-  // Whether marched rays show what meshes do, but for what these round: blocks, and fields.
+  // Whether marched rays can show what meshes do.
   [[nodiscard]] bool is_marched_alike(DrawMode mode) const {
-    return mode == DrawMode::Blocks || (mode == DrawMode::Smooth && is_all_fields);
+    return mode == DrawMode::Blocks || (mode == DrawMode::Smooth && (is_all_fields || !is_refused));
+  }
+  // As what the processor marches it, at rest.
+  [[nodiscard]] DrawMode marched_mode() const {
+    return request->mode == DrawMode::Smooth && !is_all_fields ? DrawMode::Smooth : DrawMode::Rays;
   }
   // Whether light by rays is added at rest, which a processor that acts as a device has no time for.
   [[nodiscard]] bool is_lit_at_rest() const {
@@ -65,6 +69,7 @@ struct DeviceBackend::Impl {
            light.shading == Shading::Lit && wants_rays;
   }
   [[nodiscard]] ViewRequest request_of_light() const;
+  [[nodiscard]] std::optional<ViewFrame> take_light();
   [[nodiscard]] std::optional<ViewFrame> draw_here();
   void show_by_processor();
   void give_up_device();
@@ -104,6 +109,7 @@ struct DeviceBackend::Impl {
   bool is_drawn = false;  // something of the mode that is wanted
   bool rests = false;     // the device has drawn all that it draws of it
   bool is_all_fields = false;
+  bool is_refused = false;  // by the processor: smooth surfaces of voxels
   std::optional<ViewFrame> frame;
   std::optional<Error> error;
   Told told;
@@ -251,7 +257,8 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
 // The same picture by rays, in all its light, with the occlusion that meshes have.
 ViewRequest DeviceBackend::Impl::request_of_light() const {
   ViewRequest of_cpu = *request;
-  of_cpu.mode = DrawMode::Rays;
+  of_cpu.mode = marched_mode();
+  of_cpu.whole_only = true;  // coarser than what the device has drawn it would not be shown
   of_cpu.samples = std::min(request->samples, kSamplesAtRest);
   if (of_cpu.light.occlusion_mode != OcclusionMode::Off) of_cpu.light.occlusion_mode = OcclusionMode::Smooth;
   return of_cpu;
@@ -264,11 +271,24 @@ void DeviceBackend::Impl::show_by_processor() {
     of_cpu = request_of_light();
   } else if (uses_device() && !is_device_gone) {
     const bool stands_in = has_thread() && !is_drawn;
-    of_cpu.mode = DrawMode::Rays;
+    of_cpu.mode = stands_in ? DrawMode::Rays : marched_mode();
     of_cpu.samples = 1;
     if (!stands_in) of_cpu.width = of_cpu.height = 0;
   }
   cpu.show(of_cpu);
+}
+
+// What the processor has drawn of the picture at rest. Where it refuses, the device draws once more what remains.
+std::optional<ViewFrame> DeviceBackend::Impl::take_light() {
+  if (request->mode == DrawMode::Smooth && cpu.smooth_refusal()) {
+    is_refused = true;
+    rests = false;
+    is_request_new = true;
+    wake.notify_all();
+    return std::nullopt;
+  }
+  auto lit = cpu.take();
+  return lit && lit->is_whole ? lit : std::nullopt;
 }
 
 void DeviceBackend::Impl::give_up_device() {
@@ -346,11 +366,7 @@ std::optional<ViewFrame> DeviceBackend::take() {
     me.show_by_processor();
     return std::exchange(me.frame, std::nullopt);
   }
-  if (me.rests) {
-    // Coarser than what is there it is not shown.
-    auto lit = me.cpu.take();
-    return lit && lit->is_whole ? lit : std::nullopt;
-  }
+  if (me.rests) return me.take_light();
   auto stand_in = me.is_drawn ? std::nullopt : me.cpu.take();
   if (stand_in) stand_in->is_settled = false;
   return stand_in;
@@ -372,7 +388,10 @@ std::string DeviceBackend::activity() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.uses_device() || !me.drawer) return {};
-  return me.has_thread() ? me.told.activity : me.tell().activity;
+  if (!me.has_thread()) return me.tell().activity;
+  if (!me.told.activity.empty()) return me.told.activity;
+  if (me.is_refused && me.request->mode == DrawMode::Smooth) return "too large for shadows";
+  return me.rests ? me.cpu.activity() : "";
 }
 
 bool DeviceBackend::is_slow(DrawMode mode) const {
@@ -409,6 +428,7 @@ void DeviceBackend::resume(bool changed) {
     impl_->is_paused = false;
     if (changed) {
       impl_->rests = false;
+      impl_->is_refused = false;
       if (impl_->request) {
         impl_->is_all_fields = has_meshes(impl_->request->mode) && impl_->scene.voxel_count() == 0;
         impl_->show_by_processor();

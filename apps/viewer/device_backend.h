@@ -27,7 +27,9 @@ struct DeviceBackendOptions {
 /// Pictures by a graphics device: ray-marched ones get better sample by sample, meshes follow edits as workers finish
 /// them. What is pointed at is found by the processor, which also draws where the device cannot, and rays until the
 /// device has its first picture of meshes. Where a processor acts as the device, meshes have no light that takes rays;
-/// once the view rests the processor draws, by rays, those that rays show alike: blocks, and scenes of fields alone.
+/// once the view rests the processor draws them by rays: blocks, fields, and smooth meshes of voxels through the fields
+/// that these are made from. Where the latter take too much memory their picture stays the device's, and `activity`
+/// says so.
 ///
 /// After a fault of the device it is not used again.
 class DeviceBackend final : public ViewBackend {

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/smooth_scene.h>
 
 #include "loader.h"
 #include "viewer_fixture.h"
@@ -88,7 +89,7 @@ class DeviceBackendTest : public ::testing::Test {
   static inline std::vector<std::string> messages_;
 };
 
-Image by_processor(const Document& document, const ViewRequest& request) {
+Image by_processor(const Scene& scene, const ViewRequest& request) {
   RenderOptions options;
   options.width = request.width;
   options.height = request.height;
@@ -96,7 +97,11 @@ Image by_processor(const Document& document, const ViewRequest& request) {
   options.light = request.light;
   options.detail.colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.policy.emplace();
-  return CpuRenderer(document.scene()).render(request.camera, options).value().colour;
+  return CpuRenderer(scene).render(request.camera, options).value().colour;
+}
+
+Image by_processor(const Document& document, const ViewRequest& request) {
+  return by_processor(document.scene(), request);
 }
 
 /// The share of pixels that differ by more than `most` in a channel.
@@ -341,8 +346,8 @@ TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
       const auto same = settle(*at_once);
       ASSERT_FALSE(pictures.empty());
       ASSERT_FALSE(same.empty());
-      // Light by rays is what the processor adds to blocks in the end, where it acts as a device.
-      const bool is_lit_after = is_processor() && mode == DrawMode::Blocks;
+      // Light by rays is what the processor adds in the end, where it acts as a device.
+      const bool is_lit_after = is_processor();
       const auto drawn = is_lit_after ? std::ranges::find(pictures, same.back().rgb, &Image::rgb) : pictures.end() - 1;
       ASSERT_NE(drawn, pictures.end());
       EXPECT_EQ(drawn->rgb, same.back().rgb);
@@ -358,16 +363,23 @@ TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
   }
 }
 
-TEST_F(DeviceBackendTest, BlocksHaveAllLightAtRestWhereAProcessorActsAsTheDevice) {
+class DeviceBackendLight : public DeviceBackendTest, public ::testing::WithParamInterface<DrawMode> {};
+INSTANTIATE_TEST_SUITE_P(Meshes, DeviceBackendLight, ::testing::Values(DrawMode::Blocks, DrawMode::Smooth),
+                         [](const auto& mode) { return mode.param == DrawMode::Blocks ? "Blocks" : "Smooth"; });
+
+TEST_P(DeviceBackendLight, IsAllThereAtRestWhereAProcessorActsAsTheDevice) {
   if (!is_processor()) GTEST_SKIP() << "a graphics card draws all light itself";
   Document document = small_document();
   const auto backend = backend_of(document, false);
-  ViewRequest request = request_for(document, DrawMode::Blocks);
+  ViewRequest request = request_for(document, GetParam());
   request.light = natural_light();
   const auto wanted = [&] {
     ViewRequest marched = request;
-    marched.light.occlusion_mode = OcclusionMode::Vertex;
-    return by_processor(document, marched);
+    marched.light.occlusion_mode = OcclusionMode::Smooth;
+    if (GetParam() == DrawMode::Blocks) return by_processor(document, marched);
+    SmoothScene smooth;
+    EXPECT_TRUE(smooth.update(document.scene()));
+    return by_processor(smooth.scene(), marched);
   };
   for (int round = 0; round < 3; ++round) {
     SCOPED_TRACE(round);
@@ -380,7 +392,8 @@ TEST_F(DeviceBackendTest, BlocksHaveAllLightAtRestWhereAProcessorActsAsTheDevice
     const auto whole = std::ranges::find(pictures, request.width, &Image::width);
     ASSERT_NE(whole, pictures.end());
     EXPECT_GT(differing(*whole, pictures.back(), 8), 0.02) << "the device's is without shadows";
-    EXPECT_TRUE(backend->traces_light(DrawMode::Blocks));
+    EXPECT_TRUE(backend->traces_light(GetParam()));
+    EXPECT_EQ(backend->activity(), "");
     EXPECT_FALSE(backend->take());
   }
   // What has nothing of it stays the device's: values, and edges.
@@ -393,7 +406,33 @@ TEST_F(DeviceBackendTest, BlocksHaveAllLightAtRestWhereAProcessorActsAsTheDevice
   const auto edges = settle(*backend);
   ASSERT_FALSE(edges.empty());
   EXPECT_GT(differing(edges.back(), wanted(), 8), 0.02);
-  EXPECT_FALSE(backend->traces_light(DrawMode::Smooth)) << "of voxels only a card shows those lit";
+}
+
+TEST_F(DeviceBackendTest, SmoothScenesThatAreTooLargeForLightSaySoAndStayTheDevices) {
+  if (!is_processor()) GTEST_SKIP() << "a graphics card draws all light itself";
+  Document document = small_document();
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  options.cpu.max_density_bytes = 1000;
+  const auto backend = backend_of(document, options);
+  ViewRequest request = request_for(document, DrawMode::Smooth);
+  request.light = natural_light();
+  for (int round = 0; round < 3; ++round) {
+    SCOPED_TRACE(round);
+    if (round == 1) request.camera.position.x += 3.0;
+    if (round == 2) edit(document, *backend, {30, 12, 20});
+    backend->show(request);
+    const auto pictures = settle(*backend);
+    ASSERT_FALSE(pictures.empty());
+    EXPECT_EQ(pictures.back().width, request.width);
+    EXPECT_EQ(backend->activity(), "too large for shadows");
+    EXPECT_FALSE(backend->traces_light(DrawMode::Smooth));
+    EXPECT_TRUE(backend->traces_light(DrawMode::Blocks));
+  }
+  request.mode = DrawMode::Blocks;
+  backend->show(request);
+  ASSERT_FALSE(settle(*backend).empty());
+  EXPECT_EQ(backend->activity(), "");
 }
 
 TEST_F(DeviceBackendTest, WhileADeviceOpensThereAreRaysAndEdits) {

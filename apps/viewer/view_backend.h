@@ -54,6 +54,7 @@ struct ViewRequest {
   DrawMode mode = DrawMode::Rays;
   Wireframe wireframe = Wireframe::Off;  ///< of meshes
   SlicePlace slice;                      ///< of densities, which know no camera and no light
+  bool whole_only = false;               ///< smaller pictures are of no use in the meantime
 };
 
 /// Whether both want the same picture.

@@ -78,6 +78,7 @@
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/smooth_scene.h>
 #include <quoin/scene/solid_shapes.h>
 #include <quoin/scene/sweep.h>
 #include <quoin/scene/volume_scene.h>

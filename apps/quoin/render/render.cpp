@@ -372,7 +372,8 @@ void add_render_command(CLI::App& app, int& status) {
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"
                   "Example: quoin render walk.vox -o walk.png --frames 0:24 --view left\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
-                  "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5");
+                  "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5\n"
+                  "Example: quoin render scan.raw -o scan.png --raw-size 256x256x128 --raw-type uint16 --iso 1200");
   command->callback([command, arguments, &status] {
     if (const std::string fault = settle(*command, *arguments); !fault.empty()) {
       print_error(fault + " (try --help)");

@@ -273,6 +273,8 @@ void App::take_frame(ViewFrame frame) {
     screen_->forget_picture();
     state_.tell(taken.error());
   }
+  // The status line of this frame was drawn before; where nothing better comes, nothing would draw it again.
+  if (frame.is_settled) frames_left_ = std::max(frames_left_, 2);
   state_.picture = std::move(frame);
 }
 

@@ -130,8 +130,8 @@ void draw_sun(LightOptions& light, bool has_rays) {
   ImGui::Checkbox("glass mirrors the sky", &light.glass_surfaces);
   if (!has_rays && ImGui::IsItemHovered()) {
     ImGui::SetTooltip(
-        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror;\n"
-        "marched rays show all of it (F5)");
+        "without a graphics card glass of meshes is one voxel thick, and only smooth meshes mirror, until the view\n"
+        "rests; marched rays show all of it (F5)");
   }
 }
 
@@ -151,7 +151,8 @@ void tell_of_plain_light(const ViewState& state) {
   if (!state.open.backend || state.open.backend->stats().empty()) return;
   if (state.open.backend->traces_light(state.settings.mode)) return;
   ImGui::TextWrapped(
-      "Without a graphics card smooth meshes have no shadows, lamps and depth of glass. F5 and F6 have them.");
+      "Without a graphics card so large a scene has no shadows, lamps and depth of glass in smooth meshes. F5 and F6 "
+      "have them.");
 }
 
 }  // namespace
@@ -335,7 +336,8 @@ void draw_light_part(ViewState& state) {
   ImGui::EndDisabled();
   if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip(
-        "smooth meshes have shadows where there is a graphics card; marched rays (F5) and blocks (F6) do everywhere");
+        "smooth meshes of so large a scene have shadows where there is a graphics card; marched rays (F5) and blocks\n"
+        "(F6) have them everywhere");
   }
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   if (ImGui::Checkbox("occlusion of all light", &is_all)) {

@@ -139,6 +139,12 @@ class GraphRevision {
   }
 
  private:
+  /// What a file without a scene graph shows at one frame.
+  struct Frame {
+    const GridPlan* plan = nullptr;  ///< null: its grid is gone
+    Motion first;                    ///< where the pivot of its first piece goes
+  };
+
   void number_layers();
   void find_top();
   void begin_graph(std::vector<std::int32_t> below);
@@ -176,13 +182,23 @@ class GraphRevision {
   [[nodiscard]] Result<Motion> place(const Instance& instance, const GridPlan& plan);
   [[nodiscard]] Motion place(const SceneGroup& group, const Motion& parent);
   [[nodiscard]] Result<NodeContent> transform_for(const Wanted& wanted, std::int32_t child);
-  void add_models(NodeContent& transform, NodeContent& shape, const Motion& world, const Motion& box) const;
+  [[nodiscard]] bool was_of_frames() const {
+    return source_.document.nodes.empty() && source_.document.models.size() > 1;
+  }
+  [[nodiscard]] std::vector<Frame> frames_about(const Motion& box) const;
+  [[nodiscard]] Motion from_source_box(const GridPlan& plan, std::size_t model) const;
+  void show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape);
+  void hang_piece(std::size_t group, const std::string& name, const GridPlan& plan, std::size_t piece,
+                  const Motion& motion, std::size_t frame, std::size_t frame_count);
+  void add_model(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name);
+  Status add_frames(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name);
   [[nodiscard]] NodeContent shape_of(std::int32_t id, std::uint32_t model) const;
 
   const Scene& scene_;
   const VoxSource& source_;
   const ModelPlan& models_;
   bool keeps_graph_;
+  bool keeps_frames_ = false;
   FreshIds ids_;
   RevisedGraph out_;
   Parent top_;
@@ -500,6 +516,13 @@ Status GraphRevision::revise_groups() {
   return {};
 }
 
+NodeContent group_of(std::int32_t id) {
+  NodeContent group;
+  group.kind = NodeKind::Group;
+  group.id = id;
+  return group;
+}
+
 NodeContent GraphRevision::shape_of(std::int32_t id, std::uint32_t model) const {
   NodeContent shape;
   shape.kind = NodeKind::Shape;
@@ -524,25 +547,71 @@ Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int3
   return transform;
 }
 
-/// Without a scene graph each model was a frame: they stay so. Requires: it is the instance that was read.
-/// `world`: of the model that is shown; `box`: likewise, of the box that it had in the source.
-void GraphRevision::add_models(NodeContent& transform, NodeContent& shape, const Motion& world,
-                               const Motion& box) const {
+/// Without a scene graph each model was a frame. `box`: where the pivot of the shown one's box in the source goes.
+std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box) const {
   const auto lone = [&](std::size_t model) {
     Motion motion;
     motion.translation[2] = source_.document.models[model].size.z / 2;
     return motion;
   };
-  const Motion moved = box * inverse(lone(static_cast<std::size_t>(source_.frame)));
+  const Motion ground = box * inverse(lone(static_cast<std::size_t>(source_.frame)));
+  std::vector<Frame> frames(source_.document.models.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const GridPlan* plan = models_.find({static_cast<std::uint32_t>(i), 0});
+    if (plan == nullptr || source_.scene.grids().find(plan->grid) == nullptr) continue;
+    // What outgrew its box has another pivot.
+    frames[i] = {plan, ground * lone(i) * inverse(from_source_box(*plan, i))};
+  }
+  return frames;
+}
+
+/// Where the pivot of a model's box in the source lies beside that of its first piece.
+Motion GraphRevision::from_source_box(const GridPlan& plan, std::size_t model) const {
+  GridPlan boxes = plan;
+  const IBox before = canvas_of(source_.document.models[model].size);
+  boxes.pieces.push_back({before.min, before.size(), 0});
+  return from_first_piece(boxes, plan.pieces.size());
+}
+
+/// A shape that shows, at each frame, the model that is one piece, and nothing where there are several.
+void GraphRevision::show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape) {
   transform.frames.clear();
   shape.models.clear();
-  for (std::size_t i = 0; i < source_.document.models.size(); ++i) {
-    const bool is_shown = i == static_cast<std::size_t>(source_.frame);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const bool is_one = frames[i].plan != nullptr && frames[i].plan->pieces.size() == 1;
+    out_.has_empty_model = out_.has_empty_model || !is_one;
     Entries& key = transform.frames.emplace_back();
-    set_motion(key, is_shown ? world : moved * lone(i));
+    if (is_one) set_motion(key, frames[i].first);
     key.set("_f", std::to_string(i));
-    shape.models.emplace_back(static_cast<std::uint32_t>(i), Entries{}).second.set("_f", std::to_string(i));
+    const std::uint32_t model = is_one ? frames[i].plan->first_model : models_.count;
+    shape.models.emplace_back(model, Entries{}).second.set("_f", std::to_string(i));
   }
+}
+
+/// Hangs a piece of a grid below a group that is at `group` in the added nodes; `frame`: the only one that shows it,
+/// of all those in `frame_count`; kNone: all do.
+void GraphRevision::hang_piece(std::size_t group, const std::string& name, const GridPlan& plan, std::size_t piece,
+                               const Motion& motion, std::size_t frame, std::size_t frame_count) {
+  NodeContent transform;
+  transform.kind = NodeKind::Transform;
+  transform.id = ids_.take();
+  transform.children = {ids_.take()};
+  transform.layer = layer_id({});
+  transform.attributes.set_or_erase("_name", name);
+  set_motion(transform.frames.emplace_back(), motion);
+  out_.added[group].children.push_back(transform.id);
+  const std::uint32_t model = plan.first_model + static_cast<std::uint32_t>(piece);
+  NodeContent shape = shape_of(transform.children.front(), model);
+  if (frame != kNone) {
+    shape.models.clear();
+    out_.has_empty_model = true;
+    for (std::size_t i = 0; i < frame_count; ++i) {
+      shape.models.emplace_back(i == frame ? model : models_.count, Entries{}).second.set("_f", std::to_string(i));
+    }
+  }
+  out_.added.push_back(std::move(transform));
+  added_shapes_[plan.grid].push_back(out_.added.size());
+  out_.added.push_back(std::move(shape));
 }
 
 Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instance) {
@@ -554,42 +623,69 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
   auto transform = transform_for(wanted, ids_.take());
   if (!transform) return transform.error();
   transform->id = id;
-  NodeContent shape = shape_of(transform->children.front(), plan.first_model);
-  const bool was_frame = source_.document.nodes.empty() && source_.document.models.size() > 1 &&
-                         source_.scene.instances().find(handle) != nullptr &&
-                         plan.source_model == static_cast<std::size_t>(source_.frame);
-  if (was_frame) {
-    // Where the other frames' models go does not depend on whether this one outgrew its box.
-    GridPlan boxes = plan;
-    const IBox before = canvas_of(source_.document.models[plan.source_model].size);
-    boxes.pieces.push_back({before.min, before.size(), 0});
-    const Motion shown = inverse(wanted.parent.world) * *world;
-    add_models(*transform, shape, shown, shown * from_first_piece(boxes, 1));
-  }
   children_[wanted.parent].added.push_back(id);
-  out_.added.push_back(std::move(*transform));
+  const NodeContent shape = shape_of(transform->children.front(), plan.first_model);
+  const bool was_frame = was_of_frames() && source_.scene.instances().find(handle) != nullptr &&
+                         source_.scene.grids().find(plan.grid) != nullptr &&
+                         plan.grid.index == static_cast<std::size_t>(source_.frame);
+  keeps_frames_ = keeps_frames_ || was_frame;
+  const std::string name = printable(instance.name);
+  if (was_frame) return add_frames(std::move(*transform), shape, plan, name);
+  add_model(std::move(*transform), shape, plan, name);
+  return {};
+}
+
+void GraphRevision::add_model(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name) {
+  out_.added.push_back(std::move(transform));
   const std::size_t at = out_.added.size();
-  out_.added.push_back(std::move(shape));
-  if (plan.pieces.size() > 1) {
-    out_.added[at].kind = NodeKind::Group;
-    out_.added[at].models.clear();
-    for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
-      NodeContent piece;
-      piece.kind = NodeKind::Transform;
-      piece.id = ids_.take();
-      piece.children = {ids_.take()};
-      piece.layer = layer_id({});
-      piece.attributes.set_or_erase("_name", printable(instance.name));
-      set_motion(piece.frames.emplace_back(), from_first_piece(plan, i));
-      out_.added[at].children.push_back(piece.id);
-      NodeContent part = shape_of(piece.children.front(), plan.first_model + static_cast<std::uint32_t>(i));
-      out_.added.push_back(std::move(piece));
-      added_shapes_[plan.grid].push_back(out_.added.size());
-      out_.added.push_back(std::move(part));
-    }
-  } else {
-    added_shapes_[plan.grid].push_back(at);
+  const bool is_one = plan.pieces.size() == 1;
+  if (is_one) added_shapes_[plan.grid].push_back(at);
+  out_.added.push_back(is_one ? std::move(shape) : group_of(shape.id));
+  for (std::size_t i = 0; !is_one && i < plan.pieces.size(); ++i) {
+    hang_piece(at, name, plan, i, from_first_piece(plan, i), kNone, 0);
   }
+}
+
+/// All models that were frames: keys of one shape; those of several pieces are a group, with a shape for each.
+Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const GridPlan& plan,
+                                 const std::string& name) {
+  const Motion box = from_source_box(plan, static_cast<std::size_t>(source_.frame));
+  const auto is_one = [](const Frame& frame) { return frame.plan != nullptr && frame.plan->pieces.size() == 1; };
+  std::vector<Frame> frames = frames_about(motion_of(transform.frames.front()) * box);
+  if (!std::ranges::all_of(frames, [](const Frame& frame) { return has_32_bits(frame.first.translation); })) {
+    return make_error(ErrorCode::LimitExceeded, "\"" + name + "\" lies too far out for a .vox file");
+  }
+  if (std::ranges::all_of(frames, [&](const Frame& frame) { return frame.plan == nullptr || is_one(frame); })) {
+    show_frames(frames, transform, shape);
+    out_.added.push_back(std::move(transform));
+    added_shapes_[plan.grid].push_back(out_.added.size());
+    out_.added.push_back(std::move(shape));
+    return {};
+  }
+  frames = frames_about(box);
+  out_.added.push_back(std::move(transform));
+  const std::size_t group = out_.added.size();
+  out_.added.push_back(group_of(shape.id));
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].plan == nullptr || is_one(frames[i])) continue;
+    for (std::size_t piece = 0; piece < frames[i].plan->pieces.size(); ++piece) {
+      hang_piece(group, name, *frames[i].plan, piece, frames[i].first * from_first_piece(*frames[i].plan, piece), i,
+                 frames.size());
+    }
+  }
+  if (std::ranges::none_of(frames, is_one)) return {};
+  NodeContent others;
+  others.kind = NodeKind::Transform;
+  others.id = ids_.take();
+  others.layer = layer_id({});
+  others.attributes.set_or_erase("_name", name);
+  shape.id = ids_.take();
+  others.children = {shape.id};
+  out_.added[group].children.push_back(others.id);
+  show_frames(frames, others, shape);
+  out_.added.push_back(std::move(others));
+  if (plan.pieces.size() == 1) added_shapes_[plan.grid].push_back(out_.added.size());
+  out_.added.push_back(std::move(shape));
   return {};
 }
 
@@ -768,6 +864,7 @@ Result<RevisedGraph> GraphRevision::run() {
   if (keeps_graph_) remove_what_is_gone();
   if (Status done = revise_groups(); !done) return done.error();
   if (Status done = revise_instances(); !done) return done.error();
+  if (was_of_frames() && !keeps_frames_) out_.frames_left_out = std::ssize(source_.document.models);
   name_shapes();
   apply_child_changes();
   settle_root();
@@ -802,6 +899,11 @@ bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& m
   const bool says_nothing =
       instance.name.empty() && grid.name.empty() && instance.visible && scene.layers().find(instance.layer) == nullptr;
   // Where the reader would place it: on the ground, centred.
+  // Likewise what it shows at other frames.
+  for (const GridPlan& other : models.grids) {
+    const bool was_there = source.scene.grids().find(other.grid) != nullptr;
+    if (was_there && (other.source_model == kNone || (other.is_resized && other.grid != instance.grid))) return true;
+  }
   const int height = plan->pieces.front().size.y;
   const DVec3 pivot = world_from_grid(instance, grid, pivot_of(plan->pieces.front()));
   return !says_nothing || instance.rotation != before->rotation || instance.mirrored || instance.voxel_size != 1.0 ||

@@ -365,35 +365,90 @@ TEST(VoxRevision, FilesWithoutASceneGraphKeepTheirFrames) {
   }
 }
 
-TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
+/// Each voxel that is shown, where it is and of what type.
+std::set<std::string> voxels_of(const Scene& scene) {
+  std::set<std::string> voxels;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    const SceneGrid& grid = scene.grids()[instance.grid];
+    visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
+      const DVec3 at = world_from_grid(instance, grid, DVec3(voxel) + 0.5);
+      voxels.insert(std::to_string(at.x) + " " + std::to_string(at.y) + " " + std::to_string(at.z) + " " +
+                    std::to_string(type));
+    });
+  }
+  return voxels;
+}
+
+std::vector<std::byte> three_frames() {
   FileBuilder file;
+  file.with("PACK", [](auto& out) { out.u32(3); });
   file.model(4, 4, 4, {{0, 0, 0, 1}}).model(3, 5, 3, {{1, 0, 0, 2}}).model(1, 1, 1, {{0, 0, 0, 3}});
-  const auto bytes = file.file();
-  const auto shown = [](const LoadedScene& at_frame) {
-    std::set<std::string> voxels;
-    for (const InstanceHandle handle : at_frame.scene.instances().handles()) {
-      const Instance& instance = at_frame.scene.instances()[handle];
-      const SceneGrid& grid = at_frame.scene.grids()[instance.grid];
-      visit_voxels(grid.grid, [&](IVec3 voxel, VoxelType type) {
-        const DVec3 at = world_from_grid(instance, grid, DVec3(voxel) + 0.5);
-        voxels.insert(std::to_string(at.x) + " " + std::to_string(at.y) + " " + std::to_string(at.z) + " " +
-                      std::to_string(type));
-      });
-    }
-    return voxels;
-  };
+  return file.file();
+}
+
+TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
+  const auto bytes = three_frames();
   for (const int edited : {0, 1}) {
-    // Beyond each side, and beyond two at once.
-    for (const IVec3 voxel : {IVec3(-1, 0, 0), IVec3(0, -2, 0), IVec3(0, 0, -1), IVec3(5, 0, 0), IVec3(0, 6, 9)}) {
+    // Beyond each side, and beyond two at once; and so far that no model holds it.
+    for (const IVec3 voxel : {IVec3(-1, 0, 0), IVec3(0, -2, 0), IVec3(0, 0, -1), IVec3(5, 0, 0), IVec3(0, 6, 9),
+                              IVec3(300, 0, 0), IVec3(-400, 20, 300)}) {
+      SCOPED_TRACE(std::to_string(edited) + " " + std::to_string(voxel.x));
       LoadedScene loaded = load(bytes, edited);
       loaded.scene.edit(loaded.scene.grids().handles()[static_cast<std::size_t>(edited)]).grid.set(voxel, 9);
-      const auto saved = save(loaded);
+      std::vector<std::string> warnings;
+      const auto saved = save(loaded, &warnings);
+      EXPECT_TRUE(warnings.empty()) << warnings.front();
       for (const int frame : {0, 1, 2}) {
-        const auto before = frame == edited ? shown(loaded) : shown(load(bytes, frame));
-        EXPECT_EQ(shown(load(saved, frame)), before) << frame;
+        const auto before = frame == edited ? voxels_of(loaded.scene) : voxels_of(load(bytes, frame).scene);
+        EXPECT_EQ(voxels_of(load(saved, frame).scene), before) << frame;
       }
+      EXPECT_EQ(save(load(saved, 1)), saved);
     }
   }
+}
+
+TEST(VoxRevision, FramesThatAreNotShownMayOutgrowTheirBoxesToo) {
+  const auto bytes = three_frames();
+  for (const IVec3 voxel : {IVec3(0, 0, 3), IVec3(1, 6, 0), IVec3(0, 280, 0)}) {
+    SCOPED_TRACE(voxel.y);
+    LoadedScene loaded = load(bytes, 0);
+    const GridHandle other = loaded.scene.grids().handles()[1];
+    loaded.scene.edit(other).grid.set(voxel, 9);
+    loaded.scene.edit(loaded.scene.instances().handles()[0]).position.x += 7;
+    const auto saved = save(loaded);
+    EXPECT_EQ(voxels_of(load(saved, 0).scene), voxels_of(loaded.scene));
+    // As it would be shown at its own frame.
+    for (const int frame : {1, 2}) {
+      LoadedScene at_frame = load(bytes, frame);
+      if (frame == 1) at_frame.scene.edit(other).grid.set(voxel, 9);
+      at_frame.scene.edit(at_frame.scene.instances().handles()[0]).position.x += 7;
+      EXPECT_EQ(voxels_of(load(saved, frame).scene), voxels_of(at_frame.scene)) << frame;
+    }
+  }
+}
+
+TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
+  LoadedScene loaded = load(three_frames(), 0);
+  loaded.scene.remove_instance(loaded.scene.instances().handles()[0]);
+  Instance other;
+  other.grid = loaded.scene.grids().handles()[1];
+  loaded.scene.add_instance(other);
+  const auto losses = losses_of_vox(loaded).value();
+  ASSERT_EQ(losses.size(), 1U);
+  EXPECT_EQ(losses[0], "frames of the file's animation left out, since the model that they are of was removed: 3");
+}
+
+TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
+  LoadedScene loaded = load(house());
+  // The bird shows model 2 later, and so does the bench.
+  for (const InstanceHandle handle : loaded.scene.instances().handles()) {
+    if (loaded.scene.instances()[handle].name == "bench") loaded.scene.remove_instance(handle);
+  }
+  loaded.scene.edit(loaded.scene.grids().handles()[2]).grid.set({400, 0, 0}, 4);
+  const auto losses = losses_of_vox(loaded).value();
+  ASSERT_EQ(losses.size(), 1U);
+  EXPECT_EQ(losses[0], "models of other frames that outgrew 256 voxels stay as the file has them: 1");
 }
 
 TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {

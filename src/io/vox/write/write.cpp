@@ -106,6 +106,7 @@ class Writer {
   void number_models();
   void renumber_shapes();
   [[nodiscard]] std::vector<bool> shown_models() const;
+  [[nodiscard]] std::int64_t models_left_as_they_were() const;
   void warn(std::vector<std::string>& warnings) const;
   [[nodiscard]] std::vector<std::string> lost_with_graph() const;
 
@@ -145,6 +146,7 @@ class Writer {
   std::vector<std::string> lost_;              ///< with the file's scene graph, where it is written anew
   std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null where the model is no grid any more
   std::vector<std::uint32_t> number_of_;  // of models, by their numbers in the plan; kGone for those that are left out
+  std::vector<bool> shown_;               // likewise: whether any shape shows them, at any frame
   std::uint32_t model_count_ = 0;
   std::array<std::size_t, vox::kColours> material_chunk_{};  // by colour index, the last one; kNone without
   std::size_t palette_chunk_ = vox::kNone;
@@ -207,16 +209,16 @@ std::vector<bool> Writer::shown_models() const {
 
 /// Models whose grid was removed, or became others, and that nothing shows any more, are left out.
 void Writer::number_models() {
-  const std::vector<bool> shown = shown_models();
+  shown_ = shown_models();
   const std::size_t known = source_.document.models.size();
   plan_of_.assign(known, nullptr);
   for (const vox::GridPlan& grid : models_.grids) {
     if (grid.source_model != vox::kNone) plan_of_[grid.source_model] = &grid;
   }
-  number_of_.assign(shown.size(), kGone);
+  number_of_.assign(shown_.size(), kGone);
   bool is_same = true;
   for (std::uint32_t model = 0; model < models_.count; ++model) {
-    if (model < known && plan_of_[model] == nullptr && !shown[model]) {
+    if (model < known && plan_of_[model] == nullptr && !shown_[model]) {
       is_same = false;
     } else {
       number_of_[model] = model_count_++;
@@ -263,6 +265,9 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   };
   count("instances between voxels moved to the nearest", graph_.rounded);
   count("groups whose turn a .vox file cannot say are not turned", graph_.turns_left_out);
+  count("frames of the file's animation left out, since the model that they are of was removed",
+        graph_.frames_left_out);
+  count("models of other frames that outgrew 256 voxels stay as the file has them", models_left_as_they_were());
   count("colours of the palette that no voxel has gave way to new ones", types_.replaced);
   count("lamps left out, which .vox does not hold (a .json keeps them)",
         static_cast<std::int64_t>(scene_.lamps.size()));
@@ -272,6 +277,14 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   });
   count("instances whose categories are left out, which .vox does not hold (a .json keeps them)", categories);
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
+}
+
+/// Models of the file that shapes show at frames that are not in the scene, and whose grids became pieces.
+std::int64_t Writer::models_left_as_they_were() const {
+  return std::ranges::count_if(models_.grids, [&](const vox::GridPlan& plan) {
+    const bool was_model = plan.source_model == vox::kNone && source_.scene.grids().find(plan.grid) != nullptr;
+    return was_model && !shown_[plan.first_model] && shown_[plan.grid.index];
+  });
 }
 
 /// What only nodes of the file say, and no scene.
