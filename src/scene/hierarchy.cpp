@@ -179,7 +179,7 @@ void show_all(Scene& scene) {
 
 namespace {
 
-bool is_rotation(const DQuat& q) {
+[[maybe_unused]] bool is_rotation(const DQuat& q) {
   const double squared = glm::dot(q, q);
   return squared > 0.0 && std::isfinite(squared);
 }

@@ -130,7 +130,7 @@ void next_octave(double& x, double& y) {
 }
 
 // Each octave is twice as fine, and the last one's coordinates are noise2's.
-bool are_within(double x, double y, int octaves) {
+[[maybe_unused]] bool are_within(double x, double y, int octaves) {
   return octaves >= 0 && octaves <= 29 && std::abs(x) < std::ldexp(1.0, 29 - octaves) &&
          std::abs(y) < std::ldexp(1.0, 29 - octaves);
 }

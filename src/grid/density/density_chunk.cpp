@@ -29,7 +29,7 @@ std::uint64_t solid_bits(const Half* row) {
 }
 
 // Whether it is none of what no `stored_density` is, whatever the band: -0, an infinity, NaN.
-bool is_stored(Half density) {
+[[maybe_unused]] bool is_stored(Half density) {
   return density != 0x8000U && (density & 0x7C00U) != 0x7C00U;
 }
 

@@ -37,7 +37,7 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
 }
 
 // Whether every density is one that edits within this band store.
-bool is_stored_within(const DensityChunk& samples, Half far) {
+[[maybe_unused]] bool is_stored_within(const DensityChunk& samples, Half far) {
   const auto is_stored = [far](Half density) { return stored_within(float_from_half(density), far) == density; };
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
